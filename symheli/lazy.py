@@ -1,16 +1,26 @@
 """Names of a package that are loaded when they are first used."""
 
-from __future__ import annotations
-
+import ast
 import importlib
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 
-def lazily(package: str, rooms: Mapping[str, str]) -> Callable[[str], Any]:
-    """A module's `__getattr__` that finds each name in its module, {module: "Name other_name"}."""
-    home = {name: module for module, names in rooms.items() for name in names.split()}
+def lazily(
+    package: str, file: str
+) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
+    """`__getattr__`, `__dir__` and `__all__` of a package whose stub, the .pyi beside its `file`,
+    imports every public name once: `from module import name as name`.
+    """
+    stub = ast.parse(Path(file).with_suffix(".pyi").read_text(encoding="utf-8"))
+    home = {
+        alias.name: node.module
+        for node in stub.body
+        if isinstance(node, ast.ImportFrom) and node.module
+        for alias in node.names
+    }
 
     def find(name: str) -> Any:
         if name not in home:
@@ -19,4 +29,7 @@ def lazily(package: str, rooms: Mapping[str, str]) -> Callable[[str], Any]:
         setattr(sys.modules[package], name, value)
         return value
 
-    return find
+    def names() -> list[str]:
+        return sorted({*vars(sys.modules[package]), *home})
+
+    return find, names, sorted(home)

@@ -38,7 +38,8 @@ class Progress:
 
     Examples
     --------
-    >>> str(symheli.Progress("flying", 3, 12)), str(symheli.Progress("study", 3, 12, percent=True))
+    >>> from symheli.progress import Progress
+    >>> str(Progress("flying", 3, 12)), str(Progress("study", 3, 12, percent=True))
     ('flying: 3 of 12', 'study: 25 %')
     """
 

@@ -10,6 +10,7 @@ import sys
 import warnings
 
 import pytest
+from reference import results
 
 PACKAGES = ("symheli", "identification")
 FUNCTIONS_OF = ("symheli.lpv", "symheli.records")
@@ -85,16 +86,28 @@ def test_the_examples_of_an_exported_name_print_what_they_say(package, name, sta
     check_short(run(text, where, start(package)))
 
 
-WITHOUT = {
-    "synthesis": {
-        # values that the functions return, and exceptions: shown in the examples of what makes them
-        *("Attempt", "Bandwidth", "BoxGain", "FrozenGain", "LowerBound", "Margins", "Proof"),
-        *("Seconds", "SchedulingTrajectory", "Status", "Multiplier", "Generalized"),
-        *("BoxLyapunov", "MemoryLyapunov", "SplineLyapunov"),
-        *("DesignStatus", "PointDesign"),
-    },
-}
-"""Names without an example, by package."""
+RETURNED = sorted(
+    {
+        (package, home, found.__name__)
+        for package in (*PACKAGES, "synthesis")
+        for name in importlib.import_module(package).__all__
+        for home, found in results(getattr(importlib.import_module(package), name))
+        if found not in PUBLIC
+    }
+)
+"""Classes without a public name: what public functions and methods return."""
+
+
+@pytest.mark.parametrize(("package", "home", "name"), RETURNED)
+def test_what_a_public_function_returns_is_documented(package, home, name, start):
+    text = inspect.getdoc(getattr(importlib.import_module(home), name)) or ""
+    assert text, f"{home}.{name} has no docstring"
+    if ">>> " in text:
+        check_short(run(text, f"{home}.{name}", start(package)))
+
+
+WITHOUT = {"synthesis": {"Margins", "Status", "DesignStatus"}}
+"""Names without an example of their own, by package: shown in those of what makes them."""
 
 EXPLAINED = [
     (package, name)

@@ -37,9 +37,24 @@ def public():
         module = importlib.import_module(package)
         for name in module.__all__:
             thing = getattr(module, name)
-            if callable(thing) and id(thing) not in seen:
-                seen.add(id(thing))
-                yield package, name, _room(package, thing)
+            for at, one in [(package, thing), *results(thing)]:
+                if callable(one) and id(one) not in seen:
+                    seen.add(id(one))
+                    yield at, name if one is thing else one.__name__, _room(package, one)
+
+
+def results(thing):
+    """(module, class) of what a public function, or the methods of a public class, return: classes
+    of these packages that nobody constructs, and that are not imported by a name of their own.
+    """
+    methods = vars(thing).values() if isinstance(thing, type) else [thing]
+    for method in methods:
+        plain = getattr(method, "fget", None) or getattr(method, "__func__", method)
+        said = getattr(plain, "__annotations__", {}).get("return", "")
+        for word in re.findall(r"[A-Z]\w+", said if isinstance(said, str) else ""):
+            found = getattr(plain, "__globals__", {}).get(word)
+            if isinstance(found, type) and found.__module__.split(".")[0] in FIRST_PAGES:
+                yield found.__module__, found
 
 
 def _room(package, thing):

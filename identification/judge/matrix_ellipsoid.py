@@ -49,7 +49,8 @@ class MatrixEllipsoid(NamedTuple):
 
     Examples
     --------
-    >>> line = idn.MatrixEllipsoid(np.eye(1), np.eye(1), 1.96, 0.95, 1.0)  # |theta| <= 1.96
+    >>> from identification.judge.matrix_ellipsoid import MatrixEllipsoid
+    >>> line = MatrixEllipsoid(np.eye(1), np.eye(1), 1.96, 0.95, 1.0)  # |theta| <= 1.96
     >>> line.contains([[[1.9]], [[2.0]]])
     array([ True, False])
     """

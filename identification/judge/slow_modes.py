@@ -49,7 +49,8 @@ class SlowMode:
 
     Examples
     --------
-    >>> mode = idn.SlowMode(p=(5.0,), s=-0.2 + 0.5j, standard_error=0.02, shift=0.05)
+    >>> from identification.judge.slow_modes import SlowMode
+    >>> mode = SlowMode(p=(5.0,), s=-0.2 + 0.5j, standard_error=0.02, shift=0.05)
     >>> mode.lost, round(mode.error, 3)
     (False, 0.05)
     """
@@ -90,7 +91,8 @@ class SlowModes:
 
     Examples
     --------
-    >>> print(idn.SlowModes(modes=(), dt=0.02))
+    >>> from identification.judge.slow_modes import SlowModes
+    >>> print(SlowModes(modes=(), dt=0.02))
     slow modes: none
     """
 

@@ -25,7 +25,8 @@ class UnseenFlight:
     Examples
     --------
     >>> import identification as idn
-    >>> idn.UnseenFlight(power=1.4, largest=1.05, samples=2000).explained
+    >>> from identification.judge.unseen_flight import UnseenFlight
+    >>> UnseenFlight(power=1.4, largest=1.05, samples=2000).explained
     False
     """
 

@@ -10,7 +10,7 @@ from studies.commands import options
 from studies.output import Output, columns, progress
 
 if TYPE_CHECKING:
-    from symheli import TrimMap
+    from symheli.steady.trim_map import TrimMap
 
 HELP = "trims over airspeed and climb rate: what holds, what can be flown, where the vortex ring is"
 KEY = (

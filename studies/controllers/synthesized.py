@@ -60,8 +60,9 @@ from symheli.values.arrays import Array
 from symheli.values.named_vector import NamedVector
 from symheli.values.signal import indices
 from symheli.values.units import ratio
-from synthesis import Plant, SampledLoop
+from synthesis import Plant
 from synthesis.loops.reduction import fewest
+from synthesis.loops.sampled_loop import SampledLoop
 from synthesis.worst.frozen import norm
 
 KNOTS = (2, 3, 5, 9, 17, 33)

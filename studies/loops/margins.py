@@ -13,7 +13,8 @@ from symheli import LinearModel
 from symheli.flight import XCELL_SERVOS
 from symheli.lpv import pade_delay
 from symheli.progress import tracked
-from synthesis import Bandwidth, Margins
+from synthesis import Margins
+from synthesis.loops.handling_qualities import Bandwidth
 
 DELAY = 0.02
 """From measurement to command, s."""

@@ -7,13 +7,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import symheli
-from identification import (
-    BaselineModel,
-    BesideBaseline,
-    FrozenModels,
-    beside_baseline,
-    frozen_models,
-)
+from identification import BaselineModel, FrozenModels, beside_baseline, frozen_models
+from identification.judge.beside_baseline import BesideBaseline
 from studies.transition.axes import (
     ALL,
     AXES,

@@ -23,7 +23,8 @@ from studies.transition.guarantees import PERIOD, Bound, Proof
 from studies.transition.identified import Identification
 from studies.transition.known_kinematics import KnownKinematics
 from symheli import Helicopter
-from synthesis import FrozenGain, Spline, frozen_gain
+from synthesis import Spline, frozen_gain
+from synthesis.worst.frozen import FrozenGain
 
 
 @dataclass(frozen=True, kw_only=True)

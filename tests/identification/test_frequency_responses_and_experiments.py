@@ -6,13 +6,13 @@ from known_systems import moving, structure
 from scipy.signal import lfilter
 
 from identification import (
-    FrequencyResponse,
     choose_experiments,
     compare_experiments,
     fit,
     frequency_response,
     uncertainty,
 )
+from identification.judge.frequency_response import FrequencyResponse
 from symheli.errors import ExcitationError, InputError
 from symheli.lpv import LinearModel
 from symheli.records import FlightRecord

@@ -230,7 +230,6 @@ BY_ENTRY: dict[str, tuple[tuple[str, Rule], ...]] = {
     "identification.BaselinePredictor.predict": (("", _first_of_the_horizon),),
     "identification.LPVARXModel.predict": (("", _past_is_incomplete),),
     "identification.KinematicModel.predict": (("", _past_is_incomplete),),
-    "identification.KinematicObserver.run": (("", _not_measured),),
     "identification.LPVARXModel.score": ((r"\['\w+'\]", _nothing_predicted),),
     "identification.KinematicModel.score": ((r"\['\w+'\]", _nothing_predicted),),
     "identification.Scores.of": ((r"\.(one_step|ahead|free_run)\['\w+'\]", _nothing_to_compare),),

@@ -21,7 +21,7 @@ PACKAGES = ("symheli", "identification", "synthesis")
 EXAMPLE = "<doctest"
 INSIDE = {
     *("symheli.LFT", "symheli.LinearFamily", "symheli.FlightRecord"),
-    *("symheli.NamedVector", "symheli.IdentifiedModel", "symheli.StitchedModel"),
+    *("symheli.NamedVector", "symheli.StitchedModel"),
     *("symheli.TableController", "synthesis.PolynomialMatrix"),
 }
 """Values that the examples make by other functions: caught where those make them."""

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from models import lag, random_stable
 
-from synthesis import SplineLyapunov
-from synthesis.lyapunov.spline import graded_knots
+from synthesis.lyapunov.spline import SplineLyapunov, graded_knots
 from synthesis.polynomial.bernstein import blossom, composition, restriction
 from synthesis.polynomial.cells import strips
 from synthesis.polynomial.matrix import PolynomialMatrix

@@ -16,7 +16,6 @@ from symheli.lpv import LFT, LinearModel, Scheduling, connect
 from synthesis import (
     SCALINGS,
     Bernstein,
-    Multiplier,
     Search,
     Solver,
     Status,
@@ -27,6 +26,7 @@ from synthesis import (
     lft_stability,
     lower_bound,
 )
+from synthesis.lft.multipliers import Multiplier
 
 QUICK = Search(levels=4, dwells=7, evaluations=8, steps=60)
 CLOSE = 1e-5

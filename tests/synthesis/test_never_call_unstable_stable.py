@@ -13,7 +13,8 @@ from models import forged, lag, random_stable, searched, spring
 import synthesis
 from symheli.errors import InputError, SolverError
 from symheli.lpv import LPVStateSpace, Scheduling
-from synthesis import Solver, Spline, SplineLyapunov, Status, installed_solvers, l2_gain, stability
+from synthesis import Solver, Spline, Status, installed_solvers, l2_gain, stability
+from synthesis.lyapunov.spline import SplineLyapunov
 
 COARSE = Spline(segments=2, degree=2)
 EVERY = (*installed_solvers(), "LYAPUNOV")

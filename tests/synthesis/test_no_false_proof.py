@@ -11,9 +11,10 @@ import pytest
 from symheli.errors import CertificateError, InputError
 from symheli.lpv import LPVStateSpace, Patches, PiecewiseLinear, Polynomial, Product, Scheduling
 from symheli.lpv.bases.spaces import product_space, sum_space
-from synthesis import Certificate, Spline, SplineLyapunov, SumOfSquares, l2_gain, stability
+from synthesis import Certificate, Spline, SumOfSquares, l2_gain, stability
 from synthesis.assemble.unknowns import scaled_problem
 from synthesis.lyapunov.box import BoxLyapunov
+from synthesis.lyapunov.spline import SplineLyapunov
 from synthesis.polynomial.motion import Motion
 from synthesis.polynomial.pieces import model_pieces, pieces
 from synthesis.program.scaling import Scaling

@@ -17,7 +17,6 @@ from symheli.lpv import LPVStateSpace, Scheduling
 from synthesis import (
     HigherOrder,
     Memory,
-    MemoryLyapunov,
     Search,
     Spline,
     Status,
@@ -28,6 +27,7 @@ from synthesis import (
     stability,
 )
 from synthesis.lyapunov.lag import LagRegion
+from synthesis.lyapunov.spline import MemoryLyapunov
 from synthesis.polynomial.pieces import pieces
 from synthesis.polynomial.symmetric_power import (
     generator,

@@ -8,16 +8,9 @@ from scheduled_plants import RATE, spring
 
 from symheli import Scheduling
 from symheli.errors import InputError
-from synthesis import (
-    Memory,
-    MemoryLyapunov,
-    Search,
-    Spline,
-    l2_gain,
-    lower_bound,
-    output_feedback,
-)
+from synthesis import Memory, Search, Spline, l2_gain, lower_bound, output_feedback
 from synthesis.loops.controller import ADJOINT
+from synthesis.lyapunov.spline import MemoryLyapunov
 
 GLANCE = Search(levels=6, dwells=5, starts=1, nodes=30, evaluations=8, samples=5000)
 
