@@ -14,6 +14,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 import synthesis
 from evidence.bracket.servo import curves_of, found_of, measure_servo, text_of
 from evidence.bracket.table import bracket_table
@@ -22,10 +24,10 @@ from evidence.tables import DOCS, keep, parsed
 from studies.loops.exact_lateral import ExactLateral
 from studies.loops.lateral import lateral_loop
 from studies.output import as_json, columns, progress
-from symheli import Helicopter, LPVStateSpace
+from symheli import Helicopter, LPVStateSpace, UncertainStateSpace
 from symheli.lpv.bases import Polynomial
+from symheli.values.arrays import Array
 from synthesis import GainCurve, HigherOrder, Memory, Search, Solver, Spline
-from synthesis.cover import Remainder, covering
 from synthesis.forms import LyapunovForm
 
 SLOW = Memory(1.2, segments=12, grading=1.5, across_segments=4, across_degree=2)
@@ -98,7 +100,7 @@ def bracket(
     rate: float,
     form: LyapunovForm,
     search: Search | None = None,
-    rest: Remainder | None = None,
+    missed: Array | None = None,
 ) -> Bracket:
     """The gain at one acceleration from both sides; `exact`: the better proof, and that of the
     cover, pass rational arithmetic.
@@ -109,8 +111,9 @@ def bracket(
     )
     better = min(plain, memory, key=lambda c: c.gamma)
     covered, proof = math.nan, None
-    if rest and plain.verified:
-        proof = synthesis.l2_gain(covering(loop, rest), rate, form=COVER, search=None)
+    if missed is not None and plain.verified:
+        around = UncertainStateSpace.covering(loop, missed)
+        proof = synthesis.l2_gain(around, rate, form=COVER, search=None)
         covered = proof.gamma
     exact = better.verify(rigorous=True) and (
         proof is None or math.isinf(covered) or proof.verify(rigorous=True)
@@ -129,7 +132,7 @@ def measure(
     loop: LPVStateSpace,
     gains: Mapping[float, LyapunovForm],
     stable: dict[str, Any],
-    rest: Remainder | None = None,
+    missed: Array | None = None,
 ) -> Iterator[tuple[str, Any]]:
     """(what, result) of everything the page shows, as it is found."""
     yield "gain, frozen", synthesis.frozen_gain(loop).gain
@@ -146,7 +149,7 @@ def measure(
         found = synthesis.lower_bound(loop, rate)
         yield f"growth at {rate:g} m/s^2", found.growth if math.isinf(found.gain) else "none found"
     for rate, form in gains.items():
-        found = bracket(loop, rate, form, rest=rest)
+        found = bracket(loop, rate, form, missed=missed)
         yield f"gain at {rate:g} m/s^2", {**found._asdict(), "gap": found.gap}
     for name, (form, rates) in stable.items():
         for rate in rates:
@@ -205,17 +208,17 @@ def main() -> None:
 def _measured(heli: Helicopter, *, exact: bool, quick: bool) -> dict[str, Any]:
     """Everything about the gust loop of the exact or the interpolated model, with progress."""
     found: dict[str, Any] = {}
-    gains, stable, rest = (FEWER, STABLE_EXACT, None) if exact else (GAINS, STABLE, None)
+    gains, stable, missed = (FEWER, STABLE_EXACT, None) if exact else (GAINS, STABLE, None)
     if exact:
         models = ExactLateral.of(heli)
         loop = models.loop()
-        rest = Remainder.of(models.missed(loop))
-        found["largest entry missed, SI"] = rest.largest
+        missed = models.missed(loop)
+        found["largest entry missed, SI"] = float(np.abs(missed).max())
     else:
         loop = lateral_loop(heli)
     if quick:
         gains, stable = {3.0: GAINS[3.0]}, {"P(p)": stable["P(p)"]}
-    for what, result in measure(loop, gains, stable, rest):
+    for what, result in measure(loop, gains, stable, missed):
         progress(f"{what}: {_words(result)}")
         found[what] = result
     return found

@@ -2,8 +2,8 @@
 to jump at them.
 
 The linearizations are smooth between two corners (a stall, an edge of the wake) and may jump at
-one. A polynomial through many of them on each interval misses so little that `synthesis.cover` can
-carry it through a proof.
+one. A polynomial through many of them on each interval misses so little that a set of models around
+it (`UncertainStateSpace.covering`) carries it through a proof.
 """
 
 from __future__ import annotations

@@ -17,6 +17,9 @@ from symheli.values.arrays import Array, frozen
 from symheli.values.signal import Signal, indices, signals
 from symheli.values.summary import as_table, summarized
 
+SAFETY = 2.0
+"""A covering set contains this many times the largest difference measured."""
+
 ROUNDING = 1e-12
 """A perturbation may exceed the bound by this fraction of it."""
 
@@ -98,6 +101,46 @@ class UncertainStateSpace:
             raise InputError(
                 f"source: expected a sentence on what the bound promises, got {self.source!r:.60}"
             )
+
+    @classmethod
+    def covering(cls, model: LPVStateSpace, differences: Array) -> UncertainStateSpace:
+        """Return the set of all models that differ from `model` by up to `SAFETY` times the
+        `differences` (K, nx, nx + nu) of [A B] that were measured.
+
+        dx/dt = A x + B u + rows d, v = columns (x, u), d = Delta v, |Delta| <= 1, with the inputs
+        d_<state> and the outputs z_<state>, z_<input>; every entry is covered, if only by a
+        millionth of the largest. Raises `InputError` for differences of another size.
+
+        Examples
+        --------
+        >>> import symheli, synthesis
+        >>> lag = symheli.LPVStateSpace.polynomial(
+        ...     [[[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], symheli.Scheduling("p", "1", 0.0, 1.0))
+        >>> around = symheli.UncertainStateSpace.covering(lag, np.array([[[0.0025, 0.0]]]))
+        >>> cert = synthesis.l2_gain(around, 0.0, form=synthesis.Spline(degree=0))
+        >>> bool(1 / (1 - 0.005) <= cert.gamma < 1.006)
+        True
+        """
+        nx, nu, ny = len(model.states), len(model.inputs), len(model.outputs)
+        rows, columns = _sizes(frozen(differences, "differences", (None, nx, nx + nu)))
+        one = model.basis.constant()
+        noise = np.multiply.outer(one, np.diag(rows))
+        seen = np.multiply.outer(one, np.diag(columns))
+        d = tuple(f"d_{s}" for s in model.states)
+        v = tuple(f"z_{s}" for s in (*model.states, *model.inputs))
+        apart = np.zeros((len(one), ny + nx + nu, nx))
+        wide = replace(
+            model,
+            B=np.concatenate([model.B, noise], axis=2),
+            C=np.concatenate([model.C, seen[:, :, :nx]], axis=1),
+            D=np.concatenate([np.concatenate([model.D, seen[:, :, nx:]], axis=1), apart], axis=2),
+            inputs=(*model.inputs, *d),
+            outputs=(*model.outputs, *v),
+            trim=None,
+            residuals=None,
+        )
+        source = f"{SAFETY:g} times the largest difference measured of the models that are covered"
+        return cls(wide, signals(d), signals(v), 1.0, 1.0, source)
 
     @property
     def states(self) -> tuple[Signal, ...]:
@@ -239,3 +282,17 @@ class UncertainStateSpace:
         judge.
         """
         return replace(self, bound=bound)
+
+
+def _sizes(differences: Array) -> tuple[Array, Array]:
+    """rows (nx,) and columns (nx + nu,): every difference is diag(rows) Delta diag(columns) with
+    |Delta| <= 1/`SAFETY`.
+    """
+    size = np.abs(differences).max(axis=0)
+    floor = 1e-6 * size.max() or 1e-300  # every row and column is covered, if only by a millionth
+    rows, columns = np.ones(size.shape[0]), np.ones(size.shape[1])
+    for _ in range(10):  # rows columns' >= size; settles in a few rounds
+        rows = np.sqrt(rows * np.maximum((size / columns).max(axis=1), floor))
+        columns = np.sqrt(columns * np.maximum((size / rows[:, None]).max(axis=0), floor))
+    norm = np.linalg.norm(differences / (rows[:, None] * columns), 2, axis=(1, 2)).max()
+    return SAFETY * norm * rows, columns

@@ -18,7 +18,6 @@ from symheli.threads import with_one_thread
 from symheli.values.summary import summarized
 from synthesis.analysis.questions import l2_gain
 from synthesis.certificate import Certificate
-from synthesis.cover import Remainder, covering
 from synthesis.loops.controller import Controller
 from synthesis.plant.plant import Plant, require_plant
 from synthesis.worst.rates import Rate
@@ -182,4 +181,4 @@ def _covered(loop: LPVStateSpace) -> tuple[LPVStateSpace | UncertainStateSpace, 
     missed = np.concatenate([A, B], axis=2)
     largest = float(np.abs(missed).max(initial=0.0))
     bare = replace(loop, residuals=None)
-    return (covering(bare, Remainder.of(missed)), largest) if largest > 0 else (bare, 0.0)
+    return (UncertainStateSpace.covering(bare, missed), largest) if largest > 0 else (bare, 0.0)

@@ -14,7 +14,7 @@ MODULES = (
     "identification.judge.against_constant",
     "identification.judge.beside_baseline",
     "identification.judge.frozen_models",
-    "synthesis.cover",
+    "symheli.lpv.uncertain_state_space",
 )
 
 

@@ -5,8 +5,8 @@ import pytest
 
 import synthesis
 from studies.loops.exact_lateral import ExactLateral
+from symheli import UncertainStateSpace
 from synthesis import Spline
-from synthesis.cover import Remainder, covering
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +31,7 @@ def test_the_covered_gain_is_hardly_above_that_of_the_polynomials(ideal):
     models = ExactLateral.of(ideal, 5.0, 8.0)
     loop = models.loop()
     plain = synthesis.l2_gain(loop, 1.0, form=Spline(segments=2), search=None)
-    rest = Remainder.of(models.missed(loop))
-    covered = synthesis.l2_gain(covering(loop, rest), 1.0, form=Spline(segments=2), search=None)
+    around = UncertainStateSpace.covering(loop, models.missed(loop))
+    covered = synthesis.l2_gain(around, 1.0, form=Spline(segments=2), search=None)
     assert plain.frozen < covered.gamma < 1.01 * plain.gamma
     assert covered.verify(rigorous=True)

@@ -5,12 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from symheli import LPVStateSpace, Scheduling
+from symheli import LinearModel, LPVStateSpace, Scheduling, UncertainStateSpace
 from symheli.errors import InputError
+from symheli.lpv.uncertain_state_space import SAFETY
 from synthesis import Spline, l2_gain
-from synthesis.cover import SAFETY, Remainder, covering
 
 PLAIN = Spline(degree=0)
+covering = UncertainStateSpace.covering
 
 
 def lag(pole=1.0):
@@ -26,7 +27,7 @@ def left_out(size):
 
 
 def test_a_pole_known_within_a_margin_has_the_gain_of_the_slowest_pole():
-    certificate = l2_gain(covering(lag(), Remainder.of(left_out(0.005))), 0.0, form=PLAIN)
+    certificate = l2_gain(covering(lag(), left_out(0.005)), 0.0, form=PLAIN)
     truth = 1 / (1 - 0.005)
     # a thousandth more: the remainder covers the entry of the input too, by a millionth
     assert truth <= certificate.gamma < 1.001 * truth
@@ -34,13 +35,12 @@ def test_a_pole_known_within_a_margin_has_the_gain_of_the_slowest_pole():
 
 
 def test_a_remainder_of_another_size_is_refused():
-    rest = Remainder.of(np.ones((2, 2, 3)))
-    with pytest.raises(InputError, match="expected the remainder of 1 states and 1 inputs"):
-        covering(lag(), rest)
+    with pytest.raises(InputError, match=r"differences: expected shape \(any, 1, 2\)"):
+        covering(lag(), np.ones((2, 2, 3)))
 
 
 def test_nothing_is_proven_where_the_remainder_may_make_the_plant_unstable():
-    assert l2_gain(covering(lag(), Remainder.of(left_out(1.2))), 0.0, form=PLAIN).gamma == math.inf
+    assert l2_gain(covering(lag(), left_out(1.2)), 0.0, form=PLAIN).gamma == math.inf
 
 
 def test_every_measured_difference_is_within_the_remainder_with_the_promised_safety():
@@ -49,12 +49,16 @@ def test_every_measured_difference_is_within_the_remainder_with_the_promised_saf
         * [[1.0], [1e-3], [30.0]]
         * [1, 1, 1e-4, 1, 7]
     )
-    rest = Remainder.of(missed)
-    norms = np.linalg.norm(missed / rest.rows[:, None] / rest.columns, 2, axis=(1, 2))
+    model = LPVStateSpace.constant(
+        LinearModel(*(np.zeros(s) for s in ((3, 3), (3, 2), (1, 3), (1, 2))), "abc", "uv", "y")
+    )
+    around = covering(model, missed).model.at(0.5)
+    rows = around.B[:, 2:].diagonal()
+    columns = np.hstack([around.C[1:], around.D[1:, :2]]).diagonal()
+    norms = np.linalg.norm(missed / rows[:, None] / columns, 2, axis=(1, 2))
     assert norms.max() == pytest.approx(1 / SAFETY)
 
 
 def test_without_a_remainder_the_covering_set_has_the_gain_of_the_model():
-    rest = Remainder.of(left_out(1e-12))
-    certificate = l2_gain(covering(lag(), rest), 0.0, form=PLAIN, search=None)
+    certificate = l2_gain(covering(lag(), left_out(1e-12)), 0.0, form=PLAIN, search=None)
     assert certificate.gamma == pytest.approx(1.0, rel=1e-3)

@@ -8,8 +8,8 @@ import pytest
 import symheli
 from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace, Matrices, Scheduling
+from symheli.lpv.uncertain_state_space import SAFETY
 from synthesis import Plant, Spline, certify_sampled
-from synthesis.cover import SAFETY
 
 P = Scheduling("airspeed", "m/s", 0.0, 10.0, rate=1.0)
 PLAIN = Spline(degree=0)

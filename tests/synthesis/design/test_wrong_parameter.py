@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import symheli
+from symheli import UncertainStateSpace
 from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace, Patches, PiecewiseLinear, Polynomial, Scheduling
 from synthesis import Plant, Spline, frozen_gain, l2_gain, proven_around, with_wrong_parameter
-from synthesis.cover import Remainder, covering
 from synthesis.loops.balanced_block import balanced
 from synthesis.loops.frozen_reading import largest
 from synthesis.loops.wrong_parameter import _reached, _slopes
@@ -184,8 +184,8 @@ def test_an_error_of_zero_leaves_the_loop():
 
 def test_the_block_of_an_uncertain_plant_is_kept():
     plant = lag()
-    rest = Remainder.of(np.array([[[0.01, 0.0, 0.0]]]))
-    uncertain = _plant(covering(plant.model, rest))
+    missed = np.array([[[0.01, 0.0, 0.0]]])
+    uncertain = _plant(UncertainStateSpace.covering(plant.model, missed))
     wrong = l2_gain(with_wrong_parameter(uncertain, gain(-1.0, -3.0), 0.1), search=None)
     # pole 0.8, of which the plant leaves 0.02 open and the reading 0.03; the entry of the input
     # is open by a millionth
