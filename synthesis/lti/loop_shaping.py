@@ -10,11 +10,11 @@ from dataclasses import replace
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv import LinearModel
+from symheli.lpv import LinearModel, series
 from symheli.values.signal import Signal
 from synthesis.lti.point_design import DesignStatus, PointDesign, as_model, checked
 from synthesis.lti.riccati import stabilising
-from synthesis.lti.weights import Weight, as_weight, series
+from synthesis.lti.weights import Weight, as_weight
 from synthesis.plant.diagnosis import reasons
 from synthesis.plant.generalized import Channels, Generalized, sampled_controller
 from synthesis.plant.refusals import levels_above
@@ -65,7 +65,7 @@ def ncf(
     --------
     For an integrator the optimum is sqrt(2):
 
-    >>> from symheli.lpv import LinearModel
+    >>> from symheli.lpv import LinearModel, series
     >>> integrator = LinearModel([[0.0]], [[1.0]], [[1.0]], [[0.0]], ["x"], ["u"], ["y"])
     >>> design = ncf(integrator)
     >>> print(f"{design.optimum:.6f} {design.hinf_norm:.3f} {design.controller.D[0, 0]:.1f}")

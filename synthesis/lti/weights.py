@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -68,25 +67,3 @@ def _gain(value: Any, name: str) -> LinearModel:
         return LinearModel.gain([[float(value)]], ["in"], ["out"])
     except (TypeError, ValueError) as error:
         raise InputError(f"{name}: expected a number or a system, got {value!r:.80}") from error
-
-
-def series(first: LinearModel, second: LinearModel) -> LinearModel:
-    """The outputs of the first into the inputs of the second, in their order; the states of the
-    first stand first.
-    """
-    A = np.block(
-        [
-            [first.A, np.zeros((len(first.A), len(second.A)))],
-            [second.B @ first.C, second.A],
-        ]
-    )
-    return replace(
-        second,
-        A=A,
-        B=np.vstack([first.B, second.B @ first.D]),
-        C=np.hstack([second.D @ first.C, second.C]),
-        D=second.D @ first.D,
-        states=(*first.states, *second.states),
-        inputs=first.inputs,
-        point=None,
-    )
