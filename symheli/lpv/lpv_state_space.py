@@ -207,6 +207,42 @@ class LPVStateSpace:
         )
 
     @classmethod
+    def from_expressions(
+        cls,
+        A: Any,
+        B: Any,
+        C: Any,
+        D: Any,
+        scheduling: Scheduling | Sequence[Scheduling],
+        dt: float | None = None,
+        states: Sequence[str] | None = None,
+        inputs: Sequence[str] | None = None,
+        outputs: Sequence[str] | None = None,
+    ) -> LPVStateSpace:
+        """From matrices of SymPy expressions in the symbols of the parameters
+        (`Scheduling.symbol`, in their units), and numbers; exact.
+
+        Polynomials in any number of parameters get a polynomial basis; other functions, such as
+        sin(p) or sqrt(p), are functions of a `UserFunctions` basis, in several parameters products
+        of functions of one each. Names default to x1.., u1.., y1... Raises `InputError` for
+        rational functions, which `LFT.from_expressions` holds, and for shapes that do not fit,
+        `UnknownNameError` for another symbol.
+
+        Examples
+        --------
+        >>> rho = lpv.Scheduling("rho", "1", low=-1.0, high=1.0, rate=0.5)
+        >>> p = rho.symbol
+        >>> plant = lpv.LPVStateSpace.from_expressions(
+        ...     [[-1 - p**2, p], [0, -2]], [[0], [1 + p]], [[1, 0]], [[0]], rho)
+        >>> plant.at(0.5).A
+        array([[-1.25,  0.5 ],
+               [ 0.  , -2.  ]])
+        """
+        from symheli.lpv.expressions import lpv_of
+
+        return lpv_of((A, B, C, D), scheduling, dt, states, inputs, outputs)
+
+    @classmethod
     def constant(
         cls, model: LinearModel, scheduling: Scheduling | Sequence[Scheduling] = UNSCHEDULED
     ) -> LPVStateSpace:

@@ -5,12 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.values.arrays import Array, frozen
 from symheli.values.units import per_second, ratio
+
+if TYPE_CHECKING:
+    import sympy
 
 Limit = float | str
 """Rate bound of a parameter: a number in its unit per second (math.inf: arbitrarily fast), or the
@@ -89,6 +93,13 @@ class Scheduling:
     def radius(self) -> float:
         """Half the width of the range, in `unit`."""
         return 0.5 * (self.high - self.low)
+
+    @property
+    def symbol(self) -> sympy.Symbol:
+        """The parameter in SymPy expressions, in `unit`: a real symbol of its name."""
+        import sympy
+
+        return sympy.Symbol(self.name, real=True)
 
     def normalised(self, p: Array) -> Array:
         """p as a number from -1 at `low` to 1 at `high`; no digit of p is lost far from zero."""

@@ -173,6 +173,38 @@ class LFT:
             dt,
         )
 
+    @classmethod
+    def from_expressions(
+        cls,
+        A: Any,
+        B: Any,
+        C: Any,
+        D: Any,
+        scheduling: Scheduling | Sequence[Scheduling],
+        dt: float | None = None,
+        states: Sequence[str] | None = None,
+        inputs: Sequence[str] | None = None,
+        outputs: Sequence[str] | None = None,
+    ) -> LFT:
+        """From matrices of rational SymPy expressions in the symbols of the parameters
+        (`Scheduling.symbol`, in their units), and numbers; exact, with as many copies of each
+        parameter as `reduce` leaves.
+
+        Names default to x1.., u1.., y1... Raises `InputError` for other functions and for shapes
+        that do not fit, `UnknownNameError` for another symbol.
+
+        Examples
+        --------
+        >>> rho = lpv.Scheduling("rho", "1", low=0.0, high=1.0, rate=0.5)
+        >>> p = rho.symbol
+        >>> plant = lpv.LFT.from_expressions([[-1 / (1 + p)]], [[1]], [[1]], [[0]], rho)
+        >>> plant.order, plant.at(0.25).A.round(12)
+        (1, array([[-0.8]]))
+        """
+        from symheli.lpv.expressions import lft_of
+
+        return lft_of((A, B, C, D), scheduling, dt, states, inputs, outputs)
+
     # -- what it is
 
     @property
