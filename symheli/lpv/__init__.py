@@ -27,6 +27,7 @@ from symheli.lpv.bases import (
     UserFunctions,
 )
 from symheli.lpv.delay import pade_delay, sample_delay
+from symheli.lpv.frozen_plots import bode, damping, nyquist, pole_map, sigma, step
 from symheli.lpv.interconnection import append, connect, feedback, parallel, series
 from symheli.lpv.lagged import lagged
 from symheli.lpv.lft import (
@@ -77,17 +78,23 @@ __all__ = [
     "WellPosedness",
     "append",
     "balanced_truncation",
+    "bode",
     "chordal_distance",
     "connect",
+    "damping",
     "feedback",
     "lagged",
     "lower_feedback",
     "nu_gap",
     "nu_gaps",
+    "nyquist",
     "pade_delay",
     "parallel",
+    "pole_map",
     "sample_delay",
     "series",
+    "sigma",
     "simulate",
     "stability_margin",
+    "step",
 ]

@@ -22,7 +22,15 @@ def plot_poles(model: LinearModel, ax: Axes | None = None) -> Axes:
     for mask, colour, name in ((stable, BLUE, "stable"), (~stable, RED, "not stable")):
         if mask.any():
             ax.plot(np.real(poles[mask]), np.imag(poles[mask]), "x", color=colour, label=name)
-    if model.dt is None:
+    ax = frame_of_poles(ax, model.dt)
+    if not stable.all():
+        ax.legend(frameon=False, fontsize=8)
+    return ax
+
+
+def frame_of_poles(ax: Axes, dt: float | None) -> Axes:
+    """The axes with the border of stability and their labels; `dt` in s."""
+    if dt is None:
         ax.axvline(0.0, color=GREY, linewidth=0.8)
         ax.set_xlabel("real part (1/s)")
         ax.set_ylabel("imaginary part (rad/s)")
@@ -30,9 +38,7 @@ def plot_poles(model: LinearModel, ax: Axes | None = None) -> Axes:
         angle = np.linspace(0.0, 2 * np.pi, 181)
         ax.plot(np.cos(angle), np.sin(angle), color=GREY, linewidth=0.8)
         ax.set_aspect("equal")
-        ax.set_xlabel(f"real part of z ({model.dt:g} s)")
+        ax.set_xlabel(f"real part of z ({dt:g} s)")
         ax.set_ylabel("imaginary part of z")
     ax.axhline(0.0, color=GREY, linewidth=0.8)
-    if not stable.all():
-        ax.legend(frameon=False, fontsize=8)
     return plain(ax)
