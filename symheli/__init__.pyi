@@ -5,6 +5,7 @@ from symheli.airframe.identified_models import (
     identified_models as identified_models,
 )
 from symheli.airframe.vehicle import vehicles as vehicles
+from symheli.embedding import embed as embed
 from symheli.environment import (
     Air as Air,
 )

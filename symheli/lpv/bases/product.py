@@ -70,12 +70,14 @@ class Product(FunctionSpace):
     @cached_property
     def indices(self) -> tuple[tuple[int, ...], ...]:
         """Which function of each factor makes up each product."""
-        limit = np.inf if self.total_degree is None else self.total_degree
-        return tuple(
-            i
-            for i in product(*(range(f.size) for f in self.factors))
-            if sum(i) <= limit or self.total_degree is None
-        )
+        if self.total_degree is None:
+            return tuple(product(*(range(f.size) for f in self.factors)))
+        found: list[tuple[int, ...]] = [()]
+        for f in self.factors:  # never the full product, which is 2^d long for d affine parameters
+            found = [
+                (*i, k) for i in found for k in range(min(f.size, self.total_degree - sum(i) + 1))
+            ]
+        return tuple(found)
 
     @property
     def size(self) -> int:
@@ -95,8 +97,8 @@ class Product(FunctionSpace):
 
     def constant(self) -> Array:
         """The product of the constants of the factors."""
-        every = reduce(np.multiply.outer, [f.constant() for f in self.factors])
-        return np.array([every[i] for i in self.indices])
+        own = zip([f.constant() for f in self.factors], np.array(self.indices).T, strict=True)
+        return reduce(np.multiply, (constant[places] for constant, places in own))
 
     def samples(self, ranges: Sequence[Range] | None = None) -> Array:
         """Every combination of the samples of the factors."""
@@ -137,15 +139,10 @@ class Product(FunctionSpace):
         """Products of the forms of the factors, in the same order; a total degree keeps the forms
         graded by degree.
         """
-        forms = [f.form(name) for f in self.factors]
-        full = reduce(np.kron, forms)
-        if self.total_degree is None:
-            return full
-        if name not in Polynomial.GRADED:
+        if self.total_degree is not None and name not in Polynomial.GRADED:
             raise InputError(
                 f"the {name!r} form mixes degrees: with a total degree choose from"
                 f" {', '.join(Polynomial.GRADED)}"
             )
-        every = list(product(*(range(f.size) for f in self.factors)))
-        kept = [every.index(i) for i in self.indices]
-        return full[np.ix_(kept, kept)]
+        own = zip([f.form(name) for f in self.factors], np.array(self.indices).T, strict=True)
+        return reduce(np.multiply, (form[places[:, None], places] for form, places in own))
