@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from studies.commands import options
 from studies.commands.options import count
-from studies.output import Output, columns
+from studies.output import Output
 
 if TYPE_CHECKING:
     from studies.transition.configuration import Configuration
@@ -19,7 +19,7 @@ OVERRIDE = ("vehicle", "seed", "out", "quick")
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """Configuration file, what wins over it, stages."""
+    """Configuration file, and what wins over it."""
     parser.add_argument(
         "file",
         nargs="?",
@@ -48,28 +48,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
             " ones, are computed again"
         ),
     )
-    which = parser.add_mutually_exclusive_group()
-    which.add_argument(
-        "--only",
-        type=options.names,
-        default=(),
-        metavar="STAGE,...",
-        help="compute these stages; their inputs are read from DIR/stages, or computed if absent",
-    )
-    which.add_argument(
-        "--from",
-        dest="since",
-        default="",
-        metavar="STAGE",
-        help="compute this stage and all that depend on it; the others are read from DIR/stages",
-    )
-    which.add_argument(
-        "--list-stages",
-        action="store_true",
-        help="list name, dependencies and state of every stage; run none",
-    )
     options.write_config(
-        which,
+        parser,
         "write a configuration with the defaults (default: to standard output); run nothing",
     )
     parser.set_defaults(kept=_kept)
@@ -80,13 +60,9 @@ def run(arguments: argparse.Namespace) -> Output:
     configuration = _asked(arguments)
     if arguments.write_config is not None:
         return options.choices_written(configuration.text, arguments.write_config)
-    if arguments.list_stages:
-        return _listed(configuration)
     from studies.transition.study import run_study
 
-    result = run_study(
-        configuration, resume=arguments.resume, only=arguments.only, since=arguments.since
-    )
+    result = run_study(configuration, resume=arguments.resume)
     report = configuration.out / "report.html"
     told = f"\nnumbers: {configuration.out / 'results.json'}\nreport: {report}"
     return Output(f"{result.summary()}\n{told}", result.to_dict())
@@ -100,26 +76,6 @@ def _asked(arguments: argparse.Namespace) -> Configuration:
 
 
 def _kept(arguments: argparse.Namespace) -> str:
-    if arguments.write_config is not None or arguments.list_stages:
+    if arguments.write_config is not None:
         return "nothing was written, files that were there are unchanged"
     return f"what was finished is in {_asked(arguments).out}; --resume goes on from there"
-
-
-def _listed(configuration: Configuration) -> Output:
-    from studies.transition.stages import stages
-    from studies.transition.stored_stages import stored_stages
-
-    every = stages(configuration.effort)
-    stored = stored_stages(configuration, every)
-    entries = [
-        {
-            "name": stage.name,
-            "title": stage.title,
-            "needs": stage.needs,
-            "state": stored.state(stage.name, stage.kind),
-        }
-        for stage in every
-    ]
-    rows = [["stage", "state", "needs", "what it does"]]
-    rows += [[e["name"], e["state"], ", ".join(e["needs"]) or "-", e["title"]] for e in entries]
-    return Output(columns(rows, left=4), {"folder": stored.folder, "stages": entries})

@@ -27,11 +27,17 @@ from studies.controllers.identified_plant import identified_model
 from studies.controllers.in_airspeed import of_degree
 from studies.controllers.plant import baseline, closed, design_plant, flown_plant
 from studies.known_kinematics import flights
-from studies.transition.effort import Effort
 from studies.transition.flights import autopilot_for
+from studies.transition.known_kinematics import KnownKinematics
 from studies.transition.proofs import Questions
 from symheli import FlightRecord, Helicopter, LinearModel, LPVStateSpace
-from symheli.errors import SymheliError, SynthesisError
+from symheli.errors import (
+    AccuracyError,
+    CertificateError,
+    SolverError,
+    SymheliError,
+    SynthesisError,
+)
 from symheli.flight import XCELL_SERVOS, gain_scheduled_lqr
 from symheli.lpv.bases import PiecewiseLinear
 from synthesis import Plant
@@ -74,10 +80,11 @@ class Design:
     """A controller under its name.
 
     `controller` is what flies: sampled, from measured deviations to commanded ones; None where
-    there is none, for `reason`. `promised`: the gain of the synthesis, on the plant of the design
-    (of point designs the largest; NaN without one); `frozen`: that of the loop which flies, largest
-    over `LOOKED_AT`, inf where one is unstable; `seconds` of the design; `remark`: what
-    the data say of the model that it was designed on, where they were asked.
+    there is none, for `reason` (`failed`: a solver broke off). `promised`: the gain of the
+    synthesis, on the plant of the design (of point designs the largest; NaN without one); `frozen`:
+    that of the loop which flies, largest over `LOOKED_AT`, inf where one is unstable; `seconds` of
+    the design; `remark`: what the data say of the model that it was designed on, where they were
+    asked.
     """
 
     name: str
@@ -86,6 +93,7 @@ class Design:
     frozen: float = math.inf
     seconds: float = 0.0
     reason: str = ""
+    failed: bool = False
     remark: str = ""
 
     @property
@@ -103,17 +111,22 @@ class Designs:
 
 
 def design_questions(
-    heli: Helicopter, identified: KinematicModel, seed: int, effort: Effort
+    heli: Helicopter,
+    known_kinematics: KnownKinematics,
+    seed: int,
+    certified_controllers: bool,
+    design_points: int,
 ) -> Questions:
     """Every design of `NAMES`, in that order; `seed` is that of the flight by which the identified
-    model is judged.
+    model is judged, where the controllers are certified.
     """
+    identified = known_kinematics.model
     base = baseline(heli)
     flown, record = flown_plant(base), None
-    if effort.certified_controllers:
+    if certified_controllers:
         record = symheli.fly(heli, flights.aggressive(seed, autopilot_for(heli)))
     last = partial(from_flights, from_data(identified), flown, identified, record)
-    ways = from_equations(heli, base, effort.design_points)
+    ways = from_equations(heli, base, design_points)
     asked = [partial(design, name, make, flown) for name, make in ways.items()]
     return Questions([*asked, last], lambda designs: Designs(designs=designs, plant=flown), [last])
 
@@ -161,7 +174,9 @@ def design(name: str, make: Callable[[], Controller | LPVStateSpace], plant: Pla
         controller, frozen = simplest(made, plant)
     except SymheliError as error:
         seconds = time.perf_counter() - begin
-        return [Design(name=name, controller=None, seconds=seconds, reason=str(error))]
+        failed = isinstance(error, SolverError | AccuracyError | CertificateError)
+        reason = str(error)
+        return [Design(name=name, controller=None, seconds=seconds, reason=reason, failed=failed)]
     promised = made.promised if isinstance(made, Controller) else math.nan
     return [
         Design(

@@ -379,7 +379,7 @@ def test_flights_are_the_same_for_every_controller_and_come_back_from_their_stag
         assert [f.ratio for f in one.flights] == [f.ratio for f in other.flights]
     stages = StoredStages(tmp_path, {"flown_controllers": "key"})
     stages.save("flown_controllers", Stored(result=found, seconds=1.0))
-    again = stages.load("flown_controllers", FlownControllers)
+    again = stages.load("flown_controllers")
     assert [f.ratio for f in again.result.flown] == [f.ratio for f in found.flown]
 
 
