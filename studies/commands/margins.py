@@ -9,6 +9,7 @@ import math
 from typing import TYPE_CHECKING
 
 from studies.commands import given_model, options
+from studies.commands.arguments import option, several
 from studies.output import Output, progress
 from symheli.errors import InputError
 
@@ -28,25 +29,17 @@ roll BW, pitch BW: ADS-33 bandwidth, up to which the attitude follows the stick 
   and 6 dB of gain in reserve; lag: phase delay of the roll above it
 gap: nu-gap of the two lateral models, 0 to 1: a controller whose margin b is larger holds both"""
 
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Vehicle, range and number of airspeeds."""
-    options.vehicle(parser)
-    parser.add_argument(
+ARGUMENTS = (
+    *options.HELICOPTER,
+    several(
         "--airspeeds",
+        ("LOW", "HIGH"),
+        "range, m/s (default: 0 13; of --model its own)",
         type=options.number,
-        nargs=2,
-        metavar=("LOW", "HIGH"),
-        help="range, m/s (default: 0 13; of --model its own)",
-    )
-    parser.add_argument(
-        "--points",
-        type=options.at_least_one,
-        default=14,
-        metavar="N",
-        help="airspeeds (default: %(default)s)",
-    )
-    given_model.configure(parser, channels=False)
+    ),
+    option("--points", "N", "airspeeds", options.at_least_one, 14),
+    *given_model.WITHOUT_CHANNELS,
+)
 
 
 def run(arguments: argparse.Namespace) -> Output:

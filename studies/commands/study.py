@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from studies.commands import options
+from studies.commands.arguments import Argument, flag, option, positional
 from studies.commands.options import count
 from studies.output import Output
 
@@ -17,42 +18,32 @@ HELP = "the main job: model, identification, guarantees, report"
 OVERRIDE = ("vehicle", "seed", "out", "quick")
 """Options that win over the file."""
 
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Configuration file, and what wins over it."""
-    parser.add_argument(
+ARGUMENTS = (
+    positional(
         "file",
+        "TOML file with the options; see --write-config",
         nargs="?",
         type=Path,
         metavar="FILE",
-        help="TOML file with the options; see --write-config",
-    )
-    parser.add_argument(
-        "--vehicle", metavar="NAME", help="packaged airframe or TOML file (default: xcell60)"
-    )
-    parser.add_argument(
-        "--out", type=Path, metavar="DIR", help="folder of report and numbers (default: study)"
-    )
-    parser.add_argument(
+    ),
+    option("--vehicle", "NAME", "packaged airframe or TOML file (default: xcell60)"),
+    option("--out", "DIR", "folder of report and numbers (default: study)", Path),
+    Argument(
         "--quick",
-        action=argparse.BooleanOptionalAction,
-        help="fly shorter and fewer flights: a quick look, not the full result",
-    )
-    parser.add_argument("--seed", type=count, metavar="N", help="excitation and noise (default: 0)")
-    parser.add_argument(
+        {
+            "action": argparse.BooleanOptionalAction,
+            "help": "fly shorter and fewer flights: a quick look, not the full result",
+        },
+    ),
+    option("--seed", "N", "excitation and noise (default: 0)", count),
+    flag(
         "--resume",
-        action="store_true",
-        help=(
-            "take the stages that an earlier run has finished from DIR/stages, where version,"
-            " vehicle, seed and what they read of the effort are the same; others, and damaged"
-            " ones, are computed again"
-        ),
-    )
-    options.write_config(
-        parser,
-        "write a configuration with the defaults (default: to standard output); run nothing",
-    )
-    parser.set_defaults(kept=_kept)
+        "take the stages that an earlier run has finished from DIR/stages, where version, vehicle,"
+        " seed and what they read of the effort are the same; others, and damaged ones, are"
+        " computed again",
+    ),
+    options.write_config("a configuration"),
+)
 
 
 def run(arguments: argparse.Namespace) -> Output:
@@ -75,7 +66,8 @@ def _asked(arguments: argparse.Namespace) -> Configuration:
     return Configuration.read(arguments.file, {k: v for k, v in given.items() if v is not None})
 
 
-def _kept(arguments: argparse.Namespace) -> str:
+def kept(arguments: argparse.Namespace) -> str:
+    """What an interrupted run leaves."""
     if arguments.write_config is not None:
         return "nothing was written, files that were there are unchanged"
     return f"what was finished is in {_asked(arguments).out}; --resume goes on from there"
