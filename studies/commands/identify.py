@@ -286,7 +286,7 @@ def _survey(arguments: argparse.Namespace, seen: Contents) -> Output:
     """What the log holds, and a command that would identify."""
     from studies.log import survey_report
     from studies.log.suggestion import Suggestion, suggestion
-    from studies.log.survey import survey
+    from symheli.logs.survey import survey
 
     found = survey(
         arguments.log,

@@ -16,8 +16,6 @@ from identification import FitForControl, KinematicModel, fit_for_control
 from studies.controllers.asked import (
     BACK_OFF,
     BACK_OFFS,
-    CONTROLS,
-    MEASUREMENTS,
     PERIOD,
     RATE,
     SIZES,
@@ -30,21 +28,19 @@ from studies.known_kinematics import flights
 from studies.transition.flights import autopilot_for
 from studies.transition.known_kinematics import KnownKinematics
 from studies.transition.proofs import Questions
-from symheli import FlightRecord, Helicopter, LinearModel, LPVStateSpace
+from symheli import FlightRecord, Helicopter, LPVStateSpace
 from symheli.errors import (
     AccuracyError,
     CertificateError,
     SolverError,
     SymheliError,
-    SynthesisError,
 )
 from symheli.flight import XCELL_SERVOS, gain_scheduled_lqr
-from symheli.lpv.bases import PiecewiseLinear
 from synthesis import Plant
 from synthesis.design.controller import Controller
-from synthesis.design.hinf import hinf
 from synthesis.design.lft_feedback import lft_feedback
 from synthesis.design.output_feedback import output_feedback
+from synthesis.design.point_schedule import hinf_schedule
 from synthesis.design.reduction import fewest
 from synthesis.worst.frozen import norm
 
@@ -138,7 +134,7 @@ def from_equations(
     plant = design_plant(base)
     return {
         LQR: partial(lqr_schedule, heli),
-        HINF: partial(hinf_schedule, plant, points),
+        HINF: partial(hinf_schedule, plant, np.linspace(0.0, TOP, points), BACK_OFF),
         LFT: partial(lft_feedback, plant, **SLOW),
         BASELINE: partial(output_feedback, plant, RATE, **SLOW),
     }
@@ -223,48 +219,6 @@ def lqr_schedule(heli: Helicopter) -> LPVStateSpace:
     """The gain-scheduled LQR of the study's flights, checked behind its servos."""
     autopilot = gain_scheduled_lqr(heli, 0.0, TOP, PERIOD, AIRSPEEDS, XCELL_SERVOS)
     return autopilot.scheduled_controller.model
-
-
-def hinf_schedule(plant: Plant, points: int = AIRSPEEDS) -> Controller:
-    """Point designs, their entries straight between the airspeeds: their states estimate those of
-    the plant in its own coordinates.
-
-    Raises `SynthesisError` where a point has no design.
-    """
-    speeds = np.linspace(0.0, TOP, points)
-    found = []
-    for speed in speeds:
-        at = plant.nominal.at(float(speed))
-        one = hinf(
-            at,
-            CONTROLS,
-            MEASUREMENTS,
-            disturbances=plant.disturbances,
-            performance=plant.performance,
-            back_off=BACK_OFF,
-        )
-        if one.controller is None:
-            raise SynthesisError(f"no H-infinity design at {speed:g} m/s: {'; '.join(one.reasons)}")
-        found.append(one)
-    each: list[LinearModel] = [one.controller for one in found if one.controller is not None]
-    A, B, C, D = (np.stack([getattr(one, part) for one in each]) for part in "ABCD")
-    model = LPVStateSpace(
-        PiecewiseLinear(tuple(speeds.tolist())),
-        A,
-        B,
-        C,
-        D,
-        plant.parameters,
-        each[0].states,
-        each[0].inputs,
-        each[0].outputs,
-    )
-    return Controller(
-        model=model,
-        plant=plant,
-        promised=max(one.hinf_norm for one in found),
-        method=f"H-infinity at {points} airspeeds",
-    )
 
 
 def simplest(made: Controller | LPVStateSpace, plant: Plant) -> tuple[LPVStateSpace, float]:
