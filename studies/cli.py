@@ -12,6 +12,7 @@ import warnings
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
+from studies.commands.arguments import add
 from studies.output import Output, as_json
 from studies.progress import displayed
 from studies.threads import one_thread
@@ -127,14 +128,15 @@ def parser() -> Parser:
     for verb in VERBS:
         module = importlib.import_module(f"studies.commands.{verb}")
         sub = verbs.add_parser(verb, help=module.HELP, description=module.HELP)
-        sub.set_defaults(
-            run=module.run,
-            usage=sub.format_usage,
-            kept=lambda _: "nothing was written, files that were there are unchanged",
-        )
-        module.configure(sub)
+        kept = getattr(module, "kept", _nothing_written)
+        sub.set_defaults(run=module.run, usage=sub.format_usage, kept=kept)
+        add(sub, module.ARGUMENTS)
         sub.add_argument("--json", action="store_true", help="print what a program would read")
     return whole
+
+
+def _nothing_written(_: argparse.Namespace) -> str:
+    return "nothing was written, files that were there are unchanged"
 
 
 def _fail(error: Exception, asks_json: bool, sentence: str = "", status: int = 1) -> int:

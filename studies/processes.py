@@ -2,56 +2,42 @@
 
 from __future__ import annotations
 
-import contextlib
 import pickle
-import queue
-import subprocess
-import sys
 import threading
-from collections.abc import Callable, Sequence
-from concurrent.futures import Future
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from types import TracebackType
 from typing import Any
 
-from symheli.errors import SymheliError
+from symheli.errors import InputError
 from symheli.integrate.side_by_side import workers_of
-
-Call = Callable[[], Any]
-"""A function of a module with its arguments (`functools.partial`), which can be pickled."""
+from symheli.worker import ProcessEndedError, Worker, pickled
 
 
-UNREADABLE = (TypeError, ValueError, AttributeError, ImportError, IndexError, KeyError)
-"""What goes wrong where an answer is no value of this project."""
+class Processes(ThreadPoolExecutor):
+    """An executor of `count` processes (default: one a core), each a `Worker`.
 
-
-class Processes:
-    """`count` processes (default: one a core) that compute what is submitted, in that order; with
-    one, the caller computes when it asks for the result.
-
-    They import this project and nothing of the script that started them. Leaving the `with` block
-    ends them; what is under way is lost where it is left by an exception, Ctrl-C too.
+    A process that ends under its call fails that call alone: another takes its place. Leaving the
+    `with` block by an exception, Ctrl-C too, ends all processes at once.
     """
 
     def __init__(self, count: int | None = None):
-        self._count = workers_of(count)
-        self._waiting: queue.SimpleQueue[tuple[str, bytes, Future[Any]] | None]
-        self._waiting = queue.SimpleQueue()
-        self._running: list[subprocess.Popen[bytes]] = []
-        self._serving: list[threading.Thread] = []
+        super().__init__(workers_of(count), thread_name_prefix="process")
+        self._own = threading.local()
+        self._lock = threading.Lock()
+        self._workers: list[Worker] = []
         self._leaving = False
 
-    def __enter__(self) -> Processes:
-        return self
-
-    def submit(self, calls: Sequence[Call]) -> list[Future[Any]]:
-        """A result to come for each call; an exception of a call is raised by its `result()`."""
-        futures: list[Future[Any]] = [Future() if self._count > 1 else _Here(c) for c in calls]
-        if self._count > 1:
-            for call, future in zip(calls, futures, strict=True):
-                self._waiting.put((_name(call), pickle.dumps(call), future))
-            while len(self._running) < self._count:
-                self._start()
-        return futures
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """A result to come; `InputError` for what cannot be sent to another process."""
+        try:
+            call = pickled(fn, *args, **kwargs)
+        except (pickle.PicklingError, AttributeError, TypeError) as error:
+            raise InputError(
+                f"a call cannot be sent to another process ({error}): define its function in a"
+                " module, or use one worker"
+            ) from error
+        return super().submit(self._computed, call)
 
     def __exit__(
         self,
@@ -59,72 +45,26 @@ class Processes:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._leaving = True
-        for process in self._running if kind is not None else ():
-            process.kill()
-        for _ in self._serving:
-            self._waiting.put(None)
-        for thread in self._serving:
-            thread.join()
-        for process in self._running:
-            process.wait()
+        if kind is not None:
+            self.shutdown(wait=False, cancel_futures=True)
+            with self._lock:
+                self._leaving = True
+                for worker in self._workers:
+                    worker.kill()
+        self.shutdown()
+        for worker in self._workers:
+            worker.__exit__(None, None, None)
 
-    def _start(self) -> None:
-        process = subprocess.Popen(
-            [sys.executable, "-m", "studies.worker"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            start_new_session=True,  # Ctrl-C is for this process, which ends them
-        )
-        self._running.append(process)
-        self._serving.append(threading.Thread(target=self._serve, args=(process,), daemon=True))
-        self._serving[-1].start()
-
-    def _serve(self, process: subprocess.Popen[bytes]) -> None:
-        """Hand one call after the other to a process, until there is none or it is gone."""
-        assert process.stdin is not None  # noqa: S101
-        assert process.stdout is not None  # noqa: S101
-        while (given := self._waiting.get()) is not None:
-            name, call, future = given
-            try:
-                process.stdin.write(call)
-                process.stdin.flush()
-                done, result = pickle.load(process.stdout)
-            except (OSError, EOFError, pickle.PickleError, *UNREADABLE) as error:
-                gone = not isinstance(error, UNREADABLE)
-                future.set_exception(
-                    SymheliError(
-                        f"a process that computed {name} has ended ({error!r}): memory may have run"
-                        " out; finished results are kept"
-                        if gone
-                        else f"what {name} answered cannot be read here: {error!r}"
-                    )
-                )
-                process.kill()
-                if not self._leaving:
-                    self._start()  # the others go on
-                break
-            if done:
-                future.set_result(result)
-            else:
-                future.set_exception(result)
-        for pipe in (process.stdin, process.stdout):
-            with contextlib.suppress(OSError):
-                pipe.close()
-
-
-class _Here(Future[Any]):
-    """What the caller computes himself when he asks."""
-
-    def __init__(self, call: Call):
-        super().__init__()
-        self._call = call
-
-    def result(self, timeout: float | None = None) -> Any:
-        if not self.done():
-            self.set_result(self._call())
-        return super().result(timeout)
-
-
-def _name(call: Call) -> str:
-    return getattr(getattr(call, "func", call), "__name__", "a call")
+    def _computed(self, call: bytes) -> Any:
+        """The result, by the process of this thread."""
+        if getattr(self._own, "worker", None) is None:
+            with self._lock:
+                if self._leaving:
+                    raise ProcessEndedError("the processes have been ended")
+                self._own.worker = Worker()
+                self._workers.append(self._own.worker)
+        try:
+            return self._own.worker(call)
+        except ProcessEndedError:
+            self._own.worker = None
+            raise

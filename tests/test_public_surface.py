@@ -39,6 +39,7 @@ SHARED = (
     "symheli.lazy",
     "symheli.progress",
     "symheli.threads",
+    "symheli.worker",
 )
 """What identification and synthesis may see of the model's room."""
 

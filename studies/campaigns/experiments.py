@@ -4,7 +4,6 @@ the model and compared.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -12,6 +11,7 @@ from itertools import product
 import numpy as np
 
 from identification import Experiment, Plan, choose_experiments, compare_experiments
+from studies.output import columns, progress
 from studies.transition.axes import Axis
 from studies.transition.flights import AMPLITUDE, TOP, autopilot_for
 from symheli import AirspeedSchedule, Excitation, FlightRecord, Helicopter, SymheliError, fly
@@ -71,13 +71,11 @@ class Comparison:
         """
         best = np.median(self.plan.experiments[0].bounds)
         ranked = sorted(self.experiments, key=lambda e: (not e.allowed, float(np.median(e.bounds))))
-        lines = [f"{'candidate':44s}{'seconds':>9s}{'median error':>14s}   exceeds"]
+        rows = [["candidate", "seconds", "median error", "exceeds"]]
         for e in ranked:
             beyond = ", ".join(f"{signal} {value:.2f}" for signal, value in e.exceeded.items())
-            lines.append(
-                f"{e.name:44s}{e.duration:9.0f}{np.median(e.bounds) / best:13.2f}x   {beyond}"
-            )
-        lines += [f"{name:44s}{'lost':>9s}" for name in self.lost]
+            rows.append([e.name, f"{e.duration:.0f}", f"{np.median(e.bounds) / best:.2f}x", beyond])
+        lines = [columns([*rows, *([name, "lost"] for name in self.lost)])]
         lines += ["", "fly, in this order:", *(f"  {e.name}" for e in self.plan.experiments)]
         lines.append(
             f"together: median standard error {np.median(self.plan.bounds) / best:.2f} of that of"
@@ -106,7 +104,7 @@ def design(
     autopilot = autopilot_for(heli)
     records, lost = {}, {}
     for candidate in candidates:
-        print(f"  {candidate.name}", file=sys.stderr, flush=True)
+        progress(f"  {candidate.name}")
         try:
             records[candidate.name] = candidate.fly(heli, axis, autopilot, seed)
         except SymheliError as error:

@@ -5,19 +5,17 @@ here.
 from __future__ import annotations
 
 import logging
-import pickle
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import Executor, Future
 from contextlib import closing
-from functools import partial
-from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from studies.output import progress
 from studies.processes import Processes
-from symheli.errors import InputError, SymheliError
+from symheli.errors import InputError
 from symheli.extras import extra
 from symheli.integrate.side_by_side import as_done, workers_of
+from symheli.worker import ProcessEndedError
 
 if TYPE_CHECKING:
     import distributed
@@ -54,37 +52,18 @@ class Here(Runner):
         return future
 
 
-class InProcesses(Runner):
+class InProcesses(Processes, Runner):
     """In `count` processes of this machine (default: one a core)."""
 
     tries = 3
 
     def __init__(self, count: int | None = None):
-        self._processes = Processes(count)
+        super().__init__(count)
         self.window = 2 * workers_of(count)
 
-    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """A result to come; `InputError` for what other processes cannot find."""
-        try:
-            return self._processes.submit([partial(fn, *args, **kwargs)])[0]
-        except (pickle.PicklingError, AttributeError, TypeError) as error:
-            raise InputError(
-                f"the trial cannot be sent to another process ({error}): define it in a module, or"
-                " use one worker"
-            ) from error
-
     def lost(self, error: BaseException) -> bool:
-        """What `Processes` says itself; what a trial raises is an outcome."""
-        return isinstance(error, SymheliError)
-
-    def __exit__(
-        self,
-        exc_type: type[BaseException] | None,
-        exc_val: BaseException | None,
-        exc_tb: TracebackType | None,
-    ) -> None:
-        """Ends them; see `Processes`."""
-        self._processes.__exit__(exc_type, exc_val, exc_tb)
+        """Whether the process has ended; what a trial raises is an outcome."""
+        return isinstance(error, ProcessEndedError)
 
 
 class Cluster(Runner):

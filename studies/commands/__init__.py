@@ -1,5 +1,5 @@
 """The verbs of the command line, one module a verb.
 
-Each has `HELP` (one line), `configure(parser)` and `run(arguments) -> Output`; heavy imports happen
-in `run`.
+Each has `HELP` (one line), `ARGUMENTS` (see `arguments`) and `run(arguments) -> Output`; heavy
+imports happen in `run`.
 """

@@ -5,43 +5,33 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from studies.commands.options import at_least_one, on_a_runner
+from studies.commands.arguments import flag, option, positional
+from studies.commands.options import ON_A_RUNNER, at_least_one, kept_on_a_runner
 from studies.output import Output
 from symheli.errors import InputError
 
 HELP = "a grid and draws of cases from a TOML file; without one the identification over many seeds"
 
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """What, where it is kept, where it runs."""
-    parser.add_argument(
+ARGUMENTS = (
+    positional(
         "file",
+        "TOML file that declares the campaign (docs/campaigns.md)",
         nargs="?",
         type=Path,
         metavar="FILE",
-        help="TOML file that declares the campaign (docs/campaigns.md)",
-    )
-    parser.add_argument(
-        "--vehicle",
-        metavar="NAME",
-        help="(without FILE) packaged airframe or TOML file (default: xcell60)",
-    )
-    parser.add_argument(
-        "--seeds",
-        type=at_least_one,
-        metavar="N",
-        help="(without FILE) number of seeds (default: 20)",
-    )
-    parser.add_argument(
+    ),
+    option("--vehicle", "NAME", "(without FILE) packaged airframe or TOML file (default: xcell60)"),
+    option("--seeds", "N", "(without FILE) number of seeds (default: 20)", at_least_one),
+    option(
         "--show",
+        "QUANTITY",
+        "(with FILE) quantity to show in the table; may be repeated (default: the first ones)",
         action="append",
-        metavar="QUANTITY",
-        help="(with FILE) quantity to show in the table; may be repeated (default: the first ones)",
-    )
-    parser.add_argument(
-        "--again", action="store_true", help="(with FILE) compute failed cases again"
-    )
-    on_a_runner(parser)
+    ),
+    flag("--again", "(with FILE) compute failed cases again"),
+    *ON_A_RUNNER,
+)
+kept = kept_on_a_runner
 
 
 def run(arguments: argparse.Namespace) -> Output:

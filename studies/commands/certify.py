@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from studies.commands import given_model, options
+from studies.commands.arguments import flag, option, several
 from studies.output import Output, progress
 from symheli.errors import InputError
 
@@ -20,77 +21,65 @@ if TYPE_CHECKING:
 
 HELP = "proven gain and stability of the lateral loop, or of any model, for a rate of airspeed"
 
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Rate, range and channel."""
-    options.vehicle(parser)
-    parser.add_argument(
+ARGUMENTS = (
+    *options.HELICOPTER,
+    option(
         "--rate",
-        type=options.rate,
-        default=3.0,
-        metavar="M/S^2",
-        help="largest |dV/dt|, m/s^2 (of --model: of its parameter), or inf (default: %(default)s)",
-    )
-    parser.add_argument(
+        "M/S^2",
+        "largest |dV/dt|, m/s^2 (of --model: of its parameter), or inf",
+        options.rate,
+        3.0,
+    ),
+    several(
         "--airspeeds",
+        ("LOW", "HIGH"),
+        "range, m/s (default: 0 13; of --model its own)",
         type=options.number,
-        nargs=2,
-        metavar=("LOW", "HIGH"),
-        help="range, m/s (default: 0 13; of --model its own)",
-    )
-    parser.add_argument(
+    ),
+    option(
         "--channel",
-        choices=("gust", "inputs"),
-        help="lateral gust (default), or disturbances at the inputs, -> r, phi",
-    )
-    given_model.configure(parser)
-    parser.add_argument(
+        ("gust", "inputs"),
+        "lateral gust (default), or disturbances at the inputs, -> r, phi",
+    ),
+    *given_model.ARGUMENTS,
+    option(
         "--lft",
-        metavar="TEST",
-        help="use a classical LFT test instead: small gain, D, DG or full block; --rate is ignored",
-    )
-    parser.add_argument(
+        "TEST",
+        "use a classical LFT test instead: small gain, D, DG or full block; --rate is ignored",
+    ),
+    option(
         "--memory",
-        type=options.positive,
-        metavar="S",
-        help="let P depend also on the airspeed filtered by a first-order lag of S seconds",
-    )
-    parser.add_argument(
+        "S",
+        "let P depend also on the airspeed filtered by a first-order lag of S seconds",
+        options.positive,
+    ),
+    several(
         "--across",
+        ("L", "D"),
+        "segments and degree of P in the lag error (default: 3 2)",
         type=options.at_least_one,
-        nargs=2,
-        metavar=("L", "D"),
-        help="segments and degree of P in the lag error (default: 3 2)",
-    )
-    parser.add_argument(
+    ),
+    option(
         "--order",
-        type=options.at_least_one,
-        default=1,
-        metavar="M",
-        help="use a V of degree 2M in the states, for --stability",
-    )
-    parser.add_argument(
+        "M",
+        "use a V of degree 2M in the states, for --stability",
+        options.at_least_one,
+        1,
+    ),
+    option(
         "--segments",
-        type=options.at_least_one,
+        "K",
+        "segments of P in airspeed, tried in turn",
+        options.at_least_one,
         nargs="+",
-        metavar="K",
-        help="segments of P in airspeed, tried in turn",
-    )
-    parser.add_argument(
-        "--grading",
-        type=options.positive,
-        metavar="G",
-        help="knots at (k/K)^G of the range (2; with a memory 1.5)",
-    )
-    parser.add_argument("--stability", action="store_true", help="prove stability only, no gain")
-    parser.add_argument(
-        "--save",
-        metavar="FILE",
-        help="save the certificate to FILE; symheli verify FILE verifies it again",
-    )
-    parser.add_argument(
-        "--rigorous", action="store_true", help="verify once more in exact rational arithmetic"
-    )
+    ),
+    option(
+        "--grading", "G", "knots at (k/K)^G of the range (2; with a memory 1.5)", options.positive
+    ),
+    flag("--stability", "prove stability only, no gain"),
+    option("--save", "FILE", "save the certificate to FILE; symheli verify FILE verifies it again"),
+    flag("--rigorous", "verify once more in exact rational arithmetic"),
+)
 
 
 def run(arguments: argparse.Namespace) -> Output:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 
+from studies.commands.arguments import positional
 from studies.output import Output
 from symheli.extras import extra
 
@@ -11,10 +12,7 @@ HELP = "print the completion of this command line for bash, zsh or tcsh"
 
 SHELLS = ("bash", "zsh", "tcsh")
 
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Which shell."""
-    parser.add_argument("shell", choices=SHELLS, help="shell for which to print the completion")
+ARGUMENTS = (positional("shell", "shell for which to print the completion", choices=SHELLS),)
 
 
 def run(arguments: argparse.Namespace) -> Output:

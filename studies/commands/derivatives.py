@@ -6,21 +6,18 @@ import argparse
 from pathlib import Path
 
 from studies.commands import options
+from studies.commands.arguments import option
 from studies.output import Output, progress
 
 HELP = "stability and control derivatives over airspeed, X_u ... N_ped, with units"
 
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Vehicle, airspeeds, folder."""
-    options.vehicle(parser)
-    options.span(parser, "--airspeeds", (0.0, 15.0), 6, "airspeeds")
-    parser.add_argument(
-        "--out",
-        type=Path,
-        metavar="DIR",
-        help="folder for derivatives.csv and, with matplotlib, derivatives.svg",
-    )
+ARGUMENTS = (
+    *options.HELICOPTER,
+    options.span("--airspeeds", (0.0, 15.0), 6, "airspeeds"),
+    option(
+        "--out", "DIR", "folder for derivatives.csv and, with matplotlib, derivatives.svg", Path
+    ),
+)
 
 
 def run(arguments: argparse.Namespace) -> Output:

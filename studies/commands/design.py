@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 
 from studies.commands import options
+from studies.commands.arguments import option
 from studies.output import Output
 
 HELP = (
@@ -12,42 +13,20 @@ HELP = (
     " airspeed schedules by what an identification would learn from them"
 )
 
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Axis, limits, how many flights."""
-    parser.add_argument(
-        "--vehicle",
-        default="xcell60",
-        metavar="NAME",
-        help="packaged airframe or TOML file (default: %(default)s)",
-    )
-    parser.add_argument(
+ARGUMENTS = (
+    options.VEHICLE,
+    option(
         "--axis",
-        choices=("longitudinal", "lateral", "all"),
+        ("longitudinal", "lateral", "all"),
+        "outputs and inputs of the model",
         default="longitudinal",
-        help="default: %(default)s",
-    )
-    parser.add_argument(
-        "--flights",
-        type=options.at_least_one,
-        default=3,
-        metavar="N",
-        help="to choose (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--attitude-deg",
-        type=options.positive,
-        default=28.6,
-        metavar="DEG",
-        help="largest roll and pitch (default: 28.6)",
-    )
-    parser.add_argument(
-        "--rate",
-        type=options.positive,
-        default=2.0,
-        metavar="RAD/S",
-        help="largest roll and pitch rate (default: 2)",
-    )
+    ),
+    option("--flights", "N", "to choose", options.at_least_one, 3),
+    option(
+        "--attitude-deg", "DEG", "largest roll and pitch (default: 28.6)", options.positive, 28.6
+    ),
+    option("--rate", "RAD/S", "largest roll and pitch rate (default: 2)", options.positive, 2.0),
+)
 
 
 def run(arguments: argparse.Namespace) -> Output:

@@ -42,9 +42,7 @@ OPTIONAL = {
     "jsbsim": "flying the AH-1S, a helicopter from elsewhere",
 }
 
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """No options of its own."""
+ARGUMENTS = ()
 
 
 def run(arguments: argparse.Namespace) -> Output:

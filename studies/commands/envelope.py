@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from studies.commands import options
+from studies.commands.arguments import option
 from studies.output import Output, columns, progress
 
 if TYPE_CHECKING:
@@ -18,18 +19,12 @@ KEY = (
     " accuracy promised), x no trim"
 )
 
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Vehicle, grid, folder."""
-    options.vehicle(parser)
-    options.span(parser, "--airspeeds", (0.0, 20.0), 21, "airspeeds of the whole motion")
-    options.span(parser, "--climb-rates", (-10.0, 10.0), 21, "climb rates, up")
-    parser.add_argument(
-        "--out",
-        type=Path,
-        metavar="DIR",
-        help="folder for trim_map.csv and, with matplotlib, trim_map.svg",
-    )
+ARGUMENTS = (
+    *options.HELICOPTER,
+    options.span("--airspeeds", (0.0, 20.0), 21, "airspeeds of the whole motion"),
+    options.span("--climb-rates", (-10.0, 10.0), 21, "climb rates, up"),
+    option("--out", "DIR", "folder for trim_map.csv and, with matplotlib, trim_map.svg", Path),
+)
 
 
 def run(arguments: argparse.Namespace) -> Output:

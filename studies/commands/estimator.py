@@ -7,77 +7,42 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from studies.commands import options
+from studies.commands.arguments import flag, group, option
 
 if TYPE_CHECKING:
     from symheli import Helicopter
 
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Signals, orders, forgetting, precision."""
-    group = parser.add_argument_group(
-        "estimator", "C code that identifies the coefficients over airspeed in flight"
-    )
-    add = group.add_argument
-    add(
-        "--outputs",
-        type=options.names,
-        default=("theta", "w", "u"),
-        metavar="A,B",
-        help="states to predict (default: theta,w,u)",
-    )
-    add(
-        "--inputs",
-        type=options.names,
-        default=("d_lon", "d_col"),
-        metavar="C,D",
-        help="inputs that drive them (default: d_lon,d_col)",
-    )
-    add(
-        "--na",
-        type=options.count,
-        default=3,
-        metavar="N",
-        help="lags of the outputs (default: %(default)s)",
-    )
-    add(
-        "--nb",
-        type=options.count,
-        default=3,
-        metavar="N",
-        help="lags of the inputs (default: %(default)s)",
-    )
-    add(
-        "--delay",
-        type=options.count,
-        default=1,
-        metavar="N",
-        help="first lag of the inputs (default: %(default)s)",
-    )
-    add(
-        "--degree",
-        type=options.count,
-        default=2,
-        metavar="N",
-        help="polynomial degree in airspeed (default: %(default)s)",
-    )
-    add(
-        "--offset",
-        action="store_true",
-        help="include a trim c(p) that varies with p, for outputs that are not deviations",
-    )
-    add(
-        "--forgetting",
-        type=options.number,
-        default=1.0,
-        metavar="L",
-        help="factor a sample, in (0, 1] (default: 1)",
-    )
-    add(
-        "--directional",
-        action="store_true",
-        help="forget in the direction of the new regressor only",
-    )
-    add("--single", action="store_true", help="use single instead of double precision")
+ARGUMENTS = (
+    group(
+        "estimator",
+        "C code that identifies the coefficients over airspeed in flight",
+        option(
+            "--outputs",
+            "A,B",
+            "states to predict (default: theta,w,u)",
+            options.names,
+            ("theta", "w", "u"),
+        ),
+        option(
+            "--inputs",
+            "C,D",
+            "inputs that drive them (default: d_lon,d_col)",
+            options.names,
+            ("d_lon", "d_col"),
+        ),
+        option("--na", "N", "lags of the outputs", options.count, 3),
+        option("--nb", "N", "lags of the inputs", options.count, 3),
+        option("--delay", "N", "first lag of the inputs", options.count, 1),
+        option("--degree", "N", "polynomial degree in airspeed", options.count, 2),
+        flag(
+            "--offset",
+            "include a trim c(p) that varies with p, for outputs that are not deviations",
+        ),
+        option("--forgetting", "L", "factor a sample, in (0, 1] (default: 1)", options.number, 1.0),
+        flag("--directional", "forget in the direction of the new regressor only"),
+        flag("--single", "use single instead of double precision"),
+    ),
+)
 
 
 def write(arguments: argparse.Namespace, heli: Helicopter) -> tuple[Path, ...]:

@@ -8,6 +8,7 @@ import argparse
 from pathlib import Path
 
 from studies.commands import estimator, given_model, options
+from studies.commands.arguments import group, option, positional, several
 from studies.output import Output
 from symheli.errors import InputError
 
@@ -16,57 +17,45 @@ HELP = (
     " controller, a MATLAB file, or equations in print"
 )
 
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """What, of which helicopter, to where."""
-    parser.add_argument(
+ARGUMENTS = (
+    positional(
         "format",
+        "c: equations of motion and header; estimator: recursive identification as C for an"
+        " autopilot; model: an identified model (--model) as C; controller: one in a table over"
+        " airspeed (--model) as C; mat: linear models along airspeed, or what --model holds; latex,"
+        " markdown: every component's equations to read",
         choices=("c", "estimator", "model", "controller", "mat", "latex", "markdown"),
-        help=(
-            "c: equations of motion and header; estimator: recursive identification as C for an"
-            " autopilot; model: an identified model (--model) as C; controller: one in a table"
-            " over airspeed (--model) as C; mat: linear models along airspeed, or what --model"
-            " holds; latex, markdown: every component's equations to read"
-        ),
-    )
-    options.vehicle(parser)
-    parser.add_argument(
+    ),
+    *options.HELICOPTER,
+    option(
         "--out",
-        type=Path,
-        metavar="PATH",
-        help=(
-            "file (default: NAME_rhs.c, NAME_family.mat, NAME_equations.tex or .md) or folder"
-            " (estimator, model, controller)"
-        ),
-    )
-    parser.add_argument(
+        "PATH",
+        "file (default: NAME_rhs.c, NAME_family.mat, NAME_equations.tex or .md) or folder"
+        " (estimator, model, controller)",
+        Path,
+    ),
+    several(
         "--airspeeds",
+        ("LOW", "HIGH"),
+        "range, m/s (default: 0 13)",
         type=options.number,
-        nargs=2,
         default=(0.0, 13.0),
-        metavar=("LOW", "HIGH"),
-        help="range, m/s (default: 0 13)",
-    )
-    parser.add_argument(
-        "--points",
-        type=options.at_least_one,
-        default=14,
-        metavar="N",
-        help="airspeeds of the family (default: %(default)s)",
-    )
-    estimator.configure(parser)
-    group = parser.add_argument_group(
+    ),
+    option("--points", "N", "airspeeds of the family", options.at_least_one, 14),
+    *estimator.ARGUMENTS,
+    group(
         "model, controller, mat",
         "C code that predicts and simulates what symheli identify --save kept (--single applies),"
         " or that flies what TableController.save kept; a MATLAB file of an identified model or a"
         " family of linear models",
-    )
-    group.add_argument(
-        "--model",
-        type=Path,
-        metavar="FILE",
-        help="the identified model, the controller, or the family of linear models",
-    )
+        option(
+            "--model",
+            "FILE",
+            "the identified model, the controller, or the family of linear models",
+            Path,
+        ),
+    ),
+)
 
 
 def run(arguments: argparse.Namespace) -> Output:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from studies.commands import options
+from studies.commands.arguments import group, option
 from symheli.errors import InputError
 
 if TYPE_CHECKING:
@@ -27,35 +28,30 @@ KINDS = (
 )
 
 
-def configure(parser: argparse.ArgumentParser, channels: bool = True) -> None:
-    """--model with what it keeps and its loop; with `channels` those that a gain is of."""
-    group = parser.add_argument_group("model from a file, instead of a vehicle")
-    group.add_argument("--model", type=Path, metavar="FILE", help=KINDS)
-    group.add_argument(
-        "--states",
-        type=options.names,
-        metavar="A,B",
-        help="states of a family to keep, in this order",
-    )
-    if channels:
-        for name, way in (("inputs", "from"), ("outputs", "to")):
-            words = f"the gain is {way} these (default: all)"
-            group.add_argument(f"--{name}", type=options.names, metavar="A,B", help=words)
-    parser.add_argument(
-        "--degree",
-        type=options.at_least_one,
-        default=3,
-        metavar="D",
-        help="degree of the interpolation (default: %(default)s)",
-    )
-    parser.add_argument(
+FROM_A_FILE = "model from a file, instead of a vehicle"
+
+MODEL = (
+    option("--model", "FILE", KINDS, Path),
+    option("--states", "A,B", "states of a family to keep, in this order", options.names),
+)
+CHANNELS = (
+    option("--inputs", "A,B", "the gain is from these (default: all)", options.names),
+    option("--outputs", "A,B", "the gain is to these (default: all)", options.names),
+)
+LOOP = (
+    option("--degree", "D", "degree of the interpolation", options.at_least_one, 3),
+    option(
         "--feedback",
-        type=options.feedback,
+        "IN=OUT:GAIN",
+        "feedback gain to close, such as d_lat=phi:-0.02; may be repeated",
+        options.feedback,
+        [],
         action="append",
-        default=[],
-        metavar="IN=OUT:GAIN",
-        help="feedback gain to close, such as d_lat=phi:-0.02; may be repeated",
-    )
+    ),
+)
+
+ARGUMENTS = (group(FROM_A_FILE, None, *MODEL, *CHANNELS), *LOOP)
+WITHOUT_CHANNELS = (group(FROM_A_FILE, None, *MODEL), *LOOP)
 
 
 def read(path: Path) -> Given:

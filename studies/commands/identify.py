@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from studies.commands import options
+from studies.commands.arguments import add, flag, option, positional
 from studies.output import Output
 from symheli.errors import InputError, SymheliError
 from symheli.logs.format import FORMATS, Format, format_of
@@ -49,183 +50,110 @@ ONE_MODEL = {
     "loop": "judges",
 }
 
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Log, signals, structure, what is done to the record."""
-    add = parser.add_argument
-    add("log", type=Path, metavar="LOG", help="flight log")
-    add(
-        "--format",
-        choices=("auto", *FORMATS),
-        default="auto",
-        help="default: by content",
-    )
-    add(
+ARGUMENTS = (
+    positional("log", "flight log", type=Path, metavar="LOG"),
+    option(
+        "--format", ("auto", *FORMATS), "how the log is read; auto: by its content", default="auto"
+    ),
+    option(
         "--map",
-        type=Path,
-        metavar="FILE",
-        help="TOML file that says which column is which signal, in which unit (docs/identify.md)",
-    )
-    add("--time", metavar="COLUMN", help="time column of a table (default: t or time)")
-    add(
+        "FILE",
+        "TOML file that says which column is which signal, in which unit (docs/identify.md)",
+        Path,
+    ),
+    option("--time", "COLUMN", "time column of a table (default: t or time)"),
+    option(
         "--time-unit",
-        choices=("s", "ms", "us", "ns"),
-        help="unit of the time column (default: that of its header, or s)",
-    )
-    add(
-        "--dt",
-        type=options.positive,
-        metavar="S",
-        help="sample period, s: of a log without time, or to resample to",
-    )
-    add(
+        ("s", "ms", "us", "ns"),
+        "unit of the time column (default: that of its header, or s)",
+    ),
+    option(
+        "--dt", "S", "sample period, s: of a log without time, or to resample to", options.positive
+    ),
+    option(
         "--units",
-        type=options.unit,
+        "NAME=UNIT",
+        "units of the columns, such as q=deg/s",
+        options.unit,
+        [],
         nargs="+",
         action="extend",
-        default=[],
-        metavar="NAME=UNIT",
-        help="units of the columns, such as q=deg/s",
-    )
-    add(
-        "--outputs", type=options.names, metavar="A,B", help="signals to predict (X-Plane: q,theta)"
-    )
-    add(
-        "--inputs",
-        type=options.names,
-        metavar="C,D",
-        help="signals that drive them (X-Plane: stick_lon)",
-    )
-    add("--scheduling", metavar="P", help="scheduling signal (X-Plane: airspeed)")
-    add(
-        "--scheduling-from",
-        type=options.names,
-        metavar="U,V",
-        help="schedule on the length of this vector",
-    )
-    add(
+    ),
+    option("--outputs", "A,B", "signals to predict (X-Plane: q,theta)", options.names),
+    option("--inputs", "C,D", "signals that drive them (X-Plane: stick_lon)", options.names),
+    option("--scheduling", "P", "scheduling signal (X-Plane: airspeed)"),
+    option("--scheduling-from", "U,V", "schedule on the length of this vector", options.names),
+    option(
         "--smooth-scheduling",
-        type=options.positive,
-        metavar="S",
-        help="causal low-pass of the scheduling signal, time constant in s",
-    )
-    add(
-        "--scheduling-at",
-        choices=("lag", "now"),
-        default="lag",
-        help="coefficients at p(k - lag) or p(k) (default: %(default)s)",
-    )
-    add(
-        "--commanded",
-        action="store_true",
-        help="the scheduling signal is known ahead; so are signals called ..._command",
-    )
-    add(
-        "--na",
-        type=options.count,
-        default=3,
-        metavar="N",
-        help="lags of the outputs (default: %(default)s)",
-    )
-    add(
-        "--nb",
-        type=options.count,
-        default=3,
-        metavar="N",
-        help="lags of the inputs (default: %(default)s)",
-    )
-    add(
+        "S",
+        "causal low-pass of the scheduling signal, time constant in s",
+        options.positive,
+    ),
+    option("--scheduling-at", ("lag", "now"), "coefficients at p(k - lag) or p(k)", default="lag"),
+    flag("--commanded", "the scheduling signal is known ahead; so are signals called ..._command"),
+    option("--na", "N", "lags of the outputs", options.count, 3),
+    option("--nb", "N", "lags of the inputs", options.count, 3),
+    option(
         "--delay",
-        type=options.count,
-        metavar="N",
-        help=(
-            "first lag of the inputs (default: 1; 0, and one lag more, where samples are means or"
-            " interpolated)"
-        ),
-    )
-    add(
-        "--degree",
-        type=options.count,
-        default=2,
-        metavar="N",
-        help="polynomial degree in p; 0: LTI only (default: %(default)s)",
-    )
-    add("--orders", action="store_true", help="compare orders 1 to 4 and degrees 0 to 3 instead")
-    add("--no-offset", action="store_true", help="no trim c(p): outputs are already deviations")
-    add(
+        "N",
+        "first lag of the inputs (default: 1; 0, and one lag more, where samples are means or"
+        " interpolated)",
+        options.count,
+    ),
+    option("--degree", "N", "polynomial degree in p; 0: LTI only", options.count, 2),
+    flag("--orders", "compare orders 1 to 4 and degrees 0 to 3 instead"),
+    flag("--no-offset", "no trim c(p): outputs are already deviations"),
+    option(
         "--offset-rate",
-        choices=("auto", "yes", "no"),
+        ("auto", "yes", "no"),
+        "d(p) times the change of p, the moving trim; auto: tried, and kept where it predicts 1 s"
+        " better in sample",
         default="auto",
-        help=(
-            "d(p) times the change of p, the moving trim; auto: tried, and kept where it predicts 1"
-            " s better in sample"
-        ),
-    )
-    add("--method", choices=METHODS, default="ls", help="estimator (default: %(default)s)")
-    add(
-        "--instruments",
-        type=options.names,
-        default=(),
-        metavar="E,F",
-        help="external excitation, for --method iv, riv or oe",
-    )
-    add(
-        "--start",
-        type=options.number,
-        metavar="S",
-        help="drop samples before this time, s on the log's clock",
-    )
-    add("--stop", type=options.number, metavar="S", help="drop samples after this time, s")
-    add(
-        "--decimate",
-        type=options.at_least_one,
-        default=1,
-        metavar="N",
-        help="average over N samples",
-    )
-    add(
+    ),
+    option("--method", METHODS, "estimator", default="ls"),
+    option(
+        "--instruments", "E,F", "external excitation, for --method iv, riv or oe", options.names, ()
+    ),
+    option("--start", "S", "drop samples before this time, s on the log's clock", options.number),
+    option("--stop", "S", "drop samples after this time, s", options.number),
+    option("--decimate", "N", "average over N samples", options.at_least_one, 1),
+    option(
         "--train",
-        type=options.fraction,
-        metavar="SHARE",
-        help="fraction of the time to fit, from the start; the rest is held out (default: 0.7)",
-    )
-    add(
-        "--test",
-        type=Path,
-        metavar="LOG",
-        help="another log of the same kind to hold out; LOG is fitted as a whole",
-    )
-    add(
+        "SHARE",
+        "fraction of the time to fit, from the start; the rest is held out (default: 0.7)",
+        options.fraction,
+    ),
+    option(
+        "--test", "LOG", "another log of the same kind to hold out; LOG is fitted as a whole", Path
+    ),
+    option(
         "--plot",
-        type=options.picture,
-        metavar="FILE",
-        help=(
-            "draw measured, one step, 1 s and free run into this .png, .svg or .pdf (needs"
-            " matplotlib)"
-        ),
-    )
-
-    add(
+        "FILE",
+        "draw measured, one step, 1 s and free run into this .png, .svg or .pdf (needs matplotlib)",
+        options.picture,
+    ),
+    option(
         "--bands",
-        type=options.picture,
-        metavar="FILE",
-        help="draw every coefficient over the scheduling signal with its 95 %% band",
-    )
-    add(
+        "FILE",
+        "draw every coefficient over the scheduling signal with its 95 %% band",
+        options.picture,
+    ),
+    option(
         "--loop",
-        type=options.feedback,
+        "INPUT=OUTPUT:GAIN",
+        "judge whether the model is fit for this feedback, such as d_lat=phi:-0.03",
+        options.feedback,
+        [],
         nargs="+",
         action="extend",
-        default=[],
-        metavar="INPUT=OUTPUT:GAIN",
-        help="judge whether the model is fit for this feedback, such as d_lat=phi:-0.03",
-    )
-    add(
+    ),
+    option(
         "--save",
-        type=options.model_file,
-        metavar="FILE",
-        help="write the model: .json (Python, symheli export model) or .mat (MATLAB)",
-    )
+        "FILE",
+        "write the model: .json (Python, symheli export model) or .mat (MATLAB)",
+        options.model_file,
+    ),
+)
 
 
 def run(arguments: argparse.Namespace) -> Output:
@@ -358,7 +286,7 @@ def _survey(arguments: argparse.Namespace, seen: Contents) -> Output:
     """What the log holds, and a command that would identify."""
     from studies.log import survey_report
     from studies.log.suggestion import Suggestion, suggestion
-    from studies.log.survey import survey
+    from symheli.logs.survey import survey
 
     found = survey(
         arguments.log,
@@ -378,7 +306,7 @@ def _refused(hint: Suggestion) -> str:
     from identification import fit
 
     parser = argparse.ArgumentParser()
-    configure(parser)
+    add(parser, ARGUMENTS)
     assert hint.command is not None  # noqa: S101  asked by the caller
     arguments = parser.parse_args(hint.command[2:])
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():

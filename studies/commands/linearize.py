@@ -10,11 +10,10 @@ from symheli.values.aligned import matrix
 
 HELP = "linear model about a trim: A, B with names, poles"
 
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Vehicle and flight condition."""
-    options.vehicle(parser)
-    options.condition(parser)
+ARGUMENTS = (
+    *options.HELICOPTER,
+    *options.CONDITION,
+)
 
 
 def run(arguments: argparse.Namespace) -> Output:

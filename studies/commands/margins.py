@@ -9,15 +9,16 @@ import math
 from typing import TYPE_CHECKING
 
 from studies.commands import given_model, options
-from studies.output import Output, progress
+from studies.commands.arguments import option, several
+from studies.output import Output, columns, progress
 from symheli.errors import InputError
 
 if TYPE_CHECKING:
     from synthesis import Margins
 
 HELP = "gain, phase, delay and disk margins and attitude bandwidths over airspeed"
-HOLD_COLUMNS = f"{'gain':>7s}{'phase':>7s}{'delay':>8s}{'disk':>6s}"
-HOLD_UNITS = f"{'x':>7s}{'deg':>7s}{'ms':>8s}{'':>6s}"
+MARGINS, UNITS = ("gain", "phase", "delay", "disk"), ("x", "deg", "ms", "")
+RESPONSE, RESPONSE_UNITS = ("roll BW", "lag", "pitch BW"), ("rad/s", "ms", "rad/s")
 LEGEND = """\
 gain, phase, delay: by how much the loop gain may grow, how much lag and how much more delay the
   loop bears, each alone, before it is unstable
@@ -28,25 +29,17 @@ roll BW, pitch BW: ADS-33 bandwidth, up to which the attitude follows the stick 
   and 6 dB of gain in reserve; lag: phase delay of the roll above it
 gap: nu-gap of the two lateral models, 0 to 1: a controller whose margin b is larger holds both"""
 
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Vehicle, range and number of airspeeds."""
-    options.vehicle(parser)
-    parser.add_argument(
+ARGUMENTS = (
+    *options.HELICOPTER,
+    several(
         "--airspeeds",
+        ("LOW", "HIGH"),
+        "range, m/s (default: 0 13; of --model its own)",
         type=options.number,
-        nargs=2,
-        metavar=("LOW", "HIGH"),
-        help="range, m/s (default: 0 13; of --model its own)",
-    )
-    parser.add_argument(
-        "--points",
-        type=options.at_least_one,
-        default=14,
-        metavar="N",
-        help="airspeeds (default: %(default)s)",
-    )
-    given_model.configure(parser, channels=False)
+    ),
+    option("--points", "N", "airspeeds", options.at_least_one, 14),
+    *given_model.WITHOUT_CHANNELS,
+)
 
 
 def run(arguments: argparse.Namespace) -> Output:
@@ -71,17 +64,16 @@ def _of_model(arguments: argparse.Namespace) -> Output:
     rows = list(over_parameter(lpv, gains, values))
     head = f"{arguments.model}, {given_model.words(gains)}: the loop broken at each input"
     names = list(rows[0].margins)
-    lines = [
-        head,
-        "",
-        f"{'':14s}" + "".join(f"  {u:>28s}" for u in names),
-        f"{f'{s.name}, {s.unit}':>14.14s}" + "".join(f"  {HOLD_COLUMNS}" for _ in names),
-        f"{'':14s}" + "".join(f"  {HOLD_UNITS}" for _ in names),
+    table = [
+        ["", *(cell for u in names for cell in (u, *[""] * (len(MARGINS) - 1)))],
+        [f"{s.name}, {s.unit}", *MARGINS * len(names)],
+        ["", *UNITS * len(names)],
+        *(
+            [f"{row.p:.4g}", *(cell for u in names for cell in _margins(row.margins[u]))]
+            for row in rows
+        ),
     ]
-    lines += [
-        f"{row.p:14.4g}" + "".join(f"  {_margins(row.margins[u])}" for u in names) for row in rows
-    ]
-    lines += ["", LEGEND]
+    lines = [head, "", columns(table, left=0), "", LEGEND]
     data = {
         "loop": head,
         "parameter": s.name,
@@ -129,13 +121,17 @@ def _of_vehicle(arguments: argparse.Namespace) -> Output:
         " delay; roll (held) and pitch (free) response to the stick; gap: nu-gap at 50 Hz of exact"
         " and interpolated lateral model (input / 0.01 rad, output / 0.1 SI)"
     )
-    lines = [head, "", f"{'':34s}exact{'':47s}interpolated"]
-    columns = f"{HOLD_COLUMNS}{'roll BW':>9s}{'lag':>7s}{'pitch BW':>10s}"
-    units = f"{HOLD_UNITS}{'rad/s':>9s}{'ms':>7s}{'rad/s':>10s}"
-    lines += [f"{'V, m/s':>7s}{columns}  {columns}{'gap':>7s}", f"{'':7s}{units}  {units}"]
-    for exact, near, gap in zip(tables["exact"], tables["interpolated"], gaps, strict=True):
-        lines.append(f"{exact.airspeed:7.2f}{_row(exact)}  {_row(near)}{gap:7.3f}")
-    lines += ["", LEGEND, VEHICLE_LEGEND]
+    width = len(MARGINS) + len(RESPONSE) - 1
+    table = [
+        ["", *(cell for name in tables for cell in (name, *[""] * width)), ""],
+        ["V, m/s", *(*MARGINS, *RESPONSE) * 2, "gap"],
+        ["", *(*UNITS, *RESPONSE_UNITS) * 2, ""],
+        *(
+            [f"{exact.airspeed:.2f}", *_row(exact), *_row(near), f"{gap:.3f}"]
+            for exact, near, gap in zip(*tables.values(), gaps, strict=True)
+        ),
+    ]
+    lines = [head, "", columns(table, left=0), "", LEGEND, VEHICLE_LEGEND]
     data = {
         "loop": head,
         "nu_gap": gaps,
@@ -152,21 +148,17 @@ def _gap(exact, near) -> float:
     return nu_gap(first, second, input_scale=0.01, output_scale=0.1)
 
 
-def _row(row) -> str:
-    roll, pitch = row.roll, row.pitch
-    return (
-        f"{_margins(row.hold)}{roll.rate_response:9.2f}{1000 * roll.phase_delay:7.0f}"
-        f"{pitch.rate_response:10.2f}"
-    )
+def _row(row) -> list[str]:
+    lag = f"{1000 * row.roll.phase_delay:.0f}"
+    response = f"{row.roll.rate_response:.2f}", lag, f"{row.pitch.rate_response:.2f}"
+    return [*_margins(row.hold), *response]
 
 
-def _margins(hold: Margins) -> str:
+def _margins(hold: Margins) -> list[str]:
     if not hold.stable:
-        return f"{'unstable':>28s}"
-    return (
-        f"{hold.gain[1]:7.2f}{math.degrees(hold.phase):7.1f}{1000 * hold.delay:8.0f}"
-        f"{hold.disk:6.2f}"
-    )
+        return ["unstable", *[""] * (len(MARGINS) - 1)]
+    phase, delay = math.degrees(hold.phase), 1000 * hold.delay
+    return [f"{hold.gain[1]:.2f}", f"{phase:.1f}", f"{delay:.0f}", f"{hold.disk:.2f}"]
 
 
 def _margin_entry(hold: Margins) -> dict[str, object]:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from studies.commands.arguments import Argument, option, several
 from studies.output import Output
 from symheli.airframe.printed_forms import PRINTED
 from symheli.errors import InputError
@@ -21,160 +22,6 @@ STANDARD_OUTPUT = "-"
 """Where choices are written to without a file."""
 
 PICTURES = (".png", ".svg", ".pdf")
-
-
-def vehicle(parser: argparse.ArgumentParser, governor: str = "ideal") -> None:
-    """--vehicle, --governor and --printed."""
-    parser.add_argument(
-        "--vehicle",
-        default="xcell60",
-        metavar="NAME",
-        help="packaged airframe or TOML file (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--governor",
-        choices=("ideal", "pi"),
-        default=governor,
-        help="ideal: rotor speed held exactly; pi: engine and governor (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--printed",
-        type=names,
-        default=(),
-        metavar="A,B",
-        help=(
-            "equations as the source prints them, where this project found the print wrong or"
-            f" ambiguous and departs from it: any of {', '.join(PRINTED)} (default: none;"
-            " docs/model.md has the reasons)"
-        ),
-    )
-
-
-def write_config(parser: Any, said: str) -> None:
-    """--write-config of a verb that takes a file of choices, or of a group of its options."""
-    parser.add_argument(
-        "--write-config", nargs="?", const=STANDARD_OUTPUT, metavar="FILE", help=said
-    )
-
-
-def choices_written(text: Callable[[Path], str], target: str) -> Output:
-    """The choices, whose `text` is that of a file in a folder, to a new file or to standard output.
-
-    Raises `InputError` for a file that is there.
-    """
-    if target == STANDARD_OUTPUT:
-        told = text(Path())
-        return Output(told.rstrip("\n"), {"configuration": told})
-    path = Path(target)
-    if path.exists():
-        raise InputError(f"{path} already exists; give another name, or remove it")
-    write_text(path, text(path.parent))
-    return Output(f"wrote {path}", {"written": path})
-
-
-def condition(parser: argparse.ArgumentParser) -> None:
-    """The steady flight to trim."""
-    parser.add_argument(
-        "--airspeed",
-        type=number,
-        default=0.0,
-        metavar="M/S",
-        help="true airspeed, m/s (default: hover)",
-    )
-    parser.add_argument(
-        "--climb-rate", type=number, default=0.0, metavar="M/S", help="m/s, up (default: level)"
-    )
-    parser.add_argument(
-        "--turn-rate",
-        type=number,
-        default=0.0,
-        metavar="RAD/S",
-        help="rad/s, to the right (default: none)",
-    )
-    parser.add_argument(
-        "--altitude",
-        type=number,
-        metavar="M",
-        help="in the standard atmosphere, m (default: sea-level density)",
-    )
-    parser.add_argument(
-        "--sideslip-deg",
-        type=number,
-        default=0.0,
-        metavar="DEG",
-        help="degrees, airspeed from the right; 180: rearward (default: 0)",
-    )
-
-
-def span(
-    parser: argparse.ArgumentParser, name: str, default: tuple[float, float], points: int, what: str
-) -> None:
-    """LOW HIGH N: a range of speeds in m/s with its number of points."""
-    parser.add_argument(
-        name,
-        type=number,
-        nargs=3,
-        action=_Span,
-        default=(*default, points),
-        metavar=("LOW", "HIGH", "N"),
-        help=f"{what}, m/s, and how many (default: {default[0]:g} {default[1]:g} {points})",
-    )
-
-
-class _Span(argparse.Action):
-    """Refuses a range that does not increase or has no points."""
-
-    def __call__(
-        self,
-        parser: argparse.ArgumentParser,
-        namespace: argparse.Namespace,
-        values: Any,
-        option_string: str | None = None,
-    ) -> None:
-        low, high, points = values
-        if points != int(points) or points < 1 or low > high or (points > 1 and low == high):
-            parser.error(
-                f"argument {option_string}: expected LOW < HIGH and a whole number of points, got"
-                f" {low:g} {high:g} {points:g}"
-            )
-        setattr(namespace, self.dest, (low, high, int(points)))
-
-
-def helicopter(arguments: argparse.Namespace) -> Helicopter:
-    """The helicopter of --vehicle, --governor and --printed."""
-    from symheli import Helicopter
-
-    return Helicopter.load(
-        arguments.vehicle, governor=arguments.governor, printed=arguments.printed
-    )
-
-
-def trimmed(arguments: argparse.Namespace) -> tuple[Helicopter, TrimPoint]:
-    """The helicopter and its trim at the flight condition of the options."""
-    from symheli import trim
-
-    speed, climb = arguments.airspeed, arguments.climb_rate
-    if speed < 0:
-        raise InputError(
-            f"--airspeed must be >= 0 m/s, got {speed:g}; rearward flight is --airspeed"
-            f" {-speed:g} --sideslip-deg 180"
-        )
-    if abs(climb) > speed:
-        raise InputError(
-            f"--climb-rate {climb:g} exceeds the --airspeed of {speed:g} m/s of the total velocity;"
-            f" straight {'up' if climb > 0 else 'down'} is --airspeed {abs(climb):g} --climb-rate"
-            f" {climb:g}"
-        )
-    heli = helicopter(arguments)
-    point = trim(
-        heli,
-        arguments.airspeed,
-        climb_rate=arguments.climb_rate,
-        turn_rate=arguments.turn_rate,
-        sideslip=math.radians(arguments.sideslip_deg),
-        altitude=arguments.altitude,
-    )
-    return heli, point
 
 
 def number(text: str) -> float:
@@ -252,35 +99,6 @@ def model_file(text: str) -> Path:
     return path
 
 
-def on_a_runner(parser: argparse.ArgumentParser) -> None:
-    """--workers, --scheduler and --out of a campaign."""
-    parser.add_argument(
-        "--workers",
-        type=at_least_one,
-        metavar="N",
-        help="number of processes on this machine, one thread each (default: one per core; 1: in"
-        " this process)",
-    )
-    parser.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="address of a dask.distributed scheduler to run on, such as tcp://10.0.0.5:8786",
-    )
-    parser.add_argument(
-        "--out",
-        type=Path,
-        metavar="DIR.zarr",
-        help="folder of the dataset of cases; cases already there are not computed again",
-    )
-    parser.set_defaults(
-        kept=lambda arguments: (
-            f"what was finished is in {arguments.out}: the same command goes on from there"
-            if arguments.out
-            else "what was finished is kept where --out or a file of a campaign says so"
-        )
-    )
-
-
 def unit(text: str) -> tuple[str, str]:
     """name=unit"""
     name, sign, value = text.partition("=")
@@ -305,6 +123,157 @@ def _float(text: str) -> float:
         return float(text)
     except ValueError as error:
         raise argparse.ArgumentTypeError(f"expected a number, got {text!r}") from error
+
+
+class _Span(argparse.Action):
+    """Refuses a range that does not increase or has no points."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: Any,
+        option_string: str | None = None,
+    ) -> None:
+        low, high, points = values
+        if points != int(points) or points < 1 or low > high or (points > 1 and low == high):
+            parser.error(
+                f"argument {option_string}: expected LOW < HIGH and a whole number of points, got"
+                f" {low:g} {high:g} {points:g}"
+            )
+        setattr(namespace, self.dest, (low, high, int(points)))
+
+
+VEHICLE = option("--vehicle", "NAME", "packaged airframe or TOML file", default="xcell60")
+
+HELICOPTER = (
+    VEHICLE,
+    option(
+        "--governor",
+        ("ideal", "pi"),
+        "ideal: rotor speed held exactly; pi: engine and governor",
+        default="ideal",
+    ),
+    option(
+        "--printed",
+        "A,B",
+        "equations as the source prints them, where this project found the print wrong or ambiguous"
+        f" and departs from it: any of {', '.join(PRINTED)} (default: none; docs/model.md has the"
+        " reasons)",
+        names,
+        (),
+    ),
+)
+
+CONDITION = (
+    option("--airspeed", "M/S", "true airspeed, m/s (default: hover)", number, 0.0),
+    option("--climb-rate", "M/S", "m/s, up (default: level)", number, 0.0),
+    option("--turn-rate", "RAD/S", "rad/s, to the right (default: none)", number, 0.0),
+    option("--altitude", "M", "in the standard atmosphere, m (default: sea-level density)", number),
+    option(
+        "--sideslip-deg",
+        "DEG",
+        "degrees, airspeed from the right; 180: rearward (default: 0)",
+        number,
+        0.0,
+    ),
+)
+"""The steady flight to trim."""
+
+ON_A_RUNNER = (
+    option(
+        "--workers",
+        "N",
+        "number of processes on this machine, one thread each (default: one per core; 1: in this"
+        " process)",
+        at_least_one,
+    ),
+    option(
+        "--scheduler",
+        "ADDRESS",
+        "address of a dask.distributed scheduler to run on, such as tcp://10.0.0.5:8786",
+    ),
+    option(
+        "--out",
+        "DIR.zarr",
+        "folder of the dataset of cases; cases already there are not computed again",
+        Path,
+    ),
+)
+"""Where a campaign runs, and where its cases are kept."""
+
+
+def write_config(what: str) -> Argument:
+    """--write-config of a command that takes a file of choices."""
+    help = f"write {what} with the defaults (default: to standard output); run nothing"
+    return option("--write-config", "FILE", help, nargs="?", const=STANDARD_OUTPUT)
+
+
+def span(name: str, default: tuple[float, float], points: int, what: str) -> Argument:
+    """LOW HIGH N: a range of speeds in m/s with its number of points."""
+    low, high = default
+    help = f"{what}, m/s, and how many (default: {low:g} {high:g} {points})"
+    metavar = ("LOW", "HIGH", "N")
+    return several(name, metavar, help, type=number, action=_Span, default=(low, high, points))
+
+
+def kept_on_a_runner(arguments: argparse.Namespace) -> str:
+    """What an interrupted campaign leaves."""
+    if arguments.out:
+        return f"what was finished is in {arguments.out}: the same command goes on from there"
+    return "what was finished is kept where --out or a file of a campaign says so"
+
+
+def choices_written(text: Callable[[Path], str], target: str) -> Output:
+    """The choices, whose `text` is that of a file in a folder, to a new file or to standard output.
+
+    Raises `InputError` for a file that is there.
+    """
+    if target == STANDARD_OUTPUT:
+        told = text(Path())
+        return Output(told.rstrip("\n"), {"configuration": told})
+    path = Path(target)
+    if path.exists():
+        raise InputError(f"{path} already exists; give another name, or remove it")
+    write_text(path, text(path.parent))
+    return Output(f"wrote {path}", {"written": path})
+
+
+def helicopter(arguments: argparse.Namespace) -> Helicopter:
+    """The helicopter of --vehicle, --governor and --printed."""
+    from symheli import Helicopter
+
+    return Helicopter.load(
+        arguments.vehicle, governor=arguments.governor, printed=arguments.printed
+    )
+
+
+def trimmed(arguments: argparse.Namespace) -> tuple[Helicopter, TrimPoint]:
+    """The helicopter and its trim at the flight condition of the options."""
+    from symheli import trim
+
+    speed, climb = arguments.airspeed, arguments.climb_rate
+    if speed < 0:
+        raise InputError(
+            f"--airspeed must be >= 0 m/s, got {speed:g}; rearward flight is --airspeed"
+            f" {-speed:g} --sideslip-deg 180"
+        )
+    if abs(climb) > speed:
+        raise InputError(
+            f"--climb-rate {climb:g} exceeds the --airspeed of {speed:g} m/s of the total velocity;"
+            f" straight {'up' if climb > 0 else 'down'} is --airspeed {abs(climb):g} --climb-rate"
+            f" {climb:g}"
+        )
+    heli = helicopter(arguments)
+    point = trim(
+        heli,
+        arguments.airspeed,
+        climb_rate=arguments.climb_rate,
+        turn_rate=arguments.turn_rate,
+        sideslip=math.radians(arguments.sideslip_deg),
+        altitude=arguments.altitude,
+    )
+    return heli, point
 
 
 def named(vector: Any) -> dict[str, dict[str, Any]]:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from studies.commands.options import count, on_a_runner
+from studies.commands.arguments import option
+from studies.commands.options import ON_A_RUNNER, VEHICLE, count, kept_on_a_runner
 from studies.output import Output
 
 HELP = (
@@ -12,23 +13,12 @@ HELP = (
     " inputs"
 )
 
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """How many flights, of which airframe."""
-    parser.add_argument(
-        "--vehicle",
-        default="xcell60",
-        metavar="NAME",
-        help="packaged airframe or TOML file (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--seeds",
-        type=count,
-        default=20,
-        metavar="N",
-        help="seeds beside the default one (default: %(default)s)",
-    )
-    on_a_runner(parser)
+ARGUMENTS = (
+    VEHICLE,
+    option("--seeds", "N", "seeds beside the default one", count, 20),
+    *ON_A_RUNNER,
+)
+kept = kept_on_a_runner
 
 
 def run(arguments: argparse.Namespace) -> Output:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from studies.commands import options
+from studies.commands.arguments import option, positional
 from studies.output import Output
 from symheli.errors import InputError
 
@@ -20,37 +21,26 @@ HELP = (
 OVERRIDE = ("vehicle", "model", "out")
 """Options that win over the file."""
 
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Configuration file, what wins over it."""
-    parser.add_argument(
+ARGUMENTS = (
+    positional(
         "file",
+        "TOML file with the choices; see --write-config (default: its defaults)",
         nargs="?",
         type=Path,
         metavar="FILE",
-        help="TOML file with the choices; see --write-config (default: its defaults)",
-    )
-    parser.add_argument(
-        "--vehicle", metavar="NAME", help="packaged airframe or TOML file (default: xcell60)"
-    )
-    parser.add_argument(
+    ),
+    option("--vehicle", "NAME", "packaged airframe or TOML file (default: xcell60)"),
+    option(
         "--model",
-        metavar="FILE",
-        help=(
-            "design for this model instead, written by symheli identify --save, or a family of"
-            " linear models; the controller is flown in the vehicle"
-        ),
-    )
-    parser.add_argument(
-        "--out",
-        type=Path,
-        metavar="DIR",
-        help="folder of table, certificate, numbers and page (default: controller)",
-    )
-    options.write_config(
-        parser,
-        "write the choices with their defaults (default: to standard output); run nothing",
-    )
+        "FILE",
+        "design for this model instead, written by symheli identify --save, or a family of linear"
+        " models; the controller is flown in the vehicle",
+    ),
+    option(
+        "--out", "DIR", "folder of table, certificate, numbers and page (default: controller)", Path
+    ),
+    options.write_config("the choices"),
+)
 
 
 def run(arguments: argparse.Namespace) -> Output:

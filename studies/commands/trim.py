@@ -9,11 +9,10 @@ from studies.output import Output
 
 HELP = "trim at an airspeed: attitude, flapping and controls"
 
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Vehicle and flight condition."""
-    options.vehicle(parser)
-    options.condition(parser)
+ARGUMENTS = (
+    *options.HELICOPTER,
+    *options.CONDITION,
+)
 
 
 def run(arguments: argparse.Namespace) -> Output:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 
+from studies.commands.arguments import flag, one_of, positional
 from studies.output import Output
 
 HELP = (
@@ -11,23 +12,16 @@ HELP = (
     " assumed; print a vehicle file to start from, or the reference of its entries"
 )
 
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Which airframe, and in which form."""
-    parser.add_argument(
-        "vehicle", nargs="?", help="packaged airframe or vehicle file to check and summarise"
-    )
-    form = parser.add_mutually_exclusive_group()
-    form.add_argument(
-        "--toml",
-        action="store_true",
-        help="print a whole vehicle file to start from (default: that of xcell60)",
-    )
-    form.add_argument(
-        "--reference",
-        action="store_true",
-        help="print every part and entry of a vehicle file: meaning, units, plausible range",
-    )
+ARGUMENTS = (
+    positional("vehicle", "packaged airframe or vehicle file to check and summarise", nargs="?"),
+    one_of(
+        flag("--toml", "print a whole vehicle file to start from (default: that of xcell60)"),
+        flag(
+            "--reference",
+            "print every part and entry of a vehicle file: meaning, units, plausible range",
+        ),
+    ),
+)
 
 
 def run(arguments: argparse.Namespace) -> Output:

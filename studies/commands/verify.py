@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
+from studies.commands.arguments import positional
 from studies.output import Output, progress
 
 if TYPE_CHECKING:
@@ -12,15 +13,14 @@ if TYPE_CHECKING:
 
 HELP = "prove saved certificates again, exactly, from their files alone"
 
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """The files."""
-    parser.add_argument(
+ARGUMENTS = (
+    positional(
         "files",
+        "written by Certificate.save, symheli certify --save or a study (DIR/proofs)",
         nargs="+",
         metavar="file",
-        help="written by Certificate.save, symheli certify --save or a study (DIR/proofs)",
-    )
+    ),
+)
 
 
 def run(arguments: argparse.Namespace) -> Output:

@@ -12,7 +12,6 @@ import synthesis
 from studies.controllers.asked import RATE
 from studies.controllers.designs import BASELINE, LFT, NAMES, Designs
 from studies.controllers.plant import closed
-from studies.transition.effort import Effort
 from studies.transition.guarantees import CONSTANT, PLAIN, Bound
 from studies.transition.proofs import Questions
 from symheli import LPVStateSpace
@@ -49,14 +48,16 @@ class CertifiedControllers:
         )
 
 
-def controller_questions(designs: Designs, effort: Effort) -> Questions:
+def controller_questions(
+    controllers: Designs, certified_controllers: bool, first_certificate: bool
+) -> Questions:
     """One proof a controller at the permitted acceleration, of the LFT at an airspeed that jumps;
-    with less effort of the LPV controller from the baseline alone, or none.
+    or of the LPV controller from the baseline alone, or none.
     """
-    names = NAMES if effort.certified_controllers else (BASELINE,) * effort.first_certificate
+    names = NAMES if certified_controllers else (BASELINE,) * first_certificate
     asked = [
-        partial(proofs, design.name, closed(designs.plant, design.controller))
-        for design in designs.designs
+        partial(proofs, design.name, closed(controllers.plant, design.controller))
+        for design in controllers.designs
         if design.name in names and design.controller is not None
     ]
     return Questions(asked, lambda bounds: CertifiedControllers(bounds=bounds))

@@ -16,8 +16,6 @@ from identification import FitForControl, KinematicModel, fit_for_control
 from studies.controllers.asked import (
     BACK_OFF,
     BACK_OFFS,
-    CONTROLS,
-    MEASUREMENTS,
     PERIOD,
     RATE,
     SIZES,
@@ -27,18 +25,22 @@ from studies.controllers.identified_plant import identified_model
 from studies.controllers.in_airspeed import of_degree
 from studies.controllers.plant import baseline, closed, design_plant, flown_plant
 from studies.known_kinematics import flights
-from studies.transition.effort import Effort
 from studies.transition.flights import autopilot_for
+from studies.transition.known_kinematics import KnownKinematics
 from studies.transition.proofs import Questions
-from symheli import FlightRecord, Helicopter, LinearModel, LPVStateSpace
-from symheli.errors import SymheliError, SynthesisError
+from symheli import FlightRecord, Helicopter, LPVStateSpace
+from symheli.errors import (
+    AccuracyError,
+    CertificateError,
+    SolverError,
+    SymheliError,
+)
 from symheli.flight import XCELL_SERVOS, gain_scheduled_lqr
-from symheli.lpv.bases import PiecewiseLinear
 from synthesis import Plant
 from synthesis.loops.controller import Controller
 from synthesis.loops.reduction import fewest
 from synthesis.lpv.output_feedback import lft_feedback, output_feedback
-from synthesis.lti.hinf import hinf
+from synthesis.lpv.point_schedule import hinf_schedule
 from synthesis.worst.frozen import norm
 
 LQR, HINF, LFT = "LQR schedule", "H-infinity schedule", "LFT"
@@ -73,10 +75,11 @@ class Design:
     """A controller under its name.
 
     `controller` is what flies: sampled, from measured deviations to commanded ones; None where
-    there is none, for `reason`. `promised`: the gain of the synthesis, on the plant of the design
-    (of point designs the largest; NaN without one); `frozen`: that of the loop which flies, largest
-    over `LOOKED_AT`, inf where one is unstable; `seconds` of the design; `remark`: what
-    the data say of the model that it was designed on, where they were asked.
+    there is none, for `reason` (`failed`: a solver broke off). `promised`: the gain of the
+    synthesis, on the plant of the design (of point designs the largest; NaN without one); `frozen`:
+    that of the loop which flies, largest over `LOOKED_AT`, inf where one is unstable; `seconds` of
+    the design; `remark`: what the data say of the model that it was designed on, where they were
+    asked.
     """
 
     name: str
@@ -85,6 +88,7 @@ class Design:
     frozen: float = math.inf
     seconds: float = 0.0
     reason: str = ""
+    failed: bool = False
     remark: str = ""
 
     @property
@@ -102,17 +106,22 @@ class Designs:
 
 
 def design_questions(
-    heli: Helicopter, identified: KinematicModel, seed: int, effort: Effort
+    heli: Helicopter,
+    known_kinematics: KnownKinematics,
+    seed: int,
+    certified_controllers: bool,
+    design_points: int,
 ) -> Questions:
     """Every design of `NAMES`, in that order; `seed` is that of the flight by which the identified
-    model is judged.
+    model is judged, where the controllers are certified.
     """
+    identified = known_kinematics.model
     base = baseline(heli)
     flown, record = flown_plant(base), None
-    if effort.certified_controllers:
+    if certified_controllers:
         record = symheli.fly(heli, flights.aggressive(seed, autopilot_for(heli)))
     last = partial(from_flights, from_data(identified), flown, identified, record)
-    ways = from_equations(heli, base, effort.design_points)
+    ways = from_equations(heli, base, design_points)
     asked = [partial(design, name, make, flown) for name, make in ways.items()]
     return Questions([*asked, last], lambda designs: Designs(designs=designs, plant=flown), [last])
 
@@ -124,7 +133,7 @@ def from_equations(
     plant = design_plant(base)
     return {
         LQR: partial(lqr_schedule, heli),
-        HINF: partial(hinf_schedule, plant, points),
+        HINF: partial(hinf_schedule, plant, np.linspace(0.0, TOP, points), BACK_OFF),
         LFT: partial(lft_feedback, plant, **SLOW),
         BASELINE: partial(output_feedback, plant, RATE, **SLOW),
     }
@@ -160,7 +169,9 @@ def design(name: str, make: Callable[[], Controller | LPVStateSpace], plant: Pla
         controller, frozen = simplest(made, plant)
     except SymheliError as error:
         seconds = time.perf_counter() - begin
-        return [Design(name=name, controller=None, seconds=seconds, reason=str(error))]
+        failed = isinstance(error, SolverError | AccuracyError | CertificateError)
+        reason = str(error)
+        return [Design(name=name, controller=None, seconds=seconds, reason=reason, failed=failed)]
     promised = made.promised if isinstance(made, Controller) else math.nan
     return [
         Design(
@@ -207,48 +218,6 @@ def lqr_schedule(heli: Helicopter) -> LPVStateSpace:
     """The gain-scheduled LQR of the study's flights, checked behind its servos."""
     autopilot = gain_scheduled_lqr(heli, 0.0, TOP, PERIOD, AIRSPEEDS, XCELL_SERVOS)
     return autopilot.scheduled_controller.model
-
-
-def hinf_schedule(plant: Plant, points: int = AIRSPEEDS) -> Controller:
-    """Point designs, their entries straight between the airspeeds: their states estimate those of
-    the plant in its own coordinates.
-
-    Raises `SynthesisError` where a point has no design.
-    """
-    speeds = np.linspace(0.0, TOP, points)
-    found = []
-    for speed in speeds:
-        at = plant.nominal.at(float(speed))
-        one = hinf(
-            at,
-            CONTROLS,
-            MEASUREMENTS,
-            disturbances=plant.disturbances,
-            performance=plant.performance,
-            back_off=BACK_OFF,
-        )
-        if one.controller is None:
-            raise SynthesisError(f"no H-infinity design at {speed:g} m/s: {'; '.join(one.reasons)}")
-        found.append(one)
-    each: list[LinearModel] = [one.controller for one in found if one.controller is not None]
-    A, B, C, D = (np.stack([getattr(one, part) for one in each]) for part in "ABCD")
-    model = LPVStateSpace(
-        PiecewiseLinear(tuple(speeds.tolist())),
-        A,
-        B,
-        C,
-        D,
-        plant.parameters,
-        each[0].states,
-        each[0].inputs,
-        each[0].outputs,
-    )
-    return Controller(
-        model=model,
-        plant=plant,
-        promised=max(one.hinf_norm for one in found),
-        method=f"H-infinity at {points} airspeeds",
-    )
 
 
 def simplest(made: Controller | LPVStateSpace, plant: Plant) -> tuple[LPVStateSpace, float]:

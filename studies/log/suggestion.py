@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from studies.log.survey import OWN_CLOCKS, Survey
 from symheli.logs.meaning import CONTROLS, Guess
+from symheli.logs.survey import OWN_CLOCKS, Survey
 
 AXES = (
     ("lon", ("q", "theta")),

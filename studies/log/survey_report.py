@@ -7,8 +7,8 @@ from dataclasses import asdict
 from typing import Any
 
 from studies.log.suggestion import Suggestion
-from studies.log.survey import OWN_CLOCKS, Survey
 from studies.output import columns
+from symheli.logs.survey import OWN_CLOCKS, Survey
 from symheli.values.units import to_si
 
 MOST = 12

@@ -13,6 +13,7 @@ from studies.campaigns.campaign import Campaign
 from studies.campaigns.run import columns_of
 from studies.campaigns.runners import Runner
 from studies.campaigns.trials import marks
+from studies.output import columns
 from studies.transition.accelerating_baseline import ALONE, BOTH, MARKS, SCATTER
 from studies.transition.axes import AXES, FROZEN_SPEEDS
 from studies.transition.flights import NOISES
@@ -59,13 +60,13 @@ class Row:
         return short <= self.scatter and sign * (self.mark - self.median) <= 0
 
     @property
-    def said(self) -> str:
-        """The mark as the table shows it."""
+    def said(self) -> tuple[str, str]:
+        """The mark as the table shows it, and whether it is missed."""
         if self.mark is None:
-            return ""
-        sign = "<=" if self.largest else ">="
+            return "", ""
         easier = "" if self.scatter is None else f", each within {self.scatter:g}"
-        return f"{sign:>4s}{self.mark:5.0f}{easier}{'' if self.passed else '   MISSED'}"
+        sign = "<=" if self.largest else ">="
+        return f"{sign} {self.mark:.0f}{easier}", "" if self.passed else "MISSED"
 
 
 @dataclass(frozen=True)
@@ -82,14 +83,12 @@ class MarksOverSeeds:
 
     def summary(self) -> str:
         """A table: default seed, median, worst, mark."""
-        lines = [
-            f"{'':58s}{'default':>9s}{'median':>9s}{'worst':>9s}{'mark':>9s}   over {self.seeds}"
-            " seeds and the default one, percent"
-        ]
+        head = f"percent, over {self.seeds} seeds and the default one"
+        rows = [["", "default", "median", "worst", "mark", ""]]
         for r in self.rows:
-            line = f"{r.name:58s}{r.values[0]:9.2f}{r.median:9.2f}{r.worst:9.2f}{r.said}"
-            lines.append(line)
-        return "\n".join(lines)
+            numbers = r.values[0], r.median, r.worst
+            rows.append([r.name, *(f"{number:.2f}" for number in numbers), *r.said])
+        return f"{head}\n{columns(rows)}"
 
     def to_dict(self) -> dict[str, Any]:
         """Every value with its unit."""

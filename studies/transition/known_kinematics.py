@@ -21,7 +21,6 @@ from studies.transition import accelerating_baseline
 from studies.transition.axes import ALL, LATERAL, LONGITUDINAL, update_time
 from studies.transition.baseline import Baseline
 from studies.transition.comparison import along_the_command
-from studies.transition.effort import Effort
 from studies.transition.flights import autopilot_for
 from symheli import FlightRecord, Helicopter
 from symheli.values.arrays import Array
@@ -79,12 +78,19 @@ class KnownKinematics:
 
 
 def identify_with_known_kinematics(
-    heli: Helicopter, vehicle: str, baseline: Baseline, seed: int, effort: Effort
+    heli: Helicopter,
+    vehicle: str,
+    baseline: Baseline,
+    seed: int,
+    aggressive: float,
+    gentle_flight: bool,
 ) -> KnownKinematics:
-    """Fly, identify, judge."""
+    """Fly, identify, judge: from an aggressive flight of at most so many seconds, and a gentle one
+    where it is asked for.
+    """
     autopilot = autopilot_for(heli)
-    training = [symheli.fly(heli, flights.aggressive(seed, autopilot, longest=effort.aggressive))]
-    if effort.gentle_flight:
+    training = [symheli.fly(heli, flights.aggressive(seed, autopilot, longest=aggressive))]
+    if gentle_flight:
         training.append(symheli.fly(heli, flights.gentle(seed, autopilot)))
     test = symheli.fly(heli, flights.transition(seed, autopilot))
     chosen = models.PAIRS.get(vehicle, "xcell60")

@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 from studies.known_kinematics.robust_loop import FORM, robust_loop
 from studies.loops.exact_lateral import ExactLateral
 from studies.loops.longitudinal import longitudinal_loop
 from studies.loops.robust_lateral import FEEDBACK
-from studies.processes import Processes
 from studies.transition import guarantees
 from studies.transition.axes import LATERAL
 from studies.transition.baseline import Baseline
-from studies.transition.effort import GLANCE, Effort
+from studies.transition.effort import GLANCE
 from studies.transition.flights import NOISES, TOP
 from studies.transition.guarantees import PERIOD, Bound, Proof
 from studies.transition.identified import Identification
 from studies.transition.known_kinematics import KnownKinematics
 from symheli import Helicopter
-from synthesis import Spline, frozen_gain
+from synthesis import Search, Spline, frozen_gain
 from synthesis.worst.frozen import FrozenGain
 
 
@@ -60,9 +56,6 @@ class RobustProofs:
     bounds: tuple[Bound, ...]
 
 
-Answer = tuple[float, list[Any]]
-"""What was found, after the seconds it took."""
-
 Question = Callable[[], list[Any]]
 """What a process can answer: a `functools.partial`; of a proof the answers are bounds."""
 
@@ -77,77 +70,67 @@ class Questions:
     together: Callable[[tuple[Any, ...]], Any]
     long: Sequence[Question] = ()
 
-    def asked(
-        self,
-        processes: Processes,
-        known: Mapping[int, Answer],
-        found: Callable[[int, Answer], object],
-    ) -> list[Future[Answer]]:
-        """An answer to come for each proof, at once for those that are `known` by position;
-        `found` is called with every new one.
-        """
-        order = [self.proofs.index(proof) for proof in self.long]
-        order += [i for i in range(len(self.proofs)) if i not in order]
-        open_ones = [i for i in order if i not in known]
-        answers = processes.submit([partial(_timed, self.proofs[i]) for i in open_ones])
-        for i, answer in zip(open_ones, answers, strict=True):
-            answer.add_done_callback(partial(_told, found, i))
-        new = dict(zip(open_ones, answers, strict=True))
-        return [new[i] if i in new else _known(known[i]) for i in range(len(self.proofs))]
+    @property
+    def order(self) -> list[int]:
+        """Positions of the proofs, those of `long` first."""
+        first = [self.proofs.index(proof) for proof in self.long]
+        return [*first, *(i for i in range(len(self.proofs)) if i not in first)]
 
 
-def _told(found: Callable[[int, Answer], object], i: int, answer: Future[Answer]) -> None:
-    if not answer.cancelled() and answer.exception() is None:
-        found(i, answer.result())
-
-
-def _known(answer: Answer) -> Future[Answer]:
-    future: Future[Answer] = Future()
-    future.set_result(answer)
-    return future
-
-
-def gust_questions(heli: Helicopter, baseline: Baseline, effort: Effort) -> Questions:
-    """About the baseline, and with effort the exact models; continuous time."""
-    loop, form = guarantees.gust_loop(baseline.nodes), Spline(segments=effort.gust_segments)
-    baseline_proofs = guarantees.bounds(
-        "baseline", "gust", loop, effort.gust_rates, form, effort.search
-    )
+def gust_questions(
+    heli: Helicopter,
+    baseline: Baseline,
+    gust_rates: Sequence[float],
+    gust_segments: tuple[int, ...],
+    exact_rates: Sequence[float],
+    thorough: bool,
+    search: Search,
+) -> Questions:
+    """About the baseline, with `thorough` the exact models too; continuous time."""
+    loop, form = guarantees.gust_loop(baseline.nodes), Spline(segments=gust_segments)
+    baseline_proofs = guarantees.bounds("baseline", "gust", loop, gust_rates, form, search)
     asked = [*baseline_proofs, *guarantees.lft_bounds("baseline", "gust", loop)]
     long: list[Proof] = []
-    if effort.thorough:
-        long = guarantees.memory_bounds("baseline", "gust", loop, effort.gust_rates, effort.search)
+    if thorough:
+        long = guarantees.memory_bounds("baseline", "gust", loop, gust_rates, search)
         asked += long
         exact = ExactLateral.of(heli).loop("gust")
-        asked += guarantees.bounds("exact", "gust", exact, effort.exact_rates, form, effort.search)
+        asked += guarantees.bounds("exact", "gust", exact, exact_rates, form, search)
     exact_frozen = guarantees.exact_frozen_gain(baseline.nodes, sampled=False)
     return Questions(
         asked, lambda bounds: GustProofs(bounds=bounds, exact_frozen=exact_frozen), long[::-1]
     )
 
 
-def longitudinal_questions(heli: Helicopter, effort: Effort) -> Questions:
+def longitudinal_questions(
+    heli: Helicopter, longitudinal_rates: Sequence[float], gust_segments: tuple[int, ...]
+) -> Questions:
     """About the baseline, continuous time."""
     loop, channel = longitudinal_loop(heli), "longitudinal"
-    form = Spline(segments=effort.gust_segments)
-    asked = guarantees.bounds("baseline", channel, loop, effort.longitudinal_rates, form, GLANCE)
+    form = Spline(segments=gust_segments)
+    asked = guarantees.bounds("baseline", channel, loop, longitudinal_rates, form, GLANCE)
     asked += guarantees.lft_bounds("baseline", channel, loop)
     return Questions(asked, lambda bounds: LongitudinalProofs(bounds=bounds))
 
 
 def servo_questions(
-    heli: Helicopter, baseline: Baseline, identification: Identification, effort: Effort
+    heli: Helicopter,
+    baseline: Baseline,
+    identification: Identification,
+    servo_rates: Sequence[float],
+    servo_segments: tuple[int, ...],
+    thorough: bool,
 ) -> Questions:
-    """About the baseline and the identified models, with effort the exact ones; 50 Hz."""
+    """About the baseline and the identified models, with `thorough` the exact ones too; 50 Hz."""
     aggressive = identification.of(LATERAL, NOISES[0]).model
     loops = guarantees.servo_loops(
-        heli if effort.thorough else None, baseline.nodes, identification.gentle, aggressive
+        heli if thorough else None, baseline.nodes, identification.gentle, aggressive
     )
     asked: list[Proof] = []
-    form = Spline(segments=effort.servo_segments)
+    form = Spline(segments=servo_segments)
     for name, loop in loops.items():
-        asked += guarantees.bounds(name, "servo", loop, effort.servo_rates, form, GLANCE)
-        if effort.thorough and guarantees.has_lft(loop):
+        asked += guarantees.bounds(name, "servo", loop, servo_rates, form, GLANCE)
+        if thorough and guarantees.has_lft(loop):
             asked += guarantees.lft_bounds(name, "servo", loop)
     exact_frozen = guarantees.exact_frozen_gain(baseline.nodes, sampled=True)
     peaks = {name: frozen_gain(loop) for name, loop in loops.items()}
@@ -158,33 +141,33 @@ def servo_questions(
 
 
 def robust_questions(
-    heli: Helicopter, baseline: Baseline, known: KnownKinematics, effort: Effort
+    heli: Helicopter,
+    baseline: Baseline,
+    known_kinematics: KnownKinematics,
+    robust_rates: Sequence[float],
+    robust_form: Spline,
+    every_model: bool,
+    thorough: bool,
 ) -> Questions:
-    """About the estimate, the baseline, with effort the exact models and every model that the
-    flights allow; 50 Hz.
+    """About the estimate and the baseline, with `thorough` the exact models and with `every_model`
+    all models that the flights allow; 50 Hz.
     """
-    channel, rates = "robust", effort.robust_rates
-    allowed = robust_loop(known.model)
+    channel, rates = "robust", robust_rates
+    allowed = robust_loop(known_kinematics.model)
     loops = {
         "baseline": guarantees.servo_loop(guarantees.sampled_baseline(baseline.nodes), FEEDBACK),
         guarantees.ESTIMATE: allowed.nominal,
     }
     long: list[Proof] = []
-    if effort.every_model:
+    if every_model:
         long = guarantees.allowed_bounds(channel, allowed, rates, FORM)
-    if effort.thorough:
+    if thorough:
         exact = ExactLateral.of(heli, 0.0, TOP).loop("inputs", PERIOD, FEEDBACK)
         loops = {"exact": guarantees.scaled(exact)} | loops
     asked: list[Proof] = []
     for name, loop in loops.items():
-        asked += guarantees.bounds(name, channel, loop, rates, effort.robust_form, GLANCE)
-    if effort.thorough:
+        asked += guarantees.bounds(name, channel, loop, rates, robust_form, GLANCE)
+    if thorough:
         asked += guarantees.lft_bounds("baseline", channel, loops["baseline"])
     asked += long
     return Questions(asked, lambda bounds: RobustProofs(bounds=bounds), long)
-
-
-def _timed(proof: Proof) -> Answer:
-    begin = time.perf_counter()
-    found = proof()
-    return time.perf_counter() - begin, found

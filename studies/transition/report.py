@@ -13,7 +13,13 @@ from studies.report.equations import EQUATIONS
 from studies.report.labels import Labels
 from studies.report.pages import FOLDER, environment
 from studies.report.references import REFERENCES
-from studies.report.shortfalls import shortfalls
+from studies.report.shortfalls import (
+    FAILED,
+    NEGATIVE,
+    failures,
+    negative_results,
+    without_certificate,
+)
 from studies.transition import gain_tables, tables
 from studies.transition.axes import AXES
 from studies.transition.conclusions import (
@@ -150,7 +156,10 @@ def _headline(study: Outcome) -> dict[str, object]:
         "vehicle": of_the_vehicle(study),
         "abstract": abstract(study),
         "conclusions": conclusions(study),
-        "shortfalls": shortfalls(study),
+        "unproven": without_certificate(study),
+        "negative": negative_results(study),
+        "failures": failures(study),
+        "meanings": {"negative": NEGATIVE, "failed": FAILED},
         "curves": curves(study.bounds),
         "gain_tables": gain_tables.every(study.bounds),
         "certificates": certificates(study),

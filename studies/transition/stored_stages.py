@@ -40,7 +40,7 @@ class NotUsable(SymheliError):
 
 @dataclass(frozen=True, kw_only=True)
 class Stored:
-    """The result of a stage, and the seconds it took to compute."""
+    """What was computed, and the seconds it took."""
 
     result: Any
     seconds: float
@@ -48,106 +48,62 @@ class Stored:
 
 @dataclass(frozen=True)
 class StoredStages:
-    """The stages in `folder` that were computed from what the key of each stands for."""
+    """The stages in `folder` that were computed from what the key of each stands for.
+
+    A stage of questions that is not finished has its answers there, each a `part` by its number.
+    """
 
     folder: Path
     keys: Mapping[str, str]
 
-    def path(self, name: str) -> Path:
-        """Where the stage is stored."""
-        return self.folder / f"{name}.stage"
+    def path(self, name: str, part: int | None = None) -> Path:
+        """Where the stage, or an answer to one of its questions, is stored."""
+        return self.folder / (f"{name}.stage" if part is None else f"{name}-{part}.stage")
 
-    def save(self, name: str, stored: Stored) -> Path:
-        """Store a stage, in place of an older one; see `whole_files.write_bytes`."""
-        return _write(self.path(name), self.keys[name], stored)
-
-    def load(self, name: str, kind: type) -> Stored | None:
-        """A stored stage whose result is a `kind`; None where none is stored.
-
-        Raises `NotUsable` for one that another version, vehicle, effort or seed has left, and for
-        one that is damaged.
+    def save(self, name: str, stored: Stored, part: int | None = None) -> Path:
+        """Store it, in place of an older one; see `whole_files.write_bytes`. The answers to the
+        questions of a stage go when it is stored.
         """
-        return _read(self.path(name), self.keys[name], kind)
+        content = stage_file.written(stored)
+        head = f"{FORMAT} {self.keys[name]} {hashlib.sha256(content).hexdigest()}\n"
+        path = write_bytes(self.path(name, part), head.encode() + content)
+        for answer in self.folder.glob(f"{name}-*.stage") if part is None else ():
+            answer.unlink(missing_ok=True)
+        return path
 
-    def state(self, name: str, kind: type) -> str:
-        """In a few words: whether the stage is there and can be taken, or how far it is."""
+    def load(self, name: str, part: int | None = None) -> Stored | None:
+        """What is stored; None where nothing is.
+
+        Raises `NotUsable` for what another version, vehicle, effort or seed has left, and for what
+        is damaged.
+        """
+        path = self.path(name, part)
+        if not path.is_file():
+            return None
+        head, _, content = path.read_bytes().partition(b"\n")
+        words = head.decode("utf-8", "replace").rsplit(" ", 2)
+        if len(words) != 3 or words[0] != FORMAT:
+            raise NotUsable(f"{path} is damaged: it is no stored stage")
+        if words[1] != self.keys[name]:
+            raise NotUsable(f"{path} is of another version, vehicle, effort or seed")
+        if words[2] != hashlib.sha256(content).hexdigest():
+            raise NotUsable(f"{path} is damaged: its content is not what was written")
         try:
-            if self.load(name, kind) is not None:
-                return "stored"
-        except NotUsable as reason:
-            return "damaged" if "damaged" in str(reason) else "of another run"
-        answers = len(list(self.folder.glob(f"{name}-*.stage")))
-        return f"{answers} answers stored" if answers else "absent"
+            stored = stage_file.read(content)
+        except stage_file.UnreadableError as error:
+            raise NotUsable(f"{path} is damaged: {error}") from error
+        if not isinstance(stored, Stored):
+            raise NotUsable(f"{path} is damaged: it holds no stage")
+        return stored
 
-    def answers(self, stage: str) -> StoredAnswers:
-        """Where the answers to the questions of a stage are stored until it is finished."""
-        return StoredAnswers(self.folder, stage, self.keys[stage])
-
-
-@dataclass(frozen=True)
-class StoredAnswers:
-    """Answers to the questions of a stage that is not finished, each stored as it is found."""
-
-    folder: Path
-    stage: str
-    key: str
-
-    def save(self, i: int, answer: tuple[float, Any]) -> Path:
-        """Store the answer to question i, found in so many seconds."""
-        seconds, found = answer
-        return _write(self._path(i), self.key, Stored(result=found, seconds=seconds))
-
-    def load(self, count: int) -> dict[int, tuple[float, Any]]:
-        """Those that are there and whole, of `count`."""
+    def parts(self, name: str, count: int) -> dict[int, Stored]:
+        """The answers that are there and whole, of `count`, by number."""
         known = {}
         for i in range(count):
             with contextlib.suppress(NotUsable):
-                if (answer := _read(self._path(i), self.key, list)) is not None:
-                    known[i] = (answer.seconds, answer.result)
+                if (answer := self.load(name, i)) is not None:
+                    known[i] = answer
         return known
-
-    def clear(self) -> None:
-        """Remove them: the stage is stored."""
-        for path in self.folder.glob(f"{self.stage}-*.stage"):
-            path.unlink(missing_ok=True)
-
-    def _path(self, i: int) -> Path:
-        return self.folder / f"{self.stage}-{i}.stage"
-
-
-def _write(path: Path, key: str, stored: Stored) -> Path:
-    content = stage_file.written(stored)
-    head = f"{FORMAT} {key} {hashlib.sha256(content).hexdigest()}\n"
-    return write_bytes(path, head.encode() + content)
-
-
-def _read(path: Path, key: str, kind: type) -> Stored | None:
-    if not path.is_file():
-        return None
-    head, _, content = path.read_bytes().partition(b"\n")
-    words = head.decode("utf-8", "replace").rsplit(" ", 2)
-    if len(words) != 3 or words[0] != FORMAT:
-        raise NotUsable(f"{path} is damaged: it is no stored stage")
-    if words[1] != key:
-        raise NotUsable(f"{path} is of another version, vehicle, effort or seed")
-    if words[2] != hashlib.sha256(content).hexdigest():
-        raise NotUsable(f"{path} is damaged: its content is not what was written")
-    try:
-        stored = stage_file.read(content)
-    except stage_file.UnreadableError as error:
-        raise NotUsable(f"{path} is damaged: {error}") from error
-    if not (isinstance(stored, Stored) and isinstance(stored.result, kind)):
-        raise NotUsable(f"{path} is damaged: it holds another stage")
-    return stored
-
-
-def stored_stages(
-    configuration: Configuration, stages: Iterable[Stage], heli: Helicopter | None = None
-) -> StoredStages:
-    """Those in the folder of a run that were computed from what it asks for."""
-    content = content_key(heli or loaded(configuration), configuration.vehicle, configuration.seed)
-    keys = stage_keys(stages, content, configuration.effort)
-    return StoredStages(configuration.out / STAGES, keys)
 
 
 def loaded(configuration: Configuration) -> Helicopter:

@@ -6,36 +6,33 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import Future
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, Future
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 from studies.processes import Processes
 from studies.transition.configuration import KEPT, Configuration
 from studies.transition.effort import Effort
 from studies.transition.outcome import Outcome
-from studies.transition.proofs import Answer, Questions
+from studies.transition.proofs import Questions
 from studies.transition.report import write_report, write_results
 from studies.transition.results import to_dict
-from studies.transition.selection import Selection
 from studies.transition.stages import Stage, stages
 from studies.transition.stored_stages import (
+    STAGES,
     NotUsable,
     Stored,
-    StoredAnswers,
     StoredStages,
+    content_key,
     loaded,
-    stored_stages,
+    stage_keys,
 )
 from studies.transition.summary import summary
 from symheli.progress import Task, task, tracked
 
-LONG = 2.5
-"""So many others count as one of those questions that take longest: they go on beside the others,
-so that less is in front of us than their time.
-"""
 REPORT = 10.0
 """Of figures and report, which keep one core busy, s."""
 
@@ -52,69 +49,18 @@ class Study(Outcome):
         return to_dict(self)
 
 
-@dataclass(frozen=True)
-class Asked:
-    """A stage whose questions are being answered."""
-
-    questions: Questions
-    answers: Sequence[Future[Answer]]
-
-    @classmethod
-    def of(
-        cls,
-        questions: Questions,
-        processes: Processes,
-        kept: StoredAnswers | None = None,
-        resume: bool = False,
-    ) -> Asked:
-        """Hand the questions over; answers are `kept`, and with `resume` taken from there."""
-        known = kept.load(len(questions.proofs)) if kept is not None and resume else {}
-        found = (lambda i, answer: None) if kept is None else kept.save
-        return cls(questions, questions.asked(processes, known, found))
-
-    @property
-    def share(self) -> float:
-        """Of the work, as far as the questions are answered."""
-        whole = done = 0
-        for proof, answer in zip(self.questions.proofs, self.answers, strict=True):
-            work = LONG if any(proof is long for long in self.questions.long) else 1
-            whole += work
-            done += work * answer.done()
-        return done / whole if whole else 1.0
-
-    def stored(self, told: Callable[[], object] = lambda: None) -> Stored:
-        """Wait for the answers; `seconds` is the work they were. Each is `told`."""
-        found = []
-        for answer in tracked("answers", self.answers):
-            found.append(answer.result())
-            told()
-        bounds = tuple(bound for _, own in found for bound in own)
-        return Stored(
-            result=self.questions.together(bounds), seconds=sum(seconds for seconds, _ in found)
-        )
-
-
-def run_study(
-    configuration: Configuration,
-    *,
-    resume: bool = False,
-    only: Iterable[str] = (),
-    since: str = "",
-) -> Study:
+def run_study(configuration: Configuration, *, resume: bool = False) -> Study:
     """Run every stage, store it and write results.json after each, and report.html with its figures
     into the folder at the end, beside study.toml with what was asked for.
 
-    Proofs that do not need each other run side by side, in a process a core, while the other stages
-    are computed here. `resume` takes the stages that an earlier run has stored in the folder, where
-    code, libraries, vehicle, seed and what they read of the effort are the same; others, and those
-    that are damaged, are computed again. Stages may run alone (`only`), or `since` one of them:
-    what they need is taken as it is stored, and computed where it is not. An interrupted run leaves
-    its finished stages, the proofs that are found and their results; files are whole or absent.
+    Proofs and designs run side by side, in a process a core, while the other stages are computed
+    here. `resume` takes the stages that an earlier run has stored in the folder, where code,
+    libraries, vehicle, seed and what they read of the effort are the same; others, and those that
+    are damaged, are computed again. An interrupted run leaves its finished stages, the proofs that
+    are found and their results; files are whole or absent.
     """
     out, effort = configuration.out, configuration.effort
-    every = stages(effort)
-    selection = Selection.of(every, only, since)
-    heli = loaded(configuration)
+    heli, every = loaded(configuration), stages(effort)
     study = Study(
         vehicle=configuration.vehicle,
         quick=configuration.quick,
@@ -122,86 +68,112 @@ def run_study(
         effort=effort,
         heli=heli,
     )
-    stored = stored_stages(configuration, every, heli)
+    content = content_key(heli, study.vehicle, study.seed)
+    stored = StoredStages(out / STAGES, stage_keys(every, content, effort))
     configuration.write(out / KEPT)
-    for stage in every:
-        if resume or stage.name not in selection.again:
-            found = _taken(stored, stage)
-            study = study if found is None else with_stage(study, stage, found)
-    run = _Run(stored, resume, selection.open(every, study.seconds))
-    with task("study", run.cost, percent=True) as whole:
-        study = run.finish(study, whole)
-        study = replace(study, complete={stage.name for stage in every} <= study.seconds.keys())
+    for stage in every if resume else ():
+        if (found := _taken(stored, stage)) is not None:
+            study = with_stage(study, stage, found)
+    todo = [stage for stage in every if stage.name not in study.seconds]
+    whole = REPORT + sum(stage.cost[study.quick] for stage in todo)
+    with task("study", whole, percent=True) as progress:
+        with Processes() as processes:
+            study = _Run(study, stored, resume, processes, progress).finish(todo)
         with _shown("Writing figures and report"):
             write_report(study, out)
-        whole.to(run.cost)
+        progress.to(whole)
     return study
 
 
-@dataclass(frozen=True)
+@dataclass
 class _Run:
-    """Stages to compute, and where they are stored."""
+    """A study under way: what was found, and the questions that are being answered."""
 
+    study: Study
     stored: StoredStages
     resume: bool
-    todo: Sequence[Stage]
+    processes: Executor
+    progress: Task
+    done: float = 0.0
+    asked: dict[str, tuple[Stage, Questions, list[Future[Stored]]]] = field(default_factory=dict)
 
-    @property
-    def cost(self) -> float:
-        """Of all, the report too, s."""
-        return REPORT + sum(stage.cost for stage in self.todo)
-
-    def finish(self, study: Study, whole: Task) -> Study:
-        """All of them, each as soon as what it needs is there; questions wait for other stages to
-        be computed.
+    def finish(self, todo: Sequence[Stage]) -> Study:
+        """Every stage in order; questions are answered meanwhile, and awaited where another stage
+        needs them, or at the end.
         """
-        todo, asked = list(self.todo), dict[str, Asked]()
+        for stage in todo:
+            for name in stage.needs:
+                self._await(name)
+            with task(stage.title):
+                begin = time.perf_counter()
+                result = stage.found(self.study, self.study.effort)
+                seconds = time.perf_counter() - begin
+            if isinstance(result, Questions):
+                self.asked[stage.name] = stage, result, self._submitted(stage, result)
+            else:
+                self._keep(stage, Stored(result=result, seconds=seconds))
+        for name in list(self.asked):
+            self._await(name)
+        return replace(self.study, complete=True)
 
-        def tell() -> None:
-            whole.to(self._done(todo, asked))
+    def _submitted(self, stage: Stage, questions: Questions) -> list[Future[Stored]]:
+        """An answer to come for each question, at once for those that are stored; every new one is
+        stored when it is there.
+        """
+        count = len(questions.proofs)
+        known = self.stored.parts(stage.name, count) if self.resume else {}
+        answers: dict[int, Future[Stored]] = {}
+        for i in questions.order:
+            if i in known:
+                answers[i] = Future()
+                answers[i].set_result(known[i])
+            else:
+                answers[i] = self.processes.submit(timed, questions.proofs[i])
+                answers[i].add_done_callback(partial(self._store, stage.name, i))
+        return [answers[i] for i in range(count)]
 
-        with Processes() as processes:
-            while todo:
-                ready = [stage for stage in todo if set(stage.needs) <= study.seconds.keys()]
-                for stage in ready:
-                    if stage.asks and stage.name not in asked:
-                        questions = stage.found(study, study.effort)
-                        kept = self.stored.answers(stage.name)
-                        asked[stage.name] = Asked.of(questions, processes, kept, self.resume)
-                stage = next((stage for stage in ready if not stage.asks), ready[0])
-                with task(stage.title):
-                    found = (
-                        asked[stage.name].stored(tell)
-                        if stage.asks
-                        else computed(stage, study, study.effort)
-                    )
-                work = " of work" if stage.asks else ""
-                _say(f"{stage.title}: {found.seconds:.1f} s{work}")
-                self.stored.save(stage.name, found)
-                self.stored.answers(stage.name).clear()
-                study = with_stage(study, stage, found)
-                write_results(study, self.stored.folder.parent)
-                todo.remove(stage)
-                tell()
-        return study
+    def _store(self, name: str, i: int, answer: Future[Stored]) -> None:
+        if not answer.cancelled() and answer.exception() is None:
+            self.stored.save(name, answer.result(), i)
 
-    def _done(self, todo: Sequence[Stage], asked: dict[str, Asked]) -> float:
-        """Of the cost of all, what is not in front of us."""
-        left = (
-            stage.cost * (1 - (asked[stage.name].share if stage.name in asked else 0.0))
-            for stage in todo
-        )
-        return max(0.0, self.cost - REPORT - sum(left))
+    def _await(self, name: str) -> None:
+        """Wait for the answers to the questions of a stage, if there are any."""
+        if name not in self.asked:
+            return
+        stage, questions, answers = self.asked.pop(name)
+        cost, found = stage.cost[self.study.quick], []
+        with task(stage.title):
+            for k, answer in enumerate(tracked("answers", answers)):
+                found.append(answer.result())
+                self.progress.to(self.done + cost * (k + 1) / len(answers))
+        result = questions.together(tuple(bound for one in found for bound in one.result))
+        self._keep(stage, Stored(result=result, seconds=sum(one.seconds for one in found)))
+
+    def _keep(self, stage: Stage, found: Stored) -> None:
+        """Store the result of a stage, and write what there is."""
+        _say(f"{stage.title}: {found.seconds:.1f} s of work")
+        self.stored.save(stage.name, found)
+        self.study = with_stage(self.study, stage, found)
+        write_results(self.study, self.stored.folder.parent)
+        self.done += stage.cost[self.study.quick]
+        self.progress.to(self.done)
+
+
+def timed(work: Callable[[], Any]) -> Stored:
+    """What a function returns, and how long it took."""
+    begin = time.perf_counter()
+    result = work()
+    return Stored(result=result, seconds=time.perf_counter() - begin)
 
 
 def computed(stage: Stage, study: Study, effort: Effort) -> Stored:
-    """Compute a stage here."""
-    if stage.asks:
-        with Processes(1) as here:
-            return Asked.of(stage.found(study, effort), here).stored()
-    begin = time.perf_counter()
-    result = stage.found(study, effort)
-    return Stored(result=result, seconds=time.perf_counter() - begin)
+    """Compute a stage here, its questions one after the other."""
+    found = timed(lambda: stage.found(study, effort))
+    if not isinstance(found.result, Questions):
+        return found
+    return timed(
+        lambda: found.result.together(tuple(b for proof in found.result.proofs for b in proof()))
+    )
 
 
 def with_stage(study: Study, stage: Stage, found: Stored) -> Study:
@@ -213,7 +185,7 @@ def with_stage(study: Study, stage: Stage, found: Stored) -> Study:
 def _taken(stored: StoredStages, stage: Stage) -> Stored | None:
     """A stored stage, or None with the reason said."""
     try:
-        found = stored.load(stage.name, stage.kind)
+        found = stored.load(stage.name)
     except NotUsable as reason:
         _say(f"{reason}: not taken")
         return None

@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from studies.report.shortfalls import shortfalls
+from studies.report.shortfalls import counted, without_certificate
 from studies.transition.conclusions import answer, conclusions, of_the_vehicle, question
 
 if TYPE_CHECKING:
@@ -28,6 +28,7 @@ def _lines(study: Outcome) -> Iterator[str]:
     for title, sentences in (
         ("The helicopter", of_the_vehicle(study)),
         ("What was found", conclusions(study)),
+        ("Negative results", [*without_certificate(study), *counted(study)]),
     ):
         own = [sentence for sentence in sentences if sentence not in answer(study)]
         if own:
@@ -35,10 +36,6 @@ def _lines(study: Outcome) -> Iterator[str]:
             yield title
         for sentence in own:
             yield from _wrapped(sentence, "  - ")
-    if failed := len(shortfalls(study).rows):
-        yield ""
-        things = "thing" if failed == 1 else "things"
-        yield f"{failed} {things} failed; the report says which and why."
 
 
 def _wrapped(sentence: str, mark: str = "") -> list[str]:

@@ -4,27 +4,17 @@ and one iteration may take minutes.
 
 from __future__ import annotations
 
-import os
-import pickle
-import subprocess
-import sys
 import threading
-import time
 from collections.abc import Callable
 from typing import Any, TypeVar
 
 from symheli.errors import SolverError
-from symheli.threads import one_thread
+from symheli.worker import ProcessEndedError, Worker, pickled
 
 T = TypeVar("T")
 
 PATIENCE = 1.0
 """Seconds that interrupted work has to end."""
-
-CHILD = (
-    "import pickle, sys; sys.path[:] = pickle.load(sys.stdin.buffer);"
-    " from synthesis.program.interruptible import answer; answer()"
-)
 
 
 def in_thread(work: Callable[[threading.Event], T]) -> T:
@@ -65,45 +55,8 @@ def in_process(function: Callable[..., T], *arguments: Any) -> T:
     The function is one of a module, arguments and result can be pickled. An interrupt ends the
     process. Raises `SolverError` where it ends without an answer.
     """
-    request = pickle.dumps(sys.path) + pickle.dumps((function, arguments))
-    process = subprocess.Popen(
-        [sys.executable, "-c", CHILD],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        start_new_session=True,
-    )
     try:
-        reply, _ = process.communicate(request)
-    except BaseException:
-        process.kill()
-        process.wait()
-        raise
-    if process.returncode:
-        raise SolverError(
-            f"the solver's process ended with code {process.returncode} and no answer; it may have"
-            " run out of memory"
-        )
-    value, error = pickle.loads(reply)
-    if error is not None:
-        raise error
-    return value
-
-
-def answer() -> None:
-    """The other end of `in_process`: what the work prints goes to standard error."""
-    threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
-    function, arguments = pickle.load(sys.stdin.buffer)
-    with os.fdopen(os.dup(1), "wb") as reply:
-        os.dup2(2, 1)
-        try:
-            with one_thread():
-                outcome = function(*arguments), None
-        except Exception as error:
-            outcome = None, error
-        reply.write(pickle.dumps(outcome))
-
-
-def _end_with(parent: int) -> None:
-    while os.getppid() == parent:
-        time.sleep(1.0)
-    os._exit(1)
+        with Worker() as worker:
+            return worker(pickled(function, *arguments))
+    except ProcessEndedError as error:
+        raise SolverError(str(error)) from error

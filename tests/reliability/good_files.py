@@ -71,7 +71,7 @@ def readers(folder: Path) -> list[Reader]:
         Reader(
             "study stage",
             path,
-            lambda p: StoredStages(p.parent, {p.stem: "key"}).load(p.stem, list),
+            lambda p: StoredStages(p.parent, {p.stem: "key"}).load(p.stem),
         )
     )
     return found

@@ -538,7 +538,7 @@ def test_what_another_process_cannot_find_is_refused():
     def own():
         return {}
 
-    with InProcesses(2) as on, pytest.raises(InputError, match="define it in a module"):
+    with InProcesses(2) as on, pytest.raises(InputError, match="define its function in a module"):
         columns_of(Campaign(Trial(own, {"x": "1"})), on)
 
 

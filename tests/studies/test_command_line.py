@@ -559,8 +559,6 @@ def test_help_and_version_succeed(run):
             {
                 "configuration": Configuration.of({"out": Path("o"), "quick": True, "seed": 3}),
                 "resume": False,
-                "only": (),
-                "since": "",
             },
         ),
         (

@@ -75,7 +75,8 @@ def test_an_empty_outcome_says_what_was_not_reached(tmp_path, unpainted):
     text = page(Outcome(vehicle="xcell60", quick=True, seed=0), tmp_path)
     assert text.count("Not reached") == 10
     assert "Nothing was reached that answers this" in text
-    assert "Nothing that was reached failed" in text
+    assert "No computation that was reached failed" in text
+    assert "No result that was reached is negative" in text
 
 
 @pytest.mark.parametrize("name", STAGES)

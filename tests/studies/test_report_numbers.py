@@ -135,7 +135,7 @@ def test_the_ranking_is_that_of_the_medians(full, results):
 
 def test_every_path_that_the_report_names_is_in_results_json(full, results, page):
     named = re.findall(r'<span class="path">\[<code>([\w.]+)</code>', page)
-    named += [row[2] for row in shortfalls(full).rows]
+    named += [row.path for row in shortfalls(full)]
     assert len(named) > 15
     for path in named:
         assert at(results, path), path

@@ -6,12 +6,12 @@ from __future__ import annotations
 
 import json
 from dataclasses import fields, replace
-from functools import cache, partial
+from functools import cache, partial, wraps
 from pathlib import Path
 
 import pytest
 
-from studies.processes import Processes
+from studies.campaigns.runners import Here
 from studies.transition import stages, stored_stages, study
 from studies.transition.configuration import Configuration
 from studies.transition.effort import Effort
@@ -26,17 +26,16 @@ from studies.transition.stored_stages import (
     stage_keys,
 )
 from symheli import Helicopter
-from symheli.errors import InputError
 from synthesis import Search, Spline
 
 FIRST = ("baseline", "paper_experiment", "exact_recovery")
 """The stages that are quick."""
 
 
-def run(out, *, resume=False, only=(), since="", **entries):
+def run(out, *, resume=False, **entries):
     """A quick study into this folder."""
     asked = Configuration.of({"quick": True, "out": out, **entries})
-    return study.run_study(asked, resume=resume, only=only, since=since)
+    return study.run_study(asked, resume=resume)
 
 
 @cache
@@ -55,9 +54,10 @@ def short(monkeypatch):
     counted, whole = [], study.stages
 
     def counting(stage):
-        def compute(*arguments):
+        @wraps(stage.compute)
+        def compute(**given):
             counted.append(stage.name)
-            return stage.compute(*arguments)
+            return stage.compute(**given)
 
         return replace(stage, compute=compute)
 
@@ -160,12 +160,13 @@ def test_a_damaged_stage_is_computed_again_and_said(stopped, short, capsys, dama
 
 
 def test_a_stage_under_the_name_of_another_is_refused(tmp_path):
-    stored = StoredStages(tmp_path, dict.fromkeys(("baseline", "servo"), "key"))
+    stored = StoredStages(tmp_path, {"baseline": "key", "servo": "another key"})
     stored.save("baseline", Stored(result=Recoveries(runs=()), seconds=1.0))
-    assert stored.load("baseline", Recoveries).seconds == 1.0
-    assert stored.load("servo", Recoveries) is None
-    with pytest.raises(NotUsable, match="holds another stage"):
-        stored.load("baseline", Effort)
+    assert stored.load("baseline").seconds == 1.0
+    assert stored.load("servo") is None
+    stored.path("baseline").rename(stored.path("servo"))
+    with pytest.raises(NotUsable, match="is of another version"):
+        stored.load("servo")
 
 
 def test_the_key_is_that_of_the_content(ideal, pi):
@@ -223,16 +224,22 @@ def test_every_entry_of_the_effort_is_read_by_a_stage_and_all_keys_differ():
     assert not set(keys.values()) & set(stage_keys(every, "other code", Effort()).values())
 
 
-def test_a_stage_is_given_nothing_but_what_it_needs_and_reads():
-    def stage(compute):
-        return stages.Stage("servo", "A stage", tuple, ("baseline",), compute, ("servo_rates",))
+def test_a_stage_is_given_what_its_parameters_name_and_nothing_else():
+    def servo(vehicle, seed, baseline, servo_rates):
+        return vehicle, seed, baseline, servo_rates
 
+    stage = stages.Stage("servo", "A stage", servo)
+    assert (stage.needs, stage.reads) == (("baseline",), ("servo_rates",))
     outcome = Outcome(vehicle="xcell60", quick=False, seed=3)
-    got = stage(lambda s, effort: (s.vehicle, s.seed, s.baseline, effort.servo_rates))
-    assert got.found(outcome, Effort()) == ("xcell60", 3, None, Effort().servo_rates)
-    for undeclared in (lambda s, _: s.effort, lambda s, _: s.gust, lambda _, effort: effort.ramps):
-        with pytest.raises(AttributeError):
-            stage(undeclared).found(outcome, Effort())
+    assert stage.found(outcome, Effort()) == ("xcell60", 3, None, Effort().servo_rates)
+
+
+def test_the_stages_need_earlier_ones_alone():
+    there = set()
+    for stage in stages.STAGES:
+        assert set(stage.needs) <= there
+        there.add(stage.name)
+    assert there <= {f.name for f in fields(Outcome)}
 
 
 def test_one_rate_changed_in_the_file_computes_only_what_it_touches(tmp_path, monkeypatch):
@@ -241,19 +248,19 @@ def test_one_rate_changed_in_the_file_computes_only_what_it_touches(tmp_path, mo
     """
     computed = []
 
-    def stage(name, needs, entry):
-        def compute(s, effort):
-            computed.append(name)
-            own = getattr(effort, entry) if entry else ()
-            return (own, *(getattr(s, other) for other in needs))
+    def flights(ramps):
+        computed.append("flights")
+        return (ramps,)
 
-        return stages.Stage(name, name, tuple, needs, compute, (entry,) if entry else ())
+    def servo(servo_rates):
+        computed.append("servo")
+        return (servo_rates,)
 
-    every = (
-        stage("flights", (), "ramps"),
-        stage("servo", (), "servo_rates"),
-        stage("robust", ("servo",), ""),
-    )
+    def robust(servo):
+        computed.append("robust")
+        return ((), servo[0])
+
+    every = tuple(stages.Stage(f.__name__, f.__name__, f) for f in (flights, servo, robust))
     monkeypatch.setattr(study, "stages", lambda effort: every)
     monkeypatch.setattr(study, "loaded", helicopter)
     for name in ("write_report", "write_results"):
@@ -266,12 +273,12 @@ def test_one_rate_changed_in_the_file_computes_only_what_it_touches(tmp_path, mo
         done = study.run_study(Configuration.read(file, {}), resume=True)
         return [*computed], (done.flights, done.servo, done.robust)
 
-    first = (5,), ((0.0, 3.0),), ((), ((0.0, 3.0),))
+    first = (5,), ((0.0, 3.0),), ((), (0.0, 3.0))
     assert again("ramps = 5\nservo_rates = [0, 3]") == (["flights", "servo", "robust"], first)
     assert again("ramps = 5\nservo_rates = [0, 3]") == ([], first)
     # an entry that none of them reads
     assert again("ramps = 5\nservo_rates = [0, 3]\ngust_rates = [0, 2]") == ([], first)
-    other = (5,), ((0.0, 4.0),), ((), ((0.0, 4.0),))
+    other = (5,), ((0.0, 4.0),), ((), (0.0, 4.0))
     assert again("ramps = 5\nservo_rates = [0, 4]") == (["servo", "robust"], other)
     assert again("ramps = 6\nservo_rates = [0, 4]") == (["flights"], ((6,), *other[1:]))
     # what was stored for the first file is gone, and is not taken for it
@@ -304,16 +311,12 @@ def test_proofs_that_were_found_are_not_proven_again(tmp_path, monkeypatch):
             raise KeyboardInterrupt
         return [k]
 
-    stage = stages.Stage(
-        "gust",
-        "Three questions",
-        tuple,
-        (),
-        lambda *_: Questions([partial(question, k) for k in range(3)], lambda bounds: bounds),
-        asks=True,
-    )
+    def gust():
+        return Questions([partial(question, k) for k in range(3)], lambda bounds: bounds)
+
+    stage = stages.Stage("gust", "Three questions", gust)
     monkeypatch.setattr(study, "stages", lambda effort: (stage,))
-    monkeypatch.setattr(study, "Processes", lambda: Processes(1))
+    monkeypatch.setattr(study, "Processes", Here)
     for name in ("write_report", "write_results"):
         monkeypatch.setattr(study, name, lambda *_: None)
     with pytest.raises(KeyboardInterrupt):
@@ -329,67 +332,12 @@ def test_proofs_that_were_found_are_not_proven_again(tmp_path, monkeypatch):
     assert [p.name for p in (tmp_path / "stages").iterdir()] == ["gust.stage"]
 
 
-def test_a_stage_runs_alone_from_the_stored_ones_it_needs(stopped, short):
-    done = run(stopped, only=["exact_recovery"])
-    assert short == ["exact_recovery"]
-    assert done.complete
+def test_a_stage_whose_file_is_removed_is_computed_again_alone(stopped, short):
+    run(stopped, resume=True)
     short.clear()
-    run(stopped, only=["exact_recovery"])
-    assert short == ["exact_recovery"]  # asked for again, computed again
-    short.clear()
-    run(stopped, only=["exact_recovery"], resume=True)
-    assert not short
-
-
-def test_what_a_stage_needs_is_computed_where_it_is_absent_and_nothing_else(short, tmp_path):
-    done = run(tmp_path, only=["exact_recovery"])
-    assert short == ["baseline", "exact_recovery"]
-    assert not done.complete
-    assert done.paper_experiment is None
-    assert results(tmp_path)["exact_recovery"]
-
-
-def test_from_a_stage_on_all_that_need_it_are_computed_again(short, tmp_path):
-    run(tmp_path)
-    short.clear()
-    assert run(tmp_path, since="paper_experiment").complete
+    (stopped / "stages" / "paper_experiment.stage").unlink()
+    assert run(stopped, resume=True).complete
     assert short == ["paper_experiment"]
-    short.clear()
-    assert run(tmp_path, since="baseline").complete
-    assert tuple(short) == FIRST
-
-
-def test_a_stage_there_is_not_is_named(short, tmp_path):
-    with pytest.raises(InputError, match="unknown stage 'exact'; did you mean"):
-        run(tmp_path, only=["exact"])
-    with pytest.raises(InputError, match="either"):
-        run(tmp_path, only=["baseline"], since="baseline")
-    assert not short
-
-
-def test_each_stage_needs_only_those_before_it():
-    before = set()
-    for stage in stages.stages(Effort()):
-        assert set(stage.needs) <= before
-        before.add(stage.name)
-
-
-def test_the_list_of_stages_says_what_is_there(stopped, capsys):
-    from studies import cli
-
-    def states(*more):
-        assert cli.main(["study", "--quick", "--out", str(stopped), *more, "--list-stages"]) == 0
-        rows = [line.split() for line in capsys.readouterr().out.splitlines()[1:]]
-        return {row[0]: row[1] for row in rows}
-
-    known = states()
-    assert list(known) == [stage.name for stage in stages.stages(Effort.look())]
-    assert [name for name, state in known.items() if state == "stored"] == [
-        "baseline",
-        "paper_experiment",
-    ]
-    assert states("--seed", "1")["baseline"] == "of"  # another run
-    assert results(stopped)["exact_recovery"] is None  # nothing was run
 
 
 def test_what_was_asked_for_is_kept_and_asks_for_the_same(short, tmp_path):

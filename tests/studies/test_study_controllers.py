@@ -13,6 +13,7 @@ import symheli
 from identification import Criterion, FitForControl
 from studies.controllers import tables
 from studies.controllers.asked import (
+    BACK_OFF,
     CONTROLS,
     DELAY,
     GUSTS,
@@ -29,7 +30,6 @@ from studies.controllers.designs import (
     Design,
     Designs,
     design,
-    hinf_schedule,
     lqr_schedule,
     simplest,
     verdict_in_words,
@@ -65,6 +65,7 @@ from symheli import (
 )
 from symheli.errors import SynthesisError
 from symheli.flight import XCELL_SERVOS
+from synthesis.lpv.point_schedule import hinf_schedule
 from synthesis.plant.sampling import tustin
 from synthesis.worst.frozen import norm
 
@@ -181,7 +182,7 @@ def test_the_verdict_on_a_model_is_a_sentence(verdict, said):
 
 def test_the_schedule_of_point_designs_keeps_their_gain_at_each_point(base):
     plant = design_plant(base)
-    made = hinf_schedule(plant, points=3)
+    made = hinf_schedule(plant, np.linspace(0.0, TOP, 3), BACK_OFF)
     for speed in (0.0, TOP / 2, TOP):
         loop = closed(plant, made.model)
         assert norm(*loop.matrices(speed), None)[0] <= made.promised * (1 + 1e-6)
@@ -189,7 +190,10 @@ def test_the_schedule_of_point_designs_keeps_their_gain_at_each_point(base):
 
 @pytest.mark.slow
 def test_what_flies_has_fewer_states_and_hardly_more_gain(base):
-    plant, made = flown_plant(base), hinf_schedule(design_plant(base), points=4)
+    plant, made = (
+        flown_plant(base),
+        hinf_schedule(design_plant(base), np.linspace(0.0, TOP, 4), BACK_OFF),
+    )
     controller, frozen = simplest(made, plant)
     whole = closed(plant, made.discretize(PERIOD).model)
     full = max(norm(*whole.matrices(float(v)), PERIOD)[0] for v in np.linspace(0.0, TOP, AIRSPEEDS))
@@ -379,7 +383,7 @@ def test_flights_are_the_same_for_every_controller_and_come_back_from_their_stag
         assert [f.ratio for f in one.flights] == [f.ratio for f in other.flights]
     stages = StoredStages(tmp_path, {"flown_controllers": "key"})
     stages.save("flown_controllers", Stored(result=found, seconds=1.0))
-    again = stages.load("flown_controllers", FlownControllers)
+    again = stages.load("flown_controllers")
     assert [f.ratio for f in again.result.flown] == [f.ratio for f in found.flown]
 
 

@@ -15,7 +15,6 @@ from studies.loops.lateral import ATTITUDE_HOLD
 from studies.loops.robust_lateral import margin
 from studies.transition import conclusions, guarantees, tables
 from studies.transition.baseline import build_baseline
-from studies.transition.effort import Effort
 from studies.transition.guarantees import ALLOWED, ESTIMATE, PLAIN, Bound
 from studies.transition.known_kinematics import (
     ALL_AXES,
@@ -38,8 +37,8 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def found(ideal):
     """From one short flight."""
-    effort = replace(Effort(), aggressive=100.0, gentle_flight=False)
-    return identify_with_known_kinematics(ideal, "xcell60", build_baseline(ideal), 0, effort)
+    baseline = build_baseline(ideal)
+    return identify_with_known_kinematics(ideal, "xcell60", baseline, 0, 100.0, False)
 
 
 def test_the_instruments_are_flown_in_another_vehicle(found):

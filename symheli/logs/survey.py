@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from studies.log.stretches import Stretch, longest, stretches
 from symheli.logs.column import Column, forward
 from symheli.logs.contents import Contents
 from symheli.logs.meaning import Guess, guesses, moves, plain_name
+from symheli.logs.stretches import Stretch, longest, stretches
 from symheli.values.sample_period import JITTER, USUAL
 from symheli.values.units import to_si
 

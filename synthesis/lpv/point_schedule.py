@@ -1,0 +1,55 @@
+"""Point designs along the parameter, interpolated into a scheduled controller."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from symheli.errors import SynthesisError
+from symheli.lpv import LPVStateSpace
+from symheli.lpv.bases import PiecewiseLinear
+from symheli.values.arrays import Array
+from synthesis.loops.controller import Controller
+from synthesis.lti.hinf import hinf
+from synthesis.plant.plant import Plant
+
+
+def hinf_schedule(
+    plant: Plant, points: Sequence[float] | Array, back_off: float = 1.01
+) -> Controller:
+    """H-infinity designs at values of the one parameter of a plant, their entries interpolated
+    linearly in between, which is meaningful because the states of each design estimate those of the
+    plant in the same coordinates.
+
+    `back_off` is the factor by which each design may exceed the least norm, as in `hinf`;
+    `promised` is the largest of the norms at the points; between them nothing is promised. Raises
+    `SynthesisError` where a point has no design.
+    """
+    found = []
+    for p in points:
+        one = hinf(
+            plant.nominal.at(float(p)),
+            [str(s) for s in plant.controls],
+            [str(s) for s in plant.measurements],
+            disturbances=plant.disturbances,
+            performance=plant.performance,
+            back_off=back_off,
+        )
+        if one.controller is None:
+            (parameter,) = plant.parameters
+            at = f"{parameter.name} {p:g} {parameter.unit}"
+            raise SynthesisError(f"no H-infinity design at {at}: {'; '.join(one.reasons)}")
+        found.append((one.controller, one.hinf_norm))
+    models = [model for model, _ in found]
+    A, B, C, D = (np.stack([getattr(model, part) for model in models]) for part in "ABCD")
+    basis, first = PiecewiseLinear(tuple(map(float, points))), models[0]
+    model = LPVStateSpace(
+        basis, A, B, C, D, plant.parameters, first.states, first.inputs, first.outputs
+    )
+    return Controller(
+        model=model,
+        plant=plant,
+        promised=max(norm for _, norm in found),
+        method=f"H-infinity at {len(models)} values of the parameter",
+    )
