@@ -10,14 +10,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from functools import reduce
+from itertools import pairwise, product
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
 
 from symheli.lpv import FunctionSpace
-from synthesis.lpv.cells import BernsteinCell
+from symheli.lpv.bases.function_space import tensor_grid
+from symheli.lpv.bases.polynomials import interpolation_points
 from synthesis.lpv.unknown import UnknownFunction
+from synthesis.polynomial.bernstein import blossom
 from synthesis.polynomial.symmetric import basis as symmetric_basis
 from synthesis.polynomial.symmetric import svec, symmetrized
 from synthesis.program.cone_program import Candidate, ConeProgram, Solver, solve
@@ -26,6 +30,31 @@ Array = np.ndarray
 
 MARGIN = 1e-8
 """Every inequality is kept above this multiple of the identity."""
+
+
+class BernsteinCell(NamedTuple):
+    """A box of the parameters: `nodes` (K, m) inside it, and `to_bernstein` (q, K) from values
+    there to Bernstein coefficients of degrees that take them exactly.
+    """
+
+    nodes: Array
+    to_bernstein: Array
+
+
+def cells(breaks: Sequence[Sequence[float]], degrees: Sequence[int]) -> list[BernsteinCell]:
+    """One cell between every two breaks of each parameter, for polynomials of these degrees."""
+    units = [interpolation_points([d], [(0.0, 1.0)]) for d in degrees]
+    maps = [
+        np.linalg.inv([blossom([t] * d) for t in unit])
+        for unit, d in zip(units, degrees, strict=True)
+    ]
+    return [
+        BernsteinCell(
+            tensor_grid([a + (b - a) * unit for (a, b), unit in zip(sides, units, strict=True)]),
+            reduce(np.kron, maps),
+        )
+        for sides in product(*(list(pairwise(b)) for b in breaks))
+    ]
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,13 +19,12 @@ from symheli.threads import with_one_thread
 from symheli.values.signal import indices
 from synthesis.certificate import Attempt
 from synthesis.loops.controller import Controller
-from synthesis.lpv.affine_program import AffineProgram, Variable, from_lower
+from synthesis.lpv.affine_program import AffineProgram, BernsteinCell, Variable, cells, from_lower
 from synthesis.lpv.bases import Dependence, functions, limited, used
-from synthesis.lpv.cells import BernsteinCell, cells, degrees_of
 from synthesis.lpv.fitted import fitted, in_plant_units
 from synthesis.lpv.objectives import H2, L2, EnergyToPeak, Objective, PoleRegion
 from synthesis.lpv.recovery import Transformed, controller
-from synthesis.lpv.scaled_plant import scaled_plant_of
+from synthesis.lpv.scaled_plant import degrees_of, scaled_plant_of
 from synthesis.lpv.search import ACCURACY
 from synthesis.plant.generalized import Generalized, blocks
 from synthesis.plant.plant import Plant, require_plant

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import pairwise, product
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.polynomial import chebyshev
 
 from symheli.errors import InputError
 from symheli.lpv import FunctionSpace, LinearModel, Matrices, Scheduling
-from symheli.lpv.bases.polynomials import factors_of
-from synthesis.lpv.cells import degrees_of
+from symheli.lpv.bases.function_space import tensor_grid
+from symheli.lpv.bases.polynomials import factors_of, interpolation_points
 from synthesis.lti.linear_quadratic import control_gains
 from synthesis.plant.generalized import Generalized
 from synthesis.program.scaling import model_scaling
@@ -30,6 +31,12 @@ LEAST = 1e-6
 """Part of the mean eigenvalue that is added to a solution of a Riccati equation: states without a
 cost, or known exactly, have a scale too.
 """
+MOST = 10
+"""Highest degree in a parameter by which data on a cell are followed; what lies beyond is left to
+the analysis of the closed loop.
+"""
+SMALL = 1e-10
+"""A Chebyshev coefficient below this fraction of the largest entry of its own is rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,3 +214,27 @@ def depends(plant: Plant) -> list[bool]:
     """On which parameters."""
     c = scaled_plant_of(plant, 1.0)
     return [d > 0 for d in degrees_of(lambda p: list(c.at(p)), c.breaks)]
+
+
+def degrees_of(
+    data: Callable[[Array], Sequence[Array]], breaks: Sequence[Sequence[float]]
+) -> tuple[int, ...]:
+    """The degree in each parameter that `data` (arrays (K, ...) at p (K, m)) have on the widest
+    cells, at most `MOST`.
+    """
+    sides = [max(pairwise(b), key=lambda side: side[1] - side[0]) for b in breaks]
+    unit = interpolation_points([MOST], [(-1.0, 1.0)])
+    to_chebyshev = np.linalg.inv(chebyshev.chebvander(unit, MOST))
+    found = []
+    for i in range(len(sides)):
+        axes = [
+            0.5 * (a + b) + 0.5 * (b - a) * (unit if k == i else np.zeros(1))
+            for k, (a, b) in enumerate(sides)
+        ]
+        degree = 0
+        for values in data(tensor_grid(axes)):
+            c = np.abs(to_chebyshev @ values.reshape(len(unit), -1))
+            above = np.flatnonzero((c > SMALL * max(float(c.max(initial=0.0)), 1e-300)).any(axis=1))
+            degree = max(degree, int(above.max(initial=0)))
+        found.append(degree)
+    return tuple(found)

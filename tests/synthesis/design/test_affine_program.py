@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from symheli.lpv.bases.polynomials import polynomials
-from synthesis.lpv.affine_program import AffineProgram, from_lower
-from synthesis.lpv.cells import cells
+from synthesis.lpv.affine_program import AffineProgram, cells, from_lower
 from synthesis.program.cone_program import Solver
 
 BOX = [(0.0, 2.0)]
