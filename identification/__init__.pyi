@@ -104,6 +104,9 @@ from symheli.lpv import (
     BSpline as BSpline,
 )
 from symheli.lpv import (
+    CubicSpline as CubicSpline,
+)
+from symheli.lpv import (
     PiecewiseLinear as PiecewiseLinear,
 )
 from symheli.lpv import (
@@ -111,9 +114,6 @@ from symheli.lpv import (
 )
 from symheli.lpv import (
     Product as Product,
-)
-from symheli.lpv import (
-    Spline as Spline,
 )
 from symheli.lpv import (
     UserFunctions as UserFunctions,

@@ -65,12 +65,11 @@ TYPES: dict[str, Any] = {
             bases.Polynomial,
             bases.BSpline,
             bases.PiecewiseLinear,
-            bases.Spline,
             bases.Product,
             bases.Patches,
         ),
     )
-} | {"Trajectory": SchedulingTrajectory, "Units": _former_units}
+} | {"Spline": bases.CubicSpline, "Trajectory": SchedulingTrajectory, "Units": _former_units}
 """What a file may contain, by its word there, which outlives the name of a class."""
 WORDS = {kind: word for word, kind in TYPES.items()}
 

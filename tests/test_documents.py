@@ -1,5 +1,6 @@
 """The pages: what their blocks print, what runs them, and what makes the site of them."""
 
+import importlib
 import itertools
 import re
 import shlex
@@ -295,3 +296,11 @@ def test_the_logs_beside_the_tests_give_the_tables_of_the_page(command, table, m
     found = [[float(number) for number in line.split()[-3:]] for line in printed]
     # a free run of hundreds of samples: other processors and libraries round otherwise
     np.testing.assert_allclose(found, said, rtol=0.02, atol=0.11)
+
+
+@pytest.mark.parametrize("package", ["symheli", "symheli.lpv", "identification", "synthesis"])
+def test_the_page_of_names_lists_every_public_name_once(package):
+    page = (DOCS / "names.md").read_text(encoding="utf-8")
+    section = page.split(f"\n## {package}\n")[1].split("\n## ")[0]
+    named = re.findall(r"`(\w+)`", section)
+    assert sorted(named) == sorted(importlib.import_module(package).__all__)

@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv.bases import PiecewiseLinear, Spline
+from symheli.lpv.bases import CubicSpline, PiecewiseLinear
 from symheli.lpv.linear_family import LinearFamily
 from symheli.physics.rigid_body import euler_rates, gravity_euler, rotation, translation
 from symheli.values.arrays import Array, frozen
@@ -22,7 +22,7 @@ from symheli.values.summary import summarized
 BODY_STATES = ("u", "v", "w", "p", "q", "r", "phi", "theta")
 STEP = 0.005
 """Longest integration step, s: that of the flights of the nonlinear model."""
-_TABLES = {"linear": PiecewiseLinear, "spline": Spline}
+_TABLES = {"linear": PiecewiseLinear, "spline": CubicSpline}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -36,7 +36,7 @@ class StitchedModel:
 
     Parameters
     ----------
-    basis : PiecewiseLinear or Spline
+    basis : PiecewiseLinear or CubicSpline
         Of the tables, over K airspeeds.
     x0, u0, f0 : array (K, nx), (K, nu), (K, nx)
         The trim values, and what is left of the derivative there.
@@ -69,7 +69,7 @@ class StitchedModel:
     True
     """
 
-    basis: PiecewiseLinear | Spline
+    basis: PiecewiseLinear | CubicSpline
     x0: Array
     u0: Array
     f0: Array

@@ -17,13 +17,13 @@ from symheli.lpv.balanced_truncation import BalancedTruncation, balanced_truncat
 from symheli.lpv.bases import (
     Basis,
     BSpline,
+    CubicSpline,
     FunctionSpace,
     Patches,
     Piece,
     PiecewiseLinear,
     Polynomial,
     Product,
-    Spline,
     UserFunctions,
 )
 from symheli.lpv.delay import pade_delay, sample_delay
@@ -56,6 +56,7 @@ __all__ = [
     "BalancedTruncation",
     "Basis",
     "Block",
+    "CubicSpline",
     "FunctionSpace",
     "HoldError",
     "LPVStateSpace",
@@ -69,7 +70,6 @@ __all__ = [
     "Polynomial",
     "Product",
     "Scheduling",
-    "Spline",
     "StepResponse",
     "TrimSchedule",
     "Truncation",

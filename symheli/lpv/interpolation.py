@@ -13,7 +13,7 @@ import numpy as np
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.bases.basis import Basis
 from symheli.lpv.bases.function_space import FunctionSpace, tensor_grid
-from symheli.lpv.bases.interpolating import PiecewiseLinear, Spline
+from symheli.lpv.bases.interpolating import CubicSpline, PiecewiseLinear
 from symheli.lpv.bases.polynomial import Polynomial
 from symheli.lpv.bases.product import Product
 from symheli.lpv.linear_models import LinearModels
@@ -79,7 +79,7 @@ def _factor(kind: Kind, nodes: Array, degree: int) -> Basis:
                 f" {len(nodes)}: lower the degree (one for all, or one each) or add values"
             )
         return Polynomial(degree, float(nodes[0]), float(nodes[-1]))
-    bases = {"spline": Spline, "linear": PiecewiseLinear}
+    bases = {"spline": CubicSpline, "linear": PiecewiseLinear}
     if kind not in bases:
         raise UnknownNameError("interpolation kind", kind, ("polynomial", *bases))
     return bases[kind](tuple(nodes.tolist()))

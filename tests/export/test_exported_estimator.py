@@ -40,7 +40,7 @@ GROUPS = idn.LPVARX(
     na={"a": 1, "b": {"a": 0, "b": 2}},
     nb=2,
     delay=0,
-    basis=idn.Spline((0.0, 1.0, 4.0, 9.0)),
+    basis=idn.CubicSpline((0.0, 1.0, 4.0, 9.0)),
     offset_rate=True,
 )
 BESIDE = idn.LPVARX(

@@ -34,7 +34,7 @@ STRUCTURES = {
         na={"a": 1, "b": {"a": 0, "b": 2}},
         nb=1,
         delay=3,
-        basis=idn.Spline((0.0, 1.0, 4.0, 9.0)),
+        basis=idn.CubicSpline((0.0, 1.0, 4.0, 9.0)),
     ),
     "no inputs": idn.LPVARX(
         "a", (), "p", na=2, nb=0, delay=0, basis=idn.PiecewiseLinear((0.0, 3.0, 9.0)), offset=True

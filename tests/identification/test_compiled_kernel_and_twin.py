@@ -12,7 +12,7 @@ from identification.recursive.kernel import twin
 from identification.recursive.kernel.configuration import Configuration
 from identification.recursive.online import Online
 from identification.structure.regressors import regression
-from symheli.lpv import Spline
+from symheli.lpv import CubicSpline
 from symheli.records import FlightRecord
 
 WAYS = (
@@ -28,7 +28,7 @@ STRUCTURES = {
     ),
     "no inputs, one lag": structure(inputs=(), na=1, nb=0, basis=idn.Polynomial(0, 0.0, 13.0)),
     "spline, current p": structure(
-        basis=Spline((0.0, 2.0, 6.0, 10.0, 13.0)), scheduling_at="now", delay=0, nb=3
+        basis=CubicSpline((0.0, 2.0, 6.0, 10.0, 13.0)), scheduling_at="now", delay=0, nb=3
     ),
     "nine outputs": structure(
         outputs=tuple("abcdefghi"), na=1, nb=1, basis=idn.Polynomial(1, 0.0, 13.0)
@@ -169,7 +169,7 @@ def test_other_bases_give_what_batch_least_squares_gives(name, precision):
 
 def test_basis_in_the_kernel_is_the_basis_of_the_structure():
     """Its Bernstein form against Legendre's recursion and SciPy's splines."""
-    for basis in (idn.Polynomial(5, -3.0, 13.0), Spline((0.0, 1.0, 4.0, 9.0, 13.0))):
+    for basis in (idn.Polynomial(5, -3.0, 13.0), CubicSpline((0.0, 1.0, 4.0, 9.0, 13.0))):
         (factor,) = Configuration(structure(basis=basis), idn.Constant(), np.float64).factors
         for p in np.linspace(basis.low, basis.high, 41):
             # Legendre's fifth has Bernstein coefficients of up to 330: a few roundings of those

@@ -49,7 +49,7 @@ BASES = {
     "legendre 3": (idn.Polynomial(3, 0.0, 13.0), ONE),
     "cubic b-spline": (idn.BSpline(3, (0.0, 4.0, 9.0, 13.0)), ONE),
     "hats": (idn.PiecewiseLinear((0.0, 5.0, 13.0)), ONE),
-    "spline": (idn.Spline((0.0, 4.0, 9.0, 13.0)), ONE),
+    "spline": (idn.CubicSpline((0.0, 4.0, 9.0, 13.0)), ONE),
     "brought along": (
         idn.UserFunctions((np.ones_like, np.cos, lambda p: 1 / (1 + p)), 0.0, 13.0),
         ONE,

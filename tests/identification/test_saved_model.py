@@ -26,7 +26,7 @@ CASES = {
     "b-spline": dict(
         basis=idn.BSpline(2, (0.0, 5.0, 13.0)), offset=True, offset_rate=True, scheduling_at="now"
     ),
-    "spline": dict(basis=idn.Spline((0.0, 3.0, 8.0, 13.0))),
+    "spline": dict(basis=idn.CubicSpline((0.0, 3.0, 8.0, 13.0))),
     "hats": dict(basis=idn.PiecewiseLinear((0.0, 8.0, 13.0)), inputs=(), nb=0, offset=True),
     "brought along": dict(basis=OWN),
     "two parameters": dict(

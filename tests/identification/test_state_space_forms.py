@@ -6,7 +6,7 @@ from known_systems import Truth, moving, structure
 
 import identification as idn
 from symheli.errors import InputError
-from symheli.lpv import Polynomial, Product, Spline, simulate
+from symheli.lpv import CubicSpline, Polynomial, Product, simulate
 
 TWO = dict(
     basis=Product((Polynomial(2, 0.0, 13.0), Polynomial(1, -2.0, 2.0)), total_degree=2),
@@ -23,7 +23,7 @@ CASES = {
         "shifted",
         dict(outputs=("a", "b"), inputs=("u", "v"), na=2, nb=2, delay=0),
     ),
-    "shifted, spline": ("shifted", dict(basis=Spline((0.0, 3.0, 8.0, 13.0)))),
+    "shifted, spline": ("shifted", dict(basis=CubicSpline((0.0, 3.0, 8.0, 13.0)))),
     "shifted, inputs only": ("shifted", dict(na=0, nb=2, delay=0)),
     "direct, three lags": (
         "direct",
@@ -37,7 +37,7 @@ CASES = {
     "direct, a spline and a polynomial": (
         "direct",
         dict(
-            basis=Product((Spline((0.0, 3.0, 8.0, 13.0)), Polynomial(1, -2.0, 2.0))),
+            basis=Product((CubicSpline((0.0, 3.0, 8.0, 13.0)), Polynomial(1, -2.0, 2.0))),
             scheduling=("p", "q"),
             scheduling_at="now",
         ),

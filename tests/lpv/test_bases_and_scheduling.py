@@ -4,17 +4,18 @@ import math
 
 import numpy as np
 import pytest
-from scipy.interpolate import BPoly, CubicSpline
+from scipy import interpolate
+from scipy.interpolate import BPoly
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv import (
     BSpline,
+    CubicSpline,
     Patches,
     PiecewiseLinear,
     Polynomial,
     Product,
     Scheduling,
-    Spline,
     UserFunctions,
 )
 from symheli.values.units import to_si
@@ -22,7 +23,7 @@ from symheli.values.units import to_si
 NODES = (0.0, 1.0, 3.0, 7.0, 13.0)
 BASES = [
     Polynomial(4, 0.0, 13.0),
-    Spline(NODES),
+    CubicSpline(NODES),
     PiecewiseLinear(NODES),
     BSpline(3, NODES),
     BSpline(2, NODES),
@@ -135,7 +136,9 @@ def test_bernstein_pieces_are_the_functions(basis):
 def test_spline_is_the_cubic_spline_through_values():
     values = np.sin(NODES)
     p = np.linspace(0, 13, 40)
-    np.testing.assert_allclose(Spline(NODES)(p) @ values, CubicSpline(NODES, values)(p), atol=1e-12)
+    np.testing.assert_allclose(
+        CubicSpline(NODES)(p) @ values, interpolate.CubicSpline(NODES, values)(p), atol=1e-12
+    )
     np.testing.assert_allclose(
         PiecewiseLinear(NODES)(p) @ values, np.interp(p, NODES, values), atol=1e-12
     )
@@ -182,7 +185,7 @@ def test_fit_recovers_coefficients_and_counts_its_nodes(basis):
         ),
         (lambda: Polynomial(-1, 0, 1), "degree: expected a whole number"),
         (lambda: Polynomial(2, 5.0, 5.0), "low < high"),
-        (lambda: Spline((0.0, 1.0, 2.0)), "at least 4 strictly increasing"),
+        (lambda: CubicSpline((0.0, 1.0, 2.0)), "at least 4 strictly increasing"),
         (lambda: PiecewiseLinear((0.0, 0.0)), "strictly increasing"),
         (lambda: Polynomial(1, 0, 1).from_monomial([1, 2, 3]), "degree 2 does not fit"),
         (lambda: Polynomial(1, 0, 1)(1.1), "declare the basis over the whole range"),
@@ -253,7 +256,7 @@ def test_patches_give_back_polynomials_that_jump():
     [
         Polynomial(2, 0.0, 13.0),
         PiecewiseLinear((0.0, 4.0, 13.0)),
-        Spline((0.0, 2.0, 5.0, 13.0)),
+        CubicSpline((0.0, 2.0, 5.0, 13.0)),
         BSpline(2, (0.0, 4.0, 13.0)),
         Patches(3, (0.0, 4.0, 13.0)),
     ],

@@ -7,7 +7,7 @@ import pytest
 from families import SPEED, random_lpv
 
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv import LinearModel, LPVStateSpace, Spline, pade_delay, sample_delay
+from symheli.lpv import CubicSpline, LinearModel, LPVStateSpace, pade_delay, sample_delay
 from symheli.lpv.mixing import mixed
 from symheli.values.signal import Signal, signals
 
@@ -24,7 +24,7 @@ def spline_model(dt=None):
     rng = np.random.default_rng(0)
     shapes = (3, 3), (3, 2), (2, 3), (2, 2)
     return LPVStateSpace(
-        Spline((0.0, 2.0, 5.0, 9.0, 13.0)),
+        CubicSpline((0.0, 2.0, 5.0, 9.0, 13.0)),
         *(rng.standard_normal((5, *shape)) for shape in shapes),
         SPEED,
         ("x1", "x2", "x3"),

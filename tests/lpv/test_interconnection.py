@@ -10,10 +10,10 @@ from families import SPEED, random_lpv
 from symheli.errors import InputError
 from symheli.lpv import (
     LFT,
+    CubicSpline,
     LinearModel,
     LPVStateSpace,
     Scheduling,
-    Spline,
     UncertainStateSpace,
     append,
     connect,
@@ -39,7 +39,7 @@ def linear(seed=0, nu=2, ny=2):
 def on_a_spline(seed=0):
     """Through models whose entries are no polynomials of p, without feedthrough."""
     rng = np.random.default_rng(seed)
-    basis = Spline(NODES)
+    basis = CubicSpline(NODES)
     shapes = ((3, 3), (3, 2), (2, 3))
     A, B, C = (rng.normal(size=(basis.size, *shape)) for shape in shapes)
     A -= 9 * np.multiply.outer(basis.constant(), np.eye(3))

@@ -15,6 +15,7 @@ from families import SPEED
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv import (
     BSpline,
+    CubicSpline,
     LinearModel,
     LPVStateSpace,
     Patches,
@@ -22,7 +23,6 @@ from symheli.lpv import (
     Polynomial,
     Product,
     Scheduling,
-    Spline,
     UncertainStateSpace,
     UserFunctions,
     lower_feedback,
@@ -33,7 +33,7 @@ from symheli.values.signal import signals
 
 ACCELERATION = Scheduling("acceleration", "m/s^2", -3.0, 3.0, 5.0)
 POLYNOMIAL = Polynomial(2, 0.0, 13.0)
-SPLINE = Spline((0.0, 2.0, 5.0, 9.0, 13.0))
+SPLINE = CubicSpline((0.0, 2.0, 5.0, 9.0, 13.0))
 HATS = PiecewiseLinear((0.0, 3.0, 9.0, 13.0))
 JUMPS = Patches(1, (0.0, 5.0, 13.0))
 BSPLINE = BSpline(2, (0.0, 4.0, 13.0))

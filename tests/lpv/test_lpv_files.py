@@ -9,13 +9,13 @@ import symheli
 from symheli.errors import InputError
 from symheli.lpv import (
     BSpline,
+    CubicSpline,
     LPVStateSpace,
     Patches,
     PiecewiseLinear,
     Polynomial,
     Product,
     Scheduling,
-    Spline,
     UserFunctions,
 )
 
@@ -25,7 +25,7 @@ BASES = (
     Polynomial(3, 0.0, 10.0),
     BSpline(2, (0.0, 4.0, 10.0)),
     PiecewiseLinear((0.0, 3.0, 10.0)),
-    Spline((0.0, 2.0, 5.0, 10.0)),
+    CubicSpline((0.0, 2.0, 5.0, 10.0)),
     Patches(1, (0.0, 5.0, 10.0)),
     Product((Polynomial(1, 0.0, 10.0), Polynomial(2, -2.0, 2.0))),
 )

@@ -10,12 +10,12 @@ from scipy.integrate import solve_ivp
 from symheli.errors import InputError
 from symheli.lpv import (
     BSpline,
+    CubicSpline,
     LPVStateSpace,
     Patches,
     PiecewiseLinear,
     Polynomial,
     Scheduling,
-    Spline,
     TrimSchedule,
     UserFunctions,
     simulate,
@@ -229,7 +229,7 @@ BREAKS = (0.0, 3.0, 7.0, 8.5, 13.0)
     [
         Polynomial(3, 0.0, 13.0),
         PiecewiseLinear(BREAKS),
-        Spline(BREAKS),
+        CubicSpline(BREAKS),
         BSpline(2, BREAKS),
         Patches(2, BREAKS),
         UserFunctions((np.ones_like, np.sqrt), 0.0, 13.0),
@@ -243,7 +243,7 @@ def test_another_unit_of_a_parameter_is_converted_to(basis):
         rng.standard_normal((basis.size, *shape)) for shape in ((2, 2), (2, 1), (1, 2), (1, 1))
     ]
     x0 = rng.standard_normal((5, 2))
-    trim = TrimSchedule(Spline(BREAKS), x0, x0[:, :1])
+    trim = TrimSchedule(CubicSpline(BREAKS), x0, x0[:, :1])
     known = LPVStateSpace(basis, *whole, SPEED, ("x1", "x2"), ("u1",), ("y1",), trim=trim)
     known = known.with_residuals(NODES, Matrices(*(np.zeros((2, *M.shape[1:])) for M in whole)))
     told = known.with_scheduling(Scheduling("V", "km/h", 0.0, 36.0, rate=3.6))

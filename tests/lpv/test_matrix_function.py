@@ -8,11 +8,11 @@ import pytest
 from symheli.errors import InputError
 from symheli.lpv import (
     BSpline,
+    CubicSpline,
     Patches,
     PiecewiseLinear,
     Polynomial,
     Product,
-    Spline,
     UserFunctions,
 )
 from symheli.lpv.bases.spaces import product_space, sum_space
@@ -21,7 +21,7 @@ from symheli.lpv.matrix_function import MatrixFunction, block
 BASES = [
     Polynomial(0, 0.0, 13.0),
     Polynomial(3, 0.0, 13.0),
-    Spline((0.0, 2.0, 5.0, 9.0, 13.0)),
+    CubicSpline((0.0, 2.0, 5.0, 9.0, 13.0)),
     PiecewiseLinear((0.0, 5.0, 13.0)),
     BSpline(2, (0.0, 4.0, 13.0)),
     Patches(2, (0.0, 4.0, 9.0, 13.0)),
@@ -80,7 +80,7 @@ def test_a_product_has_the_degree_it_has():
 
 
 def test_breaks_that_differ_by_rounding_are_one():
-    a, b = PiecewiseLinear((0.0, 0.3, 1.0)), Spline((0.0, 0.1 + 0.2, 0.6, 1.0))
+    a, b = PiecewiseLinear((0.0, 0.3, 1.0)), CubicSpline((0.0, 0.1 + 0.2, 0.6, 1.0))
     assert a.nodes[1] != b.nodes[1]
     assert len(product_space(a, b).breaks) == 4
 

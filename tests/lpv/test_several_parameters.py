@@ -9,12 +9,12 @@ from scipy.integrate import solve_ivp
 import symheli
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv import (
+    CubicSpline,
     LPVStateSpace,
     PiecewiseLinear,
     Polynomial,
     Product,
     Scheduling,
-    Spline,
     nu_gap,
     simulate,
 )
@@ -151,7 +151,7 @@ def test_reduction_keeps_the_response_over_the_box():
 
 
 def test_a_line_through_the_box_is_the_model_on_it_splines_too():
-    basis = Product((Spline((0.0, 3.0, 7.0, 13.0)), PiecewiseLinear((-4.0, 0.0, 4.0))))
+    basis = Product((CubicSpline((0.0, 3.0, 7.0, 13.0)), PiecewiseLinear((-4.0, 0.0, 4.0))))
     rng = np.random.default_rng(2)
     lpv = LPVStateSpace(
         basis,

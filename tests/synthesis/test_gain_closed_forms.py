@@ -106,7 +106,7 @@ def test_a_fast_sampled_model_has_the_gain_of_the_continuous_one(rate):
 
 
 def test_a_spline_model_has_the_gain_of_the_polynomial_it_samples():
-    from symheli.lpv import Spline as Cubic
+    from symheli.lpv import CubicSpline as Cubic
 
     lpv = random_stable(7, degree=2)
     nodes = tuple(np.linspace(0, 1, 6))

@@ -13,12 +13,12 @@ import symheli
 import synthesis
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv import (
+    CubicSpline,
     LinearModel,
     LPVStateSpace,
     Polynomial,
     Product,
     Scheduling,
-    Spline,
     UncertainStateSpace,
     pade_delay,
 )
@@ -472,7 +472,9 @@ def scheduled(basis, dt, parameters=SPEED):
     )
 
 
-@pytest.mark.parametrize("basis", [Polynomial(2, 0.0, 13.0), Spline((0.0, 2.0, 5.0, 9.0, 13.0))])
+@pytest.mark.parametrize(
+    "basis", [Polynomial(2, 0.0, 13.0), CubicSpline((0.0, 2.0, 5.0, 9.0, 13.0))]
+)
 @pytest.mark.parametrize("dt", [None, 0.02])
 def test_scheduled_controllers_close_every_frozen_loop(basis, dt):
     own = (
@@ -505,7 +507,7 @@ def test_a_controller_over_airspeed_closes_a_plant_over_airspeed_and_acceleratio
         },
     )
     own = plant(wide)
-    given = scheduled(Spline((0.0, 2.0, 5.0, 9.0, 13.0)), None)
+    given = scheduled(CubicSpline((0.0, 2.0, 5.0, 9.0, 13.0)), None)
     loop = own.close(given)
     for p in ((1.0, -2.0), (8.8, 2.9)):
         C = given.at(p[0]).select(inputs=["phi", "p"])

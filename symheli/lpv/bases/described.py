@@ -9,15 +9,19 @@ from typing import Any
 from symheli.errors import InputError
 from symheli.lpv.bases.bspline import BSpline
 from symheli.lpv.bases.function_space import FunctionSpace
-from symheli.lpv.bases.interpolating import PiecewiseLinear, Spline
+from symheli.lpv.bases.interpolating import CubicSpline, PiecewiseLinear
 from symheli.lpv.bases.patches import Patches
 from symheli.lpv.bases.polynomial import Polynomial
 from symheli.lpv.bases.product import Product
 from symheli.lpv.bases.user_functions import UserFunctions
 from symheli.values import plain_file
 
-BASES = {kind.__name__: kind for kind in (BSpline, Patches, PiecewiseLinear, Polynomial, Spline)}
+BASES = {
+    kind.__name__: kind for kind in (BSpline, Patches, PiecewiseLinear, Polynomial, CubicSpline)
+}
 """Bases that are their fields."""
+KINDS = {**BASES, "Spline": CubicSpline}
+"""By the names in files, of which older ones say Spline."""
 
 
 def described_basis(basis: FunctionSpace) -> dict[str, Any]:
@@ -59,12 +63,12 @@ def basis_of(
             f"{path}: the functions {', '.join(options['names'])} are not in the file; give the"
             " basis: load(path, basis=...)"
         )
-    if kind not in BASES:
+    if kind not in KINDS:
         raise InputError(
             f"{path}: a basis of kind {kind!r}, expected one of"
             f" {', '.join([*BASES, 'Product', 'UserFunctions'])}"
         )
-    return BASES[kind](**{k: tuples(v) for k, v in options.items()})
+    return KINDS[kind](**{k: tuples(v) for k, v in options.items()})
 
 
 def tuples(value: Any) -> Any:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline, PPoly
+from scipy.interpolate import CubicSpline as _CubicSpline
+from scipy.interpolate import PPoly
 
 from symheli.errors import InputError
 from symheli.lpv.bases.piecewise import PiecewisePolynomial
@@ -15,7 +16,7 @@ from symheli.values.arrays import frozen
 @dataclass(frozen=True)
 class Cardinal(PiecewisePolynomial):
     """Functions f_j with f_j(node_i) = 1 where i = j and 0 elsewhere; see `PiecewiseLinear` and
-    `Spline`.
+    `CubicSpline`.
     """
 
     nodes: tuple[float, ...]
@@ -81,7 +82,7 @@ class PiecewiseLinear(Cardinal):
 
 
 @dataclass(frozen=True)
-class Spline(Cardinal):
+class CubicSpline(Cardinal):
     """Cubic splines through the nodes with not-a-knot ends (twice continuously differentiable).
 
     Parameters
@@ -100,8 +101,8 @@ class Spline(Cardinal):
 
     Examples
     --------
-    >>> from symheli.lpv import Spline
-    >>> cubic = Spline((0.0, 3.0, 8.0, 13.0))
+    >>> from symheli.lpv import CubicSpline
+    >>> cubic = CubicSpline((0.0, 3.0, 8.0, 13.0))
     >>> print((cubic([5.0]) @ np.array([0.0, 3.0, 8.0, 13.0]) ** 3).round(6))
     [125.]
     """
@@ -109,4 +110,4 @@ class Spline(Cardinal):
     minimum_nodes = 4
 
     def _piecewise(self) -> PPoly:
-        return CubicSpline(np.array(self.nodes), np.eye(self.size))
+        return _CubicSpline(np.array(self.nodes), np.eye(self.size))
