@@ -14,8 +14,7 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv import LFT, LPVStateSpace, Scheduling, UncertainStateSpace
-from synthesis.analysis.apart import apart
-from synthesis.analysis.fine_sampling import fine_sampling
+from synthesis.analysis.apart import apart, fine_sampling
 from synthesis.analysis.general_search import General
 from synthesis.analysis.hypotheses import VERIFIED, hypotheses
 from synthesis.analysis.ladder import CLOSE, Found, Ladder

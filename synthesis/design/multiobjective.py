@@ -33,7 +33,7 @@ from synthesis.design.recovery import Transformed, controller
 from synthesis.design.refusals import failed, require_channels
 from synthesis.design.search import ACCURACY, Dependence, functions, limited
 from synthesis.program.cone_program import Solver
-from synthesis.program.panic import no_panic
+from synthesis.program.interruptible import no_panic
 from synthesis.worst.rates import Rate
 from synthesis.worst.rates import asked as limits
 

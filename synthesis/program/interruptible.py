@@ -1,5 +1,5 @@
-"""Work in native code that an interrupt from the keyboard ends at once: such code does not hear it,
-and one iteration may take minutes.
+"""Work in native code: an interrupt from the keyboard ends it at once, which such code does not
+hear while one iteration may take minutes, and a panic becomes an error.
 """
 
 from __future__ import annotations
@@ -10,7 +10,8 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 from symheli.errors import SolverError
@@ -107,3 +108,16 @@ def _end_with(parent: int) -> None:
     while os.getppid() == parent:
         time.sleep(1.0)
     os._exit(1)
+
+
+@contextmanager
+def no_panic() -> Iterator[None]:
+    """A panic of a solver written in Rust, which is no `Exception` and passes every `except
+    Exception`, becomes `SolverError`.
+    """
+    try:
+        yield
+    except BaseException as error:
+        if type(error).__name__ != "PanicException":
+            raise
+        raise SolverError(f"the solver broke down: {error}") from error
