@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from symheli.errors import InputError
-from synthesis.analysis.apart import apart
-from synthesis.analysis.fine_sampling import fine_sampling
+from symheli.lpv import LFT, LPVStateSpace, Scheduling, UncertainStateSpace
+from synthesis.analysis.apart import apart, fine_sampling
 from synthesis.analysis.general_search import General
 from synthesis.analysis.hypotheses import VERIFIED, hypotheses
 from synthesis.analysis.ladder import CLOSE, Found, Ladder
@@ -57,7 +57,7 @@ def certify(problem: Problem) -> Certificate:
     sign = 1.0 if problem.gains else -1.0
     start = time.perf_counter()
     model, frozen, delta, unstable = _worst_member(problem)
-    report = _Report(problem)
+    report = Report(problem)
     if math.isinf(frozen.value) if problem.gains else frozen.value >= 0:
         at = unstable or unstable_at(model, frozen.p or ())
         if at is not None:
@@ -129,17 +129,27 @@ def route(problem: Problem) -> Ladder:
 
 
 @dataclass(frozen=True, eq=False)
-class _Report:
+class Report:
     """How a certificate is written down."""
 
     problem: Problem
 
+    @property
+    def parameters(self) -> tuple[Scheduling, ...]:
+        """The scheduling parameters."""
+        return self.problem.model.parameters
+
+    @property
+    def model(self) -> LPVStateSpace | UncertainStateSpace | LFT:
+        """The model as it was given."""
+        return self.problem.uncertain or self.problem.model.source
+
     def nothing(self, status: Status, beaten: Beaten, ladder: Ladder | None = None) -> Certificate:
-        """Nothing is proven, and it is known why."""
+        """Write that nothing is proven, for this known reason."""
         return self._made(Found(math.inf), beaten, ladder, status)
 
     def found(self, best: Found, beaten: Beaten, ladder: Ladder) -> Certificate:
-        """What the search brought."""
+        """Write what the search brought."""
         if best.proof is None:
             status = Status.without_proof(best.answer)
         else:
@@ -165,12 +175,12 @@ class _Report:
             rates=problem.demand.rates,
             hypotheses=hypotheses(
                 kind,
-                problem.model.parameters,
+                self.parameters,
                 problem.demand.rates,
-                problem.uncertain or problem.model.source,
-                (*self._how(best, status, ladder), *self._distance(bounds, best, ladder)),
+                self.model,
+                (*self.how(best, status, ladder), *self.distance(bounds, best, ladder)),
             ),
-            method=f"{type(problem.form).__name__}, {(ladder or problem.impose).found_by}",
+            method=self.method(ladder),
             solver=str(problem.solver),
             seconds=Seconds(*(float(s) for s in spent), bounds=beaten.seconds),
             conditioning=best.conditioning,
@@ -181,7 +191,13 @@ class _Report:
             proof=best.proof,
         )
 
-    def _how(self, best: Found, status: Status, ladder: Ladder | None) -> tuple[str, ...]:
+    def method(self, ladder: Ladder | None) -> str:
+        """How the bound was looked for, in some words."""
+        form, how = self.problem.form, ladder or self.problem.impose
+        return f"{type(form).__name__}, {how.found_by}"
+
+    def how(self, best: Found, status: Status, ladder: Ladder | None) -> tuple[str, ...]:
+        """On what the proof rests, in sentences."""
         if status is Status.UNPROVEN and isinstance(self.problem.impose, Grid):
             return (
                 f"the inequalities hold at {self.problem.impose.points} values of each parameter in"
@@ -203,7 +219,7 @@ class _Report:
             VERIFIED.format(what=what, shared=shared),
         )
 
-    def _distance(
+    def distance(
         self, bounds: dict[str, float], best: Found, ladder: Ladder | None
     ) -> tuple[str, ...]:
         """What keeps the bounds of a gain apart, where they are."""

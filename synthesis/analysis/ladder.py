@@ -82,6 +82,11 @@ class Ladder(ABC):
         unit of gains.
         """
 
+    @property
+    def margins(self) -> tuple[float, ...]:
+        """Margins of the programs in turn; without a gain the margin itself is maximised."""
+        return self.problem.impose.tried if self.problem.gains else (0.0,)
+
     def proposed(self) -> Found:
         """What is proven of a gain without a program."""
         return Found(math.inf)
@@ -168,8 +173,7 @@ class Ladder(ABC):
         return best
 
     def _margins(self, shape: Any, best: Found) -> Found:
-        # without a gain the margin itself is what is maximised
-        for margin in self.problem.impose.tried if self.problem.gains else (0.0,):
+        for margin in self.margins:
             found = self._tried(shape, margin)
             best = best.or_better(found, 1.0)
             if found.proof is not None or found.answer in (Answer.INFEASIBLE, Answer.UNTRIED):

@@ -1,19 +1,23 @@
-"""Certified L2 gain and stability of an LFT whose parameters are as fast as they like."""
+"""Certified L2 gain and stability of an LFT whose parameters are arbitrarily fast."""
 
 from __future__ import annotations
 
 import math
 import time
+from typing import NamedTuple
 
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv import LFT
-from synthesis.analysis.hypotheses import VERIFIED, hypotheses
-from synthesis.analysis.ladder import NOTHING, inflated
-from synthesis.certificate import Attempt, Certificate, Kind, Proof, Seconds, Status
+from symheli.lpv import LFT, Scheduling
+from synthesis.analysis.certify import Beaten, Report
+from synthesis.analysis.hypotheses import VERIFIED
+from synthesis.analysis.ladder import NOTHING, Found, Ladder, inflated
+from synthesis.certificate import Attempt, Certificate, Kind, Proof, Status
+from synthesis.forms import Spline
+from synthesis.impose import Bernstein
 from synthesis.lft.coordinates import coordinates, scaled
-from synthesis.lft.multipliers import Class, Multiplier, check_scaling, multiplier_class
+from synthesis.lft.multipliers import Multiplier, check_scaling, multiplier_class
 from synthesis.lft.program import (
     gain_program,
     inequality,
@@ -22,18 +26,12 @@ from synthesis.lft.program import (
     with_state_channels,
 )
 from synthesis.lft.proof import Evidence, Quadratic
-from synthesis.program.cone_program import (
-    Answer,
-    Candidate,
-    ConeProgram,
-    Solver,
-    general_solver,
-    solve,
-)
-from synthesis.program.scaling import in_its_own_scale
+from synthesis.polynomial.motion import Motion
+from synthesis.program.cone_program import Answer, Solver, general_solver, solve
+from synthesis.proof.inequalities import Demand
 from synthesis.worst.budget import said
 from synthesis.worst.lft import BoxGain, box_growing_trajectory, box_lower_bound, frozen_box_gain
-from synthesis.worst.lower_bound import THOROUGH, LowerBound, Search
+from synthesis.worst.lower_bound import THOROUGH, Search
 from synthesis.worst.spectrum import surely_unstable
 from synthesis.worst.trajectory import SchedulingTrajectory
 
@@ -94,42 +92,7 @@ def lft_gain(
     >>> print(f"{cert.gamma:.3f}")
     1.000
     """
-    solver = _checked(lft, scaling, solver)
-    if not (lft.inputs and lft.outputs):
-        raise InputError(
-            f"a gain needs inputs and outputs, got {len(lft.inputs)} and {len(lft.outputs)}; see"
-            " lft_stability"
-        )
-    start = time.perf_counter()
-    frozen = frozen_box_gain(lft)
-    if math.isinf(frozen.gain):
-        if surely_unstable(lft.at(*frozen.p).A, lft.dt):
-            return _certificate(
-                lft,
-                scaling,
-                solver,
-                None,
-                LowerBound(math.inf, _at_rest(frozen)),
-                math.inf,
-                time.perf_counter() - start,
-            )
-        # stable or not to rounding: nothing is known from below
-        frozen, search = BoxGain(0.0, frozen.p, math.nan), None
-    below = box_lower_bound(lft, frozen, search)
-    bounds = time.perf_counter() - start
-
-    def found(expected: float) -> tuple[_Attempt, float, float]:
-        attempt = _Attempt(lft, scaling, solver, expected).run()
-        return attempt, attempt.gamma, attempt.evidence.coordinates.units.channel
-
-    tries = in_its_own_scale(found, frozen.gain)
-    best = min(tries, key=lambda attempt: attempt.gamma)
-    for other in tries:
-        if other is not best:
-            best.add(other)
-    return _certificate(lft, scaling, solver, best, below, frozen.gain, bounds).resting_on(
-        said(search and search.seconds, bounds)
-    )
+    return _certified(_checked(lft, scaling, "l2 gain", solver, search))
 
 
 def lft_stability(
@@ -180,121 +143,29 @@ def lft_stability(
     >>> lft_stability(lag.to_lft().reduce()).verified
     True
     """
-    solver = _checked(lft, scaling, solver)
-    frozen = frozen_box_gain(lft.select(inputs=(), outputs=()))
-    if math.isinf(frozen.gain) and surely_unstable(lft.at(*frozen.p).A, lft.dt):
-        return _certificate(
-            lft, scaling, solver, None, LowerBound(math.nan, _at_rest(frozen)), math.nan, 0.0
-        )
-    found = _Attempt(lft.select(inputs=(), outputs=()), scaling, solver, 1.0).run()
-    start = time.perf_counter()
-    worst = None if found.proof is not None else box_growing_trajectory(lft, search)
-    return _certificate(
-        lft,
-        scaling,
-        solver,
-        found,
-        LowerBound(math.nan, worst),
-        math.nan,
-        time.perf_counter() - start,
-    )
+    return _certified(_checked(lft, scaling, "stability", solver, search))
 
 
-class _Attempt:
-    """The cone programs of one LFT and one class of multipliers; what was found and what was
-    tried.
-    """
+class LFTProblem(NamedTuple):
+    """An LFT, without channels where stability is to be shown, and the class of multipliers."""
 
-    def __init__(self, lft: LFT, scaling: str, solver: Solver, gain: float):
-        self.begin = time.perf_counter()
-        self.lft, self.scaling, self.solver = lft, scaling, solver
-        self.sizes = lft.sizes
-        # a small gain means one thing only in the coordinates the LFT has, up to a number
-        self.evidence = Evidence(lft, coordinates(lft, gain, one=scaling == "small gain"))
-        self.multipliers: Class = multiplier_class(scaling, self.sizes)
-        loop = scaled(lft, self.evidence.coordinates)
-        if not lft.inputs:
-            loop = with_state_channels(loop)
-        self.inputs = loop.Bu.shape[1]
-        self.linear = inequality(loop, self.multipliers, lft.dt is None).congruent(
-            self.evidence.coordinates.units.weight
-        )
-        self.proof: Proof | None = None
-        self.gamma, self.conditioning, self.answer = math.inf, math.inf, Answer.FAILED
-        self.attempts: list[Attempt] = []
-        self.solving = self.verifying = 0.0
+    lft: LFT
+    scaling: str
+    demand: Demand
+    solver: Solver
+    search: Search | None
+    form = Spline(degree=0)
+    impose = Bernstein(margins=MARGINS)
 
     @property
-    def seconds(self) -> tuple[float, float, float]:
-        """Build, solve and verify, s."""
-        return self.ended - self.begin - self.solving - self.verifying, self.solving, self.verifying
-
-    def run(self) -> _Attempt:
-        """Minimise the gain; where no answer can be verified, ask for the largest margin of
-        stability.
-        """
-        x = len(self.lft.states)
-        for margin in MARGINS:
-            candidate = self._solve(
-                gain_program(self.linear, self.multipliers, x, self.inputs, margin)
-            )
-            self._judge("gain", margin, candidate, (1.0,))
-            self.answer = candidate.answer
-            if self.proof is not None or candidate.answer in (Answer.INFEASIBLE, Answer.UNTRIED):
-                break
-        if self.proof is None:
-            candidate = self._solve(margin_program(self.linear, self.multipliers, x, self.inputs))
-            margin = math.nan if candidate.x is None else float(candidate.x[-1])
-            self._judge("margin", margin, candidate, 10.0 ** np.arange(-2, 10))
-            if candidate.answer is Answer.SOLVED:
-                self.answer = Answer.INFEASIBLE if margin <= NOTHING else Answer.FAILED
-        self.ended = time.perf_counter()
-        return self
-
-    def add(self, other: _Attempt) -> None:
-        """The programs and the time of another attempt at the same gain."""
-        self.attempts = other.attempts + self.attempts
-        self.solving, self.verifying = (
-            self.solving + other.solving,
-            self.verifying + other.verifying,
-        )
-        self.begin -= other.ended - other.begin
-
-    def _solve(self, program: ConeProgram) -> Candidate:
-        candidate = solve(program, self.solver)
-        self.solving += candidate.seconds
-        return candidate
-
-    def _judge(
-        self, program: str, margin: float, candidate: Candidate, weights: Array | tuple[float, ...]
-    ) -> None:
-        """Keep the best multiple of the candidate that can be verified, whatever the solver said of
-        it.
-        """
-        start = time.perf_counter()
-        best = math.inf
-        for weight in weights if candidate.x is not None else ():
-            proof = self._physical(float(weight) * np.asarray(candidate.x))
-            least, conditioning = self.evidence.least_gain(proof)
-            gamma = inflated(least, self.evidence.coordinates.units.channel)
-            if gamma >= best or not self.evidence.floating(proof, gamma):
-                continue
-            self.proof = Proof(self.evidence, proof)
-            self.gamma, self.conditioning, best = gamma, conditioning, gamma
-            if math.isnan(gamma):  # stability alone: one multiple is as good as another
-                break
-        self.verifying += time.perf_counter() - start
-        words = f"{candidate.message}, {'not verified' if self.proof is None else 'verified'}"
-        self.attempts.append(Attempt(program, margin, words, best))
-
-    def _physical(self, x: Array) -> Quadratic:
-        P, Q, S, R = unpack(x, self.multipliers, len(self.lft.states))
-        units, left, _ = self.evidence.coordinates
-        multiplier = Multiplier(self.scaling, self.sizes, Q, S, R)
-        return Quadratic(units.to_physical(P), multiplier.transformed(left, units.channel**2))
+    def gains(self) -> bool:
+        """Whether the bound is one of a gain."""
+        return self.demand.kind == "l2 gain"
 
 
-def _checked(lft: LFT, scaling: str, solver: Solver | str) -> Solver:
+def _checked(
+    lft: LFT, scaling: str, kind: Kind, solver: Solver | str, search: Search | None
+) -> LFTProblem:
     if not isinstance(lft, LFT):
         raise InputError(
             f"expected an LFT, got {type(lft).__name__}; a polynomial LPVStateSpace becomes one"
@@ -305,60 +176,167 @@ def _checked(lft: LFT, scaling: str, solver: Solver | str) -> Solver:
         raise InputError(
             "the LFT has no states; its gain is the largest norm of its matrix over the box"
         )
-    return general_solver(solver)
-
-
-def _at_rest(frozen: BoxGain) -> SchedulingTrajectory:
-    p = np.array([frozen.p])
-    return SchedulingTrajectory(np.zeros(1), p[:, 0] if p.shape[1] == 1 else p)
-
-
-def _certificate(
-    lft: LFT,
-    scaling: str,
-    solver: Solver,
-    found: _Attempt | None,
-    below: LowerBound,
-    frozen: float,
-    bounds: float,
-) -> Certificate:
-    """The certificate of what was `found`; None: a frozen model is unstable and nothing was
-    tried.
-    """
-    kind: Kind = "stability" if math.isnan(below.gain) else "l2 gain"
-    proof = found.proof if found else None
-    growing = math.isinf(below.gain) if kind == "l2 gain" else below.trajectory is not None
-    if proof is not None:
-        status = Status.PROVEN
-    elif found is None:
-        status = Status.UNSTABLE
-    elif growing:
-        status = Status.GROWING
-    else:
-        status = Status.without_proof(found.answer)
-    rates = (math.inf,) * len(lft.parameters)
-    how = ["a limit on the rate is not used", f"constant P; {_CLASS[scaling]}"]
-    if proof is not None:
-        how.append(
-            VERIFIED.format(what="finitely many matrices", shared="only the matrices of the LFT")
+    solver = general_solver(solver)
+    if kind == "stability":
+        lft = lft.select(inputs=(), outputs=())
+    elif not (lft.inputs and lft.outputs):
+        raise InputError(
+            f"a gain needs inputs and outputs, got {len(lft.inputs)} and {len(lft.outputs)}; see"
+            " lft_stability"
         )
-    return Certificate(
-        kind=kind,
-        gamma=math.nan if kind == "stability" else found.gamma if found else math.inf,
-        lower=below.gain,
-        frozen=frozen,
-        status=status,
-        verified=proof is not None,
-        rates=rates,
-        hypotheses=hypotheses(kind, lft.parameters, rates, lft, how),
-        method=f"LFT test with {scaling}, p arbitrarily fast",
-        solver=str(solver),
-        seconds=Seconds(*(found.seconds if found else (0.0, 0.0, 0.0)), bounds),
-        conditioning=found.conditioning if found else math.inf,
-        attempts=tuple(found.attempts) if found else (),
-        worst=below.trajectory,
-        proof=proof,
+    every, m = lft.parameters, len(lft.parameters)
+    box = tuple((float(s.low), float(s.high)) for s in every)
+    demand = Demand(kind, Motion(box, (math.inf,) * m, (None,) * m))
+    return LFTProblem(lft, scaling, demand, solver, search)
+
+
+def _certified(problem: LFTProblem) -> Certificate:
+    """Search a lower bound and a proof, and write the certificate."""
+    lft, _, _, _, search = problem
+    start, report, worst = time.perf_counter(), LFTReport(problem), None  # type: ignore[arg-type]
+    frozen = frozen_box_gain(lft)
+    if math.isinf(frozen.gain) and surely_unstable(lft.at(*frozen.p).A, lft.dt):
+        p = np.array([frozen.p])
+        worst = SchedulingTrajectory(np.zeros(1), p[:, 0] if p.shape[1] == 1 else p)
+        beaten = Beaten(math.inf, math.inf, worst, time.perf_counter() - start)
+        return report.nothing(Status.UNSTABLE, beaten)
+    ladder = MultiplierSearch(problem)  # type: ignore[arg-type]
+    if not problem.gains:
+        best, start = ladder.search(math.inf), time.perf_counter()
+        worst = None if best.proof is not None else box_growing_trajectory(lft, search)
+        beaten = Beaten(math.nan, math.nan, worst, time.perf_counter() - start)
+        if worst is not None:
+            return report.nothing(Status.GROWING, beaten, ladder)
+        return report.found(best, beaten, ladder)
+    if math.isinf(frozen.gain):
+        # stable or not to rounding: nothing is known from below
+        frozen, search = BoxGain(0.0, frozen.p, math.nan), None
+    below = box_lower_bound(lft, frozen, search)
+    seconds = time.perf_counter() - start
+    beaten = Beaten(frozen.gain, below.gain, below.trajectory, seconds)
+    best = ladder.search(frozen.gain)
+    growing = best.proof is None and math.isinf(below.gain)
+    cert = (
+        report.nothing(Status.GROWING, beaten, ladder)
+        if growing
+        else report.found(best, beaten, ladder)
     )
+    return cert.resting_on(said(search and search.seconds, seconds))
+
+
+class MultiplierSearch(Ladder):
+    """A constant P with the multipliers of one class, in the coordinates of the `evidence`."""
+
+    problem: LFTProblem  # type: ignore[assignment]
+    margins = MARGINS  # type: ignore[assignment]
+
+    def expect(self, bound: float) -> float:
+        """Set the coordinates; the unit of gains."""
+        lft, scaling, *_ = self.problem
+        # a small gain means one thing only in the coordinates the LFT has, up to a number
+        self.evidence = Evidence(lft, coordinates(lft, bound, one=scaling == "small gain"))
+        self.multipliers = multiplier_class(scaling, lft.sizes)
+        loop = scaled(lft, self.evidence.coordinates)
+        if not self.problem.gains:
+            loop = with_state_channels(loop)
+        self.inputs = loop.Bu.shape[1]
+        units = self.evidence.coordinates.units
+        self.linear = inequality(loop, self.multipliers, lft.dt is None).congruent(units.weight)
+        return units.channel
+
+    def shapes(self) -> list[str]:
+        """The class of multipliers."""
+        return [self.problem.scaling]
+
+    def constant(self) -> str:
+        """The same: P is constant."""
+        return self.problem.scaling
+
+    def varies(self, shape: str) -> bool:
+        """Whether P depends on p: it does not."""
+        return False
+
+    def _margins(self, shape: str, best: Found) -> Found:
+        """The least gain; where no answer can be verified, the largest margin of stability."""
+        best = super()._margins(shape, best)
+        return best if best.proof is not None else best.or_better(self._tried(shape, 0.0), 1.0)
+
+    def _whether_any(self, answer: Answer) -> Answer:
+        return answer
+
+    def attempt(self, shape: str, margin: float, alpha: float = 0.0) -> Found:
+        """One margin; 0: the largest, of which many multiples may prove a gain."""
+        start, x = time.perf_counter(), len(self.problem.lft.states)
+        program = (
+            gain_program(self.linear, self.multipliers, x, self.inputs, margin)
+            if margin
+            else margin_program(self.linear, self.multipliers, x, self.inputs)
+        )
+        name, weights = ("gain", np.ones(1)) if margin else ("margin", 10.0 ** np.arange(-2, 10))
+        built = time.perf_counter()
+        candidate = solve(program, self.problem.solver)
+        solved, answer = time.perf_counter(), candidate.answer
+        if not margin:
+            margin = math.nan if candidate.x is None else float(candidate.x[-1])
+            none = Answer.INFEASIBLE if margin <= NOTHING else Answer.FAILED
+            # what is not solved leaves the answer as it was
+            answer = none if answer is Answer.SOLVED else Answer.UNTRIED
+        found = Found(math.inf, None, answer)
+        for weight in weights:
+            if candidate.x is None:
+                break
+            found = found.or_better(self._proven(float(weight) * candidate.x, answer), 1.0)
+            if found.proof is not None and not self.problem.gains:
+                break  # one multiple is as good as another
+        self.spent += (built - start, solved - built, time.perf_counter() - solved)
+        words = "not verified" if found.proof is None else "verified"
+        self.attempts.append(Attempt(name, margin, f"{candidate.message}, {words}", found.bound))
+        return found
+
+    def _proven(self, x: Array, answer: Answer) -> Found:
+        """What P and the multiplier at the solver's point prove, in physical units."""
+        lft, (units, left, _) = self.problem.lft, self.evidence.coordinates
+        P, Q, S, R = unpack(x, self.multipliers, len(lft.states))
+        multiplier = Multiplier(self.problem.scaling, lft.sizes, Q, S, R)
+        proof = Quadratic(units.to_physical(P), multiplier.transformed(left, units.channel**2))
+        least, conditioning = self.evidence.least_gain(proof)
+        gamma = inflated(least, units.channel)
+        if math.isinf(gamma) or not self.evidence.floating(proof, gamma):
+            return Found(math.inf, None, answer)
+        return Found(gamma, Proof(self.evidence, proof), answer, conditioning)
+
+
+class LFTReport(Report):
+    """How the certificate of an LFT is written down."""
+
+    problem: LFTProblem  # type: ignore[assignment]
+
+    @property
+    def parameters(self) -> tuple[Scheduling, ...]:
+        """The scheduling parameters."""
+        return self.problem.lft.parameters
+
+    @property
+    def model(self) -> LFT:
+        """The LFT."""
+        return self.problem.lft
+
+    def method(self, ladder: Ladder | None) -> str:
+        """The class of multipliers."""
+        return f"LFT test with {self.problem.scaling}, p arbitrarily fast"
+
+    def how(self, best: Found, status: Status, ladder: Ladder | None) -> tuple[str, ...]:
+        """On what the proof rests, in sentences."""
+        own = ("a limit on the rate is not used", f"constant P; {_CLASS[self.problem.scaling]}")
+        what, shared = "finitely many matrices", "only the matrices of the LFT"
+        verified = () if best.proof is None else (VERIFIED.format(what=what, shared=shared),)
+        return (*own, *verified)
+
+    def distance(
+        self, bounds: dict[str, float], best: Found, ladder: Ladder | None
+    ) -> tuple[str, ...]:
+        """Nothing is known of what keeps the bounds apart."""
+        return ()
 
 
 _CLASS = {

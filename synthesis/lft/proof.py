@@ -19,6 +19,7 @@ from synthesis.lft.coordinates import Coordinates
 from synthesis.lft.multipliers import Multiplier
 from synthesis.polynomial import structure
 from synthesis.polynomial.exact import Number, exact, positive_definite, rational
+from synthesis.polynomial.symmetric import schur_complement, symmetrized
 from synthesis.proof import pointwise
 
 Array = np.ndarray
@@ -89,15 +90,14 @@ class Evidence(NamedTuple):
         E[:n, :n], E[n : n + x, n : n + x] = right, root * units.right @ units.weight
         E[n + x :, n + x :] = np.eye(len(lft.inputs))
         F = E.T @ _left_side(lft, proof, float) @ E / units.channel**2
-        F = 0.5 * (F + F.T)
-        inner, side, corner = F[: n + x, : n + x], F[: n + x, n + x :], F[n + x :, n + x :]
-        if not (self._conditions_hold(proof) and _negative(inner)):
+        F = symmetrized(F)
+        if not (self._conditions_hold(proof) and _negative(F[: n + x, : n + x])):
             return math.inf, math.inf
         values = np.linalg.eigvalsh(units.to_scaled(proof.P)) if x else np.ones(1)
         if not len(lft.inputs) or not len(lft.outputs):
             return math.nan, float(values[-1] / values[0])
-        schur = corner - side.T @ np.linalg.solve(inner, side)
-        g = max(float(np.linalg.eigvalsh(0.5 * (schur + schur.T)).max()), 0.0)
+        level = symmetrized(schur_complement(F, n + x))
+        g = max(float(np.linalg.eigvalsh(level).max()), 0.0)
         return units.channel * math.sqrt(g), float(values[-1] / values[0])
 
     def floating(self, proof: Quadratic, gamma: float) -> bool:

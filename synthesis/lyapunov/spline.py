@@ -161,13 +161,6 @@ class SplineLyapunov:
         j, t = self._locate(p)
         return self._sum(self.coefficients, self.degree, j * self.degree, t)
 
-    def multiplier_at(self, p: float | Array) -> Array:
-        """lambda at p, shape p.shape; there must be one."""
-        assert self.multiplier is not None  # noqa: S101 - see the callers
-        j, t = self._locate(p)
-        e = self.multiplier_degree
-        return self._sum(self.multiplier[:, None, None], e, j * e, t)[..., 0, 0]
-
     def derivative(self, p: float | Array) -> Array:
         """dP/dp at p (per unit of p), the right-hand one at a knot, shape p.shape + (n, n)."""
         j, t = self._locate(p)

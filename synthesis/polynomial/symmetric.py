@@ -54,6 +54,12 @@ def extended(M: Array, by: int) -> Array:
     return out
 
 
+def schur_complement(F: Array, n: int) -> Array:
+    """What is left of matrices (..., N, N) where the first n variables are eliminated."""
+    top, side, corner = F[..., :n, :n], F[..., :n, n:], F[..., n:, n:]
+    return corner - np.swapaxes(side, -1, -2) @ np.linalg.solve(top, side)
+
+
 def basis(n: int) -> Array:
     """The matrices (n (n + 1) / 2, n, n) with smat(v) = sum_i v_i basis_i."""
     return smat(np.eye(length(n)), n)

@@ -27,8 +27,7 @@ from scipy import sparse
 
 from symheli.errors import InputError, SolverError
 from synthesis.polynomial.symmetric import basis, length
-from synthesis.program.interruptible import in_process, in_thread
-from synthesis.program.panic import no_panic
+from synthesis.program.interruptible import in_process, in_thread, no_panic
 
 Array = np.ndarray
 

@@ -1,11 +1,12 @@
-"""Work in native code that an interrupt from the keyboard ends at once: such code does not hear it,
-and one iteration may take minutes.
+"""Work in native code: an interrupt from the keyboard ends it at once, which such code does not
+hear while one iteration may take minutes, and a panic becomes an error.
 """
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 from symheli.errors import SolverError
@@ -60,3 +61,16 @@ def in_process(function: Callable[..., T], *arguments: Any) -> T:
             return worker(pickled(function, *arguments))
     except ProcessEndedError as error:
         raise SolverError(str(error)) from error
+
+
+@contextmanager
+def no_panic() -> Iterator[None]:
+    """A panic of a solver written in Rust, which is no `Exception` and passes every `except
+    Exception`, becomes `SolverError`.
+    """
+    try:
+        yield
+    except BaseException as error:
+        if type(error).__name__ != "PanicException":
+            raise
+        raise SolverError(f"the solver broke down: {error}") from error

@@ -27,6 +27,7 @@ from synthesis.polynomial.exact import Number, exact, rational
 from synthesis.polynomial.matrix import PolynomialMatrix
 from synthesis.polynomial.pieces import Pieces
 from synthesis.polynomial.regions import convert, regions
+from synthesis.polynomial.symmetric import schur_complement
 from synthesis.program.scaling import Scaling
 from synthesis.proof import pointwise
 from synthesis.proof.inequalities import Demand, Pair, decrease, peak, positivity
@@ -323,38 +324,14 @@ class _Samples(NamedTuple):
     ny: int
 
     def gain(self) -> float:
-        """Least g of the corner block, by Schur complement."""
-        g = TINY
-        for F, P in zip(self.moves, self.here, strict=True):
-            top = F[:, : self.nx, : self.nx]
-            if np.linalg.eigvalsh(P).min() <= 0 or np.linalg.eigvalsh(top).max() >= 0:
-                return math.inf
-            side, corner = F[:, : self.nx, self.nx :], F[:, self.nx :, self.nx :]
-            g = max(
-                g,
-                float(
-                    np.linalg.eigvalsh(
-                        corner - np.swapaxes(side, 1, 2) @ np.linalg.solve(top, side)
-                    ).max()
-                ),
-            )
-        return g
+        """Least g of the corner block."""
+        if any(np.linalg.eigvalsh(P).min() <= 0 for P in self.here):
+            return math.inf
+        return max([TINY, *(_least_level(F, self.nx) for F in self.moves)])
 
     def peak(self) -> float:
         """Least g of the second inequality."""
-        g = TINY
-        for F in self.outputs:
-            n = F.shape[1] - self.ny
-            top, side = F[:, :n, :n], F[:, :n, n:]
-            if np.linalg.eigvalsh(top).max() >= 0:
-                return math.inf
-            g = max(
-                g,
-                float(
-                    np.linalg.eigvalsh(-np.swapaxes(side, 1, 2) @ np.linalg.solve(top, side)).max()
-                ),
-            )
-        return g
+        return max([TINY, *(_least_level(F, F.shape[1] - self.ny) for F in self.outputs)])
 
     def decay(self, dt: float | None) -> float:
         """Largest alpha."""
@@ -370,6 +347,15 @@ class _Samples(NamedTuple):
                 # A'P+A - P <= value P
                 worst = min(worst, -math.log(max(1 + value, 1e-300)) / (2 * dt))
         return worst
+
+
+def _least_level(F: Array, n: int) -> float:
+    """Least g of the last block of matrices (K, N, N) with n rows before it; inf where those are
+    not negative definite.
+    """
+    if np.linalg.eigvalsh(F[:, :n, :n]).max() >= 0:
+        return math.inf
+    return float(np.linalg.eigvalsh(schur_complement(F, n)).max())
 
 
 def _samples(model: Pieces, P: BoxLyapunov, demand: Demand, points: int) -> _Samples:

@@ -18,7 +18,7 @@ from synthesis.polynomial import structure
 from synthesis.polynomial.exact import Number, exact, positive_definite, rational
 from synthesis.polynomial.motion import Motion
 from synthesis.polynomial.pieces import ModelPiece, joined, model_pieces, same_pieces
-from synthesis.polynomial.symmetric import extended, symmetrized
+from synthesis.polynomial.symmetric import extended, schur_complement, symmetrized
 from synthesis.program.scaling import Scaling
 from synthesis.proof import pointwise
 from synthesis.proof.inequalities import Claim, Demand, lmi_polynomials
@@ -61,20 +61,15 @@ def examine(claim: Claim, weight: Array) -> Findings:
         if len(weight) == states:
             W = extended(weight, F.shape[1] - states)
             F = symmetrized(W.T @ F @ W)
-        top = F[:, :n, :n]
-        eigenvalues = np.linalg.eigvalsh(top)
+        eigenvalues = np.linalg.eigvalsh(F[:, :n, :n])
         decreasing &= bool(
             np.all(eigenvalues[:, -1] < -_rounding(n) * np.abs(eigenvalues).max(axis=1))
         )
         if not decreasing:
             return Findings(positive, False, math.inf, conditioning)
         if F.shape[1] > n:
-            side, corner = F[:, :n, n:], F[:, n:, n:]
-            schur = corner - np.swapaxes(side, 1, 2) @ np.linalg.solve(top, side)
-            g = max(
-                g,
-                float((np.linalg.eigvalsh(schur)[:, -1] / form.weight.coefficients.ravel()).max()),
-            )
+            levels = np.linalg.eigvalsh(schur_complement(F, n))[:, -1]
+            g = max(g, float((levels / form.weight.coefficients.ravel()).max()))
     return Findings(positive, decreasing, g, conditioning)
 
 

@@ -25,7 +25,7 @@ from symheli.lpv import LinearModel, LinearModels
 from symheli.values import plain_file
 from symheli.values.text_file import text_of
 from synthesis.plant.refusals import levels_above
-from synthesis.program.panic import no_panic
+from synthesis.program.interruptible import no_panic
 from synthesis.worst.frozen import norm
 
 T = np.arange(0.0, 4.0, 0.02)
