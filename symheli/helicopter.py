@@ -288,6 +288,13 @@ class Helicopter:
             ["xdot", "balance"],
         )
 
+    @cached_property
+    def inflow(self) -> Function:
+        """(x, u, wind) -> lam: the solved inflow ratio of each rotor, as `implicit` takes them."""
+        x, u, w = SX.sym("x", len(self.states)), SX.sym("u", 4), SX.sym("wind", 3)
+        solved = self.dynamics.euler(x, u, w, self._values, self.dynamics.inflow_solver)[1].lam
+        return Function("inflow", [x, u, w], [column(solved)], ["x", "u", "wind"], ["lam"])
+
     def with_inflow(
         self,
         x: Any,

@@ -19,7 +19,7 @@ from symheli.codegen.program import (
 from symheli.codegen.reciprocals import reciprocals
 from symheli.errors import InputError
 
-_TRANSLATED = ("sq", "twice", "inv", "sign", "if_else_zero", "assign", "tan")
+_TRANSLATED = ("sq", "twice", "inv", "sign", "if_else_zero", "assign", "tan", "fmin", "fmax")
 _NAMES = {
     getattr(casadi, f"OP_{name.upper()}"): name
     for name in (*ARITHMETIC, *COMPARISONS, *ELEMENTARY, *_TRANSLATED)
@@ -28,13 +28,19 @@ _NAMES = {
 
 def program(function: casadi.Function, varying: Sequence[int] | None = None) -> Program:
     """The operations of an SX function of dense column vectors that needs no more than + - * / sqrt
-    | |, sin, cos, tan, asin, atan2, exp, comparisons and branches.
+    | |, fmin, fmax, sin, cos, tan, asin, atan2, exp, comparisons and branches.
 
     Two sides of a branch become one selection; a divisor that is constant, used more than once, or
     independent of the `varying` inputs (default: all vary; see `Program.hoist`) is inverted once;
     products are fused with the sums that use them: values differ from CasADi's by rounding. Raises
     `InputError` where an operation has no such form (log, ...).
     """
+    varies = range(function.n_in()) if varying is None else varying
+    return without_unused(fused(without_unused(reciprocals(operations(function), varies)), varies))
+
+
+def operations(function: casadi.Function) -> Program:
+    """The operations of such a function as they stand: nothing inverted, nothing fused."""
     builder = _Translator()
     registers: dict[int, int] = {}
     outputs = [[builder.constant(0.0)] * function.size1_out(i) for i in range(function.n_out())]
@@ -59,8 +65,7 @@ def program(function: casadi.Function, varying: Sequence[int] | None = None) -> 
             )
     sizes = tuple(function.size1_in(i) for i in range(function.n_in()))
     read = Program(function.name(), sizes, tuple(builder.operations), tuple(map(tuple, outputs)))
-    varies = range(len(sizes)) if varying is None else varying
-    return without_unused(fused(without_unused(reciprocals(read, varies)), varies))
+    return without_unused(read)
 
 
 class _Translator(Builder):
@@ -94,6 +99,8 @@ class _Translator(Builder):
                 return self.apply("add", a[0], a[0])
             case "tan":
                 return self.apply("div", self.apply("sin", a[0]), self.apply("cos", a[0]))
+            case "fmin" | "fmax":
+                return self.apply(name[1:], *a)
             case "inv":
                 return self.apply("div", self.constant(1.0), a[0])
             case "sign":

@@ -1,0 +1,10 @@
+"""Guaranteed bounds of functions and of their Jacobians over boxes and ellipsoids.
+
+Every bound is first order in the symbols of the domain, rounding errors included: see `enclose`.
+"""
+
+from symheli.enclosure.domain import Domain
+from symheli.enclosure.enclosure import Enclosure, enclose
+from symheli.enclosure.form import Form
+
+__all__ = ["Domain", "Enclosure", "Form", "enclose"]

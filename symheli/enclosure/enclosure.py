@@ -1,0 +1,602 @@
+"""Enclosures of functions and of their Jacobians over sets, implicit variables included."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import casadi
+import numpy as np
+
+from symheli.codegen.program import Operation, Program, without_unused
+from symheli.codegen.translation import operations
+from symheli.enclosure.domain import Domain
+from symheli.enclosure.form import Form, hull, pick
+from symheli.enclosure.interval import Interval
+from symheli.errors import InputError
+
+Array = np.ndarray
+
+TRIALS = 8
+"""Radii tried, each four times the last, until Newton's operator maps an interval into itself."""
+NEWTON_STEPS = 20
+"""At most, towards the root at the centre of a set."""
+GROWTH = 4.0
+FIRST_RADIUS = 1.5
+"""First radius tried, in units of the remainder divided by the slope."""
+
+
+@dataclass(frozen=True)
+class Enclosure:
+    """Guaranteed bounds of a function over N sets, or over one (without the axis N).
+
+    value : Form (N, n_out)
+        The outputs, stacked in their order.
+    jacobian : Form (N, n_out, n_in), or None
+        Derivatives by the inputs asked for, stacked; where the function has a kink, the hull of its
+        slopes.
+    roots : Form (N, n_roots)
+        The implicit variables: each is unique within its interval, for every point of the set.
+
+    Where a set is too large, or a function not defined on all of it, bounds are infinite.
+    """
+
+    value: Form
+    jacobian: Form | None
+    roots: Form
+
+    @property
+    def finite(self) -> Array:
+        """Whether all bounds of a set are finite, (N,) or a bool."""
+        forms = [self.value, *([] if self.jacobian is None else [self.jacobian])]
+        leading = self.value.shape[:-1]
+        checks = [np.isfinite(f.rest).reshape(*leading, -1).all(axis=-1) for f in forms]
+        return np.logical_and.reduce(checks)
+
+    def segment_average(self) -> Form:
+        """Averages of the Jacobian over segments from the centre of the set to its points.
+
+        For every z: f(x(z)) - f(x(0)) = J [x(z) - x(0)] with J in this form, by the mean value
+        theorem; the linear part halves, since it is averaged over [0, z]. All domains take part:
+        one that must not is enclosed as many small sets instead.
+        """
+        if self.jacobian is None:
+            raise InputError("enclose(..., by=[0, ...]) is needed for averages of the Jacobian")
+        j = self.jacobian
+        return Form(j.centre, 0.5 * j.slopes, j.rest, j.groups)
+
+
+def enclose(
+    function: casadi.Function,
+    *domains: Domain,
+    start: casadi.Function | None = None,
+    by: Sequence[int] = (),
+    continuous: bool = False,
+) -> Enclosure:
+    """Guaranteed bounds of a function and of its Jacobian over sets of its inputs.
+
+    Parameters
+    ----------
+    function : casadi.Function
+        SX, of dense column vectors: + - * / sqrt | |, sin, cos, tan, asin, atan2, exp, fmin, fmax,
+        comparisons and selections. With implicit variables: (inputs, lam) -> (outputs, balance),
+        lam the zero of the balance, equation i without the variables after lam_i
+        (`Helicopter.implicit`).
+    *domains : Domain
+        One for each input but lam; those of N sets at once all have the same N, the others are
+        shared.
+    start : casadi.Function
+        (inputs) -> lam, a floating-point zero of the balance (`Helicopter.inflow`). The root that
+        continues it over the set is enclosed. None: no implicit variables.
+    by : sequence of int
+        Positions of the inputs by which derivatives are bounded too, in this order; those through
+        the implicit variables are included.
+    continuous : bool
+        The caller knows that the function is continuous where a selection may take either side:
+        derivatives are then bounded by those of both sides. Otherwise they are infinite there,
+        since the function might jump; `fabs`, `fmin` and `fmax` never jump.
+
+    Returns
+    -------
+    Enclosure
+        First order in the symbols of the domains, in the order given, rounding included. The
+        bounds hold for real arithmetic on the constants of the function as they are stored.
+
+    Raises
+    ------
+    InputError
+        Domains that do not fit the inputs, an operation that has no bounds here.
+
+    References
+    ----------
+    de Figueiredo & Stolfi (2004), Affine arithmetic; Neumaier (1990), Interval Methods for Systems
+    of Equations, section 5.1 (Newton's operator).
+
+    Examples
+    --------
+    >>> import casadi
+    >>> x = casadi.SX.sym("x", 2)
+    >>> f = casadi.Function("f", [x], [x[0] * x[1]])
+    >>> unit_disk = Domain.ellipsoid([0, 0], [[1, 0], [0, 1]])
+    >>> bounds = enclose(f, unit_disk).value.interval
+    >>> print(bounds.lower.round(6), bounds.upper.round(6))
+    [-0.5] [0.5]
+    """
+    implicit = 0 if start is None else start.numel_out(0)
+    symbols = _Symbols.of(function, domains, implicit)
+    seeds = sum(domains[i].size for i in by)
+    inputs = symbols.inputs(by)
+    program = operations(function)
+    found: list[_Dual] = []
+    if start is not None:
+        guesses = _at_centres(start, symbols)
+        inputs.append(found)
+        for i in range(implicit):
+            equation = without_unused(replace(program, outputs=((program.outputs[-1][i],),)))
+            found.append(_solve(equation, inputs, guesses[:, i], seeds, continuous))
+        program = without_unused(replace(program, outputs=program.outputs[:-1]))
+    flat = [d for output in _evaluate(program, inputs, seeds, continuous) for d in output]
+    like = inputs[0][0].value
+    value = _stacked([d.value for d in flat], like)
+    roots = _stacked([d.value for d in found], like)
+    slopes = _stacked([d.derivative(seeds) for d in flat], like, (seeds,)) if by else None
+    if not symbols.many:
+        value, roots, slopes = value[0], roots[0], None if slopes is None else slopes[0]
+    return Enclosure(value, slopes, roots)
+
+
+# --- inputs and outputs --------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Symbols:
+    """The domains of all inputs as one vector of symbols."""
+
+    domains: tuple[Domain, ...]
+    groups: tuple[int, ...]
+    count: int
+    many: bool
+
+    @classmethod
+    def of(cls, function: casadi.Function, domains: Sequence[Domain], implicit: int) -> _Symbols:
+        sizes = [function.size1_in(i) for i in range(function.n_in())]
+        expected = [d.size for d in domains] + [implicit] * (implicit > 0)
+        if sizes != expected:
+            raise InputError(
+                f"{function.name()} takes inputs of sizes {sizes}; the domains and `start` have"
+                f" {expected}"
+            )
+        counts = {d.centre.shape[0] for d in domains if d.centre.ndim == 2} | {
+            d.generators.shape[0] for d in domains if d.generators.ndim == 3
+        }
+        if len(counts) > 1:
+            raise InputError(f"domains of {sorted(counts)} sets: all need the same number")
+        groups = tuple(g for d in domains for g in d.groups)
+        return cls(tuple(domains), groups, max(counts, default=1), bool(counts))
+
+    @property
+    def centres(self) -> list[Array]:
+        return [np.broadcast_to(d.centre, (self.count, d.size)) for d in self.domains]
+
+    def inputs(self, by: Sequence[int]) -> list[list[_Dual]]:
+        """The inputs as forms, with derivatives by those at the positions `by`."""
+        sizes = [self.domains[i].size for i in by]
+        column = dict(zip(by, np.cumsum([0, *sizes])[:-1].tolist(), strict=True))
+        out: list[list[_Dual]] = []
+        place = 0
+        for position, (domain, centre) in enumerate(zip(self.domains, self.centres, strict=True)):
+            width = sum(domain.groups)
+            slopes = np.zeros((self.count, domain.size, sum(self.groups)))
+            slopes[..., place : place + width] = domain.generators
+            row = []
+            for i in range(domain.size):
+                value = Form(centre[:, i], slopes[:, i], np.zeros(self.count), self.groups)
+                seed = _seed(value, column[position] + i, sum(sizes)) if position in by else None
+                row.append(_Dual(value, seed))
+            out.append(row)
+            place += width
+        return out
+
+
+def _seed(value: Form, column: int, seeds: int) -> Form:
+    """The derivative of an input by all inputs."""
+    centre = np.zeros((len(value.centre), seeds))
+    centre[:, column] = 1.0
+    slopes = np.zeros((*centre.shape, value.slopes.shape[-1]))
+    return Form(centre, slopes, np.zeros(centre.shape), value.groups)
+
+
+def _at_centres(start: casadi.Function, symbols: _Symbols) -> Array:
+    """A function of the inputs at the centres of the sets, in floating point."""
+    columns = [casadi.DM(c.T) for c in symbols.centres]
+    return np.asarray(start.map(symbols.count)(*columns)).T
+
+
+def _stacked(forms: Sequence[Form], like: Form, tail: tuple[int, ...] = ()) -> Form:
+    """Forms of one shape side by side on a new second axis."""
+    m, count = like.slopes.shape[-1], len(like.centre)
+    if not forms:
+        empty = np.zeros((count, 0, *tail))
+        return Form(empty, np.zeros((*empty.shape, m)), empty, like.groups)
+    bounds = [f.interval for f in forms]
+    return Form(
+        np.stack([f.centre for f in forms], axis=1),
+        np.stack([f.slopes for f in forms], axis=1),
+        np.stack([f.rest for f in forms], axis=1),
+        like.groups,
+        Interval(
+            np.stack([b.lower for b in bounds], axis=1), np.stack([b.upper for b in bounds], axis=1)
+        ),
+    )
+
+
+# --- values with derivatives ---------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Dual:
+    """A number (N,) with its derivatives by the inputs (N, seeds); None: all are 0."""
+
+    value: Form
+    slope: Form | None = None
+
+    def derivative(self, seeds: int) -> Form:
+        return _zero(self.value, seeds) if self.slope is None else self.slope
+
+    def chain(self, value: Form, outer: Form | None) -> _Dual:
+        """A function of this number with the derivative `outer`."""
+        return _Dual(value, None if outer is None else _times(outer, self.slope))
+
+    def __add__(self, other: _Dual) -> _Dual:
+        return _Dual(self.value + other.value, _sum(self.slope, other.slope))
+
+    def __neg__(self) -> _Dual:
+        return _Dual(-self.value, None if self.slope is None else -self.slope)
+
+    def __mul__(self, other: _Dual) -> _Dual:
+        if self is other:
+            return self.chain(self.value.square(), self.value.scaled(2.0))
+        slope = _sum(_times(other.value, self.slope), _times(self.value, other.slope))
+        return _Dual(self.value * other.value, slope)
+
+    def scaled(self, factor: float) -> _Dual:
+        return _Dual(
+            self.value.scaled(factor), None if self.slope is None else self.slope.scaled(factor)
+        )
+
+    def inverse(self) -> _Dual:
+        value = self.value.inverse()
+        return self.chain(value, None if self.slope is None else -value.square())
+
+    def absolute(self) -> _Dual:
+        x = self.value.interval
+        if self.slope is None:
+            return _Dual(self.value.absolute())
+        one = Form.constant(1.0, self.value)
+        sign = pick(x.upper <= 0, -one, _between(self.value, -1.0, 1.0))
+        return self.chain(self.value.absolute(), pick(x.lower >= 0, one, sign))
+
+    def maximum(self, other: _Dual) -> _Dual:
+        a, b = self.value.interval, other.value.interval
+        slope = None
+        if self.slope is not None or other.slope is not None:
+            some: Any = self.slope if self.slope is not None else other.slope
+            left, right = (_zero_like(some) if d.slope is None else d.slope for d in (self, other))
+            slope = pick((b.lower >= a.upper)[:, None], right, hull(left, right))
+            slope = pick((a.lower >= b.upper)[:, None], left, slope)
+        return _Dual(self.value.maximum(other.value), slope)
+
+
+def _zero(value: Form, seeds: int) -> Form:
+    centre = np.zeros((len(value.centre), seeds))
+    return Form(centre, np.zeros((*centre.shape, value.slopes.shape[-1])), centre, value.groups)
+
+
+def _zero_like(form: Form) -> Form:
+    return Form(
+        np.zeros(form.shape), np.zeros(form.slopes.shape), np.zeros(form.shape), form.groups
+    )
+
+
+def _between(like: Form, lower: float, upper: float) -> Form:
+    return Form.between(Interval(np.full(like.shape, lower), np.full(like.shape, upper)), like)
+
+
+def _sum(a: Form | None, b: Form | None) -> Form | None:
+    if a is None or b is None:
+        return b if a is None else a
+    return a + b
+
+
+def _times(value: Form, slope: Form | None) -> Form | None:
+    """A number (N,) times derivatives (N, seeds)."""
+    return None if slope is None else value.broadcast(slope.shape) * slope
+
+
+# --- evaluation ----------------------------------------------------------------------------------
+
+Value = Any
+"""A float (constant), a `_Dual`, or the state of a condition: an array with 1 true, 0 false, -1
+either.
+"""
+
+
+def _evaluate(
+    program: Program, inputs: Sequence[Sequence[_Dual]], seeds: int, continuous: bool
+) -> list[list[_Dual]]:
+    like = inputs[0][0].value
+    values: list[Value] = []
+    with np.errstate(all="ignore"):
+        for o in program.operations:
+            values.append(_apply(program, o, values, inputs, seeds, continuous))
+        return [[_dual(values[a], like) for a in output] for output in program.outputs]
+
+
+def _dual(value: Value, like: Form) -> _Dual:
+    return value if isinstance(value, _Dual) else _Dual(Form.constant(value, like))
+
+
+def _apply(
+    program: Program,
+    o: Operation,
+    values: list[Value],
+    inputs: Sequence[Sequence[_Dual]],
+    seeds: int,
+    continuous: bool,
+) -> Value:
+    if o.name == "input":
+        return inputs[o.element[0]][o.element[1]]
+    if o.name == "constant":
+        return o.value
+    a = [values[k] for k in o.arguments]
+    like = inputs[0][0].value
+    match o.name:
+        case "lt" | "le" | "eq" | "ne":
+            return _compared(o.name, *(_dual(v, like).value for v in a))
+        case "not":
+            return np.where(a[0] < 0, -1, 1 - a[0])
+        case "and":
+            return np.where(
+                (a[0] == 0) | (a[1] == 0), 0, np.where((a[0] == 1) & (a[1] == 1), 1, -1)
+            )
+        case "or":
+            return np.where(
+                (a[0] == 1) | (a[1] == 1), 1, np.where((a[0] == 0) & (a[1] == 0), 0, -1)
+            )
+        case "number":
+            return _select(a[0], _dual(1.0, like), _dual(0.0, like), seeds, continuous)
+        case "select":
+            yes, no = _dual(a[1], like), _dual(a[2], like)
+            match _extreme(program, o):
+                case "min":
+                    return -((-yes).maximum(-no))
+                case "max":
+                    return yes.maximum(no)
+            return _select(a[0], yes, no, seeds, continuous)
+        case "mul" if isinstance(a[0], float) and isinstance(a[1], _Dual):
+            return a[1].scaled(a[0])
+        case "mul" if isinstance(a[1], float) and isinstance(a[0], _Dual):
+            return a[0].scaled(a[1])
+        case "div" if isinstance(a[1], float) and isinstance(a[0], _Dual):
+            exact = np.frexp(a[1])[0] in (0.5, -0.5)
+            return a[0].scaled(1 / a[1]) if exact else a[0] * _dual(a[1], like).inverse()
+        case "sqrt":
+            return _root(program, o, values, _dual(a[0], like))
+    d = [_dual(v, like) for v in a]
+    match o.name:
+        case "add":
+            return d[0] + d[1]
+        case "sub":
+            return d[0] + -d[1]
+        case "mul":
+            return d[0] * d[1]
+        case "div":
+            return d[0] * d[1].inverse()
+        case "neg":
+            return -d[0]
+        case "fabs":
+            return d[0].absolute()
+        case "max":
+            return d[0].maximum(d[1])
+        case "min":
+            return -((-d[0]).maximum(-d[1]))
+        case "atan2":
+            return _angle(d[0], d[1])
+        case "sin" | "cos" | "exp" | "asin":
+            outer = None if d[0].slope is None else d[0].value.slope_of(o.name)
+            return d[0].chain(d[0].value.elementary(o.name), outer)
+    raise InputError(f"{program.name}: the operation {o.name} has no bounds")
+
+
+def _compared(name: str, a: Form, b: Form) -> Array:
+    x = (a - b).interval
+    y, z = a.interval, b.interval
+    if name in ("eq", "ne"):
+        apart = (x.lower > 0) | (x.upper < 0)
+        same = (y.lower == y.upper) & (z.lower == z.upper) & (y.lower == z.lower)
+        yes, no = (same, apart) if name == "eq" else (apart, same)
+    elif name == "lt":
+        yes, no = (x.upper < 0) | (y.upper < z.lower), (x.lower >= 0) | (y.lower >= z.upper)
+    else:
+        yes, no = (x.upper <= 0) | (y.upper <= z.lower), (x.lower > 0) | (y.lower > z.upper)
+    return np.where(yes, 1, np.where(no, 0, -1))
+
+
+def _extreme(program: Program, selection: Operation) -> str:
+    """ "min" or "max" where a selection takes the smaller or larger of the numbers compared."""
+    condition, *sides = selection.arguments
+    o = program.operations[condition]
+    if o.name == "not":
+        o, sides = program.operations[o.arguments[0]], sides[::-1]
+    if o.name not in ("lt", "le"):
+        return ""
+    return {o.arguments: "min", o.arguments[::-1]: "max"}.get(tuple(sides), "")
+
+
+def _select(condition: Array, yes: _Dual, no: _Dual, seeds: int, continuous: bool) -> _Dual:
+    """One of two numbers; both where the condition is open."""
+    value = pick(
+        condition == 1, yes.value, pick(condition == 0, no.value, hull(yes.value, no.value))
+    )
+    if not seeds or (yes.slope is None and no.slope is None and np.all(condition >= 0)):
+        return _Dual(value)
+    left, right = yes.derivative(seeds), no.derivative(seeds)
+    both = hull(left, right)
+    if not continuous:  # the function may jump: no bound of its slope
+        endless = np.full(both.shape, np.inf)
+        both = Form(both.centre, both.slopes, endless, both.groups)
+    slope = pick((condition == 0)[:, None], right, both)
+    return _Dual(value, pick((condition == 1)[:, None], left, slope))
+
+
+def _root(program: Program, o: Operation, values: list[Value], argument: _Dual) -> _Dual:
+    """A square root. Of a sum of squares, sqrt(x^2 + y^2 + c), the derivatives x/sqrt and y/sqrt
+    are at most 1 in size, also where the root passes 0.
+    """
+    value = argument.value.sqrt()
+    if argument.slope is None:
+        return _Dual(value)
+    terms = _squares(program, o.arguments[0])
+    inverse = value.inverse()
+    if terms is None:
+        return argument.chain(value, inverse.scaled(0.5))
+    slope: Form | None = None
+    for position in terms:
+        x = values[position]
+        if not isinstance(x, _Dual) or x.slope is None:
+            continue
+        ratio = x.value * inverse
+        ratio = replace(
+            ratio, bound=ratio.interval.intersect(_between(x.value, -1.0, 1.0).interval)
+        )
+        slope = _sum(slope, _times(ratio.settled(), x.slope))
+    return _Dual(value, slope)
+
+
+def _squares(program: Program, position: int) -> list[int] | None:
+    """Positions of the numbers whose squares are summed there, None where that is no such sum."""
+    o = program.operations[position]
+    if o.name == "constant" and o.value >= 0:
+        return []
+    if o.name == "mul" and o.arguments[0] == o.arguments[1]:
+        return [o.arguments[0]]
+    if o.name == "add":
+        parts = [_squares(program, a) for a in o.arguments]
+        return None if None in parts else [k for part in parts for k in part or ()]
+    return None
+
+
+def _angle(y: _Dual, x: _Dual) -> _Dual:
+    """atan2(y, x): atan(y/x) where x > 0 for sure, else no more than its range."""
+    ratio = y * x.inverse()
+    outer = None if ratio.slope is None else ratio.value.slope_of("atan")
+    right = ratio.chain(ratio.value.elementary("atan"), outer)
+    sure = x.value.interval.lower > 0
+    if np.all(sure):
+        return right
+    value = pick(sure, right.value, _between(y.value, -np.pi, float(np.nextafter(np.pi, 4))))
+    slope = right.slope
+    if slope is not None:
+        endless = Form(slope.centre, slope.slopes, np.full(slope.shape, np.inf), slope.groups)
+        slope = pick(sure[:, None], slope, endless)
+    return _Dual(value, slope)
+
+
+# --- implicit variables --------------------------------------------------------------------------
+
+
+def _solve(
+    program: Program,
+    inputs: list[list[_Dual]],
+    start: Array,
+    seeds: int,
+    continuous: bool,
+) -> _Dual:
+    """The zero of a residual over each set, as a form, with its derivatives.
+
+    The line l(z) = start + g z follows the root by the implicit function theorem; on l(z) +- radius
+    the residual's slope F' keeps its sign, and -F(l)/F' lies within the radius: there is one root,
+    and only one, for every z (Newton's operator).
+    """
+    like, known = inputs[0][0].value, len(inputs[-1])
+    if any(
+        o.name == "input" and o.element == (len(inputs) - 1, known + 1) for o in program.operations
+    ):
+        raise InputError(
+            f"{program.name}: equation {known} of the balance holds implicit variable {known + 1};"
+            " order the variables so that each equation brings one new variable"
+        )
+
+    def residual(guess: Form) -> tuple[Form, Form]:
+        """Residual and its slope by the implicit variable."""
+        plain = [[_Dual(d.value) for d in row] for row in inputs]
+        plain[-1].append(_Dual(guess, _seed(guess, 0, 1)))
+        found = _evaluate(program, plain, 1, continuous)[0][0]
+        return found.value, found.derivative(1)[:, 0]
+
+    with np.errstate(all="ignore"):
+        line = Form.constant(start, like)
+        for _ in range(NEWTON_STEPS):
+            value, slope = residual(line)
+            before = line
+            rate = np.where(slope.centre == 0, np.nan, slope.centre)
+            line = Form(
+                np.nan_to_num(line.centre - value.centre / rate),
+                np.nan_to_num(line.slopes - value.slopes / rate[:, None]),
+                np.zeros(like.shape),
+                like.groups,
+            )
+            moved = np.abs(line.centre - before.centre) + np.abs(line.slopes - before.slopes).sum(
+                -1
+            )
+            if np.all(moved <= 1e-8 * (np.abs(line.centre) + np.abs(line.slopes).sum(-1))):
+                break
+        on_line, slope = residual(line)
+        radius = np.nan_to_num(
+            FIRST_RADIUS * on_line.interval.magnitude / np.abs(slope.centre), posinf=1e300
+        )
+        radius = radius + 4e-16 * np.abs(line.centre)
+        proven = np.zeros(like.shape, bool)
+        step = Interval(np.full(like.shape, -np.inf), np.full(like.shape, np.inf))
+        for _ in range(TRIALS):
+            _, slope = residual(replace(line, rest=radius))
+            trial = -on_line.interval * slope.interval.inverse()
+            inside = (trial.lower > -radius) & (trial.upper < radius) & ~proven
+            step = Interval(
+                np.where(inside, trial.lower, step.lower), np.where(inside, trial.upper, step.upper)
+            )
+            proven |= inside
+            if np.all(proven):
+                break
+            radius = np.where(proven, radius, np.minimum(radius * GROWTH, 1e300))
+        middle = step.middle
+        value = Form(
+            line.centre + middle,
+            line.slopes,
+            step.reach(middle) + np.spacing(np.abs(line.centre) + np.abs(middle)),
+            like.groups,
+        ).settled()
+        if not seeds:
+            return _Dual(value)
+        # dx_root = -(dF/dinputs) / (dF/droot), by one more direction
+        wider = [[_Dual(d.value, _padded(d.slope)) for d in row] for row in inputs]
+        wider[-1].append(_Dual(value, _seed(value, seeds, seeds + 1)))
+        total = _evaluate(program, wider, seeds + 1, continuous)[0][0].derivative(seeds + 1)
+        slope = total[:, -1]
+        return _Dual(value, _times(-slope.inverse(), total[:, :-1]))
+
+
+def _padded(slope: Form | None) -> Form | None:
+    """Derivatives with one more direction, by which all are 0."""
+    if slope is None:
+        return None
+    bound = slope.interval
+    last = [(0, 0), (0, 1)]
+    return Form(
+        np.pad(slope.centre, last),
+        np.pad(slope.slopes, [*last, (0, 0)]),
+        np.pad(slope.rest, last),
+        slope.groups,
+        Interval(np.pad(bound.lower, last), np.pad(bound.upper, last)),
+    )
