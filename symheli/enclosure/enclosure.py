@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi
 import numpy as np
 
-from symheli.codegen.program import Operation, Program, without_unused
+from symheli.codegen.program import Operation, Program
 from symheli.codegen.translation import operations
 from symheli.enclosure.domain import Domain
 from symheli.enclosure.form import Form, hull, pick
@@ -38,6 +38,9 @@ class Enclosure:
         slopes.
     roots : Form (N, n_roots)
         The implicit variables: each is unique within its interval, for every point of the set.
+    symbols : int
+        Number of symbols of the domains. Those after them, each within [-1, 1] by itself, say where
+        between the slopes of its two sides a kink of the function is.
 
     Where a set is too large, or a function not defined on all of it, bounds are infinite.
     """
@@ -45,6 +48,7 @@ class Enclosure:
     value: Form
     jacobian: Form | None
     roots: Form
+    symbols: int
 
     @property
     def finite(self) -> Array:
@@ -63,8 +67,9 @@ class Enclosure:
         """
         if self.jacobian is None:
             raise InputError("enclose(..., by=[0, ...]) is needed for averages of the Jacobian")
-        j = self.jacobian
-        return Form(j.centre, 0.5 * j.slopes, j.rest, j.groups)
+        j, kinks = self.jacobian, self.jacobian.slopes.shape[-1] - self.symbols
+        halves = np.repeat([0.5, 1.0], [self.symbols, kinks])
+        return Form(j.centre, halves * j.slopes, j.rest, j.groups)
 
 
 def enclose(
@@ -124,26 +129,26 @@ def enclose(
     [-0.5] [0.5]
     """
     implicit = 0 if start is None else start.numel_out(0)
-    symbols = _Symbols.of(function, domains, implicit)
+    program = operations(function)
+    kinks = [k for k, o in enumerate(program.operations) if o.name in KINKS]
+    kinks = kinks if by or implicit else []
+    symbols = _Symbols.of(function, domains, implicit, len(kinks))
     seeds = sum(domains[i].size for i in by)
     inputs = symbols.inputs(by)
-    program = operations(function)
+    over = _Over(program, {k: symbols.own + i for i, k in enumerate(kinks)}, continuous)
+    outputs = list(program.outputs)
     found: list[_Dual] = []
     if start is not None:
         guesses = _at_centres(start, symbols)
         inputs.append(found)
-        for i in range(implicit):
-            equation = without_unused(replace(program, outputs=((program.outputs[-1][i],),)))
-            found.append(_solve(equation, inputs, guesses[:, i], seeds, continuous))
-        program = without_unused(replace(program, outputs=program.outputs[:-1]))
-    flat = [d for output in _evaluate(program, inputs, seeds, continuous) for d in output]
+        for i, position in enumerate(outputs.pop()):
+            found.append(_solve(over, position, inputs, guesses[:, i], seeds))
+    flat = over.evaluate([a for output in outputs for a in output], inputs, seeds)
     like = inputs[0][0].value
     value = _stacked([d.value for d in flat], like)
     roots = _stacked([d.value for d in found], like)
     slopes = _stacked([d.derivative(seeds) for d in flat], like, (seeds,)) if by else None
-    if not symbols.many:
-        value, roots, slopes = value[0], roots[0], None if slopes is None else slopes[0]
-    return Enclosure(value, slopes, roots)
+    return Enclosure(*symbols.finished(value, slopes, roots), symbols.own)
 
 
 # --- inputs and outputs --------------------------------------------------------------------------
@@ -154,12 +159,15 @@ class _Symbols:
     """The domains of all inputs as one vector of symbols."""
 
     domains: tuple[Domain, ...]
+    own: int
     groups: tuple[int, ...]
     count: int
     many: bool
 
     @classmethod
-    def of(cls, function: casadi.Function, domains: Sequence[Domain], implicit: int) -> _Symbols:
+    def of(
+        cls, function: casadi.Function, domains: Sequence[Domain], implicit: int, kinks: int
+    ) -> _Symbols:
         sizes = [function.size1_in(i) for i in range(function.n_in())]
         expected = [d.size for d in domains] + [implicit] * (implicit > 0)
         if sizes != expected:
@@ -173,7 +181,8 @@ class _Symbols:
         if len(counts) > 1:
             raise InputError(f"domains of {sorted(counts)} sets: all need the same number")
         groups = tuple(g for d in domains for g in d.groups)
-        return cls(tuple(domains), groups, max(counts, default=1), bool(counts))
+        own = sum(groups)
+        return cls(tuple(domains), own, groups + (1,) * kinks, max(counts, default=1), bool(counts))
 
     @property
     def centres(self) -> list[Array]:
@@ -197,6 +206,20 @@ class _Symbols:
             out.append(row)
             place += width
         return out
+
+    def finished(
+        self, value: Form, slopes: Form | None, roots: Form
+    ) -> tuple[Form, Form | None, Form]:
+        """The results without symbols of kinks that lie in no set, of one set without the axis."""
+        used = [] if slopes is None else np.any(slopes.slopes != 0, axis=(0, 1, 2))[self.own :]
+        kept = [*range(self.own), *(self.own + np.flatnonzero(used)).tolist()]
+        groups = self.groups[: len(self.groups) - len(used)] + (1,) * (len(kept) - self.own)
+
+        def trimmed(form: Form) -> Form:
+            form = Form(form.centre, form.slopes[..., kept], form.rest, groups, form.interval)
+            return form if self.many else form[0]
+
+        return trimmed(value), None if slopes is None else trimmed(slopes), trimmed(roots)
 
 
 def _seed(value: Form, column: int, seeds: int) -> Form:
@@ -269,23 +292,36 @@ class _Dual:
         value = self.value.inverse()
         return self.chain(value, None if self.slope is None else -value.square())
 
-    def absolute(self) -> _Dual:
+    def absolute(self, kink: Form | None) -> _Dual:
+        """`kink`: the symbol in [-1, 1] of the slope where the sign is open."""
         x = self.value.interval
-        if self.slope is None:
+        if self.slope is None or kink is None:
             return _Dual(self.value.absolute())
         one = Form.constant(1.0, self.value)
-        sign = pick(x.upper <= 0, -one, _between(self.value, -1.0, 1.0))
-        return self.chain(self.value.absolute(), pick(x.lower >= 0, one, sign))
+        sign = pick(x.lower >= 0, one, pick(x.upper <= 0, -one, kink))
+        return self.chain(self.value.absolute(), sign)
 
-    def maximum(self, other: _Dual) -> _Dual:
+    def maximum(self, other: _Dual, kink: Form | None) -> _Dual:
         a, b = self.value.interval, other.value.interval
-        slope = None
-        if self.slope is not None or other.slope is not None:
-            some: Any = self.slope if self.slope is not None else other.slope
-            left, right = (_zero_like(some) if d.slope is None else d.slope for d in (self, other))
-            slope = pick((b.lower >= a.upper)[:, None], right, hull(left, right))
-            slope = pick((a.lower >= b.upper)[:, None], left, slope)
+        slope = _either(a.lower >= b.upper, b.lower >= a.upper, self.slope, other.slope, kink)
         return _Dual(self.value.maximum(other.value), slope)
+
+
+def _either(
+    first: Array, second: Array, left: Form | None, right: Form | None, kink: Form | None
+) -> Form | None:
+    """`left` where `first` holds, `right` where `second` does, else a mean of both: its weights are
+    given by the symbol of the kink, the same ones for all derivatives.
+    """
+    some = right if left is None else left
+    if some is None or kink is None:
+        return None
+    left, right = (_zero_like(some) if form is None else form for form in (left, right))
+    if np.all(first | second):
+        return pick(first[:, None], left, right)
+    mean, half = (left + right).scaled(0.5), (left - right).scaled(0.5)
+    both = mean + kink.broadcast(half.shape) * half
+    return pick(first[:, None], left, pick(second[:, None], right, both))
 
 
 def _zero(value: Form, seeds: int) -> Form:
@@ -322,91 +358,134 @@ either.
 """
 
 
-def _evaluate(
-    program: Program, inputs: Sequence[Sequence[_Dual]], seeds: int, continuous: bool
-) -> list[list[_Dual]]:
-    like = inputs[0][0].value
-    values: list[Value] = []
-    with np.errstate(all="ignore"):
-        for o in program.operations:
-            values.append(_apply(program, o, values, inputs, seeds, continuous))
-        return [[_dual(values[a], like) for a in output] for output in program.outputs]
+KINKS = ("fabs", "min", "max", "select", "number")
+"""Operations whose derivative may jump."""
+
+
+@dataclass(frozen=True)
+class _Over:
+    """A program evaluated over sets; `kinks`: the symbol of each operation that may have a kink."""
+
+    program: Program
+    kinks: Mapping[int, int]
+    continuous: bool
+
+    def evaluate(
+        self, positions: Sequence[int], inputs: Sequence[Sequence[_Dual]], seeds: int
+    ) -> list[_Dual]:
+        """The numbers at these positions of the program."""
+        operations_ = self.program.operations
+        needed = self.needed(positions)
+        values: list[Value] = [None] * len(operations_)
+        with np.errstate(all="ignore"):
+            for k in needed:
+                values[k] = self._apply(k, values, inputs, seeds)
+            return [_dual(values[k], inputs[0][0].value) for k in positions]
+
+    def needed(self, positions: Sequence[int]) -> list[int]:
+        """Positions of the operations that these need, in order."""
+        used = set(positions)
+        for k in range(max(used), -1, -1):
+            if k in used:
+                used.update(self.program.operations[k].arguments)
+        return sorted(used)
+
+    def _kink(self, position: int, like: Form) -> Form | None:
+        if position not in self.kinks:
+            return None
+        slopes = np.zeros(like.slopes.shape)
+        slopes[:, self.kinks[position]] = 1.0
+        return Form(np.zeros(like.shape), slopes, np.zeros(like.shape), like.groups)
+
+    def _apply(
+        self, k: int, values: list[Value], inputs: Sequence[Sequence[_Dual]], seeds: int
+    ) -> Value:
+        o = self.program.operations[k]
+        if o.name == "input":
+            return inputs[o.element[0]][o.element[1]]
+        if o.name == "constant":
+            return o.value
+        a = [values[i] for i in o.arguments]
+        like = inputs[0][0].value
+        kink = self._kink(k, like) if seeds else None
+        match o.name:
+            case "lt" | "le" | "eq" | "ne":
+                return _compared(o.name, *(_dual(v, like).value for v in a))
+            case "not":
+                return np.where(a[0] < 0, -1, 1 - a[0])
+            case "and":
+                false, true = (a[0] == 0) | (a[1] == 0), (a[0] == 1) & (a[1] == 1)
+                return np.where(false, 0, np.where(true, 1, -1))
+            case "or":
+                false, true = (a[0] == 0) & (a[1] == 0), (a[0] == 1) | (a[1] == 1)
+                return np.where(true, 1, np.where(false, 0, -1))
+            case "number":
+                return self._select(a[0], _dual(1.0, like), _dual(0.0, like), seeds, kink)
+            case "select":
+                yes, no = _dual(a[1], like), _dual(a[2], like)
+                match _extreme(self.program, o):
+                    case "min":
+                        return -((-yes).maximum(-no, kink))
+                    case "max":
+                        return yes.maximum(no, kink)
+                return self._select(a[0], yes, no, seeds, kink)
+            case "mul" if isinstance(a[0], float) and isinstance(a[1], _Dual):
+                return a[1].scaled(a[0])
+            case "mul" if isinstance(a[1], float) and isinstance(a[0], _Dual):
+                return a[0].scaled(a[1])
+            case "div" if isinstance(a[1], float) and isinstance(a[0], _Dual):
+                exact = np.frexp(a[1])[0] in (0.5, -0.5)
+                return a[0].scaled(1 / a[1]) if exact else a[0] * _dual(a[1], like).inverse()
+            case "sqrt":
+                return _square_root(self.program, o, values, _dual(a[0], like))
+        d = [_dual(v, like) for v in a]
+        match o.name:
+            case "add":
+                return d[0] + d[1]
+            case "sub":
+                return d[0] + -d[1]
+            case "mul":
+                return d[0] * d[1]
+            case "div":
+                return d[0] * d[1].inverse()
+            case "neg":
+                return -d[0]
+            case "fabs":
+                return d[0].absolute(kink)
+            case "max":
+                return d[0].maximum(d[1], kink)
+            case "min":
+                return -((-d[0]).maximum(-d[1], kink))
+            case "atan2":
+                return _angle(d[0], d[1])
+            case "sin" | "cos" | "exp" | "asin":
+                outer = None if d[0].slope is None else d[0].value.slope_of(o.name)
+                return d[0].chain(d[0].value.elementary(o.name), outer)
+        raise InputError(f"{self.program.name}: the operation {o.name} has no bounds")
+
+    def _select(
+        self, condition: Array, yes: _Dual, no: _Dual, seeds: int, kink: Form | None
+    ) -> _Dual:
+        """One of two numbers; both where the condition is open."""
+        value = pick(condition == 0, no.value, hull(yes.value, no.value))
+        value = pick(condition == 1, yes.value, value)
+        if kink is None:
+            return _Dual(value)
+        slope = _either(condition == 1, condition == 0, yes.slope, no.slope, kink)
+        if self.continuous or np.all(condition >= 0):
+            return _Dual(value, slope)
+        # the function may jump: no bound of its slope
+        return _Dual(value, _endless(slope or _zero(kink, seeds), condition < 0))
+
+
+def _endless(slope: Form, where: Array) -> Form:
+    """Derivatives that are not bounded in some sets."""
+    none = Form(slope.centre, slope.slopes, np.full(slope.shape, np.inf), slope.groups)
+    return pick(where[:, None], none, slope)
 
 
 def _dual(value: Value, like: Form) -> _Dual:
     return value if isinstance(value, _Dual) else _Dual(Form.constant(value, like))
-
-
-def _apply(
-    program: Program,
-    o: Operation,
-    values: list[Value],
-    inputs: Sequence[Sequence[_Dual]],
-    seeds: int,
-    continuous: bool,
-) -> Value:
-    if o.name == "input":
-        return inputs[o.element[0]][o.element[1]]
-    if o.name == "constant":
-        return o.value
-    a = [values[k] for k in o.arguments]
-    like = inputs[0][0].value
-    match o.name:
-        case "lt" | "le" | "eq" | "ne":
-            return _compared(o.name, *(_dual(v, like).value for v in a))
-        case "not":
-            return np.where(a[0] < 0, -1, 1 - a[0])
-        case "and":
-            return np.where(
-                (a[0] == 0) | (a[1] == 0), 0, np.where((a[0] == 1) & (a[1] == 1), 1, -1)
-            )
-        case "or":
-            return np.where(
-                (a[0] == 1) | (a[1] == 1), 1, np.where((a[0] == 0) & (a[1] == 0), 0, -1)
-            )
-        case "number":
-            return _select(a[0], _dual(1.0, like), _dual(0.0, like), seeds, continuous)
-        case "select":
-            yes, no = _dual(a[1], like), _dual(a[2], like)
-            match _extreme(program, o):
-                case "min":
-                    return -((-yes).maximum(-no))
-                case "max":
-                    return yes.maximum(no)
-            return _select(a[0], yes, no, seeds, continuous)
-        case "mul" if isinstance(a[0], float) and isinstance(a[1], _Dual):
-            return a[1].scaled(a[0])
-        case "mul" if isinstance(a[1], float) and isinstance(a[0], _Dual):
-            return a[0].scaled(a[1])
-        case "div" if isinstance(a[1], float) and isinstance(a[0], _Dual):
-            exact = np.frexp(a[1])[0] in (0.5, -0.5)
-            return a[0].scaled(1 / a[1]) if exact else a[0] * _dual(a[1], like).inverse()
-        case "sqrt":
-            return _root(program, o, values, _dual(a[0], like))
-    d = [_dual(v, like) for v in a]
-    match o.name:
-        case "add":
-            return d[0] + d[1]
-        case "sub":
-            return d[0] + -d[1]
-        case "mul":
-            return d[0] * d[1]
-        case "div":
-            return d[0] * d[1].inverse()
-        case "neg":
-            return -d[0]
-        case "fabs":
-            return d[0].absolute()
-        case "max":
-            return d[0].maximum(d[1])
-        case "min":
-            return -((-d[0]).maximum(-d[1]))
-        case "atan2":
-            return _angle(d[0], d[1])
-        case "sin" | "cos" | "exp" | "asin":
-            outer = None if d[0].slope is None else d[0].value.slope_of(o.name)
-            return d[0].chain(d[0].value.elementary(o.name), outer)
-    raise InputError(f"{program.name}: the operation {o.name} has no bounds")
 
 
 def _compared(name: str, a: Form, b: Form) -> Array:
@@ -434,23 +513,7 @@ def _extreme(program: Program, selection: Operation) -> str:
     return {o.arguments: "min", o.arguments[::-1]: "max"}.get(tuple(sides), "")
 
 
-def _select(condition: Array, yes: _Dual, no: _Dual, seeds: int, continuous: bool) -> _Dual:
-    """One of two numbers; both where the condition is open."""
-    value = pick(
-        condition == 1, yes.value, pick(condition == 0, no.value, hull(yes.value, no.value))
-    )
-    if not seeds or (yes.slope is None and no.slope is None and np.all(condition >= 0)):
-        return _Dual(value)
-    left, right = yes.derivative(seeds), no.derivative(seeds)
-    both = hull(left, right)
-    if not continuous:  # the function may jump: no bound of its slope
-        endless = np.full(both.shape, np.inf)
-        both = Form(both.centre, both.slopes, endless, both.groups)
-    slope = pick((condition == 0)[:, None], right, both)
-    return _Dual(value, pick((condition == 1)[:, None], left, slope))
-
-
-def _root(program: Program, o: Operation, values: list[Value], argument: _Dual) -> _Dual:
+def _square_root(program: Program, o: Operation, values: list[Value], argument: _Dual) -> _Dual:
     """A square root. Of a sum of squares, sqrt(x^2 + y^2 + c), the derivatives x/sqrt and y/sqrt
     are at most 1 in size, also where the root passes 0.
     """
@@ -498,8 +561,7 @@ def _angle(y: _Dual, x: _Dual) -> _Dual:
     value = pick(sure, right.value, _between(y.value, -np.pi, float(np.nextafter(np.pi, 4))))
     slope = right.slope
     if slope is not None:
-        endless = Form(slope.centre, slope.slopes, np.full(slope.shape, np.inf), slope.groups)
-        slope = pick(sure[:, None], slope, endless)
+        slope = _endless(slope, ~sure)
     return _Dual(value, slope)
 
 
@@ -507,24 +569,19 @@ def _angle(y: _Dual, x: _Dual) -> _Dual:
 
 
 def _solve(
-    program: Program,
-    inputs: list[list[_Dual]],
-    start: Array,
-    seeds: int,
-    continuous: bool,
+    over: _Over, position: int, inputs: list[list[_Dual]], start: Array, seeds: int
 ) -> _Dual:
-    """The zero of a residual over each set, as a form, with its derivatives.
+    """The zero of the equation at a position over each set, as a form, with its derivatives.
 
     The line l(z) = start + g z follows the root by the implicit function theorem; on l(z) +- radius
     the residual's slope F' keeps its sign, and -F(l)/F' lies within the radius: there is one root,
     and only one, for every z (Newton's operator).
     """
     like, known = inputs[0][0].value, len(inputs[-1])
-    if any(
-        o.name == "input" and o.element == (len(inputs) - 1, known + 1) for o in program.operations
-    ):
+    read = (over.program.operations[k] for k in over.needed([position]))
+    if any(o.name == "input" and o.element > (len(inputs) - 1, known) for o in read):
         raise InputError(
-            f"{program.name}: equation {known} of the balance holds implicit variable {known + 1};"
+            f"{over.program.name}: equation {known} of the balance holds a later implicit variable;"
             " order the variables so that each equation brings one new variable"
         )
 
@@ -532,7 +589,7 @@ def _solve(
         """Residual and its slope by the implicit variable."""
         plain = [[_Dual(d.value) for d in row] for row in inputs]
         plain[-1].append(_Dual(guess, _seed(guess, 0, 1)))
-        found = _evaluate(program, plain, 1, continuous)[0][0]
+        found = over.evaluate([position], plain, 1)[0]
         return found.value, found.derivative(1)[:, 0]
 
     with np.errstate(all="ignore"):
@@ -582,7 +639,7 @@ def _solve(
         # dx_root = -(dF/dinputs) / (dF/droot), by one more direction
         wider = [[_Dual(d.value, _padded(d.slope)) for d in row] for row in inputs]
         wider[-1].append(_Dual(value, _seed(value, seeds, seeds + 1)))
-        total = _evaluate(program, wider, seeds + 1, continuous)[0][0].derivative(seeds + 1)
+        total = over.evaluate([position], wider, seeds + 1)[0].derivative(seeds + 1)
         slope = total[:, -1]
         return _Dual(value, _times(-slope.inverse(), total[:, :-1]))
 
