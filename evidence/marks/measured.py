@@ -14,13 +14,13 @@ import numpy as np
 
 import symheli
 from evidence.tables import DOCS, keep, parsed
-from identification import BaselineModel
 from studies.campaigns.runners import results, runner
 from studies.known_kinematics.flights import aggressive, transition
 from studies.known_kinematics.models import PAIRS, identified
 from studies.known_kinematics.predictions import HORIZON, OUTPUTS, fits_of, states_of
 from studies.known_kinematics.truth import SPEEDS, Truth, frozen_axes
 from studies.output import as_json, progress
+from studies.transition.comparison import along_the_command
 from studies.transition.flights import (
     ABOVE_GROUND,
     BREEZE,
@@ -121,10 +121,7 @@ def baseline_of(heli: Helicopter, record: FlightRecord) -> Array:
     """
     family = symheli.sweep(heli, np.linspace(0.0, TOP, 27))  # type: ignore[arg-type]
     lpv = family.interpolate("polynomial", 3)
-    baseline = BaselineModel(
-        model=lpv, scheduling="airspeed_command", inputs=tuple(map(str, heli.inputs))
-    )
-    return baseline.on(record).predict(OUTPUTS, HORIZON)
+    return along_the_command(lpv, heli).on(record).predict(OUTPUTS, HORIZON)
 
 
 def table(setting: Setting, marks: Sequence[Marks], simulator_gaps: dict[str, float]) -> str:

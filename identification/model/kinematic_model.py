@@ -13,7 +13,7 @@ from identification.model import kinematic_run
 from identification.model.kinematic_realization import Realization
 from identification.model.kinematic_run import Run
 from identification.model.lpvarx_model import LEAST_SQUARES, LPVARXModel
-from identification.model.prediction import fit_percent, require_horizon
+from identification.model.prediction import named_fit, require_horizon
 from identification.structure.kinematic_arx import MOVING, STATES, KinematicARX
 from symheli.errors import InputError
 from symheli.lpv import FunctionSpace, LinearModel, LPVStateSpace, UncertainStateSpace
@@ -163,8 +163,7 @@ class KinematicModel:
         `fit_percent`.
         """
         guess = self.simulate(record) if horizon is None else self.predict(record, horizon)
-        fit = fit_percent(record.columns(STATES), guess)
-        return NamedVector(tuple(Signal(s, "%") for s in self.outputs), fit)
+        return named_fit(self.outputs, record, guess)
 
     def states(self, record: FlightRecord) -> Array:
         """States (n, nx) of the whole `to_state_space` along a record, as measured: y(k), and what

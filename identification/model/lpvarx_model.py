@@ -185,8 +185,7 @@ class LPVARXModel:
             if horizon is None
             else self.predict(record, horizon, hold_p=hold_p)
         )
-        fit = prediction.fit_percent(record.columns(self.outputs), guess)
-        return NamedVector(tuple(Signal(s, "%") for s in self.outputs), fit)
+        return prediction.named_fit(self.outputs, record, guess)
 
     def at(self, p: float | Sequence[float]) -> LinearModel:
         """The discrete model with the scheduling held at p (one number a parameter), in observer
