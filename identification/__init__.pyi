@@ -62,7 +62,7 @@ from identification.judge.frozen_models import (
     FrozenModels as FrozenModels,
 )
 from identification.judge.frozen_models import (
-    frozen_models as frozen_models,
+    compare_frozen as compare_frozen,
 )
 from identification.judge.frozen_models import (
     pole_miss as pole_miss,
