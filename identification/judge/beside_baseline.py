@@ -9,8 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.judge.scores import HORIZON, Scores, predicted, steps
-from identification.model.lpvarx_model import LPVARXModel
+from identification.judge.scores import HORIZON, Identified, Scores, predicted, steps
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv import LPVStateSpace, Scheduling
 from symheli.records import FlightRecord
@@ -238,7 +237,7 @@ class BesideBaseline:
 
 
 def beside_baseline(
-    identified: Mapping[str, LPVARXModel],
+    identified: Mapping[str, Identified],
     baselines: Mapping[str, BaselineModel],
     record: FlightRecord,
     outputs: Sequence[str],
@@ -253,7 +252,7 @@ def beside_baseline(
 
     Parameters
     ----------
-    identified : mapping of str to LPVARXModel
+    identified : mapping of str to LPVARXModel or KinematicModel
         By name; each has all of `outputs` among its own.
     baselines : mapping of str to BaselineModel
         By name, with what of the record drives them.
