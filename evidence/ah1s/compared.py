@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from evidence.ah1s.flight import CalmFlight, Plan, fly, unknown
-from evidence.ah1s.servos import behind, servos
+from evidence.ah1s.servos import servos
 from evidence.ah1s.simulator import AH1S, DEFLECTIONS, STATES, STICKS
 from evidence.ah1s.trim import GUESS, trim
 from evidence.ah1s.truth import SLOWEST, realization
@@ -29,7 +29,7 @@ from identification.judge.frozen_models import continuous_poles
 from studies.output import columns
 from studies.transition.comparison import SCALES
 from symheli.flight import AirspeedSchedule, Excitation
-from symheli.lpv import LinearModel
+from symheli.lpv import LinearModel, series
 from symheli.records import FlightRecord
 
 KNOT = 1852 / 3600
@@ -82,7 +82,7 @@ class Kind:
         """From sticks, at an airspeed held (m/s)."""
         p = speed if len(model.parameters) == 1 else (speed, 0.0)
         held = model.at(p)
-        return behind(servos(record), held) if self.deflections else held
+        return series(servos(record), held) if self.deflections else held
 
 
 def _as_the_xcell(high: float, degree: int) -> KinematicARX:
