@@ -190,7 +190,7 @@ def compare_frozen(
     Parameters
     ----------
     models : mapping of str to model
-        By name: an LPV or identified model, or its linear models by point.
+        By name: an LPV or identified model of one scheduling parameter, or linear models by point.
     reference : mapping of float (or tuple) to LinearModel
         The exact model at each point of the scheduling.
     scales : mapping of str to float
@@ -218,8 +218,8 @@ def compare_frozen(
     UnknownNameError
         For a size that is missing and a signal that a model does not have.
     InputError
-        Without a point or a sampled model, where `mode` or `responses_at` has other points, and as
-        `symheli.lpv.nu_gap`.
+        Without a point or a sampled model, where `models`, `mode` or `responses_at` have other
+        points, and as `symheli.lpv.nu_gap`.
 
     References
     ----------
@@ -248,21 +248,10 @@ def compare_frozen(
             f" {None if mode is None else list(mode)} and {at}"
         )
     exact = [reference[point] for point in points]
-    held = {
-        name: [model[p] if isinstance(model, Mapping) else model.at(p) for p in points]
-        for name, model in models.items()
-    }
+    held = {name: _held(name, model, points) for name, model in models.items()}
     inputs = list(map(str, exact[0].inputs if inputs is None else inputs))
     outputs = list(map(str, exact[0].outputs if outputs is None else outputs))
-    for signal in (*inputs, *outputs):
-        if signal not in scales:
-            raise UnknownNameError("size in scales", signal, scales)
-    if channel is not None:
-        if len(channel) != 2:
-            raise InputError(f"channel: expected (input, output), got {channel!r:.80}")
-        for signal, there in zip(channel, (inputs, outputs), strict=True):
-            if signal not in there:
-                raise UnknownNameError("signal of channel", signal, there)
+    _require_signals(inputs, outputs, scales, channel)
     periods = (m.dt for group in (exact, *held.values()) for m in group if m.dt is not None)
     dt = next(periods, None)
     if dt is None:
@@ -313,6 +302,36 @@ def compare_frozen(
         channel=channel or (),
         responses_at=at,
     )
+
+
+def _held(
+    name: str, model: Freezable | Mapping[Any, LinearModel], points: Sequence[Any]
+) -> list[LinearModel]:
+    """The linear models at the points."""
+    if not isinstance(model, Mapping):
+        return [model.at(point) for point in points]
+    if set(points) - set(model):
+        raise InputError(f"{name}: expected a model at the points {points}, got {list(model)}")
+    return [model[point] for point in points]
+
+
+def _require_signals(
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+    scales: Mapping[str, float],
+    channel: tuple[str, str] | None,
+) -> None:
+    """Raise `UnknownNameError` for a signal without a size, or a channel of other signals."""
+    for signal in (*inputs, *outputs):
+        if signal not in scales:
+            raise UnknownNameError("size in scales", signal, scales)
+    if channel is None:
+        return
+    if len(channel) != 2:
+        raise InputError(f"channel: expected (input, output), got {channel!r:.80}")
+    for signal, there in zip(channel, (inputs, outputs), strict=True):
+        if signal not in there:
+            raise UnknownNameError("signal of channel", signal, there)
 
 
 def _magnitude(model: LinearModel, channel: tuple[str, str], omega: Array) -> Array:

@@ -213,6 +213,8 @@ def test_frozen_models_of_an_aeroplane(transition):
     assert found.otherwise_stable("identified") == 0
     with pytest.raises(UnknownNameError, match="lft"):
         found["lft"]
+    with pytest.raises(InputError, match="lft: expected a model at the points"):
+        idn.compare_frozen({"lft": {25.0: exact[25.0]}}, exact, **options)
     with pytest.raises(InputError, match="all models are continuous"):
         idn.compare_frozen({"baseline": outputs}, exact, **options)
     del sizes["flap"]
