@@ -54,15 +54,9 @@ class FrozenPlant:
 
     def of_each(self, thetas: Array, p: float | Sequence[float]) -> LinearModels:
         """The plants of coefficients (K, n, ny) in the place of the model's, at p."""
-        return LinearModels.of([replace(self, model=self.with_theta(t)).at(p) for t in thetas])
-
-    def with_theta(self, theta: Array) -> Model:
-        """The model with other coefficients (n, ny)."""
-        model = self.model
-        if isinstance(model, KinematicModel):
-            aerodynamics = replace(model.aerodynamics, theta=theta, covariance=None)
-            return replace(model, aerodynamics=aerodynamics)
-        return replace(model, theta=theta, covariance=None)
+        return LinearModels.of(
+            [replace(self, model=self.model.with_theta(t)).at(p) for t in thetas]
+        )
 
     @property
     def regression(self) -> LPVARX:

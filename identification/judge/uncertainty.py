@@ -5,7 +5,7 @@ over p, and the standard error of the frozen frequency response.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -200,7 +200,7 @@ class Uncertainty:
         """
         free = self.model.structure.free
         thetas = drawn(self.model.theta, self.covariance, free, whole(count, "count", 1), seed)
-        return tuple(replace(self.model, theta=theta, covariance=None) for theta in thetas)
+        return tuple(map(self.model.with_theta, thetas))
 
     def frequency_response(self, p: object, omega: object) -> ResponseBand:
         """The response at `omega` (k,) in rad/s with the scheduling held at p, and its standard

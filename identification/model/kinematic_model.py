@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -157,6 +157,10 @@ class KinematicModel:
         return kinematic_run.closed_loop(
             self._along(record), self.structure.inputs, record, controller
         )
+
+    def with_theta(self, theta: Array) -> KinematicModel:
+        """The same with other coefficients (n, 6), whose covariance is not known."""
+        return replace(self, aerodynamics=self.aerodynamics.with_theta(theta))
 
     def score(self, record: FlightRecord, horizon: int | None) -> NamedVector:
         """Fit of each state in percent, `horizon` samples ahead or with None in free run; see

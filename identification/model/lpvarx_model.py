@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -165,6 +165,10 @@ class LPVARXModel:
         period or unit.
         """
         return prediction.simulate(self._along(record))
+
+    def with_theta(self, theta: Array) -> LPVARXModel:
+        """The same with other coefficients (n, ny), whose covariance is not known."""
+        return replace(self, theta=theta, covariance=None)
 
     def score(
         self, record: FlightRecord, horizon: int | None = None, *, hold_p: bool = False
