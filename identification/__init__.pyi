@@ -48,12 +48,12 @@ from identification.judge.beside_baseline import (
 from identification.judge.beside_baseline import (
     beside_baseline as beside_baseline,
 )
-from identification.judge.criterion import Criterion as Criterion
+from identification.judge.criteria import Criterion as Criterion
 from identification.judge.dependence import dependence_report as dependence_report
-from identification.judge.design_model import design_model as design_model
 from identification.judge.fit_for_control import (
     FitForControl as FitForControl,
 )
+from identification.judge.fit_for_control import design_model as design_model
 from identification.judge.fit_for_control import (
     fit_for_control as fit_for_control,
 )
@@ -62,7 +62,7 @@ from identification.judge.frozen_models import (
     FrozenModels as FrozenModels,
 )
 from identification.judge.frozen_models import (
-    frozen_models as frozen_models,
+    compare_frozen as compare_frozen,
 )
 from identification.judge.frozen_models import (
     pole_miss as pole_miss,

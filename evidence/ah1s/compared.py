@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from evidence.ah1s.flight import CalmFlight, Plan, fly, unknown
-from evidence.ah1s.servos import behind, servos
+from evidence.ah1s.servos import servos
 from evidence.ah1s.simulator import AH1S, DEFLECTIONS, STATES, STICKS
 from evidence.ah1s.trim import GUESS, trim
 from evidence.ah1s.truth import SLOWEST, realization
@@ -22,13 +22,14 @@ from identification import (
     KinematicModel,
     Polynomial,
     Product,
+    compare_frozen,
     fit,
 )
+from identification.judge.frozen_models import continuous_poles
 from studies.output import columns
 from studies.transition.comparison import SCALES
 from symheli.flight import AirspeedSchedule, Excitation
-from symheli.lpv import LinearModel
-from symheli.lpv.nu_gap import nu_gap
+from symheli.lpv import LinearModel, series
 from symheli.records import FlightRecord
 
 KNOT = 1852 / 3600
@@ -81,7 +82,7 @@ class Kind:
         """From sticks, at an airspeed held (m/s)."""
         p = speed if len(model.parameters) == 1 else (speed, 0.0)
         held = model.at(p)
-        return behind(servos(record), held) if self.deflections else held
+        return series(servos(record), held) if self.deflections else held
 
 
 def _as_the_xcell(high: float, degree: int) -> KinematicARX:
@@ -138,9 +139,8 @@ def phugoid(model: LinearModel) -> complex:
     """The fastest growing (or slowest decaying) pole (1/s) of those that turn slowly; NaN where
     there is none.
     """
-    poles = model.poles().astype(complex)
-    s = np.log(poles[np.abs(poles) > 0.5]) / model.dt
-    slow = s[(s.imag > SLOW[0]) & (s.imag < SLOW[1]) & (np.abs(s.real) < GENTLE)]
+    s = continuous_poles(model)
+    slow = s[(np.imag(s) > SLOW[0]) & (np.imag(s) < SLOW[1]) & (np.abs(np.real(s)) < GENTLE)]
     return complex(max(slow, key=lambda pole: pole.real, default=complex(np.nan, np.nan)))
 
 
@@ -167,14 +167,15 @@ def judge(kind: Kind, knots: int, seed: int, exact: Sequence[LinearModel], metho
         model = fit(kind.make(high, DEGREE), record, method=method)
         constant = fit(kind.make(high, 0), record, method=method)
     held = [kind.at(model, speed, record) for speed in SPEEDS[knots]]
-    scale = {
-        "input_scale": STICK_SCALE,
-        "output_scale": np.array([SCALES[str(s)] for s in STATES]),
-    }
+    beside = compare_frozen(
+        {"model": dict(zip(SPEEDS[knots], held, strict=True))},
+        dict(zip(SPEEDS[knots], exact, strict=True)),
+        scales=SCALES | dict.fromkeys(map(str, STICKS), STICK_SCALE),
+    )
     return Judged(
         kind,
         seed,
-        tuple(nu_gap(one, other, **scale) for one, other in zip(exact, held, strict=True)),
+        tuple(beside["model"].gap.tolist()),
         tuple(map(phugoid, held)),
         {str(s): v for s, v in model.score(test, SECOND).items()},
         {str(s): v for s, v in constant.score(test, SECOND).items()},

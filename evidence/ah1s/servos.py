@@ -39,23 +39,3 @@ def servos(record: FlightRecord) -> LinearModel:
         DEFLECTIONS,
         dt=record.dt,
     )
-
-
-def behind(actuators: LinearModel, body: LinearModel) -> LinearModel:
-    """`body` driven by what the `actuators` (without feedthrough) reach."""
-    A = np.block(
-        [
-            [body.A, body.B @ actuators.C],
-            [np.zeros((len(actuators.A), len(body.A))), actuators.A],
-        ]
-    )
-    return LinearModel(
-        A,
-        np.vstack([np.zeros((len(body.A), 4)), actuators.B]),
-        np.hstack([body.C, body.D @ actuators.C]),
-        np.zeros((len(body.outputs), 4)),
-        (*body.states, *actuators.states),
-        actuators.inputs,
-        body.outputs,
-        dt=body.dt,
-    )

@@ -130,12 +130,6 @@ def response(model: LinearModel, inputs: Array) -> Array:
     return np.array(out)
 
 
-def static_gain(model: LinearModel) -> Array:
-    """Outputs (ny, nu) per input where all stands still."""
-    away = np.zeros_like(model.A) if model.dt is None else np.eye(len(model.A))
-    return model.C @ np.linalg.solve(away - model.A, model.B) + model.D
-
-
 def held_model(simulator: AH1S, trim: Trim) -> LinearModel:
     """The body alone, rotors and lags settled (continuous): central differences of the
     accelerations the held simulator shows, and exact kinematics.

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from identification import KinematicModel
@@ -32,7 +30,7 @@ def coverage(model: KinematicModel, truth: Truth, draws: int = 120, seed: int = 
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     rng = np.random.default_rng(seed)
     members = [
-        _with_theta(model, model.theta + (root @ rng.standard_normal(size)).reshape(6, -1).T)
+        model.with_theta(model.theta + (root @ rng.standard_normal(size)).reshape(6, -1).T)
         for _ in range(draws)
     ]
     inside = []
@@ -47,11 +45,6 @@ def coverage(model: KinematicModel, truth: Truth, draws: int = 120, seed: int = 
         distance = np.sum(off * np.linalg.solve(covariances, off), axis=(-2, -1))
         inside.append(distance <= WITHIN)
     return float(np.mean(inside))
-
-
-def _with_theta(model: KinematicModel, theta: Array) -> KinematicModel:
-    aerodynamics = replace(model.aerodynamics, theta=theta, covariance=None)
-    return replace(model, aerodynamics=aerodynamics)
 
 
 def _at(model: KinematicModel, k: int) -> Array:

@@ -25,7 +25,7 @@ from identification import (
     fit,
 )
 from identification import fit_for_control as judge
-from identification.judge.criteria_in_feedback import SHARE_OF_MARGIN
+from identification.judge.criteria import SHARE_OF_MARGIN
 from studies.campaigns.runners import results, runner
 from studies.known_kinematics.models import PAIRS
 from studies.loops.lateral import STATES

@@ -14,13 +14,13 @@ import numpy as np
 
 import symheli
 from evidence.tables import DOCS, keep, parsed
-from identification import BaselineModel
 from studies.campaigns.runners import results, runner
 from studies.known_kinematics.flights import aggressive, transition
 from studies.known_kinematics.models import PAIRS, identified
 from studies.known_kinematics.predictions import HORIZON, OUTPUTS, fits_of, states_of
 from studies.known_kinematics.truth import SPEEDS, Truth, frozen_axes
 from studies.output import as_json, progress
+from studies.transition.comparison import along_the_command
 from studies.transition.flights import (
     ABOVE_GROUND,
     BREEZE,
@@ -96,15 +96,13 @@ def of_seed(setting: Setting, seed: int) -> Marks:
     test = symheli.fly(heli, transition(seed, autopilot, servos=setting.servos))
     truth = Truth.of(heli, setting.servos)
     models = frozen_axes(model, truth)
-    gaps = {
-        name: (float(gap.max()), float(SPEEDS[gap.argmax()]))
-        for name, gap in truth.gaps(models).items()
-    }
+    beside = truth.compare(models)
+    gaps = {name: one["model"].gap for name, one in beside.items()}
     clean = states_of(heli, test)
     return Marks(
         seed=seed,
-        gaps=gaps,
-        stability=truth.falsely_stable(models)["all axes"],
+        gaps={name: (float(g.max()), float(SPEEDS[g.argmax()])) for name, g in gaps.items()},
+        stability=beside["all axes"].otherwise_stable("model"),
         static=(
             {} if setting.servos else {v: truth.static_ratio(models, v) for v in STATIC_SPEEDS}
         ),
@@ -121,10 +119,7 @@ def baseline_of(heli: Helicopter, record: FlightRecord) -> Array:
     """
     family = symheli.sweep(heli, np.linspace(0.0, TOP, 27))  # type: ignore[arg-type]
     lpv = family.interpolate("polynomial", 3)
-    baseline = BaselineModel(
-        model=lpv, scheduling="airspeed_command", inputs=tuple(map(str, heli.inputs))
-    )
-    return baseline.on(record).predict(OUTPUTS, HORIZON)
+    return along_the_command(lpv, heli).on(record).predict(OUTPUTS, HORIZON)
 
 
 def table(setting: Setting, marks: Sequence[Marks], simulator_gaps: dict[str, float]) -> str:
@@ -192,10 +187,10 @@ def seeds_of(text: str) -> list[int]:
 def measure(setting: Setting, seeds: Sequence[int]) -> tuple[list[Marks], dict[str, float]]:
     """Every seed, on the runner that is there; and the simulator's own gaps."""
     heli, simulator = setting.helicopters()
-    own = Truth.of(heli, setting.servos).gaps(Truth.of(simulator, setting.servos).models)
+    own = Truth.of(heli, setting.servos).compare(Truth.of(simulator, setting.servos).models)
     with runner() as on:
         found = list(results(on, [partial(of_seed, setting, s) for s in seeds]))
-    return found, {name: float(gap.max()) for name, gap in own.items()}
+    return found, {name: float(one["model"].gap.max()) for name, one in own.items()}
 
 
 def main() -> None:

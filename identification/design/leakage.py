@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from identification.structure.kinematic_arx import KinematicARX
 from identification.structure.lpvarx import LPVARX
 from identification.structure.regressors import as_records, scheduling_values
 from symheli.errors import DataWarning
@@ -74,7 +75,7 @@ def share_from_outputs(arx: LPVARX, records: FlightRecord | Iterable[FlightRecor
     )
 
 
-def warn_of_own_past(arx: LPVARX, record: FlightRecord) -> None:
+def warn_of_own_past(arx: LPVARX | KinematicARX, record: FlightRecord) -> None:
     """Warns (`DataWarning`) where a scheduling parameter is the outputs, their squares or products,
     now or up to two samples ago: a free run that follows the measured one is told its answer.
     """

@@ -16,16 +16,17 @@ from identification.recursive.forgetting import numbers
 from identification.recursive.kernel.configuration import KINDS
 from identification.recursive.recursive_least_squares import RecursiveLeastSquares
 from symheli.errors import InputError
-from symheli.values.c_text import (
+from symheli.export.c_program import CProgram
+from symheli.export.c_text import (
+    blocks,
+    check_data,
     define,
     identifier,
+    index_macros,
     literals,
-    require_identifier,
-    rows,
     table,
 )
-from symheli.values.template import filled, filled_module
-from symheli.values.whole_files import write_own, write_text
+from symheli.values import Signal
 
 HERE = Path(__file__).parent
 """estimator.c, estimator.h, estimator_check.c and CMakeLists.txt lie here, with marked places."""
@@ -87,10 +88,9 @@ def write_estimator(
     ['estimator.h', 'estimator.c', 'estimator_check.c']
     >>> folder.cleanup()
     """
-    require_identifier(name)
     if rls.structure is not rls.regression:
         raise InputError("a KinematicARX is written by write_kinematic_estimator, with its dt")
-    arx, folder = rls.regression, Path(folder)
+    arx = rls.regression
     if missing := [s for s in (*arx.outputs, *arx.inputs, *arx.parameters) if s not in units]:
         raise InputError(f"units: none given for {', '.join(missing)}")
     if not rls.configuration.factors:
@@ -99,20 +99,19 @@ def write_estimator(
             " basis"
         )
     up = f"{name.upper()}_"
-    files = {
-        "rls.h": _rls_header(rls.precision),
-        "rls.c": (KERNEL / "rls.c").read_text(encoding="utf-8"),
-        **filled_module(
-            HERE / "estimator",
-            name,
-            _header(rls, units, up),
-            {"configuration": _configuration(rls, up)},
-            {"cases": _cases(rls, up)},
-        ),
-    }
-    written = [write_text(folder / file, content) for file, content in files.items()]
-    cmake = write_own(folder / "CMakeLists.txt", filled(HERE / "CMakeLists.txt", {"name": name}))
-    return (*written, *([] if cmake is None else [cmake]))
+    return CProgram(
+        template=HERE / "estimator",
+        name=name,
+        word="estimator",
+        header=_header(rls, units, up),
+        source={"configuration": _configuration(rls, up)},
+        check={"cases": _cases(rls, up)},
+        before={
+            "rls.h": _rls_header(rls.precision),
+            "rls.c": (KERNEL / "rls.c").read_text(encoding="utf-8"),
+        },
+        cmake=(HERE / "CMakeLists.txt", {"name": name}),
+    ).write(folder)
 
 
 def _rls_header(precision: str) -> str:
@@ -123,9 +122,12 @@ def _rls_header(precision: str) -> str:
 def _header(rls: RecursiveLeastSquares, units: Mapping[str, str], up: str) -> dict[str, object]:
     """Sizes, the index of every signal and regressor, and what is estimated in words."""
     arx, c = rls.regression, rls.configuration
-    ranges = dict(zip(arx.parameters, arx.basis.ranges, strict=True))
+    ranges = [f"{low:g} to {high:g}" for low, high in arx.basis.ranges]
+    outputs, inputs, parameters = (
+        [Signal(s, units[s]) for s in group] for group in (arx.outputs, arx.inputs, arx.parameters)
+    )
     state, work = c.sizes
-    blocks = [
+    sections = [
         [
             define(f"{up}NY", arx.ny),
             define(f"{up}NU", arx.nu),
@@ -135,12 +137,9 @@ def _header(rls: RecursiveLeastSquares, units: Mapping[str, str], up: str) -> di
             define(f"{up}STATE", state, "numbers to save and restore"),
             define(f"{up}WORK", work, "numbers of scratch"),
         ],
-        [define(f"{up}Y_{s}", i, units[s]) for i, s in enumerate(arx.outputs)],
-        [define(f"{up}U_{s}", i, units[s]) for i, s in enumerate(arx.inputs)],
-        [
-            define(f"{up}P_{s}", i, f"{units[s]}, {low:g} to {high:g}")
-            for i, (s, (low, high)) in enumerate(ranges.items())
-        ],
+        index_macros(f"{up}Y_", outputs),
+        index_macros(f"{up}U_", inputs),
+        index_macros(f"{up}P_", parameters, ranges),
         [define(f"{up}R_{identifier(r)}", i, r) for i, r in enumerate(arx.regressor_names)],
     ]
     groups = [
@@ -155,7 +154,7 @@ def _header(rls: RecursiveLeastSquares, units: Mapping[str, str], up: str) -> di
         "basis": arx.basis,
         "forgetting": c.forgetting,
         "groups": "\n".join(groups),
-        "sizes": "\n\n".join("\n".join(block) for block in blocks if block),
+        "sizes": blocks(*sections),
     }
 
 
@@ -204,13 +203,15 @@ def _cases(rls: RecursiveLeastSquares, up: str) -> str:
     given = samples(arx.ny + arx.nu, arx.basis.ranges, arx.memory + 3 * arx.basis.size + 20)
     learnt, *history = rls.online().run(given)
     innovations, coefficients = map(np.asarray, history)
-    return "\n".join(
-        [
-            define("SAMPLES", len(given)),
-            define("LEARNT", int(learnt.sum())),
-            define("TOLERANCE", f"{TOLERANCE[rls.precision]:g}"),
-            rows("rls_real", "samples", f"{up}NY + {up}NU + {up}NP", given, c.dtype),
-            rows("rls_real", "innovations", f"{up}NY", innovations[learnt], c.dtype),
-            rows("rls_real", "coefficients", f"{up}NY", coefficients[-1], c.dtype),
-        ]
+    return check_data(
+        {
+            "SAMPLES": len(given),
+            "LEARNT": int(learnt.sum()),
+            "TOLERANCE": TOLERANCE[rls.precision],
+        },
+        "rls_real",
+        c.dtype,
+        samples=(f"{up}NY + {up}NU + {up}NP", given),
+        innovations=(f"{up}NY", innovations[learnt]),
+        coefficients=(f"{up}NY", coefficients[-1]),
     )

@@ -11,23 +11,19 @@ from pathlib import Path
 
 import numpy as np
 
-from identification.export.checked import TOLERANCE, samples
+from identification.export.checked import ORDINARY, TOLERANCE, samples
 from identification.export.estimator import write_estimator
 from identification.export.rigid_body import rigid_body_files
 from identification.recursive.recursive_least_squares import RecursiveLeastSquares
 from identification.structure.kinematic_arx import INCREMENTS, KinematicARX
 from symheli.errors import InputError
-from symheli.values.c_text import define, index_macros, rows
+from symheli.export.c_program import CProgram
+from symheli.export.c_text import blocks, check_data, define, index_macros
 from symheli.values.kinematics import RIGID_BODY
 from symheli.values.signal import signals
-from symheli.values.template import filled_module
-from symheli.values.whole_files import write_text
 
 HERE = Path(__file__).parent
 """kinematic_estimator.c, .h and _check.c lie here, with marked places."""
-
-ORDINARY = 0.1
-"""Size of the states and inputs the check computes with: angles and rates of a flight."""
 
 
 def write_kinematic_estimator(
@@ -86,28 +82,31 @@ def write_kinematic_estimator(
     if not isinstance(kin, KinematicARX):
         raise InputError("known kinematics need a KinematicARX; write_estimator takes an LPVARX")
     known = {str(s): s.unit for s in (*RIGID_BODY, *INCREMENTS)}
+    up = f"{name.upper()}_"
+    sizes = blocks(
+        [define(f"{up}NY", len(RIGID_BODY)), define(f"{up}NU", len(kin.inputs))],
+        index_macros(f"{up}Y_", RIGID_BODY),
+        index_macros(f"{up}U_", signals(kin.inputs, units)),
+    )
+    program = CProgram(
+        template=HERE / "kinematic_estimator",
+        name=name,
+        word="estimator",
+        header={"dt": f"{dt:.9g}", "sizes": sizes},
+        check={"cases": _cases(rls, kin, dt, up)},
+        after=rigid_body_files(name, dt, rls.precision),
+    )
     regression = replace(rls, structure=kin.aerodynamics)
     inner = write_estimator(regression, {**units, **known}, folder, f"{name}_aero")
-    folder, up = Path(folder), f"{name.upper()}_"
-    states = index_macros(f"{up}Y_", RIGID_BODY)
-    inputs = index_macros(f"{up}U_", signals(kin.inputs, units))
-    sizes = [define(f"{up}NY", len(RIGID_BODY)), define(f"{up}NU", len(kin.inputs))]
-    header = {"dt": f"{dt:.9g}", "sizes": "\n".join([*sizes, "", *states, "", *inputs])}
-    files = {
-        **filled_module(
-            HERE / "kinematic_estimator", name, header, {}, {"cases": _cases(rls, kin, dt, up)}
-        ),
-        **rigid_body_files(name, dt, rls.precision),
-    }
-    return (*(write_text(folder / file, content) for file, content in files.items()), *inner)
+    return (*program.write(folder), *inner)
 
 
 def _cases(rls: RecursiveLeastSquares, kin: KinematicARX, dt: float, up: str) -> str:
     """A record of a fixed seed with a gap and a missing sample, with what comes out here."""
     wide = len(RIGID_BODY) + len(kin.inputs)
     count = kin.memory + 3 * kin.basis.size + 40
-    given, dtype = samples(wide, kin.basis.ranges, count), rls.configuration.dtype
-    given[:, :wide] *= ORDINARY
+    dtype = rls.configuration.dtype
+    given = samples(wide, kin.basis.ranges, count, ORDINARY)
     given = given.astype(dtype).astype(float)
     online, gap = rls.online(dt=dt), count // 3
     parts = []
@@ -117,14 +116,16 @@ def _cases(rls: RecursiveLeastSquares, kin: KinematicARX, dt: float, up: str) ->
     learnt, innovations, coefficients = (
         np.concatenate([np.asarray(part[i]) for part in parts]) for i in range(3)
     )
-    return "\n".join(
-        [
-            define("SAMPLES", count),
-            define("GAP", gap),
-            define("LEARNT", int(learnt.sum())),
-            define("TOLERANCE", f"{TOLERANCE[rls.precision]:g}"),
-            rows("rls_real", "samples", str(given.shape[1]), given, dtype),
-            rows("rls_real", "innovations", f"{up}AERO_NY", innovations[learnt], dtype),
-            rows("rls_real", "coefficients", f"{up}AERO_NY", coefficients[-1], dtype),
-        ]
+    return check_data(
+        {
+            "SAMPLES": count,
+            "GAP": gap,
+            "LEARNT": int(learnt.sum()),
+            "TOLERANCE": TOLERANCE[rls.precision],
+        },
+        "rls_real",
+        dtype,
+        samples=(str(given.shape[1]), given),
+        innovations=(f"{up}AERO_NY", innovations[learnt]),
+        coefficients=(f"{up}AERO_NY", coefficients[-1]),
     )

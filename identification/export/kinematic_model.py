@@ -8,22 +8,15 @@ import os
 from pathlib import Path
 from typing import Literal
 
-import numpy as np
-
-from identification.export.checked import TOLERANCE, samples
+from identification.export.checked import model_cases
 from identification.export.model import write_model
 from identification.export.rigid_body import rigid_body_files
 from identification.model.kinematic_model import KinematicModel
-from symheli.records import FlightRecord
-from symheli.values.c_text import define, index_macros, rows
-from symheli.values.template import filled_module
-from symheli.values.whole_files import write_text
+from symheli.export.c_program import CProgram
+from symheli.export.c_text import blocks, define, index_macros
 
 HERE = Path(__file__).parent
-"""kinematic_model.c, .h and _check.c lie here, with marked places for one model."""
-
-ORDINARY = 0.1
-"""Size of the states and inputs the check computes with: angles and rates of a flight."""
+"""kinematic_model.c, .h and model_check.c lie here, with marked places for one model."""
 
 
 def write_kinematic_model(
@@ -78,20 +71,22 @@ def write_kinematic_model(
     ['heli.h', 'heli.c', 'heli_check.c']
     >>> folder.cleanup()
     """
+    program = CProgram(
+        template=HERE / "kinematic_model",
+        name=name,
+        word="model",
+        header=_header(model, f"{name.upper()}_"),
+        check={"present": "p", "past": ", u", "cases": model_cases(model, name, precision)},
+        check_template=HERE / "model_check.c",
+        after=rigid_body_files(name, model.dt, precision),
+    )
     inner = write_model(model.aerodynamics, folder, f"{name}_aero", precision)
-    folder, cases = Path(folder), {"cases": _cases(model, name, precision)}
-    files = {
-        **filled_module(
-            HERE / "kinematic_model", name, _header(model, f"{name.upper()}_"), {}, cases
-        ),
-        **rigid_body_files(name, model.dt, precision),
-    }
-    return (*(write_text(folder / file, content) for file, content in files.items()), *inner)
+    return (*program.write(folder), *inner)
 
 
 def _header(model: KinematicModel, up: str) -> dict[str, object]:
     ranges = [f"{low:g} to {high:g}" for low, high in model.structure.basis.ranges]
-    blocks = [
+    sections = [
         [
             define(f"{up}NY", len(model.outputs)),
             define(f"{up}NU", len(model.inputs)),
@@ -105,37 +100,5 @@ def _header(model: KinematicModel, up: str) -> dict[str, object]:
     return {
         "dt": f"{model.dt:.9g}",
         "method": model.method,
-        "sizes": "\n\n".join("\n".join(b) for b in blocks),
+        "sizes": blocks(*sections),
     }
-
-
-def _cases(model: KinematicModel, name: str, precision: str) -> str:
-    """A record of a fixed seed, one sample missing, with one-step predictions, and the free run up
-    to the missing sample.
-    """
-    dtype = np.float32 if precision == "single" else np.float64
-    memory, wide = model.structure.memory, len(model.outputs) + len(model.inputs)
-    count = 2 * memory + 60
-    given = samples(wide, model.structure.basis.ranges, count)
-    given[:, :wide] *= ORDINARY
-    given = given.astype(dtype).astype(float)
-    record = FlightRecord(
-        model.dt * np.arange(count), given, (*model.outputs, *model.inputs, *model.parameters)
-    )
-    guess = model.predict(record, 1)
-    complete = np.logical_and.reduce(np.isfinite(given), axis=1)
-    there = [k for k in range(memory, count) if complete[k - memory : k].all()]
-    free = record.columns(map(str, model.outputs))[: count // 2].copy()
-    free[memory:] = model.simulate(record)[memory : count // 2]
-    real, outputs = f"{name}_real", f"{name.upper()}_NY"
-    return "\n".join(
-        [
-            define("SAMPLES", count),
-            define("THERE", len(there)),
-            define("HALF", count // 2),
-            define("TOLERANCE", f"{TOLERANCE[precision]:g}"),
-            rows(real, "samples", str(given.shape[1]), given, dtype),
-            rows(real, "predicted", outputs, guess[there], dtype),
-            rows(real, "simulated", outputs, free, dtype),
-        ]
-    )

@@ -11,23 +11,13 @@ from typing import Literal
 
 import numpy as np
 
-from identification.export.checked import TOLERANCE, samples
+from identification.export.checked import model_cases, number_type
 from identification.model.lpvarx_model import LPVARXModel
 from identification.recursive.forgetting import Constant
 from identification.recursive.kernel.configuration import KINDS, Configuration
 from symheli.errors import InputError
-from symheli.records import FlightRecord
-from symheli.values.arrays import Array
-from symheli.values.c_text import (
-    define,
-    index_macros,
-    literals,
-    require_identifier,
-    rows,
-    table,
-)
-from symheli.values.template import filled_module
-from symheli.values.whole_files import write_text
+from symheli.export.c_program import CProgram
+from symheli.export.c_text import blocks, define, index_macros, literals, rows, table
 
 HERE = Path(__file__).parent
 """model.c, model.h and model_check.c lie here, with marked places for one model."""
@@ -84,31 +74,27 @@ def write_model(
     ['roll.h', 'roll.c', 'roll_check.c']
     >>> folder.cleanup()
     """
-    require_identifier(name)
-    if precision not in TOLERANCE:
-        raise InputError(f'precision: expected "double" or "single", got {precision!r}')
-    dtype = np.float32 if precision == "single" else np.float64
-    c = Configuration(model.structure, Constant(1.0), dtype)
+    c = Configuration(model.structure, Constant(1.0), number_type(precision))
     if not c.factors:
         raise InputError(
             "user-supplied functions cannot be written in C; identify with a polynomial or spline"
             " basis"
         )
-    files = filled_module(
-        HERE / "model",
-        name,
-        _header(model, c, name),
-        {"tables": _tables(model, c, f"{name.upper()}_")},
-        {"cases": _cases(model, c, name, precision)},
-    )
-    return tuple(write_text(Path(folder) / file, content) for file, content in files.items())
+    return CProgram(
+        template=HERE / "model",
+        name=name,
+        word="model",
+        header=_header(model, c, name),
+        source={"tables": _tables(model, c, f"{name.upper()}_")},
+        check={"present": "u, p", "past": "", "cases": model_cases(model, name, precision)},
+    ).write(folder)
 
 
 def _header(model: LPVARXModel, c: Configuration, name: str) -> dict[str, object]:
     """Sizes, the index of every signal with its unit, and what the model is in words."""
     arx, up = model.structure, f"{name.upper()}_"
     ranges = [f"{low:g} to {high:g}" for low, high in arx.basis.ranges]
-    blocks = [
+    sections = [
         [f"typedef {'float' if c.dtype is np.float32 else 'double'} {name}_real;"],
         [
             define(f"{up}NY", arx.ny),
@@ -126,7 +112,7 @@ def _header(model: LPVARXModel, c: Configuration, name: str) -> dict[str, object
         "method": model.method,
         "at": "of their lag" if arx.scheduling_at == "lag" else "now",
         "basis": arx.basis,
-        "sizes": "\n\n".join("\n".join(b) for b in blocks if b),
+        "sizes": blocks(*sections),
     }
 
 
@@ -165,40 +151,3 @@ def _tables(model: LPVARXModel, c: Configuration, up: str) -> str:
 
 def _braced(values: Iterable[int]) -> str:
     return f"{{{', '.join(map(str, values))}}}"
-
-
-def _cases(model: LPVARXModel, c: Configuration, name: str, precision: str) -> str:
-    """A record of a fixed seed, one sample missing, with one-step predictions, and the free run up
-    to the missing sample.
-    """
-    arx, real, outputs = model.structure, f"{name}_real", f"{name.upper()}_NY"
-    wide, count = arx.ny + arx.nu, 2 * arx.memory + 60
-    given = samples(wide, arx.basis.ranges, count).astype(c.dtype).astype(float)
-    record = FlightRecord(
-        model.dt * np.arange(count), given, (*model.outputs, *model.inputs, *model.parameters)
-    )
-    complete = np.logical_and.reduce(np.isfinite(given), axis=1)
-    there = [
-        k
-        for k in range(arx.memory, count)
-        if complete[k - arx.memory : k].all() and np.isfinite(given[k, arx.ny :]).all()
-    ]
-    return "\n".join(
-        [
-            define("SAMPLES", count),
-            define("THERE", len(there)),
-            define("HALF", count // 2),
-            define("TOLERANCE", f"{TOLERANCE[precision]:g}"),
-            rows(real, "samples", str(given.shape[1]), given, c.dtype),
-            rows(real, "predicted", outputs, model.predict(record, 1)[there], c.dtype),
-            rows(real, "simulated", outputs, _free_run(model, record, count // 2), c.dtype),
-        ]
-    )
-
-
-def _free_run(model: LPVARXModel, record: FlightRecord, stop: int) -> Array:
-    """Up to `stop`, the samples it starts from as they are."""
-    start = model.structure.memory
-    out = record.columns(model.outputs)[:stop].copy()
-    out[start:] = model.simulate(record)[start:stop]
-    return out

@@ -27,18 +27,18 @@ int main(void)
     model_init(&s);
     for (int k = 0; k < SAMPLES; k++) {
         const model_real *u = samples[k] + MODEL_NY, *p = u + MODEL_NU;
-        if (model_predict(&s, u, p, y) == MODEL_PREDICTED) {
+        if (model_predict(&s, @present@, y) == MODEL_PREDICTED) {
             if (there < THERE) compare(y, predicted[there]);
             there++;
         }
-        model_observe(&s, samples[k]);
+        model_observe(&s, samples[k]@past@);
     }
     model_init(&s);
     for (int k = 0; k < HALF; k++) {
         const model_real *u = samples[k] + MODEL_NY, *p = u + MODEL_NU;
-        const int free_run = model_predict(&s, u, p, y) == MODEL_PREDICTED;
+        const int free_run = model_predict(&s, @present@, y) == MODEL_PREDICTED;
         if (free_run) compare(y, simulated[k]);
-        model_observe(&s, free_run ? y : samples[k]);
+        model_observe(&s, free_run ? y : samples[k]@past@);
     }
     printf("model: %d of %d predictions and a free run, largest difference %.2e\n", there, THERE,
            worst);

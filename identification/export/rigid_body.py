@@ -5,13 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
-import numpy as np
-
+from identification.export.checked import number_type
 from identification.model.kinematic_run import CORRECTIONS, STEEP
 from identification.model.prediction import DIVERGED
-from symheli.values.c_text import literals
+from symheli.export.c_program import filled
+from symheli.export.c_text import literals
 from symheli.values.kinematics import GRAVITY
-from symheli.values.template import filled
 
 HERE = Path(__file__).parent
 REALS = {"double": "double", "single": "float"}
@@ -21,7 +20,7 @@ def rigid_body_files(
     name: str, dt: float, precision: Literal["double", "single"]
 ) -> dict[str, str]:
     """NAME_body.h and NAME_body.c by file name, to write out."""
-    dtype = np.float32 if precision == "single" else np.float64
+    dtype = number_type(precision)
     bound = DIVERGED if precision == "double" else 1e18  # squares overflow beyond
     constants = {
         "GRAVITY": GRAVITY,

@@ -4,13 +4,12 @@ from the same samples on.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from identification.judge.scores import HORIZON, Scores, steps
-from identification.model.lpvarx_model import LPVARXModel
+from identification.judge.scores import HORIZON, Identified, Scores, predicted, steps
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv import LPVStateSpace, Scheduling
 from symheli.records import FlightRecord
@@ -238,7 +237,7 @@ class BesideBaseline:
 
 
 def beside_baseline(
-    identified: Mapping[str, LPVARXModel],
+    identified: Mapping[str, Identified],
     baselines: Mapping[str, BaselineModel],
     record: FlightRecord,
     outputs: Sequence[str],
@@ -253,7 +252,7 @@ def beside_baseline(
 
     Parameters
     ----------
-    identified : mapping of str to LPVARXModel
+    identified : mapping of str to LPVARXModel or KinematicModel
         By name; each has all of `outputs` among its own.
     baselines : mapping of str to BaselineModel
         By name, with what of the record drives them.
@@ -303,10 +302,10 @@ def beside_baseline(
     if not identified and not baselines:
         raise InputError("nothing to compare: give identified models or baselines")
     outputs = tuple(map(str, outputs))
-    measured, ahead = record.columns(outputs), list(steps(record.dt, horizon).values())[1]
-    assert ahead is not None  # noqa: S101  (only the free run has no horizon)
+    measured, samples = record.columns(outputs), steps(record.dt, horizon).values()
 
-    def judged(name: str, own: bool, one: Array, far: Array, free: Array) -> Prediction:
+    def judged(name: str, own: bool, guesses: Iterable[Array]) -> Prediction:
+        one, far, free = guesses
         found = Scores.of(
             measured, outputs, one_step=one, ahead=far, free_run=free, horizon=horizon
         )
@@ -318,15 +317,14 @@ def beside_baseline(
             if y not in model.outputs:
                 raise UnknownNameError(f"output of {name}", y, map(str, model.outputs))
         columns = [model.outputs.index(y) for y in outputs]  # type: ignore[arg-type]
-        guesses = model.predict(record, 1), model.predict(record, ahead), model.simulate(record)
-        predictions.append(judged(name, True, *(guess[:, columns] for guess in guesses)))
+        guesses = (predicted(model, record, n)[:, columns] for n in samples)
+        predictions.append(judged(name, True, guesses))
     start = max((model.structure.memory for model in identified.values()), default=0)
     for name, baseline in baselines.items():
         along = baseline.on(record)
         guesses = (
-            along.predict(outputs, 1),
-            along.predict(outputs, ahead),
-            along.simulate(outputs, start),
+            along.simulate(outputs, start) if n is None else along.predict(outputs, n)
+            for n in samples
         )
-        predictions.append(judged(name, False, *guesses))
+        predictions.append(judged(name, False, guesses))
     return BesideBaseline(outputs=outputs, record=record, predictions=tuple(predictions))

@@ -1,5 +1,5 @@
 """The covariance of least-squares coefficients whose residuals are correlated, in time and between
-outputs.
+outputs; draws of coefficients from a covariance.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.fft import irfft, rfft
 from scipy.fft import next_fast_len
+from scipy.stats import chi2
 
 from identification.estimators.least_squares import (
     inverse_root,
@@ -19,6 +20,7 @@ from identification.estimators.least_squares import (
 )
 from identification.structure.lpvarx import LPVARX
 from symheli.values.arrays import Array
+from symheli.values.numbers import whole
 
 TAKEN = 0.8
 """Of the residuals' power, what the fit is taken to have removed at most."""
@@ -118,3 +120,27 @@ class _Spectra(NamedTuple):
         return (
             self.phi[:, rows].conj().T @ (kernel[:, None] * self.phi[:, columns])
         ).real / self.length
+
+
+def drawn(
+    theta: Array, joint: Array, free: Array, count: int, seed: int, boundary: float | None = None
+) -> Array:
+    """`count` coefficients (count, n, ny) around theta (n, ny) with the normal distribution of the
+    covariance `joint` (ny, n, ny, n); those that are not `free` (n, ny) stay.
+
+    `boundary`: each is moved along its ray to the boundary of the ellipsoid that holds this share
+    of the distribution.
+    """
+    count, seed = whole(count, "draws", 1), whole(seed, "seed")
+    mask = free.T.reshape(-1)
+    square = joint.reshape(len(mask), len(mask))[mask][:, mask]
+    scale = np.sqrt(np.diagonal(square))
+    scale = np.where(scale > 0, scale, 1.0)
+    values, vectors = np.linalg.eigh(square / np.outer(scale, scale))
+    root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+    z = np.random.default_rng(seed).standard_normal((count, len(root)))
+    if boundary is not None:
+        z *= np.sqrt(chi2.ppf(boundary, len(root))) / np.linalg.norm(z, axis=1, keepdims=True)
+    moved = np.tile(theta.T.reshape(-1), (count, 1))
+    moved[:, mask] += z @ root.T
+    return moved.reshape(count, theta.shape[1], -1).transpose(0, 2, 1)

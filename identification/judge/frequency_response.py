@@ -66,7 +66,7 @@ class FrequencyResponse:
         """Magnitude of every response over frequency (rad/s), shaded by its random error; returns
         the axes.
         """
-        from identification.judge.frequency_response_plot import plot_response
+        from identification.judge.plots import plot_response
 
         return plot_response(self, ax)
 

@@ -2,75 +2,120 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
-from identification.model.lpvarx_model import LPVARXModel
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv import LinearModel, LPVStateSpace, chordal_distance, nu_gap
+from symheli.lpv import LinearModel, chordal_distance, nu_gap
 from symheli.values.arrays import Array
+from symheli.values.numbers import whole
 from symheli.values.summary import summarized
 
-FAST = 3.0
-"""Frequency (rad/s) above which models are compared on their own: what is slower hardly shows in
-records of a minute.
-"""
+
+class Freezable(Protocol):
+    """A model whose scheduling can be held: LPV state space, LFT, identified model."""
+
+    def at(self, p: Any, /) -> LinearModel:
+        """The linear model with the scheduling held at p."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FrozenModel:
+    """One model with the scheduling held at K points, and its distance from a reference.
+
+    Parameters
+    ----------
+    poles : tuple of array
+        rad/s, at each point; those of a sampled model as the continuous ones it samples.
+    stable : bool array (K,)
+        Whether it is stable.
+    gap : array (K,)
+        nu-gap to the reference.
+    miss : array (K,)
+        Distance of the nearest pole to the reference's `mode`, percent of its magnitude.
+    distance : array (K,)
+        Largest chordal distance from the reference above the frequency `fast`.
+    response : array (n,)
+        |G| of the channel over `omega` at one of the points.
+
+    What was not asked for is empty.
+    """
+
+    poles: tuple[Array, ...]
+    stable: Array
+    gap: Array
+    miss: Array
+    distance: Array
+    response: Array
+
+    __repr__ = summarized
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FrozenModels:
-    """Reference, baseline and identified model with the scheduling held at `points`.
+    """A reference and other models with the scheduling held at the same points.
 
-    Poles (rad/s) are those of the sampled models as continuous ones. `miss_*` (K,): percent of its
-    magnitude by which the nearest pole misses the reference's `mode`; `gap_*` (K,): nu-gaps to the
-    reference; `fast_*` (K,): the largest chordal distance from `fast` rad/s on. `responses`: |G|
-    (n,) over `omega` (rad/s) of the `channel` (input, output) at the point `responses_at`.
+    Parameters
+    ----------
+    points : array (K,) or (K, parameters)
+        Values of the scheduling.
+    reference : FrozenModel
+        The reference; its distances are 0.
+    models : mapping of str to FrozenModel
+        The others, by name.
+    mode : tuple of complex
+        The pole (rad/s) of the reference that a model must have, at each point; () without one.
+    fast : float, optional
+        Frequency from which chordal distances count, rad/s.
+    omega : array (n,)
+        Frequencies of the responses, rad/s.
+    channel : tuple of str
+        Input and output of the responses; () without one.
+    responses_at : float or tuple
+        The point of the responses.
 
     Examples
     --------
-    >>> import numpy as np, identification as idn, symheli
+    >>> import identification as idn, symheli
     >>> names = dict(states=["p"], inputs=["aileron"], outputs=["p"])
-    >>> roll = symheli.LPVStateSpace.polynomial(
-    ...     A=[[[-4.0]], [[-0.2]]], B=[[[30.0]]], C=[[[1.0]]], D=[[[0.0]]],
+    >>> exact, coarse = (symheli.LPVStateSpace.polynomial(
+    ...     A=[[[-4.0]], [[slope]]], B=[[[30.0]]], C=[[[1.0]]], D=[[[0.0]]],
     ...     scheduling=symheli.Scheduling("speed", "m/s", 0.0, 10.0), **names)
-    >>> arx = idn.LPVARX(
-    ...     "p", "aileron", "speed", na=1, nb=1, delay=1, basis=idn.Polynomial(0, 0.0, 10.0))
-    >>> rng = np.random.default_rng(0)
-    >>> u, p = rng.standard_normal(300), np.zeros(300)
-    >>> for k in range(1, 300):
-    ...     p[k] = 0.9 * p[k - 1] + 0.5 * u[k - 1]
-    >>> record = symheli.FlightRecord.from_arrays(
-    ...     0.02 * np.arange(300), {"p": "rad/s", "aileron": "rad", "speed": "m/s"},
-    ...     p=p, aileron=u, speed=5 + 5 * np.sin(np.arange(300)))
-    >>> found = idn.frozen_models(
-    ...     {v: roll.at(v) for v in (2.0, 8.0)}, roll, idn.fit(arx, record),
-    ...     mode={v: -4.0 - 0.2 * v for v in (2.0, 8.0)},
-    ...     scales={"p": 1.0, "aileron": 0.1}, channel=("aileron", "p"))
-    >>> bool(found.gap_baseline.max() < 1e-9 < found.gap_identified.min())
-    True
+    ...     for slope in (-0.2, -0.1))
+    >>> reference = {v: exact.at(v).discretize(0.02) for v in (0.0, 8.0)}
+    >>> found = idn.compare_frozen(
+    ...     {"coarse": coarse}, reference, scales={"p": 1.0, "aileron": 0.1},
+    ...     mode={v: -4.0 - 0.2 * v for v in reference})
+    >>> found["coarse"].gap.round(3).tolist(), found["coarse"].miss.round(1).tolist()
+    ([0.0, 0.067], [0.0, 14.3])
     """
 
     points: Array
+    reference: FrozenModel
+    models: Mapping[str, FrozenModel]
     mode: tuple[complex, ...]
-    reference_poles: tuple[Array, ...]
-    baseline_poles: tuple[Array, ...]
-    identified_poles: tuple[Array, ...]
-    miss_baseline: Array
-    miss_identified: Array
-    gap_baseline: Array
-    gap_identified: Array
-    fast: float
-    fast_baseline: Array
-    fast_identified: Array
+    fast: float | None
     omega: Array
-    channel: tuple[str, str]
-    responses_at: float
-    responses: Mapping[str, Array]
+    channel: tuple[str, ...]
+    responses_at: Any
 
     __repr__ = summarized
+
+    def __getitem__(self, name: str) -> FrozenModel:
+        """The model of this name."""
+        if name not in self.models:
+            raise UnknownNameError("model", name, self.models)
+        return self.models[name]
+
+    def otherwise_stable(self, name: str) -> int:
+        """Number of points at which this model is stable and the reference is not, or the
+        reverse.
+        """
+        return int(np.sum(self[name].stable != self.reference.stable))
 
 
 def pole_miss(model: LinearModel, pole: complex) -> float:
@@ -124,135 +169,172 @@ def continuous_poles(model: LinearModel) -> Array:
     return poles if model.dt is None else np.log(poles[np.abs(poles) > 1e-12]) / model.dt
 
 
-def frozen_models(
-    reference: Mapping[float, LinearModel],
-    baseline: LPVStateSpace,
-    identified: LPVARXModel,
+def compare_frozen(
+    models: Mapping[str, Freezable | Mapping[Any, LinearModel]],
+    reference: Mapping[Any, LinearModel],
     *,
-    mode: Mapping[float, complex],
     scales: Mapping[str, float],
-    channel: tuple[str, str],
-    responses_at: float | None = None,
-    fast: float = FAST,
+    inputs: Sequence[str] | None = None,
+    outputs: Sequence[str] | None = None,
+    mode: Mapping[Any, complex] | None = None,
+    channel: tuple[str, str] | None = None,
+    responses_at: Any = None,
+    fast: float | None = None,
+    frequencies: int = 2000,
 ) -> FrozenModels:
-    """Compare a baseline and an identified model with exact linear models at frozen scheduling.
+    """Compare models with exact linear models at frozen scheduling: poles, nu-gaps, responses.
 
-    Everything is compared at the sample period of the identified model, inputs held from sample to
-    sample, on its inputs and outputs.
+    All are compared at one sample period: continuous models are sampled with inputs held, as the
+    first sampled one is.
 
     Parameters
     ----------
-    reference : mapping of float to LinearModel
-        The continuous model at each point of the scheduling.
-    baseline : LPVStateSpace
-        Continuous, with the inputs and outputs of the identified model.
-    identified : LPVARXModel
-        One scheduling parameter.
-    mode : mapping of float to complex
-        The pole (rad/s) of the reference at each point that a model must have.
+    models : mapping of str to model
+        By name: an LPV or identified model of one scheduling parameter, or linear models by point.
+    reference : mapping of float (or tuple) to LinearModel
+        The exact model at each point of the scheduling.
     scales : mapping of str to float
         A change of this size of an input or output counts as 1 in the distances; all of them.
-    channel : (str, str)
+    inputs, outputs : sequence of str, optional
+        The signals that are compared; default those of the reference.
+    mode : mapping of float (or tuple) to complex, optional
+        The pole (rad/s) of the reference at each point that a model must have.
+    channel : (str, str), optional
         Input and output whose response is kept.
-    responses_at : float, optional
+    responses_at : float (or tuple), optional
         The point at which it is kept; default the middle one.
-    fast : float
-        Frequency, rad/s, from which the chordal distances count.
+    fast : float, optional
+        Frequency, rad/s, from which chordal distances are compared.
+    frequencies : int
+        Frequencies a nu-gap begins with; see `symheli.lpv.nu_gap`.
 
     Returns
     -------
     FrozenModels
-        Poles, misses, distances by point.
+        Poles, stability, distances by model and point.
 
     Raises
     ------
     UnknownNameError
-        For a size that is missing and a channel the model does not have.
+        For a size that is missing and a signal that a model does not have.
     InputError
-        Without a point, or where `mode` or `responses_at` has other points.
+        Without a point or a sampled model, where `models`, `mode` or `responses_at` have other
+        points, and as `symheli.lpv.nu_gap`.
+
+    References
+    ----------
+    Vinnicombe (2001), Uncertainty and Feedback, ch. 3.
 
     Examples
     --------
-    >>> import numpy as np, identification as idn, symheli
+    >>> import identification as idn, symheli
     >>> names = dict(states=["p"], inputs=["aileron"], outputs=["p"])
-    >>> roll = symheli.LPVStateSpace.polynomial(
-    ...     A=[[[-4.0]], [[-0.2]]], B=[[[30.0]]], C=[[[1.0]]], D=[[[0.0]]],
+    >>> exact, coarse = (symheli.LPVStateSpace.polynomial(
+    ...     A=[[[-4.0]], [[slope]]], B=[[[30.0]]], C=[[[1.0]]], D=[[[0.0]]],
     ...     scheduling=symheli.Scheduling("speed", "m/s", 0.0, 10.0), **names)
-    >>> arx = idn.LPVARX(
-    ...     "p", "aileron", "speed", na=1, nb=1, delay=1, basis=idn.Polynomial(0, 0.0, 10.0))
-    >>> rng = np.random.default_rng(0)
-    >>> u, p = rng.standard_normal(300), np.zeros(300)
-    >>> for k in range(1, 300):
-    ...     p[k] = 0.9 * p[k - 1] + 0.5 * u[k - 1]
-    >>> record = symheli.FlightRecord.from_arrays(
-    ...     0.02 * np.arange(300), {"p": "rad/s", "aileron": "rad", "speed": "m/s"},
-    ...     p=p, aileron=u, speed=5 + 5 * np.sin(np.arange(300)))
-    >>> found = idn.frozen_models(
-    ...     {v: roll.at(v) for v in (2.0, 8.0)}, roll, idn.fit(arx, record),
-    ...     mode={v: -4.0 - 0.2 * v for v in (2.0, 8.0)},
-    ...     scales={"p": 1.0, "aileron": 0.1}, channel=("aileron", "p"))
-    >>> bool(found.gap_baseline.max() < 1e-9 < found.gap_identified.min())
-    True
+    ...     for slope in (-0.2, -0.1))
+    >>> reference = {v: exact.at(v).discretize(0.02) for v in (0.0, 8.0)}
+    >>> found = idn.compare_frozen(
+    ...     {"coarse": coarse}, reference, scales={"p": 1.0, "aileron": 0.1},
+    ...     mode={v: -4.0 - 0.2 * v for v in reference})
+    >>> found["coarse"].stable.tolist(), found.otherwise_stable("coarse")
+    ([True, True], 0)
     """
-    points, dt = list(reference), identified.dt
-    inputs, outputs = list(map(str, identified.inputs)), list(map(str, identified.outputs))
+    points, frequencies = list(reference), whole(frequencies, "frequencies", 2)
     at = points[len(points) // 2] if responses_at is None and points else responses_at
-    if at not in points or set(mode) != set(points):
+    if at not in points or (mode is not None and set(mode) != set(points)):
         raise InputError(
-            f"mode and responses_at: expected the points {points}, got {list(mode)} and {at}"
+            f"mode and responses_at: expected the points {points}, got"
+            f" {None if mode is None else list(mode)} and {at}"
         )
+    exact = [reference[point] for point in points]
+    held = {name: _held(name, model, points) for name, model in models.items()}
+    inputs = list(map(str, exact[0].inputs if inputs is None else inputs))
+    outputs = list(map(str, exact[0].outputs if outputs is None else outputs))
+    _require_signals(inputs, outputs, scales, channel)
+    periods = (m.dt for group in (exact, *held.values()) for m in group if m.dt is not None)
+    dt = next(periods, None)
+    if dt is None:
+        raise InputError("all models are continuous: discretize one of them, the others follow")
+    omega = np.geomspace(0.3, 0.8 * np.pi / dt, 200)
+    if fast is not None and not fast <= omega[-1]:
+        raise InputError(f"fast: expected at most {omega[-1]:.4g} rad/s, got {fast}")
+    sizes: dict[str, Any] = {
+        "input_scale": [scales[i] for i in inputs],
+        "output_scale": [scales[y] for y in outputs],
+    }
+
+    def compared(linear: Sequence[LinearModel], to: Sequence[LinearModel] | None) -> FrozenModel:
+        def each(distance: Callable[[LinearModel, LinearModel], float]) -> Array:
+            if to is None:
+                return np.zeros(len(linear))
+            return np.array([distance(a, b) for a, b in zip(to, linear, strict=True)])
+
+        empty = np.zeros(0)
+        far = omega[omega >= (np.inf if fast is None else fast)]
+        return FrozenModel(
+            poles=tuple(map(continuous_poles, linear)),
+            stable=np.array([m.is_stable() for m in linear]),
+            gap=each(lambda a, b: nu_gap(a, b, **sizes, points=frequencies)),
+            miss=empty
+            if mode is None
+            else np.array([pole_miss(m, mode[p]) for m, p in zip(linear, points, strict=True)]),
+            distance=empty
+            if fast is None
+            else each(lambda a, b: chordal_distance(a, b, far, **sizes).max()),
+            response=empty
+            if channel is None
+            else _magnitude(linear[points.index(at)], channel, omega),
+        )
+
+    def sampled(linear: Sequence[LinearModel]) -> list[LinearModel]:
+        discrete = (m if m.dt is not None else m.discretize(dt) for m in linear)
+        return [m.select(inputs=inputs, outputs=outputs) for m in discrete]
+
+    exact = sampled(exact)
+    return FrozenModels(
+        points=np.array(points, float),
+        reference=compared(exact, None),
+        models={name: compared(sampled(linear), exact) for name, linear in held.items()},
+        mode=() if mode is None else tuple(complex(mode[point]) for point in points),
+        fast=fast,
+        omega=omega,
+        channel=channel or (),
+        responses_at=at,
+    )
+
+
+def _held(
+    name: str, model: Freezable | Mapping[Any, LinearModel], points: Sequence[Any]
+) -> list[LinearModel]:
+    """The linear models at the points."""
+    if not isinstance(model, Mapping):
+        return [model.at(point) for point in points]
+    if set(points) - set(model):
+        raise InputError(f"{name}: expected a model at the points {points}, got {list(model)}")
+    return [model[point] for point in points]
+
+
+def _require_signals(
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+    scales: Mapping[str, float],
+    channel: tuple[str, str] | None,
+) -> None:
+    """Raise `UnknownNameError` for a signal without a size, or a channel of other signals."""
     for signal in (*inputs, *outputs):
         if signal not in scales:
             raise UnknownNameError("size in scales", signal, scales)
+    if channel is None:
+        return
     if len(channel) != 2:
         raise InputError(f"channel: expected (input, output), got {channel!r:.80}")
     for signal, there in zip(channel, (inputs, outputs), strict=True):
         if signal not in there:
             raise UnknownNameError("signal of channel", signal, there)
-    sizes: dict[str, Any] = {
-        "input_scale": [scales[i] for i in inputs],
-        "output_scale": [scales[y] for y in outputs],
-    }
-    omega = np.geomspace(0.3, 0.8 * np.pi / dt, 200)
-    if not fast <= omega[-1]:
-        raise InputError(f"fast: expected at most {omega[-1]:.4g} rad/s, got {fast}")
-    names = ("reference", "baseline", "identified")
-    poles: dict[str, list[Array]] = {name: [] for name in names}
-    misses, gaps, distances = ({name: [] for name in names[1:]} for _ in range(3))
-    responses = {}
-    for point in points:
-        models = {
-            "reference": reference[point].discretize(dt),
-            "baseline": baseline.at(point).discretize(dt),
-            "identified": identified.at(point),
-        }
-        exact = models["reference"].select(inputs=inputs, outputs=outputs)
-        for name, whole in models.items():
-            frozen = whole.select(inputs=inputs, outputs=outputs)
-            poles[name].append(continuous_poles(frozen))
-            if name != "reference":
-                misses[name].append(pole_miss(frozen, mode[point]))
-                gaps[name].append(nu_gap(exact, frozen, **sizes))
-                far = chordal_distance(exact, frozen, omega[omega >= fast], **sizes)
-                distances[name].append(far.max())
-            if point == at:
-                one = frozen.select(inputs=[channel[0]], outputs=[channel[1]])
-                responses[name] = np.abs(one.frequency_response(omega)[:, 0, 0])
-    return FrozenModels(
-        points=np.array(points, float),
-        mode=tuple(complex(mode[point]) for point in points),
-        reference_poles=tuple(poles["reference"]),
-        baseline_poles=tuple(poles["baseline"]),
-        identified_poles=tuple(poles["identified"]),
-        miss_baseline=np.array(misses["baseline"]),
-        miss_identified=np.array(misses["identified"]),
-        gap_baseline=np.array(gaps["baseline"]),
-        gap_identified=np.array(gaps["identified"]),
-        fast=fast,
-        fast_baseline=np.array(distances["baseline"]),
-        fast_identified=np.array(distances["identified"]),
-        omega=omega,
-        channel=channel,
-        responses_at=at,
-        responses=responses,
-    )
+
+
+def _magnitude(model: LinearModel, channel: tuple[str, str], omega: Array) -> Array:
+    """|G| (n,) of a channel."""
+    one = model.select(inputs=[channel[0]], outputs=[channel[1]])
+    return np.abs(one.frequency_response(omega)[:, 0, 0])

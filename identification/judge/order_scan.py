@@ -9,6 +9,8 @@ from itertools import product
 import numpy as np
 
 from identification.estimators.estimate import fit
+from identification.judge.scores import predicted
+from identification.model.prediction import named_fit
 from identification.structure.lpvarx import LPVARX
 from identification.structure.regressors import as_records, stacked
 from symheli.errors import ExcitationError, InputError
@@ -220,17 +222,16 @@ def _judge(
     n = len(error)
     sign, logdet = np.linalg.slogdet(error.T @ error / n)
     bic = n * logdet + int(structure.free.sum()) * np.log(n) if sign > 0 else -np.inf
-    steps = [
+    one_step, ahead, free_run = (
         np.mean(
             [
-                model.score(record, horizon=h, hold_p=hold_p and h is not None).array
+                named_fit(model.outputs, record, predicted(model, record, n, hold_p)).array
                 for record in test
             ],
             axis=0,
         )
-        for h in (1, horizon, None)
-    ]
-    one_step, ahead, free_run = steps
+        for n in (1, horizon, None)
+    )
     return Trial(
         structure=structure, bic=float(bic), one_step=one_step, ahead=ahead, free_run=free_run
     )

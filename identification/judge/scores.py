@@ -8,12 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.design.leakage import warn_of_own_past
+from identification.model.kinematic_model import KinematicModel
 from identification.model.lpvarx_model import LPVARXModel
 from identification.model.prediction import fit_percent
 from symheli.errors import InputError
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 from symheli.values.numbers import positive
+
+Identified = LPVARXModel | KinematicModel
 
 HORIZON = 1.0
 """Seconds ahead at which models are judged unless said otherwise."""
@@ -84,7 +87,7 @@ class Scores:
 
 
 def scores(
-    model: LPVARXModel, record: FlightRecord, *, horizon: float = HORIZON, hold_p: bool = False
+    model: Identified, record: FlightRecord, *, horizon: float = HORIZON, hold_p: bool = False
 ) -> Scores:
     """Judge a model on a record: one step ahead, some seconds ahead and in free run.
 
@@ -93,7 +96,7 @@ def scores(
 
     Parameters
     ----------
-    model : LPVARXModel
+    model : LPVARXModel or KinematicModel
         The identified model.
     record : FlightRecord
         With the outputs, inputs and scheduling of the model, at its sample period; best one that
@@ -102,7 +105,7 @@ def scores(
         Of the second prediction, s; one sample where it is shorter.
     hold_p : bool
         Hold the scheduling from the start of each prediction, as where it is measured; a free run
-        follows it in any case.
+        follows it in any case. Of an LPVARXModel only.
 
     Returns
     -------
@@ -165,12 +168,16 @@ def steps(dt: float, horizon: float = HORIZON) -> dict[str, int | None]:
 
 
 def predicted(
-    model: LPVARXModel, record: FlightRecord, horizon: int | None, hold_p: bool = False
+    model: Identified, record: FlightRecord, horizon: int | None, hold_p: bool = False
 ) -> Array:
     """The prediction (n, ny) `horizon` samples ahead, or with None the free run."""
-    return (
-        model.simulate(record) if horizon is None else model.predict(record, horizon, hold_p=hold_p)
-    )
+    if horizon is None:
+        return model.simulate(record)
+    if isinstance(model, LPVARXModel):
+        return model.predict(record, horizon, hold_p=hold_p)
+    if hold_p:
+        raise InputError("hold_p: a KinematicModel takes its scheduling as known ahead")
+    return model.predict(record, horizon)
 
 
 DIVERGES = -1e4

@@ -5,7 +5,7 @@ seen.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import nnls
@@ -167,7 +167,7 @@ def slow_modes(
     """
     records = as_records(records)
     joint, data = uncertainty(model, records).covariance, stacked(model.structure, records)
-    others = [replace(model, theta=theta, covariance=None) for theta in _compensated(model, data)]
+    others = [model.with_theta(theta) for theta in _compensated(model, data)]
     p, points = data.p.reshape(len(data.p), -1), whole(points, "points", 1)
     found = []
     for row in np.unique(np.quantile(p, (np.arange(points) + 0.5) / points, axis=0), axis=0):

@@ -1,11 +1,11 @@
-"""How well the coefficients are known: their covariance, honest about coloured residuals, and bands
-over p.
+"""How well the coefficients are known: their covariance, honest about coloured residuals, bands
+over p, and the standard error of the frozen frequency response.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -13,16 +13,42 @@ import numpy as np
 from scipy.stats import t as student
 
 from identification.design.excitation import excitation_of
-from identification.judge.coefficient_covariance import covariances
-from identification.judge.draws import drawn
-from identification.judge.response_band import ResponseBand, response_band
+from identification.judge.coefficient_covariance import covariances, drawn
 from identification.model.lpvarx_model import LEAST_SQUARES, LPVARXModel
+from identification.model.realization import one_value
 from identification.structure.regressors import Regression, as_records, stacked
 from symheli.errors import InputError
 from symheli.records import FlightRecord
-from symheli.values.arrays import Array
+from symheli.values.arrays import Array, frozen
 from symheli.values.numbers import whole
 from symheli.values.summary import as_table, summarized
+
+
+class ResponseBand(NamedTuple):
+    """A frozen response and its standard error: the root mean square of |G - truth|, to first order
+    in the errors of the coefficients.
+
+    Parameters
+    ----------
+    omega : array (k,)
+        rad/s.
+    G : complex array (k, ny, nu)
+        Output per input.
+    standard_error : array (k, ny, nu)
+        In the units of G.
+
+    Examples
+    --------
+    >>> band = idn.uncertainty(model, record).frequency_response(0.0, [0.1, 1.0])
+    >>> print(np.abs(band.G[:, 0, 0]).round(1), bool(band.standard_error.max() < 0.05))
+    [2. 2.] True
+    """
+
+    omega: Array
+    G: Array
+    standard_error: Array
+
+    __repr__ = summarized
 
 
 class Band(NamedTuple):
@@ -174,7 +200,7 @@ class Uncertainty:
         """
         free = self.model.structure.free
         thetas = drawn(self.model.theta, self.covariance, free, whole(count, "count", 1), seed)
-        return tuple(replace(self.model, theta=theta, covariance=None) for theta in thetas)
+        return tuple(map(self.model.with_theta, thetas))
 
     def frequency_response(self, p: object, omega: object) -> ResponseBand:
         """The response at `omega` (k,) in rad/s with the scheduling held at p, and its standard
@@ -183,13 +209,13 @@ class Uncertainty:
         It is that of `at(p)` and of both exact state-space forms at p. Raises `InputError` for p
         outside the basis.
         """
-        return response_band(self.model, self.covariance, p, omega)
+        return _response_band(self.model, self.covariance, p, omega)
 
     def plot(self, level: float = 0.95) -> Array:
         """Axes (coefficients,) with every coefficient function and its confidence band over p; see
-        `identification.judge.band_plot`.
+        `identification.judge.plots`.
         """
-        from identification.judge.band_plot import plot_bands
+        from identification.judge.plots import plot_bands
 
         return plot_bands(self, level)
 
@@ -274,3 +300,43 @@ def _runs(data: Regression) -> list[slice]:
     breaks = np.flatnonzero(np.diff(data.rows) != 1) + 1
     ends = [0, *breaks.tolist(), len(data.rows)]
     return [slice(a, b) for a, b in pairwise(ends)]
+
+
+def _response_band(model: LPVARXModel, joint: Array, p: object, omega: object) -> ResponseBand:
+    """The response with the scheduling held at p, and its error from the covariance `joint` (ny, n,
+    ny, n) of the coefficients.
+
+    With M = I + sum_i A_i z^-i and M G = sum_j B_j z^-j, coefficients that change move G by M^-1
+    (sum_j dB_j z^-j - sum_i dA_i z^-i G). Raises `InputError` for p outside the basis.
+    """
+    arx = model.structure
+    omega = np.atleast_1d(frozen(omega, "omega"))
+    if omega.ndim != 1:
+        raise InputError(f"omega: expected (k,) rad/s, got shape {omega.shape}")
+    f = arx.basis(one_value(p, arx.basis))
+    size, ny, count = arx.basis.size, arx.ny, len(arx.entries)
+    entries = np.einsum(
+        "yeazfb,a,b->yezf", joint.reshape(ny, count, size, ny, count, size), f, f
+    ).reshape(ny * count, ny * count)
+    theta = np.einsum("eby,b->ey", model.theta.reshape(count, size, ny), f)
+    G, error = np.zeros((len(omega), ny, arx.nu), complex), np.zeros((len(omega), ny, arx.nu))
+    for k, z in enumerate(np.exp(1j * omega * model.dt)):
+        M, N = np.eye(ny, dtype=complex), np.zeros((ny, arx.nu), complex)
+        for e, entry in enumerate(arx.entries):
+            if entry.kind == "output":
+                M[:, entry.channel] += theta[e] * z**-entry.lag
+            elif entry.kind == "input":
+                N[:, entry.channel] += theta[e] * z**-entry.lag
+        inverse = np.linalg.inv(M)
+        G[k] = inverse @ N
+        moved = np.zeros(
+            (count, arx.nu), complex
+        )  # what a change of an entry's coefficient does to M G
+        for e, entry in enumerate(arx.entries):
+            if entry.kind == "output":
+                moved[e] = -G[k, entry.channel] * z**-entry.lag
+            elif entry.kind == "input":
+                moved[e, entry.channel] = z**-entry.lag
+        J = np.einsum("oy,eu->ouye", inverse, moved).reshape(ny, arx.nu, ny * count)
+        error[k] = np.sqrt(np.maximum(np.einsum("oui,ij,ouj->ou", J, entries, J.conj()).real, 0.0))
+    return ResponseBand(omega, G, error)

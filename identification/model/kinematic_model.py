@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +13,7 @@ from identification.model import kinematic_run
 from identification.model.kinematic_realization import Realization
 from identification.model.kinematic_run import Run
 from identification.model.lpvarx_model import LEAST_SQUARES, LPVARXModel
-from identification.model.prediction import fit_percent, require_horizon
+from identification.model.prediction import named_fit, require_horizon
 from identification.structure.kinematic_arx import MOVING, STATES, KinematicARX
 from symheli.errors import InputError
 from symheli.lpv import FunctionSpace, LinearModel, LPVStateSpace, UncertainStateSpace
@@ -158,13 +158,16 @@ class KinematicModel:
             self._along(record), self.structure.inputs, record, controller
         )
 
+    def with_theta(self, theta: Array) -> KinematicModel:
+        """The same with other coefficients (n, 6), whose covariance is not known."""
+        return replace(self, aerodynamics=self.aerodynamics.with_theta(theta))
+
     def score(self, record: FlightRecord, horizon: int | None) -> NamedVector:
         """Fit of each state in percent, `horizon` samples ahead or with None in free run; see
         `fit_percent`.
         """
         guess = self.simulate(record) if horizon is None else self.predict(record, horizon)
-        fit = fit_percent(record.columns(STATES), guess)
-        return NamedVector(tuple(Signal(s, "%") for s in self.outputs), fit)
+        return named_fit(self.outputs, record, guess)
 
     def states(self, record: FlightRecord) -> Array:
         """States (n, nx) of the whole `to_state_space` along a record, as measured: y(k), and what

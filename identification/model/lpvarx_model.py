@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -166,6 +166,10 @@ class LPVARXModel:
         """
         return prediction.simulate(self._along(record))
 
+    def with_theta(self, theta: Array) -> LPVARXModel:
+        """The same with other coefficients (n, ny), whose covariance is not known."""
+        return replace(self, theta=theta, covariance=None)
+
     def score(
         self, record: FlightRecord, horizon: int | None = None, *, hold_p: bool = False
     ) -> NamedVector:
@@ -185,8 +189,7 @@ class LPVARXModel:
             if horizon is None
             else self.predict(record, horizon, hold_p=hold_p)
         )
-        fit = prediction.fit_percent(record.columns(self.outputs), guess)
-        return NamedVector(tuple(Signal(s, "%") for s in self.outputs), fit)
+        return prediction.named_fit(self.outputs, record, guess)
 
     def at(self, p: float | Sequence[float]) -> LinearModel:
         """The discrete model with the scheduling held at p (one number a parameter), in observer

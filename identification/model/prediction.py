@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,7 @@ from identification.structure.lpvarx import LPVARX
 from identification.structure.regressors import Samples, regressor_rows
 from symheli.errors import InputError
 from symheli.records import FlightRecord
+from symheli.values import NamedVector, Signal
 from symheli.values.arrays import Array
 
 DIVERGED = 1e100
@@ -195,6 +197,12 @@ def _flagged(y: Array) -> Array:
 
 LARGEST = 1e150
 """From here on the square of a measurement may overflow."""
+
+
+def named_fit(outputs: Sequence[Signal], record: FlightRecord, guess: Array) -> NamedVector:
+    """`fit_percent` of a prediction (n, ny) of the `outputs` of a record, by name."""
+    fit = fit_percent(record.columns(outputs), guess)
+    return NamedVector(tuple(Signal(s, "%") for s in outputs), fit)
 
 
 def fit_percent(y: object, yhat: object) -> Array:

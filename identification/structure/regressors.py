@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from identification.structure.kinematic_arx import KinematicARX
 from identification.structure.lpvarx import LPVARX
 from symheli.errors import InputError
 from symheli.records import FlightRecord
@@ -87,7 +88,7 @@ class Regression:
         return error
 
 
-def scheduling_values(arx: LPVARX, record: FlightRecord) -> Array:
+def scheduling_values(arx: LPVARX | KinematicARX, record: FlightRecord) -> Array:
     """p of a record: (n,) for one parameter, (n, parameters) for several."""
     p = record.columns(arx.parameters)
     return p[:, 0] if len(arx.parameters) == 1 else p

@@ -88,6 +88,7 @@ def _of_vehicle(arguments: argparse.Namespace) -> Output:
     import numpy as np
 
     import symheli
+    from identification import compare_frozen
     from studies.loops.lateral import HOLD
     from studies.loops.margins import DELAY, LATERAL, LONGITUDINAL, over_airspeed
 
@@ -115,7 +116,13 @@ def _of_vehicle(arguments: argparse.Namespace) -> Output:
             over_airspeed(speeds, *([model.at(v) for v in speeds] for model in fitted))
         ),
     }
-    gaps = [_gap(parts[0][k], fitted[0].at(v)) for k, v in enumerate(speeds)]
+    beside = compare_frozen(
+        {"interpolated": fitted[0]},
+        {v: parts[0][k].discretize(0.02) for k, v in enumerate(speeds)},
+        scales=dict.fromkeys(LATERAL[1], 0.01) | dict.fromkeys(("p", "r", "phi"), 0.1),
+        outputs=("p", "r", "phi"),
+    )
+    gaps = beside["interpolated"].gap.tolist()
     head = (
         f"{arguments.vehicle}, roll hold d_lat = {HOLD:g} phi with servo and {1000 * DELAY:g} ms"
         " delay; roll (held) and pitch (free) response to the stick; gap: nu-gap at 50 Hz of exact"
@@ -138,14 +145,6 @@ def _of_vehicle(arguments: argparse.Namespace) -> Output:
         **{name: [_entry(row) for row in rows] for name, rows in tables.items()},
     }
     return Output("\n".join(lines), data)
-
-
-def _gap(exact, near) -> float:
-    from symheli.lpv import nu_gap
-
-    outputs = ("p", "r", "phi")
-    first, second = (model.select(outputs=outputs).discretize(0.02) for model in (exact, near))
-    return nu_gap(first, second, input_scale=0.01, output_scale=0.1)
 
 
 def _row(row) -> list[str]:

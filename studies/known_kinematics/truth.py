@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import symheli
-from identification import KinematicModel
+from identification import FrozenModels, KinematicModel, compare_frozen
 from studies.known_kinematics.models import INPUTS
 from studies.loops.lateral import HOLD
 from studies.transition.comparison import SCALES
@@ -16,9 +16,7 @@ from studies.transition.flights import TOP
 from studies.transition.guarantees import PERIOD, SIZES
 from symheli import Helicopter, LinearModel
 from symheli.flight import XCELL_SERVOS
-from symheli.lpv import nu_gap
 from symheli.values import Signal
-from symheli.values.arrays import Array
 
 SPEEDS = np.linspace(0.0, TOP, 27)
 """m/s."""
@@ -64,37 +62,18 @@ class Truth:
             models[name] = tuple(sampled(model, axis, servos) for model in exact)
         return cls(models, servos)
 
-    def gaps(self, models: FrozenAxes, points: int = 2000) -> dict[str, Array]:
-        """nu-gap at each airspeed, by axis, of the axes that `models` have; `points` as of
-        `nu_gap`.
+    def compare(self, models: FrozenAxes, frequencies: int = 2000) -> dict[str, FrozenModels]:
+        """The models ("model") beside the truth over airspeed, by axis, of the axes that `models`
+        have; `frequencies` as of `compare_frozen`.
         """
         return {
-            name: np.array(
-                [
-                    nu_gap(
-                        exact,
-                        other,
-                        input_scale=[SCALES[u] for u in AXES[name].inputs],
-                        output_scale=[SCALES[y] for y in AXES[name].outputs],
-                        points=points,
-                    )
-                    for exact, other in zip(self.models[name], models[name], strict=True)
-                ]
+            name: compare_frozen(
+                {"model": dict(zip(SPEEDS, models[name], strict=True))},
+                dict(zip(SPEEDS, exact, strict=True)),
+                scales=SCALES,
+                frequencies=frequencies,
             )
-            for name in self.models
-            if name in models
-        }
-
-    def falsely_stable(self, models: FrozenAxes) -> dict[str, int]:
-        """By axis: airspeeds at which the model is unstable and the truth is stable, counted
-        together with the reverse.
-        """
-        return {
-            name: sum(
-                exact.is_stable() != other.is_stable()
-                for exact, other in zip(self.models[name], models[name], strict=True)
-            )
-            for name in self.models
+            for name, exact in self.models.items()
             if name in models
         }
 

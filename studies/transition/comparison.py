@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import symheli
-from identification import BaselineModel, FrozenModels, beside_baseline, frozen_models
+from identification import BaselineModel, FrozenModels, beside_baseline, compare_frozen
 from identification.judge.beside_baseline import BesideBaseline
 from studies.transition.axes import (
     ALL,
@@ -106,10 +106,11 @@ def compare(
     frozen = [
         FrozenAxis(
             axis=axis,
-            found=frozen_models(
+            found=compare_frozen(
+                {"baseline": cubic, "identified": identification.of(axis, NOISES[0]).model},
                 exact,
-                cubic,
-                identification.of(axis, NOISES[0]).model,
+                inputs=axis.inputs,
+                outputs=axis.outputs,
                 mode={v: rotor_mode(model, axis.mode) for v, model in exact.items()},
                 scales=SCALES,
                 channel=CHANNELS[axis.name],

@@ -11,6 +11,7 @@ import numpy as np
 from studies.controllers.figure import RATIOS, SEEDS, energy_ratios, seeds
 from studies.known_kinematics import models
 from studies.known_kinematics.truth import SPEEDS
+from studies.transition.comparison import FAST
 from studies.transition.flights import NOISES
 from studies.transition.guarantees import curves
 from studies.transition.known_kinematics import CUBIC, KNOWN, TWO_INPUTS
@@ -322,11 +323,12 @@ def prediction(compared: ComparedAxis) -> Figure:
 def frozen(f: FrozenModels) -> Figure:
     """Poles, frequency response and nu-gap."""
     figure, axes = _subplots(1, 3, 12, 3.2)
+    baseline, identified = f["baseline"], f["identified"]
     shade = np.linspace(0.25, 1.0, len(f.points))
     for name, stack, colour, marker in (
-        ("exact", f.reference_poles, INK, "o"),
-        ("baseline", f.baseline_poles, ORANGE, "+"),
-        ("identified", f.identified_poles, BLUE, "x"),
+        ("exact", f.reference.poles, INK, "o"),
+        ("baseline", baseline.poles, ORANGE, "+"),
+        ("identified", identified.poles, BLUE, "x"),
     ):
         for k, poles in enumerate(stack):
             shown = poles[(np.imag(poles) >= 0) & (np.real(poles) > -12) & (np.imag(poles) < 30)]
@@ -345,25 +347,29 @@ def frozen(f: FrozenModels) -> Figure:
     axes[0][0].set_xlabel("real (rad/s)")
     axes[0][0].set_title("poles, imaginary part (rad/s)")
     axes[0][0].legend(loc="center left")
-    for name, colour in (("reference", INK), ("baseline", ORANGE), ("identified", BLUE)):
+    for name, model, colour in (
+        ("exact", f.reference, INK),
+        ("baseline", baseline, ORANGE),
+        ("identified", identified, BLUE),
+    ):
         axes[0][1].loglog(
             f.omega,
-            f.responses[name],
+            model.response,
             color=colour,
-            label="exact" if name == "reference" else name,
+            label=name,
             linestyle="--" if name == "baseline" else "-",
-            linewidth=2.4 if name == "reference" else 1.2,
+            linewidth=2.4 if name == "exact" else 1.2,
         )
     axes[0][1].set_title(f"|{f.channel[1]}/{f.channel[0]}| at {f.responses_at:g} m/s (1/s)")
     axes[0][1].set_xlabel("frequency (rad/s)")
     axes[0][1].legend()
-    axes[0][2].plot(f.points, f.gap_baseline, "+-", color=ORANGE, label="baseline")
-    axes[0][2].plot(f.points, f.gap_identified, "x-", color=BLUE, label="identified")
+    axes[0][2].plot(f.points, baseline.gap, "+-", color=ORANGE, label="baseline")
+    axes[0][2].plot(f.points, identified.gap, "x-", color=BLUE, label="identified")
     axes[0][2].plot(
-        f.points, f.fast_baseline, "+:", color=ORANGE, label=f"baseline, above {f.fast:g} rad/s"
+        f.points, baseline.distance, "+:", color=ORANGE, label=f"baseline, above {FAST:g} rad/s"
     )
     axes[0][2].plot(
-        f.points, f.fast_identified, "x:", color=BLUE, label=f"identified, above {f.fast:g} rad/s"
+        f.points, identified.distance, "x:", color=BLUE, label=f"identified, above {FAST:g} rad/s"
     )
     axes[0][2].set_ylim(0, 1.05)
     axes[0][2].set_title("nu-gap to the exact model")

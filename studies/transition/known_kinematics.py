@@ -35,7 +35,7 @@ KNOWN = {kind: f"known kinematics, {kind}" for kind in (models.CONSTANT, models.
 STATIC_SPEEDS = (0.0, 4.0, 13.0)
 """Airspeeds at which static gains are compared, m/s."""
 
-POINTS = 500
+FREQUENCIES = 500
 """Frequencies of a nu-gap, beside those around the poles: within 0.001 of those on 2000."""
 
 LOOPS = {"attitude hold": ATTITUDE_HOLD, "loop with a margin": FEEDBACK}
@@ -98,11 +98,12 @@ def identify_with_known_kinematics(
     truth, clean = Truth.of(heli), states_of(heli, test)
 
     def rival(name: str, guess: Array | None, own: FrozenAxes) -> Rival:
+        beside = truth.compare(own, FREQUENCIES)
         return Rival(
             name=name,
             ahead={} if guess is None else fits_of(clean, guess),
-            gaps=truth.gaps(own, POINTS),
-            unlike=truth.falsely_stable(own),
+            gaps={axis: one["model"].gap for axis, one in beside.items()},
+            unlike={axis: one.otherwise_stable("model") for axis, one in beside.items()},
             static=(
                 {v: truth.static_ratio(own, v) for v in STATIC_SPEEDS} if "lateral" in own else {}
             ),

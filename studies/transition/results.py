@@ -18,6 +18,7 @@ from studies.report.held import held_to_dict
 from studies.report.provenance import provenance
 from studies.transition.axes import HORIZON
 from studies.transition.certificates import bound_to_dict
+from studies.transition.comparison import FAST
 from studies.transition.guarantees import unit_of
 from studies.transition.paper_experiment import PERIOD
 from studies.transition.quantities import named, value, values
@@ -255,20 +256,21 @@ def _frozen(f: FrozenModels) -> dict[str, Any]:
     def poles(stack: Iterable[Any]) -> list[list[dict[str, float]]]:
         return [[{"real": float(z.real), "imag": float(z.imag)} for z in row] for row in stack]
 
+    baseline, identified = f["baseline"], f["identified"]
     return {
         "airspeed": values(f.points, "m/s"),
         "poles": {
-            "exact": poles(f.reference_poles),
-            "baseline": poles(f.baseline_poles),
-            "identified": poles(f.identified_poles),
+            "exact": poles(f.reference.poles),
+            "baseline": poles(baseline.poles),
+            "identified": poles(identified.poles),
             "unit": "rad/s",
         },
-        "mode_miss": _both(f.miss_baseline, f.miss_identified, "%"),
+        "mode_miss": _both(baseline.miss, identified.miss, "%"),
         "chordal_distance": {
-            "from_frequency": value(f.fast, "rad/s"),
-            **_both(f.fast_baseline, f.fast_identified, "1"),
+            "from_frequency": value(FAST, "rad/s"),
+            **_both(baseline.distance, identified.distance, "1"),
         },
-        "nu_gap": _both(f.gap_baseline, f.gap_identified, "1"),
+        "nu_gap": _both(baseline.gap, identified.gap, "1"),
     }
 
 

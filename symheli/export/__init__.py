@@ -1,7 +1,5 @@
 """The model for other programs: C99 source, MATLAB files; and the controller that flies it."""
 
-from symheli.export.c import write_c
-from symheli.export.controller import write_controller
-from symheli.export.mat import write_family_mat, write_mat
+from symheli.lazy import lazily
 
-__all__ = ["write_c", "write_controller", "write_family_mat", "write_mat"]
+__getattr__, __dir__, __all__ = lazily(__name__, __file__)

@@ -9,19 +9,41 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from symheli.errors import InputError
-from symheli.export.c_check import cases
+from symheli.export.c_program import CProgram
+from symheli.export.c_text import define, index_macros, rows
 from symheli.helicopter import Helicopter
 from symheli.values import Signal
-from symheli.values.c_text import define, index_macros
 from symheli.values.signal import signals
-from symheli.values.template import filled
-from symheli.values.whole_files import write_own, write_text
 
 HERE = Path(__file__).parent
 """heli.c, heli.h, heli_check.c and CMakeLists.txt lie here, with marked places for one model."""
 
 EARTH_WIND = signals(("w_n", "w_e", "w_d"), dict.fromkeys(("w_n", "w_e", "w_d"), "m/s"))
+
+
+CASES = 12
+"""Number of cases of each function in the check program."""
+
+STEP = 0.005
+"""Length of the Runge-Kutta step of the check program, s."""
+
+_SIZE = {
+    "u": 6.0,
+    "v": 1.5,
+    "w": 1.0,
+    "p": 0.5,
+    "q": 0.5,
+    "r": 0.5,
+    "phi": 0.3,
+    "theta": 0.3,
+    "a1": 0.03,
+    "b1": 0.03,
+    "om_i": 20.0,
+}
+"""Spread of each state (SI) over the cases; what is not named here (quaternion, position) has 1."""
 
 
 def write_c(heli: Helicopter, path: str | os.PathLike[str]) -> tuple[Path, ...]:
@@ -65,24 +87,18 @@ def write_c(heli: Helicopter, path: str | os.PathLike[str]) -> tuple[Path, ...]:
     path = Path(path)
     if path.suffix != ".c":
         raise InputError(f"{path}: expected a name that ends in .c")
-    stem, include = path.stem, {'"heli.h"': f'"{path.stem}.h"'}
+    stem = path.stem
     guard = re.sub(r"\W", "_", f"{stem}_h").upper()
     project = re.sub(r"[^A-Za-z0-9_]", "_", stem)
-    written = (
-        write_text(path, filled(HERE / "heli.c", _source(heli), include)),
-        write_text(
-            path.with_suffix(".h"), filled(HERE / "heli.h", _declarations(heli), {"HELI_H": guard})
-        ),
-        write_text(
-            path.with_name(f"{stem}_check.c"),
-            filled(HERE / "heli_check.c", {"cases": cases(heli)}, include),
-        ),
-        write_own(
-            path.with_name("CMakeLists.txt"),
-            filled(HERE / "CMakeLists.txt", {"project": project, "stem": stem}),
-        ),
-    )
-    return tuple(file for file in written if file is not None)
+    header, source, *others = CProgram(
+        template=HERE / "heli",
+        name=stem,
+        header={"guard": guard, **_declarations(heli)},
+        source={"stem": stem, **_source(heli)},
+        check={"stem": stem, "cases": _cases(heli)},
+        cmake=(HERE / "CMakeLists.txt", {"project": project, "stem": stem}),
+    ).write(path.parent)
+    return (source, header, *others)
 
 
 def _source(heli: Helicopter) -> dict[str, str]:
@@ -118,3 +134,50 @@ def _indices(prefix: str, names: Sequence[Signal], travel: Sequence[float] | Non
     notes = [f"+-{size:g}" for size in travel or ()]
     lines = index_macros(f"RHS_{prefix}_", names, notes)
     return "\n".join([*lines, define(f"RHS_N_{prefix}", len(names))])
+
+
+def _cases(heli: Helicopter) -> str:
+    """Cases of `heli_rhs`, `heli_flight_rhs` and `heli_flight_step` as C tables, drawn from a fixed
+    seed: flight, wind, saturations.
+    """
+    rng = np.random.default_rng(0)
+    found = {"rhs_cases": [], "flight_cases": [], "step_cases": []}
+    middle = np.array([0, 0, 1, 1])
+    for _ in range(CASES):
+        inputs = 0.5 * heli.travel * (rng.uniform(-1, 1, len(heli.inputs)) + middle)
+        wind = 2.0 * rng.standard_normal(3)
+        x, flight = _state(heli, heli.states, rng), _state(heli, heli.flight_states, rng)
+        flight[6:10] /= np.linalg.norm(flight[6:10])
+        rhs, flight_rhs = heli.numeric("rhs"), heli.numeric("flight_rhs")
+        found["rhs_cases"].append((x, inputs, wind, rhs(x, inputs, wind)[0]))
+        found["flight_cases"].append((flight, inputs, wind, flight_rhs(flight, inputs, wind)[0]))
+        found["step_cases"].append((flight, inputs, wind, _step(heli, flight, inputs, wind)))
+    tables = (
+        rows("double", name, str(sum(map(len, given[0]))), np.array([*map(np.concatenate, given)]))
+        for name, given in found.items()
+    )
+    return "\n".join([define("CASES", CASES), define("STEP", STEP, "s"), *tables])
+
+
+def _state(heli: Helicopter, names: tuple, rng: np.random.Generator) -> np.ndarray:
+    x = np.array([_SIZE.get(s, 1.0) for s in names]) * rng.standard_normal(len(names))
+    x[0] = abs(x[0])
+    for i, s in enumerate(names):
+        if s == "Om":
+            x[i] = heli.nominal_speed * (1 + 0.02 * rng.standard_normal())
+    return x
+
+
+def _step(heli: Helicopter, x: np.ndarray, u: np.ndarray, wind: np.ndarray) -> np.ndarray:
+    """One classical Runge-Kutta step of `STEP` seconds, quaternion brought back to length 1."""
+
+    def f(z: np.ndarray) -> np.ndarray:
+        return heli.numeric("flight_rhs")(z, u, wind)[0]
+
+    k1 = f(x)
+    k2 = f(x + STEP / 2 * k1)
+    k3 = f(x + STEP / 2 * k2)
+    k4 = f(x + STEP * k3)
+    end = x + STEP / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+    end[6:10] /= np.linalg.norm(end[6:10])
+    return end

@@ -1,5 +1,5 @@
 /* @title@: equations of motion; see the header for the meaning of every entry. */
-#include "heli.h"
+#include "@stem@.h"
 #if defined(__GNUC__)
 /* the generated functions take work arrays that they do not need */
 #pragma GCC diagnostic ignored "-Wunused-parameter"

@@ -4,8 +4,8 @@
    Continuous time, SI units and radians, body axes x forward, y right, z down.
    Air density @density@ kg/m^3, governor "@governor@". d_ped is the total tail blade pitch.
 */
-#ifndef HELI_H
-#define HELI_H
+#ifndef @guard@
+#define @guard@
 
 /* states x of heli_rhs, and their derivatives xdot (unit per second) */
 /* @states@ */

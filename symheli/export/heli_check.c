@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include "heli.h"
+#include "@stem@.h"
 
 /* x, u, wind, expected */
 /* @cases@ */

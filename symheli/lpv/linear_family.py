@@ -100,6 +100,8 @@ class LinearFamily:
                 f" got {len(self.models)}"
             )
         object.__setattr__(self, "models", LinearModels.of(self.models))
+        for name, at in self.kinks.items():
+            frozen(at, f"kinks of {name}", (None,))
 
     @classmethod
     def from_models(

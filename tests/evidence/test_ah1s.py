@@ -10,7 +10,6 @@ from evidence.ah1s.compared import phugoid
 from evidence.ah1s.simulator import AH1S, DEFLECTIONS, DT, STATES, STICKS
 from symheli.errors import FlightLostError, InputError
 from symheli.flight import AirspeedSchedule, Excitation
-from symheli.lpv import LinearModel
 
 SPEEDS = (1.0, 10.0, 20.0, 31.0)
 """m/s, up to 60 kt."""
@@ -89,7 +88,9 @@ def test_pulses_and_central_differences_tell_of_one_helicopter(ah1s, trims, spee
     """
     pulses = truth.realization(ah1s, trims[speed])
     held = truth.held_model(ah1s, trims[speed])
-    found, wanted = (truth.static_gain(m) * truth.SCALE[:, None] for m in (pulses, held))
+    found, wanted = (
+        m.frequency_response(np.zeros(1))[0].real * truth.SCALE[:, None] for m in (pulses, held)
+    )
     assert np.linalg.norm(found - wanted) < truth.STATIC * np.linalg.norm(wanted)
     assert abs(phugoid(pulses) - phugoid(held.discretize(DT))) < 0.01
     assert (phugoid(pulses).real > 0) == (speed < 25.0)  # unstable in hover, stable at 60 kt
@@ -134,23 +135,6 @@ def test_a_lost_flight_says_when(ah1s):
     wild = Excitation({"d_lat": 3.0}, kind="prbs", band=(0.1, 0.3))
     with pytest.raises(FlightLostError, match=r"the AH-1S was lost at .* reduce excitation"):
         flight.fly(flight.Plan(SHORT, wild))
-
-
-def test_a_body_behind_servos_answers_as_one_after_the_other():
-    rng = np.random.default_rng(0)
-
-    def model(states, inputs, outputs):
-        nx, nu, ny = len(states), len(inputs), len(outputs)
-        A = 0.5 * rng.standard_normal((nx, nx)) / np.sqrt(nx)
-        B, C = rng.standard_normal((nx, nu)), rng.standard_normal((ny, nx))
-        return LinearModel(A, B, C, np.zeros((ny, nu)), states, inputs, outputs, dt=DT)
-
-    actuators = model(("a", "b"), STICKS, DEFLECTIONS)
-    body = model(("c", "d", "e"), DEFLECTIONS, STATES)
-    omega = np.array([0.1, 3.0, 100.0])
-    series = body.frequency_response(omega) @ actuators.frequency_response(omega)
-    joined = servos.behind(actuators, body)
-    np.testing.assert_allclose(joined.frequency_response(omega), series, rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.slow

@@ -12,9 +12,9 @@ from scipy.signal import butter, sosfilt
 from scipy.stats import chi2
 
 import identification as idn
-from identification.judge.criterion import together
+from identification.judge.coefficient_covariance import drawn
+from identification.judge.criteria import together
 from identification.judge.derivatives import Certainty, Derivatives
-from identification.judge.draws import drawn
 from identification.judge.frozen_plant import FrozenPlant
 from symheli import FlightRecord, LinearModel
 from symheli.errors import InputError, UnknownNameError

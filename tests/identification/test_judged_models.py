@@ -200,15 +200,26 @@ def test_frozen_models_of_an_aeroplane(transition):
     outputs = lpv.select(outputs=["alpha", "pitch_rate"])
     sizes = {"alpha": 0.1, "pitch_rate": 0.5, "elevator": 0.05, "flap": 0.05}
     options = {"mode": short_period, "channel": ("elevator", "pitch_rate"), "scales": sizes}
-    found = idn.frozen_models(exact, outputs, model, **options)
+    models = {"baseline": outputs, "identified": model}
+    options |= {"inputs": model.inputs, "outputs": model.outputs, "fast": 3.0}
+    found = idn.compare_frozen(models, exact, **options)
     assert found.responses_at == 30.0
-    assert found.miss_baseline.max() < 1e-6
-    assert found.gap_baseline.max() < 1e-9 < found.gap_identified.min()
-    assert found.miss_identified.max() < 0.1
-    assert set(found.responses) == {"reference", "baseline", "identified"}
+    assert found["baseline"].miss.max() < 1e-6
+    assert found["baseline"].gap.max() < 1e-9 < found["identified"].gap.min()
+    assert found["identified"].miss.max() < 0.1
+    for one in (found.reference, found["baseline"], found["identified"]):
+        assert one.response.shape == found.omega.shape
+        assert one.stable.all()
+    assert found.otherwise_stable("identified") == 0
+    with pytest.raises(UnknownNameError, match="lft"):
+        found["lft"]
+    with pytest.raises(InputError, match="lft: expected a model at the points"):
+        idn.compare_frozen({"lft": {25.0: exact[25.0]}}, exact, **options)
+    with pytest.raises(InputError, match="all models are continuous"):
+        idn.compare_frozen({"baseline": outputs}, exact, **options)
     del sizes["flap"]
     with pytest.raises(UnknownNameError, match="flap"):
-        idn.frozen_models(exact, outputs, model, **options)
+        idn.compare_frozen(models, exact, **options)
 
 
 def test_a_horizon_is_in_seconds_and_positive(transition):

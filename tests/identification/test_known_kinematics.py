@@ -376,3 +376,15 @@ def test_remembered_states_are_the_samples_their_names_say(vehicle, flight):
         back = int(back or 0)
         assert np.isnan(x[:back, i]).all()
         np.testing.assert_array_equal(x[back:, i], flight[signal][: len(flight) - back])
+
+
+def test_scores_are_those_of_its_predictions_at_every_horizon(vehicle, flight):
+    model = vehicle.model(flight)
+    found = idn.scores(model, flight, horizon=10 * DT)
+    for fits, horizon in ((found.one_step, 1), (found.ahead, 10), (found.free_run, None)):
+        assert fits == {str(y): v for y, v in model.score(flight, horizon).items()}
+    beside = idn.beside_baseline({"own": model}, {}, flight, ("phi", "u"), horizon=10 * DT)
+    (own,) = beside.predictions
+    assert own.scores.ahead == {y: found.ahead[y] for y in ("phi", "u")}
+    with pytest.raises(InputError, match="hold_p: a KinematicModel"):
+        idn.scores(model, flight, hold_p=True)

@@ -320,10 +320,11 @@ def test_frozen_models_are_compared_below_the_fastest_frequency(model):
     lag = symheli.LPVStateSpace.polynomial(
         [[[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], p, states=["y"], inputs=["u"], outputs=["y"]
     )
+    models = {"baseline": lag, "identified": model}
     asked = {"mode": {0.0: -1.0}, "scales": {"y": 1.0, "u": 1.0}, "channel": ("u", "y")}
     for fast in (1e300, math.inf, math.nan, 0.81 * math.pi / model.dt):
         with pytest.raises(InputError, match="fast: expected at most"):
-            idn.frozen_models({0.0: lag.at(0.0)}, lag, model, **asked, fast=fast)
+            idn.compare_frozen(models, {0.0: lag.at(0.0)}, **asked, fast=fast)
 
 
 @pytest.fixture(scope="module")

@@ -73,7 +73,7 @@ def full():
     study = stages.Study(vehicle="xcell60", quick=True, seed=0, heli=heli)
     with pytest.MonkeyPatch.context() as shorter:
         shorter.setattr(designs, "output_feedback", partial(output_feedback, X=0, Y=0))
-        shorter.setattr(known_kinematics, "POINTS", 60)
+        shorter.setattr(known_kinematics, "FREQUENCIES", 60)
         for stage in stages.stages(effort):
             study = stages.with_stage(study, stage, stages.computed(stage, study, effort))
     return study

@@ -75,7 +75,8 @@ def test_the_baseline_frozen_is_the_exact_model_where_nothing_is_interpolated(fo
 def test_gaps_on_fewer_frequencies_are_those_on_many(ideal, found):
     truth = Truth.of(ideal)
     axis = {"lateral": frozen_axes(found.model, truth)["lateral"]}
-    for name, gaps in truth.gaps(axis).items():
+    for name, beside in truth.compare(axis).items():
+        gaps = beside["model"].gap
         np.testing.assert_allclose(found.of(KNOWN[BOTH]).gaps[name], gaps, atol=1e-3)
 
 

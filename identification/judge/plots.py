@@ -1,6 +1,4 @@
-"""Coefficient functions as a picture: each over the scheduling parameter, with its confidence
-band.
-"""
+"""Pictures: coefficient functions with their confidence bands, measured frequency responses."""
 
 from __future__ import annotations
 
@@ -10,9 +8,13 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.values.arrays import Array
-from symheli.values.drawing import GRID, LINE, label, new_figure
+from symheli.values.drawing import GRID, LINE, axes_of, label, legend_beside, new_figure, plain
+from symheli.values.labelled import per
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from identification.judge.frequency_response import FrequencyResponse
     from identification.judge.uncertainty import Uncertainty
 
 COLUMNS = 4
@@ -51,3 +53,21 @@ def plot_bands(known: Uncertainty, level: float = 0.95) -> Array:
         ax.set_xlabel(label(model.parameters[0]), fontsize=8)
     figure.suptitle(f"coefficients with their {100 * level:g} % confidence bands", fontsize=9)
     return axes[: len(shown)]
+
+
+def plot_response(response: FrequencyResponse, ax: Axes | None) -> Axes:
+    """See `FrequencyResponse.plot`."""
+    ax = axes_of(ax)
+    for j, u in enumerate(response.inputs):
+        for i, y in enumerate(response.outputs):
+            magnitude, error = np.abs(response.G[:, i, j]), response.random_error[:, i, j]
+            unit = per(y.unit, u.unit)
+            name = f"{y} from {u}" + ("" if unit == "1" else f", {unit}")
+            (line,) = ax.plot(response.omega, magnitude, label=name)
+            low, high = magnitude * np.maximum(1 - error, 0.0), magnitude * (1 + error)
+            ax.fill_between(
+                response.omega, low, high, color=line.get_color(), alpha=0.2, linewidth=0
+            )
+    ax.set(xscale="log", yscale="log", xlabel="frequency (rad/s)", ylabel="magnitude")
+    legend_beside(ax)
+    return plain(ax)

@@ -2,8 +2,8 @@
 
 import pytest
 
-from symheli.values.c_text import rows, table
-from symheli.values.template import filled
+from symheli.export.c_program import filled
+from symheli.export.c_text import rows, table
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -63,6 +63,28 @@ def index_macros(prefix: str, names: Sequence[Signal], notes: Sequence[str] = ()
         define(f"{prefix}{identifier(s)}", i, in_comment(f"{s.unit}, {note}" if note else s.unit))
         for i, (s, note) in enumerate(zip(names, notes or [""] * len(names), strict=True))
     ]
+
+
+def blocks(*lines: Sequence[str]) -> str:
+    """Blocks of lines, an empty line between two of them; empty blocks are left out."""
+    return "\n\n".join("\n".join(block) for block in lines if block)
+
+
+def check_data(
+    constants: Mapping[str, object],
+    kind: str,
+    dtype: type[np.floating],
+    **tables: tuple[str, Array],
+) -> str:
+    """Macros for the `constants` and constant arrays of `kind` for the `tables`, by name: (length
+    of a row as C writes it, rows).
+    """
+    return "\n".join(
+        [
+            *(define(name, value) for name, value in constants.items()),
+            *(rows(kind, name, size, values, dtype) for name, (size, values) in tables.items()),
+        ]
+    )
 
 
 def _wrapped(words: Iterable[str], indent: str) -> str:
