@@ -17,7 +17,7 @@ from symheli.lpv import LFT, LPVStateSpace, Scheduling, UncertainStateSpace
 from synthesis.analysis.apart import apart, fine_sampling
 from synthesis.analysis.general_search import General
 from synthesis.analysis.hypotheses import VERIFIED, hypotheses
-from synthesis.analysis.ladder import CLOSE, Found, Ladder
+from synthesis.analysis.ladder import CLOSE_TO_LOWER, Found, Ladder
 from synthesis.analysis.one_parameter_search import OneParameter
 from synthesis.analysis.problem import Problem
 from synthesis.certificate import Certificate, Seconds, Status
@@ -37,8 +37,10 @@ from synthesis.worst.trajectory import SchedulingTrajectory
 
 Array = np.ndarray
 
-ROUNDED = 1e-12
-"""What is looked for where the slowest frozen mode is stable or not to rounding, 1/s."""
+MARGINAL_DECAY = 1e-12
+"""Decay rate, 1/s, that the search must exceed where the slowest frozen mode is stable or unstable
+only to rounding.
+"""
 
 
 class Beaten(NamedTuple):
@@ -71,7 +73,7 @@ def certify(problem: Problem) -> Certificate:
             )
             return report.nothing(Status.UNSTABLE, beaten)
         # stable or not to rounding: nothing is known from below
-        frozen, search = Worst(0.0 if problem.gains else -ROUNDED, frozen.p), None
+        frozen, search = Worst(0.0 if problem.gains else -MARGINAL_DECAY, frozen.p), None
     stability = demand.kind == "stability"
     limit = frozen if stability else worst_moving(model.source, demand, frozen, search)
     beaten = Beaten(
@@ -227,7 +229,7 @@ class Report:
             return ()
         cause = apart(bounds["gamma"], bounds["lower"], ladder.rounding, best.answer)
         # numbers that suffice for the frozen model suffice for its sample period
-        return cause if ladder.rounding <= CLOSE else (*cause, *self._sampling(bounds))
+        return cause if ladder.rounding <= CLOSE_TO_LOWER else (*cause, *self._sampling(bounds))
 
     def _sampling(self, bounds: dict[str, float]) -> tuple[str, ...]:
         if "gamma" not in bounds:

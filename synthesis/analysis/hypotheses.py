@@ -17,9 +17,9 @@ from synthesis.norm_bounded import open_block
 
 Array = np.ndarray
 
-NOTHING = 1e-12
-"""Entries below this fraction of both their row's and their column's largest are rounding, and so
-is their misfit.
+NEGLIGIBLE_ENTRY = 1e-12
+"""Entries below this fraction of both their row's and their column's largest entry are rounding,
+and so is their misfit.
 """
 
 VERIFIED = (
@@ -118,7 +118,7 @@ def fitted(model: object) -> tuple[str, ...]:
             continue
         size, off = np.abs(own).max(axis=0), np.abs(residual).max(axis=0)
         size = np.maximum(size, off)
-        real = size > NOTHING * np.minimum(
+        real = size > NEGLIGIBLE_ENTRY * np.minimum(
             size.max(axis=0, keepdims=True), size.max(axis=1, keepdims=True)
         )
         ratio = np.where(real & (size > 0), off / np.where(size > 0, size, 1.0), 0.0)

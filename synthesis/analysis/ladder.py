@@ -19,18 +19,18 @@ from synthesis.program.cone_program import Answer
 from synthesis.program.scaling import in_its_own_scale
 
 INFLATION = 1e-6
-"""gamma^2 is raised by this fraction above what P admits in floating point, so that an exact proof
-has room.
+"""gamma^2 is raised by this fraction above the value that P admits in floating point, to leave a
+margin for the exact proof.
 """
-SMALLEST = 1e-6
-"""Least gain in scaled units: a model without response is given a small gain rather than none,
-which no strict inequality proves.
+MIN_GAIN = 1e-6
+"""Least gain in scaled units: no strict inequality proves a gain of zero, so a model without
+response is given this one.
 """
-NOTHING = 1e-6
-"""A largest margin of stability below this (P <= I, scaled) counts as none: the solver is no more
-accurate than that.
+NO_MARGIN = 1e-6
+"""A largest margin of stability (P <= I, scaled) up to this value counts as none: the solver is no
+more accurate.
 """
-CLOSE = 1e-3
+CLOSE_TO_LOWER = 1e-3
 """A bound within this fraction of the lower bound is not improved further by a constant P."""
 DECAY_TOLERANCE = 2e-3
 """The decay rate is found to this fraction of the frozen one."""
@@ -151,14 +151,14 @@ class Ladder(ABC):
     def _least(self, limit: float) -> Found:
         gains = self.problem.gains
         best = self.proposed() if gains else Found(math.nan)
-        if best.proof is not None and best.bound <= (1 + CLOSE) * limit:
+        if best.proof is not None and best.bound <= (1 + CLOSE_TO_LOWER) * limit:
             return best
         self.unit = self.settle() if gains else self.unit
         shapes, near, still = self.shapes(), self.problem.form.near, None
         if gains and any(map(self.varies, shapes)):
             # cheapest, and enough where p changes little
             still = self._margins(self.constant(), Found(math.inf))
-            if still.proof is not None and still.bound <= (1 + CLOSE) * limit:
+            if still.proof is not None and still.bound <= (1 + CLOSE_TO_LOWER) * limit:
                 return still
         for shape in shapes:
             best = self._margins(shape, best)
@@ -224,4 +224,4 @@ def inflated(least: float, channel: float) -> float:
     """The gain to be verified where a proof admits `least` in floating point, `channel` the unit of
     gains; NaN stays.
     """
-    return least if math.isnan(least) else max(least, SMALLEST * channel) * math.sqrt(1 + INFLATION)
+    return least if math.isnan(least) else max(least, MIN_GAIN * channel) * math.sqrt(1 + INFLATION)

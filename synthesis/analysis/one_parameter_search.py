@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from synthesis.analysis.ladder import CLOSE, NOTHING, Found, Ladder, inflated
+from synthesis.analysis.ladder import CLOSE_TO_LOWER, NO_MARGIN, Found, Ladder, inflated
 from synthesis.assemble.bounded_real import assemble
 from synthesis.assemble.unknowns import (
     Quadratic,
@@ -29,15 +29,15 @@ from synthesis.worst.frozen import norm
 
 Array = np.ndarray
 
-VIOLATED = 1e-8
-"""A block left out of the program joins it when its largest eigenvalue (scaled) exceeds this."""
-ABOVE = (1e-6, 1e-5, 1e-4, 5e-4, 2e-3, 1e-2)
-"""Fractions above the expected gain at which a storage function of a frozen model is tried."""
-TOWARDS = (1e-3, 1e-2, 0.1, 0.5)
-"""Shares of the way to P = I."""
-ROUNDS = 12
-"""Most rounds of adding violated blocks; what then remains violated only makes the recomputed gain
-larger.
+MAX_VIOLATION = 1e-8
+"""Largest eigenvalue (scaled) of a block outside the program above which the block is added."""
+GAIN_MARGINS = (1e-6, 1e-5, 1e-4, 5e-4, 2e-3, 1e-2)
+"""Fractions above the expected gain at which a storage function of a frozen model is computed."""
+SHIFTS_TO_IDENTITY = (1e-3, 1e-2, 0.1, 0.5)
+"""Weights of I in the convex combinations of P and I that are tried."""
+MAX_ROUNDS = 12
+"""Largest number of rounds in which violated blocks are added; blocks violated after the last one
+only raise the recomputed gain.
 """
 
 
@@ -135,7 +135,7 @@ class OneParameter(Ladder):
                 self.problem.solver,
             )
             seconds += candidate.seconds
-            if candidate.x is None or rounds == ROUNDS or all(which.all() for which in active):
+            if candidate.x is None or rounds == MAX_ROUNDS or all(which.all() for which in active):
                 break
             P, multiplier = form.coefficients(candidate.x), form.multiplier(candidate.x)
             level = candidate.x[-1]
@@ -150,7 +150,7 @@ class OneParameter(Ladder):
                     continue
                 excess = block.values(P, sizes.rows, multiplier)
                 excess = excess - block.weight[:, None, None] * target
-                new = ~which & (np.linalg.eigvalsh(excess)[:, -1] > VIOLATED)
+                new = ~which & (np.linalg.eigvalsh(excess)[:, -1] > MAX_VIOLATION)
                 which |= new
                 added += int(new.sum())
             if not added:
@@ -163,7 +163,7 @@ class OneParameter(Ladder):
         start, scaled, best = time.perf_counter(), self.dissipating, Found(math.inf)
         if scaled is not None:
             knots, middle = self.constant().knots, scaled.lpv.at(scaled.lpv.scheduling.middle)
-            for above in ABOVE:
+            for above in GAIN_MARGINS:
                 P = scaled.units.storage(middle, above)
                 if P is None:
                     continue
@@ -188,7 +188,7 @@ class OneParameter(Ladder):
                 excess = self._frozen_gain(scaled, shape, p) / gain - 1 if gain > 0 else 0.0
                 if not excess >= self.rounding:
                     self.scaled, self.rounding = scaled, excess
-                if excess <= CLOSE:
+                if excess <= CLOSE_TO_LOWER:
                     break
         self.spent[1] += time.perf_counter() - start
         return self.scaled.units.channel
@@ -212,13 +212,13 @@ class OneParameter(Ladder):
         if candidate.x is None:
             return Found(math.inf, None, answer)
         # a largest margin of nothing, for fewer blocks or for all of them: there is no P
-        if not self.problem.gains and candidate.x[-1] <= NOTHING and answer is Answer.SOLVED:
+        if not self.problem.gains and candidate.x[-1] <= NO_MARGIN and answer is Answer.SOLVED:
             answer = Answer.INFEASIBLE
         P = shape.lyapunov(candidate.x)
         found = self._proven(self.scaled, P, answer)
         if self.scaled is self.dissipating:
             # nearer to P = I, which has margins of one, where rounding leaves this one none
-            for share in TOWARDS:
+            for share in SHIFTS_TO_IDENTITY:
                 if found.proof is not None:
                     break
                 inner = (1 - share) * P.coefficients + share * np.eye(P.coefficients.shape[-1])

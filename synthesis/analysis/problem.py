@@ -13,7 +13,7 @@ from synthesis.impose import Bernstein, Grid, Imposed, SumOfSquares, Vertices
 from synthesis.polynomial.motion import Motion
 from synthesis.polynomial.pieces import Pieces, pieces
 from synthesis.program.cone_program import LYAPUNOV, Solver, general_solver
-from synthesis.program.lyapunov_program import GENERAL
+from synthesis.program.lyapunov_program import MAX_STATES_GENERAL
 from synthesis.proof.inequalities import Demand
 from synthesis.worst.lower_bound import Search
 from synthesis.worst.rates import Rate
@@ -120,7 +120,9 @@ def _solver(problem: Problem, solver: Solver | str | None) -> Solver:
         problem.one_parameter and isinstance(problem.form, Spline)
     ) or problem.points_serve
     if solver is None:
-        return Solver(LYAPUNOV if by_products and problem.model.sizes[0] > GENERAL else "CLARABEL")
+        return Solver(
+            LYAPUNOV if by_products and problem.model.sizes[0] > MAX_STATES_GENERAL else "CLARABEL"
+        )
     if by_products:
         return solver if isinstance(solver, Solver) else Solver(solver)
     return general_solver(solver)

@@ -31,7 +31,7 @@ from synthesis.polynomial.cells import Strip, cells, strips
 from synthesis.polynomial.pieces import ModelPiece, model_pieces, rounded
 from synthesis.polynomial.symmetric import extended, length, smat, svec
 from synthesis.polynomial.symmetric_power import generator, monomials, null_matrix, null_size
-from synthesis.program.lyapunov_program import MANY, LyapunovBlocks, Sizes
+from synthesis.program.lyapunov_program import MANY_STATES, LyapunovBlocks, Sizes
 from synthesis.program.scaling import Scaling, block_scaling, scaling
 from synthesis.proof.one_parameter import Evidence
 
@@ -290,7 +290,7 @@ class Remembering(Unknown):
 def unknowns(problem: ScaledProblem, form: LyapunovForm) -> Iterator[Unknown]:
     """The finer and finer P to try in turn."""
     n, sampled = len(problem.lpv.states), problem.lpv.dt is not None
-    many = isinstance(form, Spline) and n > MANY
+    many = isinstance(form, Spline) and n > MANY_STATES
     higher = isinstance(form, HigherOrder)
     remembers = isinstance(form, Memory) and 0 < problem.rate < math.inf
     (own,) = form.degrees(1)

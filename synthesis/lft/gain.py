@@ -12,7 +12,7 @@ from symheli.errors import InputError
 from symheli.lpv import LFT, Scheduling
 from synthesis.analysis.certify import Beaten, Report
 from synthesis.analysis.hypotheses import VERIFIED
-from synthesis.analysis.ladder import NOTHING, Found, Ladder, inflated
+from synthesis.analysis.ladder import NO_MARGIN, Found, Ladder, inflated
 from synthesis.certificate import Attempt, Certificate, Kind, Proof, Status
 from synthesis.forms import Spline
 from synthesis.impose import Bernstein
@@ -278,7 +278,7 @@ class MultiplierSearch(Ladder):
         solved, answer = time.perf_counter(), candidate.answer
         if not margin:
             margin = math.nan if candidate.x is None else float(candidate.x[-1])
-            none = Answer.INFEASIBLE if margin <= NOTHING else Answer.FAILED
+            none = Answer.INFEASIBLE if margin <= NO_MARGIN else Answer.FAILED
             # what is not solved leaves the answer as it was
             answer = none if answer is Answer.SOLVED else Answer.UNTRIED
         found = Found(math.inf, None, answer)

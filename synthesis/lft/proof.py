@@ -24,8 +24,10 @@ from synthesis.proof import pointwise
 
 Array = np.ndarray
 
-CORNERS = 6
-"""Most parameters at all of whose corners a proof is checked once more."""
+MAX_PARAMETERS_AT_CORNERS = 6
+"""Largest number of parameters for which a proof is checked independently at all corners of the
+box.
+"""
 
 
 class Quadratic(NamedTuple):
@@ -130,7 +132,7 @@ class Evidence(NamedTuple):
         """
         g = None if math.isnan(gamma) else number(gamma) * number(gamma)
         P, m = exact(proof.P, number), len(self.lft.parameters)
-        corners = product((-1.0, 1.0), repeat=m) if m <= CORNERS else ()
+        corners = product((-1.0, 1.0), repeat=m) if m <= MAX_PARAMETERS_AT_CORNERS else ()
         diagonals = (np.where(np.arange(m) % 2, -t, t) for t in np.linspace(-0.9, 0.9, 7))
         for delta in (*corners, *diagonals):
             model = self.lft.at(

@@ -12,8 +12,8 @@ import numpy as np
 
 Array = np.ndarray
 
-ROUNDS, SHARPNESS = 60, 6.0
-"""Rounds of balancing; how much more the worst responses count."""
+ITERATIONS, WEIGHT_EXPONENT = 60, 6.0
+"""Number of balancing iterations, and the exponent with which larger responses are weighted."""
 
 
 def balanced(responses: Array, size: int, count: int = 1) -> tuple[Array, Array, float]:
@@ -35,7 +35,7 @@ def balanced(responses: Array, size: int, count: int = 1) -> tuple[Array, Array,
     own, alpha = size * count, 1.0
     T = np.eye(own)
     best, least = (T, alpha), np.inf
-    for _ in range(ROUNDS):
+    for _ in range(ITERATIONS):
         left, right = _whole(T, alpha, rows), _whole(T, alpha, columns)
         seen = np.linalg.solve(left, responses @ right)
         norms = np.linalg.norm(seen, 2, axis=(1, 2))
@@ -44,7 +44,7 @@ def balanced(responses: Array, size: int, count: int = 1) -> tuple[Array, Array,
             least, best = worst, (T, alpha)
         if not np.isfinite(worst) or worst == 0:
             break
-        weights = (norms / worst) ** SHARPNESS
+        weights = (norms / worst) ** WEIGHT_EXPONENT
         adjoint = np.conj(np.swapaxes(seen, 1, 2))
         out = _regular(np.real(np.tensordot(weights, seen @ adjoint, axes=1)))
         into = _regular(np.real(np.tensordot(weights, adjoint @ seen, axes=1)))

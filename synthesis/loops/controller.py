@@ -37,19 +37,19 @@ SAMPLED = (
 )
 
 
-NEAR = 1.05
-"""A gain proven within this factor of what no proof undercuts is not tried to improve upon, where
-none was promised.
+GAIN_TOLERANCE = 1.05
+"""Ratio of a proven gain to its lower bound up to which no richer P is tried, where the synthesis
+promised no gain.
 """
 ADJOINT_USUAL = {"form": Spline(degree=2, segments=(1, 4)), "solver": LYAPUNOV}
 
-RICHER = {
+RICHER_SEARCH = {
     "form": Spline(degree=4, segments=4, grading=1.0),
     "impose": Bernstein(floor=1e-2),
     "solver": Solver(LYAPUNOV, tolerance=1e-3),
 }
-"""Where the usual P proves far more than was promised. Solved coarsely and held off zero, such a P
-keeps digits enough for its verification.
+"""Search used where the usual P proves far more than was promised. A coarse tolerance and a larger
+margin leave such a P enough digits for its verification.
 """
 
 
@@ -169,7 +169,7 @@ class Controller:
         def proof(adjoint: bool, richer: bool = False) -> Certificate:
             usually: dict[str, Any] = {}
             if richer or (adjoint and usual and len(moving) == 1):
-                usually = RICHER if richer else ADJOINT_USUAL
+                usually = RICHER_SEARCH if richer else ADJOINT_USUAL
             if not adjoint:
                 return l2_gain(loop, rate, **usually | options).resting_on(rests)
             proven = l2_gain(loop.adjoint(), rate, **usually | options)
@@ -178,13 +178,13 @@ class Controller:
         if tied or isinstance(loop, UncertainStateSpace):
             return proof(False)
         found = proof(self.by_adjoint)
-        enough = NEAR * found.lower if math.isnan(self.promised) else self.promised
+        enough = GAIN_TOLERANCE * found.lower if math.isnan(self.promised) else self.promised
         others = [lambda: proof(not self.by_adjoint)] if usual and moving else []
         if usual and len(moving) == 1 and loop.dt is None:
             # at once where the usual P proves nothing
             others.insert(found.verified, lambda: proof(self.by_adjoint, richer=True))
         for k, other in enumerate(others):
-            if found.gamma <= (NEAR if k else 1.0) * enough:
+            if found.gamma <= (GAIN_TOLERANCE if k else 1.0) * enough:
                 break
             found = min(found, other(), key=_proven)
         return found

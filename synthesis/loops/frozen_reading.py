@@ -16,8 +16,10 @@ from synthesis.plant.plant import Plant, require_plant
 from synthesis.worst.rates import Rate
 from synthesis.worst.rates import asked as limits
 
-FINEST = 1e-6
-"""The smallest tolerance: twenty bisections, each of them a proof; solvers decide no closer."""
+MIN_TOLERANCE = 1e-6
+"""Smallest permitted tolerance: twenty bisections, each with a proof; solvers are no more
+accurate.
+"""
 
 
 class Largest(NamedTuple):
@@ -110,7 +112,7 @@ def proven_around(
     Raises
     ------
     InputError
-        Several parameters, an `at` out of range, a tolerance below `FINEST` or not below 1.
+        Several parameters, an `at` out of range, a tolerance below `MIN_TOLERANCE` or not below 1.
 
     Examples
     --------
@@ -127,8 +129,8 @@ def proven_around(
     0.0 0.719
     """
     require_plant(plant)
-    if not FINEST <= tolerance < 1:
-        raise InputError(f"tolerance: expected from {FINEST:g} to below 1, got {tolerance}")
+    if not MIN_TOLERANCE <= tolerance < 1:
+        raise InputError(f"tolerance: expected from {MIN_TOLERANCE:g} to below 1, got {tolerance}")
     (s,) = _one(plant, rate)
     if not s.low <= at <= s.high:
         raise InputError(f"at: expected {s.name} within [{s.low:g}, {s.high:g}] {s.unit}, got {at}")

@@ -31,7 +31,7 @@ NOT_STABLE = (
 )
 
 NODES = {1: 14, 2: 6}
-"""Values of each parameter at which the loop is looked at (more parameters: 4)."""
+"""Values of each parameter at which the loop is evaluated (more parameters: 4)."""
 
 
 def reduced(controller: Controller, order: int) -> Controller:

@@ -31,7 +31,7 @@ from symheli.lpv.matrix_function import MatrixFunction, block, functions_of, in_
 from symheli.values.sample_period import same_period
 from symheli.values.signal import signals
 from synthesis.loops.balanced_block import balanced
-from synthesis.lpv.existence import FINEST
+from synthesis.lpv.existence import MAX_DIVISIONS
 from synthesis.plant.as_controller import as_controller
 from synthesis.plant.plant import Plant, require_plant
 from synthesis.polynomial.bernstein import restriction
@@ -40,11 +40,13 @@ from synthesis.polynomial.pieces import function_pieces
 Array = np.ndarray
 
 ROUNDING = 64 * np.finfo(float).eps
-"""What an entry may be off by, as a fraction of the terms that it is the sum of: of its own, so
-that the units of controls and measurements play no part.
+"""Relative rounding error of an entry, as a fraction of the sum of its own terms, so that the
+units of controls and measurements play no part.
 """
-LOST = 0.1
-"""Coordinates whose inverse is not known to this fraction are not used."""
+MAX_INVERSE_ERROR = 0.1
+"""Largest relative error of the inverse of a change of coordinates; with a larger error the change
+is not used.
+"""
 
 
 def with_wrong_parameter(
@@ -102,8 +104,10 @@ def with_wrong_parameter(
     if not (np.isfinite(error) and error >= 0):
         raise InputError(f"error: expected a number >= 0 in the unit of p, got {error!r}")
     whole = isinstance(divisions, int) and not isinstance(divisions, bool)
-    if not whole or not 1 <= divisions <= FINEST:
-        raise InputError(f"divisions: expected an integer from 1 to {FINEST}, got {divisions!r}")
+    if not whole or not 1 <= divisions <= MAX_DIVISIONS:
+        raise InputError(
+            f"divisions: expected an integer from 1 to {MAX_DIVISIONS}, got {divisions!r}"
+        )
     if len(plant.parameters) != 1:
         raise InputError(
             "a wrong reading needs a plant of one parameter, this one has"
@@ -265,7 +269,7 @@ def _inverse(left: Array, right: Array, own: int) -> tuple[Array, Array]:
     L = inverse[:own, :own]
     computed = np.abs(L @ T - np.eye(own))
     missed = np.linalg.norm(computed + own * np.finfo(float).eps * np.abs(L) @ np.abs(T))
-    if not missed < LOST:
+    if not missed < MAX_INVERSE_ERROR:
         return np.eye(len(left)), np.eye(len(right))
     grown = right * (1.0 + 4 * np.finfo(float).eps)
     grown[:, :own] /= 1.0 - missed

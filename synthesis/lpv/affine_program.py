@@ -29,7 +29,7 @@ from synthesis.program.cone_program import Candidate, ConeProgram, Solver, solve
 Array = np.ndarray
 
 MARGIN = 1e-8
-"""Every inequality is kept above this multiple of the identity."""
+"""Every inequality is imposed as >= this multiple of the identity."""
 
 
 class BernsteinCell(NamedTuple):

@@ -13,7 +13,8 @@ from symheli.lpv.bases.polynomials import factors_of, polynomials
 Dependence = int | tuple[int, ...] | FunctionSpace
 """Of X or Y on the parameters: a degree for all, one each, or the functions themselves."""
 DEGREES = {1: (2, 4, 6, 8), 2: (2, 4)}
-"""Of the one that moves, tried in turn while gamma falls (more parameters: 2)."""
+"""Degrees of the function that depends on p, tried in turn while gamma falls (more parameters: 2).
+"""
 
 
 def moves(parameters: Sequence[Scheduling]) -> bool:

@@ -32,41 +32,46 @@ from synthesis.program.lyapunov_program import LyapunovBlocks, Sizes
 
 Array = np.ndarray
 
-LARGEST = (1e8, 1e10)
-"""X and Y are kept below this multiple of the identity, in scaled coordinates; the second where the
-first decides.
+MATRIX_BOUNDS = (1e8, 1e10)
+"""X and Y are kept below this multiple of the identity, in scaled coordinates; the second bound is
+used where the first is active.
 """
-NEAR = 0.1
-"""A bound decides where X or Y comes to more than this part of it."""
-WIDE = (1e2, 1e3, 1e4, 1e6, 1e8)
-"""The bounds once g is settled, tried in turn."""
-GROWS = 1.03
-"""A larger bound that separates X Y from I by less than this factor more is not worth it."""
-COARSE, FINE = 1e-3, 1e-5
-"""Tolerances of g while points are added and at the end, where p moves: points leave VIOLATED."""
-CENTRAL = 0.1
-"""Tolerance to which X and Y are separated once g is settled: near the middle of what is feasible,
-where gains change slowly with p; at the end of the search they turn steeply at the ends of a range.
+ACTIVE_FRACTION = 0.1
+"""A bound counts as active where the largest eigenvalue of X or Y exceeds this fraction of it."""
+SETTLED_BOUNDS = (1e2, 1e3, 1e4, 1e6, 1e8)
+"""Bounds on X and Y once gamma is fixed, tried in turn."""
+MIN_GROWTH = 1.03
+"""Least factor by which a larger bound must increase the separation of X Y from I to be preferred.
+"""
+COARSE_TOLERANCE, FINE_TOLERANCE = 1e-3, 1e-5
+"""Tolerances of g while points are added, and of the last program where p moves (points are
+checked to `MAX_VIOLATION`).
+"""
+SEPARATION_TOLERANCE = 0.1
+"""Tolerance to which X and Y are separated once g is fixed. Near the centre of the feasible set
+gains change slowly with p; near its boundary they change steeply at the ends of a range.
 """
 MARGIN = 1e-8
 """Blocks are kept below minus this multiple of the identity."""
-SETTLED = (1e-3, 1e-5, 1e-8)
-"""The same once g is settled, tried in turn: at a block that is singular gains have no bound."""
+SETTLED_MARGINS = (1e-3, 1e-5, 1e-8)
+"""The same once g is fixed, tried in turn: where a block is singular the gains are unbounded."""
 
-FINEST = 1000
-"""Parts that an interval of p may be divided into."""
-LEAST_POINTS = {1: 13, 2: 5}
-"""Of each parameter, at least (more parameters: 3)."""
-FINER = {1: 8, 2: 3}
-"""Points in which blocks are looked at for each at which they are imposed (more parameters: 2)."""
-ROUNDS = 8
-"""Most additions of points."""
-ADDED = 8
-"""Most points that are added at a time."""
-VIOLATED = 1e-4
-"""Excess of g, relative, with which a block between the points must be negative."""
+MAX_DIVISIONS = 1000
+"""Largest number of parts into which the range of a parameter may be divided."""
+MIN_POINTS = {1: 13, 2: 5}
+"""Least number of points of each parameter (more parameters: 3)."""
+CHECK_RATIO = {1: 8, 2: 3}
+"""Number of points at which blocks are checked for each point at which they are imposed (more
+parameters: 2).
+"""
+MAX_ROUNDS = 8
+"""Largest number of times that points are added."""
+MAX_ADDED = 8
+"""Largest number of points added at a time."""
+MAX_VIOLATION = 1e-4
+"""Relative increase of g with which a block must be negative between the points."""
 ROUNDING = 1e-8
-"""An eigenvalue up to this size is zero there, in scaled coordinates."""
+"""Eigenvalue up to which a block counts as negative there, in scaled coordinates."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +109,7 @@ class Existence:
         X: FunctionSpace | None,
         Y: FunctionSpace | None,
         divisions: int = 1,
-        largest: float = LARGEST[0],
+        largest: float = MATRIX_BOUNDS[0],
         p: Array | None = None,
     ):
         self.plant, self.largest = plant, largest
@@ -122,8 +127,8 @@ class Existence:
 
     def _first(self, divisions: int) -> Array:
         """Points (K, m) at which blocks are imposed at first."""
-        if not 1 <= whole(divisions, "divisions", 1) <= FINEST:
-            raise InputError(f"divisions: expected 1 to {FINEST}, got {divisions}")
+        if not 1 <= whole(divisions, "divisions", 1) <= MAX_DIVISIONS:
+            raise InputError(f"divisions: expected 1 to {MAX_DIVISIONS}, got {divisions}")
         breaks = [set(b) for b in self.plant.breaks]
         m = len(breaks)
         most = np.zeros(m, int)
@@ -139,7 +144,7 @@ class Existence:
                 a + (b - a) * np.arange(divisions) / divisions for a, b in pairwise(sorted(ends))
             ]
             knots = [*np.concatenate(parts), max(ends)]
-            least = LEAST_POINTS.get(m, 3)
+            least = MIN_POINTS.get(m, 3)
             count = max(-(-(least - 1) // (len(knots) - 1)), 2 * int(degree) + (m == 1))
             axes.append(piecewise_lobatto(knots, count))
         return tensor_grid(axes)
@@ -149,12 +154,12 @@ class Existence:
         if len(self.points) == 1:
             return self._least(solver)
         start = None
-        for _ in range(ROUNDS):
-            found = self._least(replace(solver, tolerance=COARSE), start)
+        for _ in range(MAX_ROUNDS):
+            found = self._least(replace(solver, tolerance=COARSE_TOLERANCE), start)
             start = found.early
             if not np.isfinite(found.gamma) or not self._added(found, found.gamma):
                 break
-        return self._least(replace(solver, tolerance=FINE), start)
+        return self._least(replace(solver, tolerance=FINE_TOLERANCE), start)
 
     def _least(self, solver: Solver, start: interior_point.Early | None = None) -> Solution:
         return self._least_within(self.largest, solver, start)
@@ -169,27 +174,29 @@ class Existence:
         """Below this part of the g that was found there is none within a larger bound on X and Y;
         0 where the program does not tell. At the present points alone: more of them raise g.
         """
-        within = self._least_within(largest, replace(solver, tolerance=COARSE), found.early)
-        return (1 - COARSE) * within.gamma / found.gamma if within.reached else 0.0
+        within = self._least_within(
+            largest, replace(solver, tolerance=COARSE_TOLERANCE), found.early
+        )
+        return (1 - COARSE_TOLERANCE) * within.gamma / found.gamma if within.reached else 0.0
 
     def bounded(self, found: Solution) -> bool:
         """Whether the bound on X and Y decides."""
         each = (u.at(found.coefficients, self.points) for u in (self.X, self.Y) if u is not None)
-        return any(np.linalg.eigvalsh(M).max() > NEAR * self.largest for M in each)
+        return any(np.linalg.eigvalsh(M).max() > ACTIVE_FRACTION * self.largest for M in each)
 
     def _added(self, found: Solution, gamma: float) -> bool:
         """Whether a block is violated between the points at this g: then there are more of them,
         where it is most, one in each cell of the present ones.
         """
         axes = [np.unique(x) for x in self.points.T]
-        finer = FINER.get(len(axes), 2)
+        finer = CHECK_RATIO.get(len(axes), 2)
         between = tensor_grid([piecewise_lobatto(x.tolist(), finer) for x in axes])
-        gamma = (1 + VIOLATED) * gamma
+        gamma = (1 + MAX_VIOLATION) * gamma
         worst = self._excess(between, found, gamma)
         allowed = max(ROUNDING, 2 * float(self._excess(self.points, found, gamma).max()))
         chosen: dict[tuple[int, ...], Array] = {}
         for k in np.argsort(-worst):
-            if worst[k] <= allowed or len(chosen) == ADDED:
+            if worst[k] <= allowed or len(chosen) == MAX_ADDED:
                 break
             cell = tuple(int(np.searchsorted(x, q)) for x, q in zip(axes, between[k], strict=True))
             chosen.setdefault(cell, between[k])
@@ -208,13 +215,15 @@ class Existence:
         """For this g the X and Y whose product is farthest from one: first within the least bound
         beyond which that hardly grows, then within larger ones.
         """
-        for margin in SETTLED:
+        for margin in SETTLED_MARGINS:
             before: Solution | None = None
-            for largest in WIDE:
-                found = self._widest(gamma, margin, largest, replace(solver, tolerance=CENTRAL))
+            for largest in SETTLED_BOUNDS:
+                found = self._widest(
+                    gamma, margin, largest, replace(solver, tolerance=SEPARATION_TOLERANCE)
+                )
                 if not np.any(found.coefficients):
                     continue
-                if before is not None and found.gamma < GROWS * before.gamma:
+                if before is not None and found.gamma < MIN_GROWTH * before.gamma:
                     yield before._replace(gamma=gamma)
                 before = found
             if before is not None:
@@ -222,7 +231,7 @@ class Existence:
 
     def _widest(self, gamma: float, margin: float, largest: float, solver: Solver) -> Solution:
         """The same within this bound, with points added as for the least g."""
-        for _ in range(ROUNDS):
+        for _ in range(MAX_ROUNDS):
             blocks = [*self._halves(gamma, margin), *self._coupling(True, largest)]
             found = self._solved(blocks, -1.0, solver)
             if not np.any(found.coefficients) or len(self.points) == 1:

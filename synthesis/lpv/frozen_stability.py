@@ -14,12 +14,14 @@ from synthesis.polynomial.pieces import pieces
 
 Array = np.ndarray
 
-CELLS = 500
-"""Most Lyapunov equations that are solved; then stability between points is not shown."""
-HALVED = 16
-"""Most boxes for which one solution serves."""
-PART = 0.5
-"""Of the decay rate of the slowest mode that P keeps."""
+MAX_CELLS = 500
+"""Largest number of Lyapunov equations that are solved; beyond it stability between points is left
+undecided.
+"""
+MAX_BOXES = 16
+"""Largest number of boxes on which one Lyapunov matrix is checked."""
+DECAY_FRACTION = 0.5
+"""Fraction of the decay rate of the slowest mode for which the Lyapunov equation is solved."""
 
 
 class FrozenStability(NamedTuple):
@@ -39,7 +41,7 @@ def frozen_stability(loop: LPVStateSpace) -> FrozenStability:
     from cell to cell.
     """
     waiting = [models[0] for models in pieces(loop).models.values()]
-    for _ in range(CELLS):
+    for _ in range(MAX_CELLS):
         if not waiting:
             return FrozenStability(True)
         A = waiting.pop()
@@ -47,7 +49,7 @@ def frozen_stability(loop: LPVStateSpace) -> FrozenStability:
         root = _lyapunov(A(middle), loop.dt)
         if root is None:
             return FrozenStability(False, middle)
-        if not negative_definite(_decrease(A, root, loop.dt), cells=HALVED):
+        if not negative_definite(_decrease(A, root, loop.dt), cells=MAX_BOXES):
             waiting += A.split(int(np.argmax(_variation(A))))
     return FrozenStability(None, middle)
 
@@ -65,12 +67,12 @@ def _lyapunov(A: Array, dt: float | None) -> Array | None:
         slowest = -float(poles.real.max(initial=-1.0))
         if slowest <= 0:
             return None
-        P = linalg.solve_continuous_lyapunov((balanced + PART * slowest * one).T, -one)
+        P = linalg.solve_continuous_lyapunov((balanced + DECAY_FRACTION * slowest * one).T, -one)
     else:
         largest = float(np.abs(poles).max(initial=0.0))
         if largest >= 1:
             return None
-        P = linalg.solve_discrete_lyapunov((balanced / max(largest, 0.01) ** PART).T, one)
+        P = linalg.solve_discrete_lyapunov((balanced / max(largest, 0.01) ** DECAY_FRACTION).T, one)
     try:
         return np.linalg.cholesky(0.5 * (P + P.T)).T / units
     except np.linalg.LinAlgError:

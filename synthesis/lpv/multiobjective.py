@@ -37,13 +37,15 @@ Array = np.ndarray
 
 BACK_OFF = 1.02
 """Every bound is loosened by this factor before X and Y are settled."""
-NEAR = 3.0
-"""Gains so many times larger or smaller than the units of the program ask for other units."""
-ROUNDS = 3
-"""Most changes of units."""
-LARGEST, WIDE = 1e5, 1e3
-"""X and Y are kept below this multiple of the identity, in scaled coordinates; the second once the
-gains are settled.
+UNIT_RATIO = 3.0
+"""Ratio of a gain to its unit in the program beyond which the program is solved again in other
+units.
+"""
+MAX_UNIT_CHANGES = 3
+"""Largest number of changes of units."""
+MATRIX_BOUND, SETTLED_BOUND = 1e5, 1e3
+"""X and Y are kept below this multiple of the identity, in scaled coordinates: while gains are
+minimised, and once they are fixed.
 """
 ONE = np.eye(1)
 
@@ -216,11 +218,13 @@ class _Problem:
     def best(self, solver: Solver, attempts: list[Attempt]) -> list[float] | None:
         """`least`, again in units of the gains found while these are far from the first."""
         values = self.least(solver, attempts)
-        for _ in range(ROUNDS):
+        for _ in range(MAX_UNIT_CHANGES):
             if values is None:
                 break
             sizes = [max(v * pace, 1e-9) for v, pace in zip(values, self.pace, strict=True)]
-            if all(1 / NEAR < a / b < NEAR for a, b in zip(sizes, self.sizes, strict=True)):
+            if all(
+                1 / UNIT_RATIO < a / b < UNIT_RATIO for a, b in zip(sizes, self.sizes, strict=True)
+            ):
                 break
             self.sizes = sizes
             values = self.least(solver, attempts) or values
@@ -293,10 +297,10 @@ class _Problem:
         ]
         each = [program.value(v) for v in unknowns.scalars]
         if squares is None:
-            bounds, apart, widest = each, program.known(ONE), LARGEST
+            bounds, apart, widest = each, program.known(ONE), MATRIX_BOUND
         else:
             bounds = [program.known(s * ONE) for s in squares]
-            (apart,), widest = each, WIDE
+            (apart,), widest = each, SETTLED_BOUND
         X, Y = program.value(unknowns.X), program.value(unknowns.Y)
         one = np.eye(n)
         for cell in self.cells:

@@ -15,7 +15,7 @@ from synthesis.certificate import Attempt
 from synthesis.loops.controller import Controller
 from synthesis.lpv.at_rest import at_rest
 from synthesis.lpv.bases import DEGREES, Bases, Dependence, both_moving, candidates, used
-from synthesis.lpv.existence import LARGEST, Existence, Solution
+from synthesis.lpv.existence import MATRIX_BOUNDS, Existence, Solution
 from synthesis.lpv.fitted import in_plant_units
 from synthesis.lpv.frozen_stability import frozen_stability
 from synthesis.lpv.recovery import controller, sampled_controller, split
@@ -23,10 +23,10 @@ from synthesis.lpv.robust import robust_plant
 from synthesis.lpv.scaled_plant import ScaledPlant, depends
 from synthesis.lpv.search import (
     BACK_OFF,
-    CHECKED,
-    CLOSE,
+    CHECK_POINTS,
+    CLOSE_TO_OPTIMUM,
     FAR_ABOVE,
-    WORTH,
+    MIN_IMPROVEMENT,
     Design,
     Start,
     best,
@@ -269,10 +269,10 @@ def _controllers(
             yield replace(made, optimum=floor), ()
 
     def other() -> Start | None:
-        if start.gamma <= CLOSE * floor or not both(DEGREES[1][0]):
+        if start.gamma <= CLOSE_TO_OPTIMUM * floor or not both(DEGREES[1][0]):
             return None
         found = best(plant, both, divisions, USUAL, attempts, worst)
-        return found if found.gamma < WORTH * start.gamma else None
+        return found if found.gamma < MIN_IMPROVEMENT * start.gamma else None
 
     for own, design in _designs(plant, start, other(), factors, attempts):
         if still and design.gamma > _far(min(factors)) * floor:
@@ -282,7 +282,7 @@ def _controllers(
         method = f"output feedback, {own.shape}{told}"
         made = in_plant_units(plant, design.scaled, design.fit, design.gamma, method)
         made = replace(made, optimum=own.gamma, by_adjoint=own.shape.by_y)
-        decides = own.existence.bounded(own.found) and own.existence.largest >= LARGEST[-1]
+        decides = own.existence.bounded(own.found) and own.existence.largest >= MATRIX_BOUNDS[-1]
         yield made, (BOUND_DECIDES.format(own.existence.largest),) if decides else ()
     if still:
         yield from central()
@@ -379,6 +379,6 @@ def _fastest(made: Controller) -> float:
     model = made.model
     if model.dt is not None:
         return 0.0
-    p = lobatto_points(CHECKED.get(len(model.parameters), 3), model.box)
+    p = lobatto_points(CHECK_POINTS.get(len(model.parameters), 3), model.box)
     A = model.matrices(p).A
     return float(np.abs(np.linalg.eigvals(A)).max(initial=0.0))

@@ -27,16 +27,17 @@ MatricesAt = Callable[[Array], Generalized]
 
 POINTS = 9
 """Values of p, on the diagonal of its box, from which coordinates are made."""
-LEAST = 1e-6
-"""Part of the mean eigenvalue that is added to a solution of a Riccati equation: states without a
-cost, or known exactly, have a scale too.
+REGULARIZATION = 1e-6
+"""Fraction of the mean eigenvalue added to a solution of a Riccati equation, so that states
+without cost, or known exactly, have a scale too.
 """
-MOST = 10
-"""Highest degree in a parameter by which data on a cell are followed; what lies beyond is left to
+MAX_DEGREE = 10
+"""Highest degree in a parameter to which data on a cell are represented; the remainder is left to
 the analysis of the closed loop.
 """
-SMALL = 1e-10
-"""A Chebyshev coefficient below this fraction of the largest entry of its own is rounding."""
+NEGLIGIBLE_COEFFICIENT = 1e-10
+"""A Chebyshev coefficient below this fraction of the largest coefficient of its entry is rounding.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,7 +190,7 @@ def _mean_cost(plants: Generalized, dt: float | None) -> Array | None:
     if not costs:
         return None
     traces = np.array([np.trace(X) for X in costs])
-    mean = np.mean(costs / traces[:, None, None], axis=0) + LEAST / n * np.eye(n)
+    mean = np.mean(costs / traces[:, None, None], axis=0) + REGULARIZATION / n * np.eye(n)
     return float(np.exp(np.log(traces).mean())) * mean
 
 
@@ -220,11 +221,11 @@ def degrees_of(
     data: Callable[[Array], Sequence[Array]], breaks: Sequence[Sequence[float]]
 ) -> tuple[int, ...]:
     """The degree in each parameter that `data` (arrays (K, ...) at p (K, m)) have on the widest
-    cells, at most `MOST`.
+    cells, at most `MAX_DEGREE`.
     """
     sides = [max(pairwise(b), key=lambda side: side[1] - side[0]) for b in breaks]
-    unit = interpolation_points([MOST], [(-1.0, 1.0)])
-    to_chebyshev = np.linalg.inv(chebyshev.chebvander(unit, MOST))
+    unit = interpolation_points([MAX_DEGREE], [(-1.0, 1.0)])
+    to_chebyshev = np.linalg.inv(chebyshev.chebvander(unit, MAX_DEGREE))
     found = []
     for i in range(len(sides)):
         axes = [
@@ -234,7 +235,9 @@ def degrees_of(
         degree = 0
         for values in data(tensor_grid(axes)):
             c = np.abs(to_chebyshev @ values.reshape(len(unit), -1))
-            above = np.flatnonzero((c > SMALL * max(float(c.max(initial=0.0)), 1e-300)).any(axis=1))
+            above = np.flatnonzero(
+                (c > NEGLIGIBLE_COEFFICIENT * max(float(c.max(initial=0.0)), 1e-300)).any(axis=1)
+            )
             degree = max(degree, int(above.max(initial=0)))
         found.append(degree)
     return tuple(found)

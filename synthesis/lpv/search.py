@@ -25,7 +25,7 @@ from symheli.lpv.bases.function_space import tensor_grid
 from symheli.progress import tracked
 from synthesis.certificate import Attempt
 from synthesis.lpv.bases import DEGREES, Bases, used
-from synthesis.lpv.existence import LARGEST, Existence, Solution
+from synthesis.lpv.existence import MATRIX_BOUNDS, Existence, Solution
 from synthesis.lpv.fitted import Fitted, cut_to_serve, fits
 from synthesis.lpv.scaled_plant import ScaledPlant, scaled_plant_of
 from synthesis.lpv.worst_optimum import FrozenOptimum
@@ -40,36 +40,37 @@ Array = np.ndarray
 
 BACK_OFF = (1.02, 1.04, 1.01, 1.1, 1.2, 1.5)
 """Multiples of the least gamma at which X and Y are settled, tried in turn."""
-SLACK = 1e-6
-"""By which the frozen gain of a controller may exceed what was promised: rounding."""
+LEVEL_TOLERANCE = 1e-6
+"""Relative excess of a frozen gain over the promised one that counts as rounding."""
 UNKEPT = "frozen loops do not keep it"
-UNTOLD = "p moves too fast for gains that are not told dp/dt"
+RATE_UNMEASURED = "p moves too fast for gains that are not told dp/dt"
 SHARP = "frozen loops keep it, no functions of p do"
 FAR_ABOVE = 1.05
 """A gamma this many times the least one is said to be, one of a larger back-off that was asked for
 in proportion; before it gains that turn sharply become splines with as many knots as that takes.
 """
-FURTHER = 1.05
-"""Of the gamma of a controller that is told dp/dt, where it is not told."""
-TOO_FAST = 1.1
-"""The same at which no other X and Y of this gamma are tried: all move about as much."""
-ROUGH = 0.3
-"""Functions of p farther from the gains than this are not looked at."""
-ACCURACY = 3e-3
-"""Of functions of p fitted to the gains, relative, entry by entry."""
-NEAR = 2e-2
-"""Polynomials as accurate as this are preferred to splines."""
-CHECKED = {1: 97, 2: 7}
-"""Values of each parameter at which frozen loops are judged, beside those where the inequalities
-were imposed (more parameters: 3).
+MAX_RATE_LOSS = 1.05
+"""Largest factor by which neglecting dp/dt in the gains may raise gamma."""
+HOPELESS_RATE_LOSS = 1.1
+"""Factor above which no other X and Y of this gamma are tried: they all vary about as fast with p.
 """
-CLOSE = 1.01
-"""A gamma within this factor of what no controller can beat is not worth another program."""
+MAX_MISFIT = 0.3
+"""Relative misfit above which functions of p are not considered."""
+ACCURACY = 3e-3
+"""Accuracy of the functions of p fitted to the gains, relative, entry by entry."""
+POLYNOMIAL_MISFIT = 2e-2
+"""Relative misfit up to which polynomials are preferred to splines."""
+CHECK_POINTS = {1: 97, 2: 7}
+"""Values of each parameter at which frozen loops are checked, in addition to those at which the
+inequalities were imposed (more parameters: 3).
+"""
+CLOSE_TO_OPTIMUM = 1.01
+"""Ratio of gamma to a lower bound for every controller up to which no further program is solved."""
 NOTHING_KNOWN = FrozenOptimum()
-WORTH = 0.995
-"""Part of gamma to which a richer program must lower it to be worth another."""
-FAR = 30.0
-"""A gamma this many times larger or smaller than the unit of performance asks for another unit."""
+MIN_IMPROVEMENT = 0.995
+"""Factor by which a richer program must lower gamma to be preferred."""
+MAX_UNIT_RATIO = 30.0
+"""Ratio of gamma to the unit of performance beyond which the unit is changed."""
 
 
 Gains = Callable[[Array], Array]
@@ -129,27 +130,27 @@ def best(
     starts: list[Start] = []
     for shape in every(degrees[0]):
         starts.append(least(plant, shape, divisions, solver, attempts, channel, worst.p))
-        if starts[-1].gamma <= CLOSE * floor:
+        if starts[-1].gamma <= CLOSE_TO_OPTIMUM * floor:
             break
     chosen = min(range(len(starts)), key=lambda k: starts[k].gamma)
     start = starts[chosen]
 
     def worth(other: Start) -> bool:
-        return other.gamma < WORTH * start.gamma
+        return other.gamma < MIN_IMPROVEMENT * start.gamma
 
     for degree in degrees[1:]:
         shape = every(degree)[chosen]
-        if start.gamma <= CLOSE * floor or shape.size == start.shape.size:
+        if start.gamma <= CLOSE_TO_OPTIMUM * floor or shape.size == start.shape.size:
             break
         richer = least(plant, shape, divisions, solver, attempts, channel, worst.p)
         more = worth(richer)
         start = richer if richer.gamma < start.gamma else start
         if not more and math.isfinite(start.gamma):
             break
-    for largest in LARGEST[1:]:
-        if start.gamma <= CLOSE * floor or not start.existence.bounded(start.found):
+    for largest in MATRIX_BOUNDS[1:]:
+        if start.gamma <= CLOSE_TO_OPTIMUM * floor or not start.existence.bounded(start.found):
             break
-        if start.existence.least_share(start.found, largest, solver) >= WORTH:
+        if start.existence.least_share(start.found, largest, solver) >= MIN_IMPROVEMENT:
             break
         unit = start.gamma
         wider = least(
@@ -170,7 +171,7 @@ def least(
     channel: float = 1.0,
     p: Array | None = None,
     *,
-    largest: float = LARGEST[0],
+    largest: float = MATRIX_BOUNDS[0],
 ) -> Start:
     """The least gamma of a shape, in a unit of performance that suits it, at first `channel`; with
     the inequalities at this p (m,), too.
@@ -181,7 +182,7 @@ def least(
         found = existence.least_gamma(solver)
         gamma = channel * found.gamma
         attempts.append(Attempt(f"least gamma, {shape}", 0.0, found.message, gamma))
-        if not math.isfinite(found.gamma) or 1 / FAR < found.gamma < FAR:
+        if not math.isfinite(found.gamma) or 1 / MAX_UNIT_RATIO < found.gamma < MAX_UNIT_RATIO:
             break
         channel = gamma
     return Start(own, existence, found, shape)
@@ -196,8 +197,9 @@ def settled(
     loop: Loop | None = None,
     neglecting: bool = False,
 ) -> Iterator[Design]:
-    """Designs at these multiples of the least gamma, whose frozen `loop` keeps it with the gains
-    as functions of p; `neglecting`: at most `FURTHER` above, where the gains are not told dp/dt.
+    """Yield designs at these multiples of the least gamma, whose frozen `loop` keeps the level with
+    the gains as functions of p; `neglecting`: the gains do not depend on dp/dt, which may raise
+    gamma by `MAX_RATE_LOSS` at most.
     """
     scaled, existence, lowest, _ = start
     if not math.isfinite(lowest.gamma):
@@ -234,7 +236,7 @@ def settled(
             noted(factor, found.message, outcome)
             if design is not None:
                 yield design
-            if design is not None or outcome.startswith(UNTOLD):
+            if design is not None or outcome.startswith(RATE_UNMEASURED):
                 break
     yield from by_splines()
 
@@ -255,10 +257,10 @@ def _tried(
         looped = closed(scaled, gains, points)
         reached = max(reached, level_kept(scaled, existence, found, looped, points))
     further = reached / found.gamma
-    if further > FURTHER:
-        said = UNTOLD if further > TOO_FAST else "as dp/dt is not known"
+    if further > MAX_RATE_LOSS:
+        said = RATE_UNMEASURED if further > HOPELESS_RATE_LOSS else "as dp/dt is not known"
         return None, f"{said}, {further:.3g} times as much"
-    if not all(kept(scaled, gains, loop, points, reached * (1 + SLACK))):
+    if not all(kept(scaled, gains, loop, points, reached * (1 + LEVEL_TOLERANCE))):
         return None, UNKEPT
     fit = fit_of(scaled, gains, loop, points, reached)
     if fit is None:
@@ -275,11 +277,11 @@ def simplest(
     """
     every = list(fits(gains, scaled.parameters))
     polynomials = [fit for fit in every if fit.basis.degrees]
-    near = any(fit.misfit <= NEAR for fit in polynomials)
+    near = any(fit.misfit <= POLYNOMIAL_MISFIT for fit in polynomials)
     accurate = [fit for fit in every if fit.misfit <= ACCURACY]
-    rest = [fit for fit in (polynomials if near else every) if ACCURACY < fit.misfit <= ROUGH]
+    rest = [fit for fit in (polynomials if near else every) if ACCURACY < fit.misfit <= MAX_MISFIT]
     for fit in (*accurate, *sorted(rest, key=lambda fit: fit.misfit)):
-        if all(kept(scaled, fit, loop, points, gamma * (1 + SLACK))):
+        if all(kept(scaled, fit, loop, points, gamma * (1 + LEVEL_TOLERANCE))):
             return fit
     return None
 
@@ -292,7 +294,7 @@ def with_knots(
     """
     if len(scaled.parameters) != 1:
         return None
-    limit = gamma * (1 + SLACK)
+    limit = gamma * (1 + LEVEL_TOLERANCE)
 
     def serves(fit: Fitted, p: Array) -> Array:
         return np.fromiter(kept(scaled, fit, loop, p, limit), bool, len(p))
@@ -305,7 +307,7 @@ def judged(parameters: Sequence[Scheduling], more: Array | None = None) -> Array
     """Points (K, m) at which frozen loops are judged, with `more`; a parameter that is the rate of
     another is zero there.
     """
-    count = CHECKED.get(len(parameters), 3)
+    count = CHECK_POINTS.get(len(parameters), 3)
     p = tensor_grid([np.linspace(s.low, s.high, count) for s in parameters])
     p = p if more is None else np.vstack([p, more])
     rates = [s.name in {other.rate for other in parameters} for s in parameters]

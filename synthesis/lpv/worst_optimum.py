@@ -10,7 +10,7 @@ from scipy import optimize
 
 from symheli.lpv.bases.polynomials import lobatto_points
 from symheli.progress import tracked
-from synthesis.lti.hinf import ROUGH, optimum_above, slack
+from synthesis.lti.hinf import ROUGH_ACCURACY, optimum_above, slack
 from synthesis.plant.generalized import Generalized
 
 if TYPE_CHECKING:
@@ -20,9 +20,9 @@ Array = np.ndarray
 
 POINTS = {1: 65, 2: 5}
 """Values of each parameter (more parameters: 3)."""
-PLACES, BESIDE, ROUNDS = 4, 16, 6
-"""Between them the worst is looked for at so many places, at so many values each, again while the
-level that is looked for rises.
+MAX_MINIMA, MAX_EVALUATIONS, MAX_ROUNDS = 4, 16, 6
+"""Between the points, the worst is searched near so many minima of the slack, with so many
+evaluations each, again while the level rises.
 """
 
 
@@ -66,11 +66,13 @@ def worst_optimum(plant: Plant) -> FrozenOptimum:
     line = np.sort(p.ravel())
     found = np.pad([spare(q) for q in line], 1, constant_values=math.inf)
     low = np.flatnonzero((found[1:-1] <= found[:-2]) & (found[1:-1] <= found[2:]))
-    for k in low[np.argsort(found[1:-1][low])][:PLACES]:
+    for k in low[np.argsort(found[1:-1][low])][:MAX_MINIMA]:
         ends = line[max(k - 1, 0)], line[min(k + 1, len(line) - 1)]
-        for _ in range(ROUNDS):  # out of reach, a level is so by no measure: raised, by another
+        for _ in range(MAX_ROUNDS):  # out of reach, a level is so by no measure: raised, by another
             before = worst
-            worst = raised(np.array([optimize.fminbound(spare, *ends, maxfun=BESIDE, disp=0)]))
-            if worst.level <= before.level * (1 + ROUGH):
+            worst = raised(
+                np.array([optimize.fminbound(spare, *ends, maxfun=MAX_EVALUATIONS, disp=0)])
+            )
+            if worst.level <= before.level * (1 + ROUGH_ACCURACY):
                 break
     return worst

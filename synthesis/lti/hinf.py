@@ -31,22 +31,25 @@ from synthesis.worst.frozen import norm
 Array = np.ndarray
 
 ACCURACY = 1e-10
-"""Of the optimum, relative."""
+"""Relative accuracy of the optimum."""
 
-ROUGH = 1e-3
-"""The same where it is a number to compare with."""
+ROUGH_ACCURACY = 1e-3
+"""Relative accuracy of an optimum that only serves for comparison."""
 
-NOTHING = 1e-9
-"""A level below this part of that of the LQG controller counts as zero."""
+ZERO_LEVEL = 1e-9
+"""A level below this fraction of the H-infinity norm of the LQG loop counts as zero."""
 
 BACK_OFFS = 1.0, 1.02, 1.05, 1.2, 2.0, 10.0, 100.0, 1000.0
 """Where a controller does not keep its level in the check, the level is raised by these in turn."""
 
-KEPT = 1e-6
-"""A level is kept where the norm of the loop exceeds it by no more than this part."""
+LEVEL_TOLERANCE = 1e-6
+"""Relative excess of the norm of the loop over the level up to which the level counts as reached.
+"""
 
-DOUBLINGS = 40
-"""How often a level that was not reached, though a controller is known to, is doubled."""
+MAX_DOUBLINGS = 40
+"""Largest number of times that a level is doubled which was not reached although a controller
+exists.
+"""
 
 NOT_KEPT = "the loop of the central controller for gamma = {:.6g} does not keep that level"
 NO_LEVEL = "the Riccati equations have no solution at any level, though nothing speaks against one"
@@ -55,8 +58,8 @@ NO_LEAST = (
     " what limits it (noise, a price on the controls)"
 )
 
-LARGEST = 1e100
-"""Of a level, and of its inverse: its square is a number, too."""
+MAX_LEVEL = 1e100
+"""Largest level, and the inverse of the smallest: its square must neither over- nor underflow."""
 
 
 def hinf(
@@ -123,9 +126,9 @@ def hinf(
     0.6009252 0.607 True
     """
     model = as_model(model)
-    if gamma is not None and not 1 / LARGEST < gamma < LARGEST:
+    if gamma is not None and not 1 / MAX_LEVEL < gamma < MAX_LEVEL:
         raise InputError(
-            f"gamma: expected a number from {1 / LARGEST:g} to {LARGEST:g}, got {gamma}"
+            f"gamma: expected a number from {1 / MAX_LEVEL:g} to {MAX_LEVEL:g}, got {gamma}"
         )
     levels_above(back_off)
     names = Channels.of(model, controls, measurements, disturbances, performance)
@@ -171,7 +174,7 @@ def optimum_above(plant: Generalized, level: float, dt: float | None) -> float:
         normal = _Levels.of(plant, dt).normal
         if level > 0 and normal.trial(level).obstacle is None:
             return level
-        found = _smallest(normal, level or 1.0, ROUGH)
+        found = _smallest(normal, level or 1.0, ROUGH_ACCURACY)
     except (np.linalg.LinAlgError, InputError):
         return level
     return level if found is None else max(level, found[0])
@@ -211,7 +214,7 @@ def _optimal(levels: _Levels, plant: Generalized, names: Channels, back_off: flo
     """The central controller a little above the smallest level."""
     K = lqg(plant, levels.dt)
     simple = None if K is None else checked(plant, K, names, levels.dt)
-    if simple is not None and simple.hinf_norm <= NOTHING * _untouched(plant, simple):
+    if simple is not None and simple.hinf_norm <= ZERO_LEVEL * _untouched(plant, simple):
         return replace(simple, optimum=0.0, reasons=(NO_LEAST,))
     found = _smallest(levels.normal, 1.0 if simple is None else simple.hinf_norm)
     if found is None:
@@ -247,7 +250,9 @@ def _kept(levels: _Levels, plant: Generalized, names: Channels, gamma: float) ->
     if K is None:
         return None
     design = checked(plant, K, names, levels.dt)
-    return design if design is not None and design.hinf_norm <= gamma * (1 + KEPT) else None
+    return (
+        design if design is not None and design.hinf_norm <= gamma * (1 + LEVEL_TOLERANCE) else None
+    )
 
 
 def _smallest(
@@ -261,13 +266,13 @@ def _smallest(
     """
     least = normal.least()
     high = max(start * (1 + 1e-6), least * (1 + 1e-6), 1e-300)
-    for _ in range(DOUBLINGS):
+    for _ in range(MAX_DOUBLINGS):
         if normal.trial(high).obstacle is None:
             break
         high *= 2
     else:
         return None
-    low = max(least, NOTHING * high)
+    low = max(least, ZERO_LEVEL * high)
     below = normal.trial(low)
     if below.obstacle is None:
         return 0.0, None

@@ -9,9 +9,9 @@ from scipy import linalg
 
 Array = np.ndarray
 
-ISOTROPIC = 1e-6
-"""How far the stable subspace V, with orthonormal columns, may be from V'JV = 0: rounding leaves
-less, one that took an eigenvalue on the axis for a stable one far more.
+MAX_SUBSPACE_ERROR = 1e-6
+"""Largest entry of V'JV of the stable subspace V with orthonormal columns, exactly zero in theory:
+rounding leaves less, an eigenvalue on the axis taken for a stable one far more.
 """
 
 SEMIDEFINITE = 1e-8
@@ -62,7 +62,7 @@ def stabilising(A: Array, R: Array, Q: Array) -> Array | None:
     if stable != n:
         return None
     X1, X2 = vectors[:n, :n], vectors[n:, :n]
-    if np.abs(X1.T @ X2 - X2.T @ X1).max() > ISOTROPIC:
+    if np.abs(X1.T @ X2 - X2.T @ X1).max() > MAX_SUBSPACE_ERROR:
         return None
     try:
         X = np.linalg.solve(X1.T, X2.T)

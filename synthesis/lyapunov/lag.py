@@ -17,11 +17,11 @@ from synthesis.polynomial import structure
 
 Array = np.ndarray
 
-START = 2.0**-20
-"""The region begins this fraction of the range away from e = 0, so that rounded corners keep it
-invariant.
+CORNER_OFFSET = 2.0**-20
+"""The region begins this fraction of the range away from e = 0, so that it stays invariant with
+rounded corners.
 """
-ROOM = 1e-3
+INVARIANCE_MARGIN = 1e-3
 """Relative margin of the invariance condition at the corners, for the same reason."""
 
 
@@ -66,8 +66,8 @@ class LagRegion:
         """A polygon around all (p, e) that p can reach: e grows no faster than by 1 - e/(rate time)
         per unit of p.
         """
-        up = _polygon(np.diff(knots), rate * time, START * (knots[-1] - knots[0]))
-        down = _polygon(np.diff(knots)[::-1], rate * time, START * (knots[-1] - knots[0]))
+        up = _polygon(np.diff(knots), rate * time, CORNER_OFFSET * (knots[-1] - knots[0]))
+        down = _polygon(np.diff(knots)[::-1], rate * time, CORNER_OFFSET * (knots[-1] - knots[0]))
         return cls(knots, -down[::-1], up, time)
 
     def invariant(self, rate: float, number: Callable[[float], Any]) -> bool:
@@ -111,6 +111,6 @@ class LagRegion:
 def _polygon(widths: Array, reach: float, start: float) -> Array:
     out = [start]
     for width in widths:
-        out.append(out[-1] + width * max(0.0, 1.0 - (1.0 - ROOM) * out[-1] / reach))
+        out.append(out[-1] + width * max(0.0, 1.0 - (1.0 - INVARIANCE_MARGIN) * out[-1] / reach))
     assert all(a <= b for a, b in pairwise(out))  # noqa: S101 - never falls
     return np.array(out)

@@ -16,16 +16,23 @@ from synthesis.worst.frozen import norm
 Array = np.ndarray
 
 SINGULAR = 1e-9
-"""A direction with a smaller singular value, in units that bring the entries to one, is missing."""
+"""Singular values of a matrix with entries of order one up to this fraction of the largest count
+as zero.
+"""
 
-CLOSE = 0.01
-"""A gamma within this part of what no controller can lower is decided by it."""
+FLOOR_TOLERANCE = 0.01
+"""Relative difference up to which a gamma counts as decided by the part that no controller can
+lower.
+"""
 
-BELOW = 1e-6
-"""A gamma is below that by more than this part: what ill-conditioned plants leave of its digits."""
+FLOOR_ERROR = 1e-6
+"""Relative error of that part for ill-conditioned plants: a gamma below it by more contradicts it.
+"""
 
-PART = 0.3
-"""Signals with at least this part of a direction are named."""
+NAMED_FRACTION = 0.3
+"""Least component of a signal in a direction, relative to the largest, with which the signal is
+named.
+"""
 
 
 def reasons(
@@ -224,7 +231,8 @@ def decided(
     close = [
         k
         for k, floor in enumerate(floors)
-        if gamma <= floor.gamma * (1 + CLOSE) and floor.gamma <= reached * (1 + CLOSE)
+        if gamma <= floor.gamma * (1 + FLOOR_TOLERANCE)
+        and floor.gamma <= reached * (1 + FLOOR_TOLERANCE)
     ]
     close.sort(key=lambda k: -floors[k].gamma)
     out = []
@@ -250,11 +258,11 @@ def decided_by(
 
 
 def _unreachable(floor: Unreachable, names: Channels, gamma: float) -> list[str]:
-    if gamma < floor.gamma * (1 - BELOW):
+    if gamma < floor.gamma * (1 - FLOOR_ERROR):
         return [f"gamma = {gamma:.6g} cannot be reached: {_floor(floor, names)}"]
-    if gamma > floor.gamma * (1 + CLOSE):
+    if gamma > floor.gamma * (1 + FLOOR_TOLERANCE):
         return []
-    if floor.at_rest <= floor.gamma * (1 + CLOSE):
+    if floor.at_rest <= floor.gamma * (1 + FLOOR_TOLERANCE):
         return [
             f"gamma = {gamma:.6g} proves nothing: {_floor(floor, names)}, as it is with the"
             " controls at rest; scale those signals or their weights, or give the"
@@ -271,7 +279,7 @@ def _at_rest(P: Generalized, dt: float | None) -> float:
 
 
 def _idle(idle: float, gamma: float) -> list[str]:
-    if idle > gamma * (1 + CLOSE):
+    if idle > gamma * (1 + FLOOR_TOLERANCE):
         return []
     return [
         f"the gain is {idle:.6g} with the controls at rest: a controller for gamma ="
@@ -296,7 +304,7 @@ def _floor(floor: Unreachable, names: Channels) -> str:
 
 def _foremost(sizes: Array, names: tuple[str, ...]) -> str:
     order = np.argsort(-sizes)
-    return _listed([names[i] for i in order if sizes[i] >= PART * sizes.max()])
+    return _listed([names[i] for i in order if sizes[i] >= NAMED_FRACTION * sizes.max()])
 
 
 def _direction(direction: Array, names: Sequence[str]) -> str:

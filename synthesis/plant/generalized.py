@@ -17,8 +17,10 @@ from synthesis.worst.frozen import to_continuous
 
 Array = np.ndarray
 
-SIZES = 1e-100, 1e100
-"""Riccati equations square what a control costs and a measurement errs, and invert the squares."""
+SIZE_LIMITS = 1e-100, 1e100
+"""Least and largest entries: Riccati equations square control weights and measurement noise, and
+invert the squares.
+"""
 
 
 class Generalized(NamedTuple):
@@ -59,7 +61,7 @@ class Generalized(NamedTuple):
         """The matrices of a model that has these channels.
 
         Raises `InputError` for numbers whose squares are no numbers: an entry beyond the second of
-        `SIZES`, a price of a control or noise of a measurement below the first.
+        `SIZE_LIMITS`, a price of a control or noise of a measurement below the first.
         """
         w = indices(channels.disturbances, model.inputs, "input")
         u = indices(channels.controls, model.inputs, "input")
@@ -76,15 +78,15 @@ class Generalized(NamedTuple):
             ("noise", channels.measurements, noises),
         ):
             for signal, size in zip(signals, sizes, strict=True):
-                if 0 < size < SIZES[0]:
+                if 0 < size < SIZE_LIMITS[0]:
                     raise InputError(
                         f"the {what} of {signal} is {size:.3g}, whose square underflows; increase"
                         " its weight"
                     )
-        if max(np.abs(M).max(initial=0.0) for M in plant) > SIZES[1]:
+        if max(np.abs(M).max(initial=0.0) for M in plant) > SIZE_LIMITS[1]:
             raise InputError(
-                f"a model with entries beyond {SIZES[1]:.0e} cannot be squared; choose other units"
-                " or weights"
+                f"a model with entries beyond {SIZE_LIMITS[1]:.0e} cannot be squared; choose other"
+                " units or weights"
             )
         return plant
 

@@ -13,18 +13,20 @@ from symheli.lpv.equilibration import equilibrate
 Array = np.ndarray
 
 HIDDEN = 1e-9
-"""[A - s I; C] with rows and columns in units of their own loses rank at s where its smallest
-singular value is below this part of A's largest entry.
+"""[A - s I; C], with rows and columns in units of their own, loses rank at s where its smallest
+singular value is below this fraction of A's largest entry.
 """
 
 BOUNDARY = 1e-9
-"""Beside the size of A, a mode this near to the border of stability is on it."""
+"""Distance from the stability boundary, relative to the size of A, within which a mode counts as
+on it.
+"""
 
 ROUNDING = 1e-7
-"""Beside the size of A: an eigenvalue of a cluster is not known better."""
+"""Accuracy of an eigenvalue in a cluster, relative to the size of A."""
 
-SHARE = 0.3
-"""States with this part of the participation of the foremost are named with it."""
+NAMED_FRACTION = 0.3
+"""Least participation of a state, relative to the largest, with which the state is named."""
 
 
 class Mode(NamedTuple):
@@ -39,7 +41,7 @@ class Mode(NamedTuple):
     def among(self, states: tuple[str, ...]) -> str:
         """The states that take the foremost part, by name."""
         order = np.argsort(-self.participation)
-        return ", ".join(states[i] for i in order[:4] if self.participation[i] >= SHARE)
+        return ", ".join(states[i] for i in order[:4] if self.participation[i] >= NAMED_FRACTION)
 
 
 def hidden_modes(A: Array, C: Array, counts: Callable[[complex, float], bool]) -> list[Mode]:

@@ -21,7 +21,7 @@ from symheli.values.signal import Signal
 Part = LinearModel | LPVStateSpace
 Model = LPVStateSpace | UncertainStateSpace
 DISTURBANCE = "_disturbance"
-"""Ends the name of what is added to a control."""
+"""Suffix of the name of a disturbance added to a control."""
 
 
 @runtime_checkable

@@ -32,8 +32,8 @@ from synthesis.plant.generalized import Channels, Generalized
 from synthesis.plant.parts import DISTURBANCE, Model, disturbed, new_name, on, passing, with_row
 
 TRUE, WEIGHTED = "true_", "weighted_"
-"""Before the name of a performance signal of which the measurement is another: without its noise
-and filter, or without the weight.
+"""Prefixes of a performance signal that is also measured: without the noise and filter of the
+measurement, and with a weight.
 """
 
 

@@ -18,8 +18,8 @@ Array = np.ndarray
 
 NODES = {1: 41, 2: 13}
 """Values of each parameter at which the rule is applied, at least (more parameters: 7)."""
-EACH = 5
-"""Parts of every piece of the functions of one parameter, at least."""
+PARTS_PER_PIECE = 5
+"""Least number of parts of every piece of the functions of one parameter."""
 
 
 def tustin(model: LPVStateSpace, dt: float) -> LPVStateSpace:
@@ -82,4 +82,4 @@ def _nodes(model: LPVStateSpace) -> Array:
     pieces = model.basis.pieces()
     ((low, high),) = model.box  # may be narrower than the range of the functions
     knots = [low, *(piece.high for piece in pieces if low < piece.high < high), high]
-    return piecewise_lobatto(knots, max(EACH, -(-NODES[1] // (len(knots) - 1))))
+    return piecewise_lobatto(knots, max(PARTS_PER_PIECE, -(-NODES[1] // (len(knots) - 1))))

@@ -11,11 +11,11 @@ from synthesis.polynomial.matrix import PolynomialMatrix
 
 Array = np.ndarray
 
-CELLS = 4000
-"""Most boxes looked at before giving up: the answer is then "not shown"."""
+MAX_BOXES = 4000
+"""Largest number of boxes examined; beyond it the answer is "not shown"."""
 
 
-def negative_definite(F: PolynomialMatrix, cells: int = CELLS) -> bool:
+def negative_definite(F: PolynomialMatrix, cells: int = MAX_BOXES) -> bool:
     """Floating point, all boxes of a generation at once; False too where `cells` boxes did not
     suffice.
     """
@@ -41,7 +41,7 @@ def negative_definite(F: PolynomialMatrix, cells: int = CELLS) -> bool:
     return True
 
 
-def negative_definite_exactly(F: PolynomialMatrix, cells: int = CELLS) -> bool:
+def negative_definite_exactly(F: PolynomialMatrix, cells: int = MAX_BOXES) -> bool:
     """The same in the exact arithmetic of the coefficients: an LDL' factorisation of each
     decides.
     """

@@ -35,13 +35,13 @@ def positive_definite(M: Array) -> bool:
     strictly dominant in its diagonal: a few products of integers. Else all pivots of an LDL'
     factorisation decide, whose numbers grow with every row.
     """
-    return (len(M) > FEW and _dominant(M)) or _pivots_are_positive(M)
+    return (len(M) > MAX_DIRECT_ROWS and _dominant(M)) or _pivots_are_positive(M)
 
 
-FEW = 6
-"""Rows up to which the factorisation is as fast."""
-DIGITS = 50
-"""Bits of the rounded numbers of the congruence."""
+MAX_DIRECT_ROWS = 6
+"""Number of rows up to which the exact factorisation is as fast as the congruence."""
+CONGRUENCE_BITS = 50
+"""Number of bits to which the entries of the congruence are rounded."""
 
 
 def _dominant(M: Array) -> bool:
@@ -66,7 +66,7 @@ def _dominant(M: Array) -> bool:
     if not np.all(np.isfinite(R)):
         return False
     # R is `whole` times a power of two a column
-    whole = np.rint(np.ldexp(R, DIGITS - exponents)).astype(np.int64).astype(object)
+    whole = np.rint(np.ldexp(R, CONGRUENCE_BITS - exponents)).astype(np.int64).astype(object)
     own = _whole(M)
     Q = whole.T @ (own @ whole)
     steps = [1 << int(e) for e in exponents - exponents.min()]

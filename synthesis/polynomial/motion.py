@@ -13,9 +13,10 @@ from symheli.lpv import Scheduling
 
 Array = np.ndarray
 
-SHARES = {True: 2, False: 4}
-"""In how many parts either sign of a parameter that is the rate of another is cut, by whether time
-is continuous: so closely is its reach, and in discrete time the step of the other, known.
+PARTS_PER_SIGN = {True: 2, False: 4}
+"""Number of parts into which either sign of a parameter that is the rate of another is divided, by
+whether time is continuous: this limits how closely its reach and, in discrete time, the step of
+the other parameter are known.
 """
 
 
@@ -95,7 +96,7 @@ class Motion(NamedTuple):
         if continuous and math.isinf(self.rates[axis]):
             return ()  # every inequality is affine in it, and all of it can be reached
         low, high = self.box[axis]
-        count = SHARES[continuous]
+        count = PARTS_PER_SIGN[continuous]
         return tuple(side * k / count for side in (low, high) for k in range(count))
 
     def span(self, i: int, cell: Sequence[tuple[float, float]], dt: float) -> tuple[float, float]:

@@ -27,8 +27,8 @@ from synthesis.polynomial.matrix import PolynomialMatrix
 Array = np.ndarray
 
 CONSTANT = 1e-14
-"""In the search for a proof alone, coefficients of an entry that differ by less than this fraction
-of its terms are one constant: the rounding of the basis itself. A proof knows nothing of it.
+"""In the search for a proof only, coefficients of an entry that differ by less than this fraction
+of its terms count as one constant: the rounding of the basis. The proof does not use it.
 """
 
 

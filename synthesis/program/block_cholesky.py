@@ -14,8 +14,10 @@ from synthesis.polynomial.symmetric import length
 Array = np.ndarray
 
 
-LARGE = 128
-"""Rows of a block from which on a matrix without a zero block is not factored as one."""
+MAX_DENSE_ROWS = 128
+"""Number of rows of a block below which a matrix without zero blocks is factored as one dense
+matrix.
+"""
 
 
 class BlockCholesky:
@@ -29,7 +31,7 @@ class BlockCholesky:
         self.whole: Array | None = None
         self.columns: list[dict[int, Array]] = [{} for _ in range(self.size)]
         rows = len(next(iter(blocks.values())))
-        if rows < LARGE and len(blocks) == length(self.size):
+        if rows < MAX_DENSE_ROWS and len(blocks) == length(self.size):
             self._factor_whole(blocks, rows)
         else:
             self._factor_blocks(blocks)

@@ -33,7 +33,8 @@ Array = np.ndarray
 
 
 LYAPUNOV = "LYAPUNOV"
-"""What `Solver` takes for the method of `interior_point`, of Lyapunov inequalities alone."""
+"""Name in `Solver` of the method of `interior_point`, for programs of Lyapunov inequalities only.
+"""
 
 
 class Answer(Enum):
@@ -127,7 +128,7 @@ class Solver:
 
 
 _OWN = "interior-point method for Lyapunov inequalities"
-"""What certificates and messages call "LYAPUNOV"."""
+"""Name of "LYAPUNOV" in certificates and messages."""
 
 _PACKAGES = {
     "CLARABEL": "clarabel",
@@ -178,7 +179,7 @@ _OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
         "time_limit": ("TimeLimit",),
     },
 }
-"""What each solver calls tolerance, iterations and time limit; a setting that is missing has no
+"""Names of tolerance, iterations and time limit in each solver; a missing setting has no such
 option.
 """
 
@@ -258,9 +259,9 @@ def solve(program: ConeProgram, solver: Solver) -> Candidate:
     return Candidate(answer, x, time.perf_counter() - start, message)
 
 
-SHORT = 3e8
-"""Operations of an iteration that takes some tenths of a second: Clarabel and SCS can be
-interrupted between two.
+SHORT_ITERATION = 3e8
+"""Operations of an iteration that takes some tenths of a second: below it Clarabel and SCS can be
+interrupted between two iterations.
 """
 
 
@@ -271,7 +272,7 @@ def _interruptible(
     starting it takes half a second.
     """
     operations = (sum(length(n) ** 3 for n in program.sizes) + len(program.c) ** 3) / 3
-    if method is not _cvxpy and operations < SHORT:
+    if method is not _cvxpy and operations < SHORT_ITERATION:
         return method(program, solver)
     try:
         return in_process(method, program, solver)
@@ -279,9 +280,9 @@ def _interruptible(
         return Answer.FAILED, None, str(error)
 
 
-MEMORY = 4e9
-"""Bytes beyond which a program is left alone by an interior-point method: the operating system
-would end the process.
+MAX_BYTES = 4e9
+"""Bytes above which an interior-point method refuses a program: the operating system would end the
+process.
 """
 
 
@@ -293,7 +294,7 @@ def _bytes(program: ConeProgram) -> float:
 
 
 def _clarabel(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
-    if _bytes(program) > MEMORY / 4:
+    if _bytes(program) > MAX_BYTES / 4:
         words = (
             f"not tried: cones of size {max(program.sizes)} would need several times"
             f" {_bytes(program) / 1e9:.2g} GB"

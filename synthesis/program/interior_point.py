@@ -39,41 +39,39 @@ from synthesis.program.lyapunov_program import LyapunovBlocks, Program, Sizes
 Array = np.ndarray
 Normal = dict[tuple[int, int], Array]
 
-START = 10.0
-"""Least multiple of the identity to start from, for slacks and multipliers."""
+MIN_START = 10.0
+"""Least multiple of the identity from which slacks and multipliers start."""
 FEASIBLE = 1e-9
-"""Residual of the blocks, of their constants, below which they are kept without one, where they
-can be.
+"""Residual of the blocks, relative to their constants, at which a point counts as feasible."""
+MIN_LEVEL = 0.01
+"""Least level relative to which the gap is measured."""
+MIN_STEP = 1e-4
+"""Step length below which the iteration ends."""
+NORMAL_RESIDUAL = 1e-11
+"""Relative residual of the normal equations at which conjugate gradients end."""
+MAX_REFINEMENTS = 12
+"""Largest number of conjugate gradient steps for a solution of the normal equations."""
+DIAGONAL_SHIFT = 1e-13
+"""Relative increase of the diagonal of the normal equations before factoring; conjugate gradients
+correct for it.
 """
-LEAST = 0.01
-"""A level smaller than this is known to fractions of this."""
-SMALL = 1e-4
-"""Steps below this lead nowhere."""
-REFINED = 1e-11
-"""Residual of the normal equations, relative, that is small enough."""
-REFINEMENTS = 12
-"""Most conjugate gradients for a solution of the normal equations."""
-SHIFT = 1e-13
-"""The diagonal of the normal equations is factored larger by this fraction, and the gradients put
-it right.
-"""
-DUAL = 1e-6
-"""Residual of the multipliers, of the largest of their entries, at a solution."""
-IMPOSSIBLE = 1e-7
-"""Residual of multipliers, of what they show to be contradictory, that prove that there is no P."""
+DUAL_RESIDUAL = 1e-6
+"""Residual of the multipliers at a solution, relative to the largest of their entries."""
+INFEASIBILITY_RESIDUAL = 1e-7
+"""Relative residual of multipliers that prove infeasibility."""
 
-EARLY = 0.1
-"""Gap of the point from which the method may start on a program that differs little."""
-NEARLY = 10.0
-"""A gap this many times as large as it was asked for is no reason to start again from afar."""
-TRUSTED = 1e-3
-"""Residual of the multipliers, of the largest of their entries, beyond which the gap says nothing
-of the level: there it does start again.
+EARLY_GAP = 0.1
+"""Gap of the point from which the method may start on a similar program."""
+GAP_FACTOR = 10.0
+"""Factor on the requested gap up to which the result still counts as reached."""
+MAX_DUAL_RESIDUAL = 1e-3
+"""Residual of the multipliers, relative to the largest of their entries, above which the gap does
+not bound the level and the result does not count as reached.
 """
-FEW = 10
-"""So many products of matrices by coefficient take the time of one by place."""
-TOGETHER = 2_000_000
-"""Entries of n^4 by place that are summed at a time: 16 MB."""
+PRODUCT_COST = 10
+"""Number of products of matrices by coefficient that take the time of one product by place."""
+CHUNK_ENTRIES = 2_000_000
+"""Number of entries of n^4 by place that are summed at a time: 16 MB."""
 
 
 class Early(NamedTuple):
@@ -91,7 +89,7 @@ class Early(NamedTuple):
 @dataclass(frozen=True, eq=False)
 class Minimum(Candidate):
     """Whether the gap that was asked for is `reached`, at least nearly; with the point at which it
-    first was `EARLY`, None where it never was.
+    first was `EARLY_GAP`, None where it never was.
     """
 
     reached: bool = False
@@ -131,14 +129,14 @@ def _minimised(program: Program, solver: Solver, solving: Task, start: Early | N
         if close and not feasible and cones.inside(point):
             feasible, point = True, point._replace(S=cones.slacks(point.P, point.y))
             at = cones.residuals(point)
-        if feasible and early is None and at.gap <= EARLY:
+        if feasible and early is None and at.gap <= EARLY_GAP:
             least = tuple(float(np.linalg.eigvalsh(S).min()) for S in point.S)
             early = Early(point.P, point.y, at.product / cones.order, least)
-        if close and at.gap <= tolerance and at.dual_size <= DUAL:
+        if close and at.gap <= tolerance and at.dual_size <= DUAL_RESIDUAL:
             word = "solved"
         elif close and at.gap <= tolerance and at.dual_size >= before:
             word = "out of digits"  # the multipliers no longer improve
-        elif at.contradiction < IMPOSSIBLE:
+        elif at.contradiction < INFEASIBILITY_RESIDUAL:
             word = "infeasible"
         elif count == iterations:
             word = "out of iterations"
@@ -157,7 +155,7 @@ def _minimised(program: Program, solver: Solver, solving: Task, start: Early | N
         x = np.r_[svec(point.P).ravel(), point.y[1:], point.y[0]] if close else None
         gap = "" if word == "infeasible" else f", relative gap {at.gap:.1e}"
         message = f"{word} after {count} iterations{gap}"
-        reached = close and at.gap <= NEARLY * tolerance and at.dual_size <= TRUSTED
+        reached = close and at.gap <= GAP_FACTOR * tolerance and at.dual_size <= MAX_DUAL_RESIDUAL
         return Minimum(answer, x, time.perf_counter() - begin, message, reached, early)
 
 
@@ -258,7 +256,7 @@ class _Inequalities:
         # the functions of each matrix
         own = [np.flatnonzero(np.any(weights[:, :, a], axis=0)) for a in range(A)]
         total = np.zeros((k, k, v * v))
-        together = max(1, TOGETHER // n**4)
+        together = max(1, CHUNK_ENTRIES // n**4)
         for first in range(0, G, together):
             places = slice(first, first + together)
             g = [weights[places, j, a] for a, j in enumerate(own)]
@@ -362,7 +360,7 @@ def _few(blocks: LyapunovBlocks) -> bool:
         return False
     places, k, A = blocks.weights.shape
     motions = len(blocks.constant) // places
-    return k * (k + 1) * motions <= FEW * A * (A + 1)
+    return k * (k + 1) * motions <= PRODUCT_COST * A * (A + 1)
 
 
 def _contracted(g: Array, h: Array, blocks: Array) -> Array:
@@ -408,7 +406,7 @@ class _Cones:
     def start(self) -> _Point:
         """Far inside the cones, wherever that is."""
         n = self.sizes.states
-        far = max(START, self.size)
+        far = max(MIN_START, self.size)
         S = [
             far * np.broadcast_to(np.eye(c.constant.shape[1]), c.constant.shape) for c in self.each
         ]
@@ -469,7 +467,7 @@ class _Cones:
             dual_y,
             _largest(dual, dual_y) / max(1.0, most),
             product,
-            product / max(abs(float(point.y[0])), LEAST),
+            product / max(abs(float(point.y[0])), MIN_LEVEL),
             _largest(dual, level) / -constant if constant < 0 else np.inf,
         )
 
@@ -543,7 +541,7 @@ class _NormalEquations:
             cone.add_normal(scaling.H, blocks)
         for (i, j), block in blocks.items():
             if i == j:
-                block[np.diag_indices(len(block))] *= 1.0 + SHIFT
+                block[np.diag_indices(len(block))] *= 1.0 + DIAGONAL_SHIFT
         self.factor = BlockCholesky(blocks)
         start = cones.start()
         columns = [self.times(np.zeros_like(start.P), unit) for unit in np.eye(len(start.y))]
@@ -572,7 +570,7 @@ class _NormalEquations:
         P, y, rest, left = np.zeros_like(b), np.zeros_like(d), b, d
         along, pace, size = None, 0.0, _inner(b, d, b, d)
         best, least = (P, y), np.inf
-        for _ in range(REFINEMENTS):
+        for _ in range(MAX_REFINEMENTS):
             zP, zy = self._by_factors(rest, left)
             before, pace = pace, _inner(rest, left, zP, zy)
             if along is not None:
@@ -587,7 +585,7 @@ class _NormalEquations:
                 raise np.linalg.LinAlgError
             if misfit < least:
                 best, least = (P, y), misfit
-            if misfit <= REFINED:
+            if misfit <= NORMAL_RESIDUAL:
                 break
         return best
 
@@ -640,7 +638,7 @@ def _step(cones: _Cones, point: _Point, at: _Residuals, feasible: bool) -> _Poin
     share = 0.9 + 0.08 * min(along, across)
     dP, dy, dS, dZ = direction(targets)
     along, across = (_longest(extent(scaled)[0], share) for scaled in (dS, dZ))
-    if max(along, across) < SMALL:
+    if max(along, across) < MIN_STEP:
         return None
     P, y = symmetrized(point.P + along * dP), point.y + along * dy
     if feasible:

@@ -14,8 +14,8 @@ from symheli.worker import ProcessEndedError, Worker, pickled
 
 T = TypeVar("T")
 
-PATIENCE = 1.0
-"""Seconds that interrupted work has to end."""
+MAX_WAIT = 1.0
+"""Longest time for interrupted work to end, s."""
 
 
 def in_thread(work: Callable[[threading.Event], T]) -> T:
@@ -23,7 +23,7 @@ def in_thread(work: Callable[[threading.Event], T]) -> T:
     raised here.
 
     An interrupt sets `stop`, at which the work must look often, and is raised here when it has
-    ended, or `PATIENCE` later.
+    ended, or `MAX_WAIT` later.
     """
     stop, done, outcome = threading.Event(), threading.Event(), []
 
@@ -41,7 +41,7 @@ def in_thread(work: Callable[[threading.Event], T]) -> T:
             pass
     except BaseException:
         stop.set()
-        done.wait(PATIENCE)  # Python ends badly where native code still runs
+        done.wait(MAX_WAIT)  # Python ends badly where native code still runs
         raise
     value, error = outcome[0]
     if error is not None:

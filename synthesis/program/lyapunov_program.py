@@ -14,10 +14,10 @@ import numpy as np
 
 Array = np.ndarray
 
-MANY = 12
-"""States beyond which fewer coefficients of P are tried."""
-GENERAL = 9
-"""States up to which a general solver is as fast."""
+MANY_STATES = 12
+"""Number of states above which fewer coefficients of P are tried."""
+MAX_STATES_GENERAL = 9
+"""Number of states up to which a general solver is as fast."""
 
 
 class Sizes(NamedTuple):

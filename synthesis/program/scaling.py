@@ -23,33 +23,35 @@ from synthesis.worst.frozen import norm
 
 Array = np.ndarray
 
-LARGEST = 1e100
-"""Gramians square the entries of a model."""
+MAX_ENTRY = 1e100
+"""Largest entry of a model: Gramians square the entries."""
 
-UNSEEN = 0.3
-"""Every state is driven and seen by this fraction of what inputs and outputs do: what they do not
-reach needs a scale too.
+MIN_COUPLING = 0.3
+"""Every state is reached and observed at least by this fraction of the inputs and outputs, so that
+states which they do not reach have a scale too.
 """
-DECOUPLED = 1e-3
-"""Balancing leaves a coupling alone where both of its directions are below this fraction of the
-states' own pace.
+MIN_BALANCED = 1e-3
+"""Couplings of which both directions are below this fraction of the states' own rate are not
+balanced.
 """
-NOTHING = 1e-6
-"""A gain below this fraction of the response of the states is what cancellation leaves, and no
-scale of anything.
+NEGLIGIBLE_GAIN = 1e-6
+"""A gain below this fraction of the response of the states is the remainder of a cancellation and
+sets no scale.
 """
-ROUNDED = 1e-7
-"""A response below this fraction is rounding: the root of that of a Gramian."""
-START = 0.1
-"""Fraction of that response from which a proof then sets out."""
-FAR = 30.0
-"""A bound this many times larger or smaller than the scale it was found in deserves its own."""
-RESCALED = 3
-"""Most changes of scale."""
+NEGLIGIBLE_RESPONSE = 1e-7
+"""Fraction below which a response is rounding: the square root of the rounding of a Gramian."""
+INITIAL_FRACTION = 0.1
+"""Fraction of that response with which the search then begins."""
+MAX_SCALE_RATIO = 30.0
+"""Ratio of a bound to the scale in which it was found beyond which it is computed again in a new
+scale.
+"""
+MAX_RESCALINGS = 3
+"""Largest number of changes of scale."""
 LEVELS = (1.01, 2.0, 10.0, 100.0, 1e4)
 """Multiples of the expected gain at which a storage function is sought in turn."""
-SWEEPS = 100
-"""Most sweeps of balancing."""
+MAX_SWEEPS = 100
+"""Largest number of sweeps of balancing."""
 
 
 T = TypeVar("T")
@@ -177,9 +179,9 @@ def model_scaling(model: LinearModel, gain: float, elsewhere: Matrices | None = 
     """
     n, continuous = len(model.states), model.dt is None
     every = elsewhere or Matrices(*(M[None] for M in (model.A, model.B, model.C, model.D)))
-    if max(np.abs(M).max(initial=0.0) for M in every) > LARGEST:
+    if max(np.abs(M).max(initial=0.0) for M in every) > MAX_ENTRY:
         raise InputError(
-            f"a model with entries beyond {LARGEST:.0e} cannot be squared; choose other units"
+            f"a model with entries beyond {MAX_ENTRY:.0e} cannot be squared; choose other units"
         )
     B, C = np.hstack([*every.B]), np.vstack([*every.C])
     D = balance(np.abs(every.A).max(axis=0), B, C)
@@ -189,8 +191,8 @@ def model_scaling(model: LinearModel, gain: float, elsewhere: Matrices | None = 
     time = 1.0 / float(np.median(pace)) if continuous and np.median(pace) > 0 else 1.0
     A = _stabilised(A, poles, continuous)
     own = _pace(A if continuous else A - np.eye(n))
-    reached = np.hstack([B, UNSEEN * _size(B) * np.diag(np.sqrt(own))])
-    seen = np.vstack([C, UNSEEN * _size(C) * np.diag(np.sqrt(own))])
+    reached = np.hstack([B, MIN_COUPLING * _size(B) * np.diag(np.sqrt(own))])
+    seen = np.vstack([C, MIN_COUPLING * _size(C) * np.diag(np.sqrt(own))])
     Wc, Wo = _gramian(A, reached, continuous), _gramian(A.T, seen.T, continuous)
     inverse = linalg.inv(Wc)
     # where inputs and outputs weigh alike: the geometric mean of the Hankel singular values
@@ -210,7 +212,7 @@ def model_scaling(model: LinearModel, gain: float, elsewhere: Matrices | None = 
         float(np.sum(heard)),
         *(np.sqrt(np.trace(c) * np.trace(o)) for c, o in (alone, (Wc, Wo))),
     )
-    channel = _channel(gain, response if response > ROUNDED * silent else hardly)
+    channel = _channel(gain, response if response > NEGLIGIBLE_RESPONSE * silent else hardly)
     size_B, size_C = (
         np.linalg.norm(weight @ linalg.solve(root, B)),
         np.linalg.norm(C @ root @ weight) / channel,
@@ -261,11 +263,14 @@ def in_its_own_scale(found: Callable[[float], tuple[T, float, float]], expected:
     """
     results: list[T] = []
     least = 0.0
-    for _ in range(1 + RESCALED):
+    for _ in range(1 + MAX_RESCALINGS):
         result, bound, scale = found(expected)
         results.append(result)
-        least = least or NOTHING * scale
-        if not least < bound < math.inf or scale / FAR < bound < scale * FAR:
+        least = least or NEGLIGIBLE_GAIN * scale
+        if (
+            not least < bound < math.inf
+            or scale / MAX_SCALE_RATIO < bound < scale * MAX_SCALE_RATIO
+        ):
             break
         expected = bound
     return results
@@ -276,7 +281,7 @@ def balance(A: Array, B: Array, C: Array) -> Array:
     as what leaves it.
 
     A (n, n) of sizes, its diagonal the states' own. Osborne's balancing of the whole system matrix;
-    a state that is reached or seen by nothing else ends at `DECOUPLED`.
+    a state that is reached or seen by nothing else ends at `MIN_BALANCED`.
     """
     n = len(A)
     d, own = np.ones(n), np.abs(np.diag(A))
@@ -286,14 +291,14 @@ def balance(A: Array, B: Array, C: Array) -> Array:
         np.linalg.norm(B, axis=1),
         np.linalg.norm(C, axis=0),
     )
-    for _ in range(SWEEPS):
+    for _ in range(MAX_SWEEPS):
         # inputs and outputs in the units in which they are as large as one another
         ratio = _size(out * d) / _size(into / d)
         unit = np.sqrt(ratio) if into.any() and out.any() else 1.0
         before = d.copy()
         for i in range(n):
-            entering = A[i] @ d / d[i] + into[i] * unit / d[i] + DECOUPLED * own[i]
-            leaving = A[:, i] @ (1 / d) * d[i] + out[i] / unit * d[i] + DECOUPLED * own[i]
+            entering = A[i] @ d / d[i] + into[i] * unit / d[i] + MIN_BALANCED * own[i]
+            leaving = A[:, i] @ (1 / d) * d[i] + out[i] / unit * d[i] + MIN_BALANCED * own[i]
             d[i] *= np.sqrt(entering / leaving)
         if np.abs(np.log(d / before)).max(initial=0.0) < 0.05:
             break
@@ -304,7 +309,11 @@ def _channel(gain: float, response: float) -> float:
     """The gain expected; where that is nothing beside the `response` of the states to inputs and
     outputs, a gain to begin with.
     """
-    return gain if math.isfinite(gain) and gain > NOTHING * response else START * response
+    return (
+        gain
+        if math.isfinite(gain) and gain > NEGLIGIBLE_GAIN * response
+        else INITIAL_FRACTION * response
+    )
 
 
 def _size(M: Array) -> float:

@@ -14,16 +14,16 @@ from synthesis.worst.frozen import to_continuous
 
 Array = np.ndarray
 
-LEAST = 1e-12
-"""Share of the pace of the states below which there is no strict dissipation to speak of."""
-REFINED = 2
-"""Steps of Newton that put right what the Schur form leaves where paces are far apart."""
-AGAIN = 3
-"""Most changes of coordinates on the way, each to those of the function found last."""
-ROUND = 100.0
-"""Condition of P below which they are left at that."""
-SHRINK = 8.0
-"""By which the share falls until there is a solution, and once more from there."""
+MIN_DISSIPATION = 1e-12
+"""Least dissipation, as a fraction of the rates of the states."""
+NEWTON_STEPS = 2
+"""Number of Newton steps that correct the Schur solution where rates are far apart."""
+MAX_CHANGES = 3
+"""Largest number of changes of coordinates, each to those of the last storage function."""
+MAX_CONDITION = 100.0
+"""Condition number of P below which the coordinates are kept."""
+REDUCTION = 8.0
+"""Factor by which the dissipation is reduced until a solution exists, and once more from there."""
 
 
 class Storage(NamedTuple):
@@ -49,14 +49,14 @@ def strict_storage(
         into = _midway(A)
         A, B, C, D = to_continuous(A, B, C, D)
     T, found = np.eye(len(A)), None
-    for _ in range(AGAIN):
+    for _ in range(MAX_CHANGES):
         own = _strict(linalg.solve(T, A @ T), linalg.solve(T, B), C @ T, D, level)
         if own is None:
             break
         P, W = own
         step = powered(P, -0.5)
         T, found = T @ step, Storage(T @ step, symmetrized(step @ W @ step))
-        if np.linalg.cond(P) < ROUND:
+        if np.linalg.cond(P) < MAX_CONDITION:
             break
     if found is None:
         return None
@@ -85,12 +85,12 @@ def _strict(A: Array, B: Array, C: Array, D: Array, level: float) -> tuple[Array
     """P and W."""
     pace = _pace(A)
     share = 1.0
-    while share > LEAST:
+    while share > MIN_DISSIPATION:
         if _least(A, B, C, D, level, share * pace) is not None:
-            W = share / SHRINK * pace
+            W = share / REDUCTION * pace
             P = _least(A, B, C, D, level, W)
             return (P, W) if P is not None and linalg.eigvalsh(P)[0] > 0 else None
-        share /= SHRINK
+        share /= REDUCTION
     return None
 
 
@@ -104,7 +104,7 @@ def _least(A: Array, B: Array, C: Array, D: Array, level: float, W: Array) -> Ar
     X = stabilising(F, G, Q)
     if X is None:
         return None
-    for _ in range(REFINED):
+    for _ in range(NEWTON_STEPS):
         residual = symmetrized(X @ F + F.T @ X + X @ G @ X + Q)
         X = symmetrized(X + linalg.solve_continuous_lyapunov((F + G @ X).T, -residual))
     return X

@@ -34,23 +34,23 @@ from synthesis.proof.inequalities import Demand, Pair, decrease, peak, positivit
 
 Array = np.ndarray
 
-LADDER = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
-"""The bound is loosened by these fractions in turn until the whole box is shown to admit it."""
+LOOSENINGS = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
+"""Fractions by which the bound is increased in turn until it is verified on the whole box."""
 
 
-FURTHER = (1e2, 1e4, 1e6)
-"""Steps beyond, where the model has no response to compare rounding with."""
+LARGE_LOOSENINGS = (1e2, 1e4, 1e6)
+"""Further fractions, for a model without a response to compare rounding with."""
 
 GRID = 100
-"""Values of p at which a proof is checked in floating point."""
+"""Number of values of p at which a proof is checked in floating point."""
 
-WITNESSES = 40
-"""Values of several parameters at which a proof is checked once more, through the model's own
-matrices.
+INDEPENDENT_POINTS = 40
+"""Number of values of several parameters at which a proof is checked once more, through the
+model's own matrices.
 """
 
-TINY = 1e-8
-"""Least g in scaled units: a model without response is given a small gain rather than none."""
+MIN_LEVEL = 1e-8
+"""Least g in scaled units: no strict inequality proves zero."""
 
 
 class Evidence(NamedTuple):
@@ -150,7 +150,7 @@ class Evidence(NamedTuple):
         g = samples.gain()
         if kind == "l2 gain" or not 0 < g < math.inf:
             return P, math.sqrt(g) / self.in_units(1.0)
-        factor = 1.0 / (g * (1 + LADDER[0]))
+        factor = 1.0 / (g * (1 + LOOSENINGS[0]))
         P = replace(P, coefficients=P.coefficients * factor)
         back = self._back(P)
         return P, math.sqrt(_samples(model, back, demand, points).peak()) / self.in_units(1.0)
@@ -164,9 +164,9 @@ class Evidence(NamedTuple):
         if math.isinf(value):
             return None
         nothing = kind.endswith("gain") and value * self.in_units(1.0) <= math.sqrt(
-            TINY * (1 + LADDER[0])
+            MIN_LEVEL * (1 + LOOSENINGS[0])
         )
-        for fraction in (*LADDER, *FURTHER) if nothing else LADDER:
+        for fraction in (*LOOSENINGS, *LARGE_LOOSENINGS) if nothing else LOOSENINGS:
             # gains: of gamma^2
             bound = (
                 value
@@ -223,7 +223,7 @@ class Evidence(NamedTuple):
         """The pieces are the model, and the inequalities hold at some p without them; see
         `pointwise`.
         """
-        points = self._points(P, 1, WITNESSES)
+        points = self._points(P, 1, INDEPENDENT_POINTS)
         own = self.model.at(points)
         if not all(self._reproduced(p, [M[k] for M in own]) for k, p in enumerate(points)):
             return False
@@ -327,11 +327,11 @@ class _Samples(NamedTuple):
         """Least g of the corner block."""
         if any(np.linalg.eigvalsh(P).min() <= 0 for P in self.here):
             return math.inf
-        return max([TINY, *(_least_level(F, self.nx) for F in self.moves)])
+        return max([MIN_LEVEL, *(_least_level(F, self.nx) for F in self.moves)])
 
     def peak(self) -> float:
         """Least g of the second inequality."""
-        return max([TINY, *(_least_level(F, F.shape[1] - self.ny) for F in self.outputs)])
+        return max([MIN_LEVEL, *(_least_level(F, F.shape[1] - self.ny) for F in self.outputs)])
 
     def decay(self, dt: float | None) -> float:
         """Largest alpha."""

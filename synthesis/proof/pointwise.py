@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 
 Array = np.ndarray
 
-INSIDE = (0.03, 0.382, 0.764, 0.97)
-"""Where in a stretch between knots and breaks an inequality is looked at: near its ends, where
-derivatives jump, and between.
+RELATIVE_POSITIONS = (0.03, 0.382, 0.764, 0.97)
+"""Positions in an interval between knots and breaks at which an inequality is checked: near its
+ends, where derivatives jump, and in between.
 """
 ROUNDING = 1e-10
 """Largest difference of an entry of a polynomial piece from the model's own, as a fraction of what
@@ -44,9 +44,11 @@ def inside(points: Any, least: int = 1) -> list[float]:
     values or more.
     """
     ends = sorted(set(map(float, points)))
-    parts = -(-least // (len(INSIDE) * (len(ends) - 1)))
+    parts = -(-least // (len(RELATIVE_POSITIONS) * (len(ends) - 1)))
     finer = np.interp(np.arange(parts * (len(ends) - 1) + 1) / parts, np.arange(len(ends)), ends)
-    return [a + share * (b - a) for a, b in pairwise(finer.tolist()) for share in INSIDE]
+    return [
+        a + share * (b - a) for a, b in pairwise(finer.tolist()) for share in RELATIVE_POSITIONS
+    ]
 
 
 def combined(axes: Sequence[Sequence[float]], count: int) -> Array:

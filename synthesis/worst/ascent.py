@@ -26,8 +26,10 @@ from synthesis.worst.waves import Steps, steps
 
 Array = np.ndarray
 
-REACH = 0.25
-"""First trust region, as a fraction of the range of p; the period may then change by a tenth."""
+INITIAL_RADIUS = 0.25
+"""Radius of the first trust region, as a fraction of the range of p; the period may then change by
+a tenth.
+"""
 SHORTEST_REACH = 1e-3
 """The ascent ends where a trust region this small brings nothing."""
 
@@ -88,7 +90,7 @@ def ascend(
     """
     s = lpv.scheduling
     width = s.high - s.low
-    best, reach = start, REACH
+    best, reach = start, INITIAL_RADIUS
     here, gradient = _gradient(lpv, best, objective)
     for _ in range(evaluations - 1):
         if reach < SHORTEST_REACH or not math.isfinite(here.value) or budget.over:
@@ -103,7 +105,12 @@ def ascend(
             objective.score(there.value, trial.time[-1])
             > objective.score(here.value, best.time[-1]) + 1e-9
         ):
-            best, here, gradient, reach = trial, there, new_gradient, min(1.5 * reach, 2 * REACH)
+            best, here, gradient, reach = (
+                trial,
+                there,
+                new_gradient,
+                min(1.5 * reach, 2 * INITIAL_RADIUS),
+            )
         else:
             reach /= 3.0
     return best, here.value

@@ -33,8 +33,8 @@ Array = np.ndarray
 Measure = Callable[[Array, Array, Array, Array], float]
 
 WAVES = 30
-"""Waves looked at along each line for peaks and slow decay, those of the fastest growth first; for
-peaks, those of many periods too.
+"""Number of waves examined along each line for peaks and slow decay, those of the fastest growth
+first; for peaks also waves of many periods.
 """
 
 

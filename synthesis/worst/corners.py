@@ -24,8 +24,8 @@ from synthesis.worst.waves import Steps, steps
 
 Array = np.ndarray
 
-SHIFT = 1e-6
-"""Relative change of a rest or of a level by which the steps are differenced."""
+RELATIVE_STEP = 1e-6
+"""Relative change of a rest or of a level in the finite differences of the steps."""
 
 
 class Corners(NamedTuple):
@@ -123,13 +123,13 @@ def gradient(
         difference = found.along(path.steps(other).step - system.step)
         return np.bincount(part, difference, 2 * k)
 
-    of_rests = change(corners._replace(rests=corners.rests * (1 + SHIFT)))[::2] / (
-        SHIFT * corners.rests
+    of_rests = change(corners._replace(rests=corners.rests * (1 + RELATIVE_STEP)))[::2] / (
+        RELATIVE_STEP * corners.rests
     )
     of_levels, longer = np.zeros(k), np.zeros(k)
     for parity in (0, 1):
         moved = np.arange(k) % 2 == parity
-        shift = SHIFT * 2 * s.radius * np.where(corners.levels > s.middle, -1.0, 1.0)
+        shift = RELATIVE_STEP * 2 * s.radius * np.where(corners.levels > s.middle, -1.0, 1.0)
         other = corners._replace(levels=corners.levels + np.where(moved, shift, 0.0))
         # a level is felt on its rest and on the ramps before and after it
         rest, ramp = change(other).reshape(k, 2).T

@@ -13,7 +13,7 @@ from scipy.optimize import minimize, minimize_scalar
 Array = np.ndarray
 
 STARTS = 3
-"""The highest peaks of the grid are climbed, so many of them."""
+"""Number of grid peaks, the highest first, from which an ascent starts."""
 
 
 def grid_of(axes: Sequence[Array]) -> Array:

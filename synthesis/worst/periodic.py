@@ -24,7 +24,7 @@ LANCZOS_STEPS = 30
 never wrong.
 """
 RESIDUAL = 1e-3
-"""They end where the residual of the squared norm is this fraction of it."""
+"""Residual of the squared norm, relative to it, at which the iteration ends."""
 
 
 class Sensitivity(NamedTuple):

@@ -26,9 +26,9 @@ from synthesis.worst.waves import Wave
 Array = np.ndarray
 
 CANDIDATES = 24
-"""Trapezoids that are averaged and flown."""
-MOVED = 40
-"""Evaluations by which the best is moved about."""
+"""Number of trapezoidal trajectories that are averaged and simulated."""
+MAX_EVALUATIONS = 40
+"""Number of evaluations with which the best trajectory is refined."""
 
 
 class Smooth(NamedTuple):
@@ -196,6 +196,6 @@ def _moved(
         cost,
         start,
         method="Nelder-Mead",
-        options={"maxfev": MOVED, "initial_simplex": simplex},
+        options={"maxfev": MAX_EVALUATIONS, "initial_simplex": simplex},
     )
     return best

@@ -18,17 +18,17 @@ if TYPE_CHECKING:
 
 Array = np.ndarray
 
-STRETCH = 2.0
-"""Along the slowest cycles time steps are at most this many times what resolves the fastest
+MAX_STEP_RATIO = 2.0
+"""Largest ratio of a time step along the slowest cycles to the step that resolves the fastest
 mode.
 """
 
-FINEST = 8
-"""For a slow p the levels are at most this many times closer than asked for."""
+MAX_LEVEL_RATIO = 8
+"""Largest factor by which levels may be closer than requested for a slow p."""
 
 
 PERIODS = 7
-"""Periods of the waves that `spread` looks at, from half that of the fastest mode to the
+"""Number of periods of the waves that `spread` tries, from half that of the fastest mode to the
 longest.
 """
 
@@ -53,7 +53,7 @@ class WaveFamily:
         # a slow p covers little of the range in the longest cycle: levels close enough for some
         # steps up and down
         spacing = min((s.high - s.low) / search.levels, self.rate * self.longest_period / 6)
-        levels = min(math.ceil((s.high - s.low) / spacing), FINEST * search.levels)
+        levels = min(math.ceil((s.high - s.low) / spacing), MAX_LEVEL_RATIO * search.levels)
         self.grid = np.linspace(s.low, s.high, levels + 1)
 
     @property
@@ -69,7 +69,7 @@ class WaveFamily:
         if self.lpv.dt is not None:
             # every sample of a cycle counts, so that long cycles are dear
             return min(self.longest_period, self.search.steps * self.lpv.dt)
-        s, reach = self.lpv.scheduling, STRETCH * self.search.steps * self.longest
+        s, reach = self.lpv.scheduling, MAX_STEP_RATIO * self.search.steps * self.longest
         return max(self.longest_period, min(2 * (s.high - s.low) / self.rate, reach))
 
     def wave(
