@@ -1,4 +1,4 @@
-"""The forms of the Lyapunov function V that a proof can take, as one asks for them."""
+"""The forms of the Lyapunov function V that a user can request for a proof."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class _InP:
 
     @property
     def near(self) -> float:
-        """`accept`, or what is usual."""
+        """`accept`, or its default."""
         return 2.0 if self.accept is None else self.accept
 
 
@@ -219,4 +219,4 @@ class HigherOrder(_InP):
 
 
 LyapunovForm = Spline | Memory | HigherOrder
-"""What `form` may be."""
+"""Type of `form`."""

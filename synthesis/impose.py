@@ -1,5 +1,5 @@
-"""How an inequality is imposed for every p of a range, as one asks for it; docs/relaxations.md says
-what each promises.
+"""The relaxations with which a user can impose an inequality for every p of a range;
+docs/relaxations.md describes them.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ FLOOR = 1e-6
 
 @dataclass(frozen=True, kw_only=True)
 class _Strictly:
-    """How strictly: see `Bernstein`."""
+    """Margins of the inequalities: see `Bernstein`."""
 
     margins: tuple[float, ...] | None = None
     floor: float | None = None
@@ -32,12 +32,12 @@ class _Strictly:
 
     @property
     def tried(self) -> tuple[float, ...]:
-        """The margins, or the usual ones."""
+        """The margins, or their defaults."""
         return MARGINS if self.margins is None else self.margins
 
     @property
     def least(self) -> float:
-        """The floor, or the usual one."""
+        """The floor, or its default."""
         return FLOOR if self.floor is None else self.floor
 
 
@@ -188,4 +188,4 @@ class Grid(_Strictly):
 
 
 Imposed = Bernstein | SumOfSquares | Vertices | Grid
-"""What `impose` may be."""
+"""Type of `impose`."""

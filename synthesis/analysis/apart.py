@@ -1,5 +1,5 @@
-"""Why the two bounds of a gain are apart: numbers, a fine sample period, a search that did not end,
-or the class of P.
+"""Causes of a gap between the two bounds of a gain: rounding, a small sample period, a search that
+did not converge, or the class of P.
 """
 
 from __future__ import annotations
@@ -29,15 +29,16 @@ MIN_SAMPLING_RATIO = 1.01
 
 
 def apart(gamma: float, lower: float, rounding: float, answer: Answer) -> tuple[str, ...]:
-    """A sentence where a proven gain is far above what no proof undercuts; else nothing.
+    """Return a sentence on the cause where a proven gain is far above its lower bound; else
+    nothing.
 
     `rounding` is the fraction by which the gain of a frozen model was missed in the same
-    coordinates (NaN: not asked), `answer` the solver's for the program of the proof.
+    coordinates (NaN: not computed), `answer` the solver's for the program of the proof.
     """
     if not (math.isfinite(gamma) and gamma > MAX_UNEXPLAINED_RATIO * lower) or math.isnan(rounding):
         return ()
     if lower == 0.0:
-        return ()  # the lower bound tells nothing to compare with
+        return ()  # there is no lower bound to compare with
     head = f"the bounds are {100 * (gamma / lower - 1):.3g} % apart"
     if not rounding <= FROZEN_GAIN_ERROR:
         return (
@@ -58,8 +59,8 @@ def apart(gamma: float, lower: float, rounding: float, answer: Answer) -> tuple[
 
 
 def fine_sampling(A: Array, dt: float | None, gamma: float, lower: float) -> tuple[str, ...]:
-    """A hypothesis where `gamma`, proven of a model sampled every `dt` seconds, may be loose
-    because of that period; else nothing.
+    """Return a hypothesis where `gamma`, proven of a model sampled every `dt` seconds, may be
+    conservative because of that period; else nothing.
 
     A (k, n, n): frozen models of the range. `lower` is the lower bound on the gain.
     """

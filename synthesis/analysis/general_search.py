@@ -1,4 +1,4 @@
-"""The general route: any number of parameters, kind of bound and way to impose it."""
+"""The general search: any number of parameters, kind of bound and relaxation."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class General(Ladder):
         super().__init__(problem)
 
     def expect(self, bound: float) -> float:
-        """Set the units; the unit of gains."""
+        """Set the units for this expected gain; return the unit of gains."""
         model, kind = self.problem.model, self.problem.demand.kind
         frozen, scale = _scaling(model, kind, bound)
         self.choices = [scale]
@@ -76,8 +76,8 @@ class General(Ladder):
         return self._in_units(self.choices[-1])
 
     def settle(self) -> float:
-        """Programs are solved in the first units in which the gain of the model frozen at mid-range
-        is found, or nearly; the unit of gains.
+        """Choose the first units in which the gain of the model frozen at mid-range is found
+        accurately; return the unit of gains.
         """
         if self.problem.demand.kind != "l2 gain" or len(self.choices) == 1:
             return self.unit
@@ -100,7 +100,7 @@ class General(Ladder):
         return 1.0 / self.evidence.in_units(1.0)
 
     def _frozen_gain(self) -> float:
-        """What a program in these units finds of the gain of the model frozen at mid-range."""
+        """Return the gain of the model frozen at mid-range as a program in these units finds it."""
         whole, scaled = self.evidence, self.scaled
         box = tuple((s.low, s.high) for s in self.problem.model.parameters)
         still = {
@@ -120,13 +120,13 @@ class General(Ladder):
 
     @property
     def found_by(self) -> str:
-        """How the inequalities were imposed in the search."""
+        """Name of the relaxation used in the search."""
         if self.problem.by_points:
             return "LMIs at single p, added where they were violated"
         return super().found_by
 
     def constant(self) -> Shape:
-        """One matrix for the whole box."""
+        """The form of a constant P over the whole box."""
         parameters = self.problem.model.parameters
         ends = tuple(np.array([s.low, s.high]) for s in parameters)
         return Shape(ends, (0,) * len(parameters))
@@ -136,7 +136,7 @@ class General(Ladder):
         return any(shape.degrees)
 
     def shapes(self) -> list[Shape]:
-        """The P of the form that was asked for."""
+        """Forms of P that the user requested, in turn."""
         model, form, m = self.problem.model, self.problem.form, len(self.problem.model.parameters)
         motion = self.problem.demand.motion
         # a parameter whose rate is another is one of its own, graded towards its lower end
@@ -177,7 +177,7 @@ class General(Ladder):
         return out
 
     def attempt(self, shape: Shape, margin: float, alpha: float = 0.0) -> Found:
-        """One P and one margin, or one decay rate."""
+        """Solve and verify a program with one form of P and one margin, or one decay rate."""
         problem = self.problem
         demand = self.scaled_demand
         shift = self.evidence.in_units(alpha) if alpha else 0.0
@@ -195,7 +195,7 @@ class General(Ladder):
         return found
 
     def _solve(self, shape: Shape, margin: float) -> Candidate:
-        """A program of every inequality."""
+        """Solve the program of all inequalities."""
         problem, start = self.problem, time.perf_counter()
         if problem.by_points:
             every = self._inequalities(shape)
@@ -216,8 +216,8 @@ class General(Ladder):
         return candidate
 
     def _by_points(self, shape: Shape, margin: float) -> tuple[Found, str]:
-        """Programs of few inequalities, which those that came out violated join, until the bound
-        proven of the whole box is near their level; in a word what became of them.
+        """Solve programs of few inequalities, adding the violated ones, until the bound proven on
+        the whole box is near their level; return it with the outcome in words.
         """
         best, n, nu = Found(math.inf), *self.problem.model.sizes[:2]
         every, rounds = self._inequalities(shape), 0
@@ -247,7 +247,7 @@ class General(Ladder):
         return best, f"{candidate.message} ({rounds} round(s))"
 
     def _inequalities(self, shape: Shape) -> list[LyapunovBlocks]:
-        """Those that may join a program, one object a region."""
+        """Return the inequalities that may be added, one object a region."""
         start, demand = time.perf_counter(), self.scaled_demand
         count = CANDIDATE_POINTS.get(len(shape.knots), 5)
         moving = demand.moving(shape.degrees)
@@ -259,7 +259,9 @@ class General(Ladder):
         return every
 
     def _first(self, shape: Shape, block: LyapunovBlocks) -> Array:
-        """Which of a region stand in the first program: some points, with every motion."""
+        """Mark the inequalities of a region in the first program: some points, with every
+        motion.
+        """
         m = len(shape.knots)
         count = CANDIDATE_POINTS.get(m, 5)
         chosen = np.zeros(count, dtype=bool)
@@ -284,11 +286,11 @@ class General(Ladder):
 
     @property
     def weight(self) -> Array:
-        """Of the state blocks; see `Scaling`."""
+        """Weight of the state blocks; see `Scaling`."""
         return self.evidence.units.weight
 
     def _lyapunov(self, x: Array, shape: Shape) -> BoxLyapunov:
-        """P at the solver's point x, as it is stored: in physical units."""
+        """Return P at the solver's point x in physical units, as it is stored."""
         n, free = self.problem.model.sizes[0], shape.free
         values = smat(x[: free.shape[1] * length(n)].reshape(free.shape[1], -1), n)
         tensor = np.tensordot(free, values, axes=1).reshape(*shape.counts, n, n)
@@ -301,7 +303,7 @@ class General(Ladder):
         return found
 
     def _judged(self, candidate: Candidate, shape: Shape) -> Found:
-        """What P itself gives, whatever the solver said."""
+        """Compute the bound that P itself admits, whatever status the solver reported."""
         if candidate.x is None:
             return Found(math.inf, None, candidate.answer)
         n, free, gains = self.problem.model.sizes[0], shape.free, self.problem.gains

@@ -1,4 +1,6 @@
-"""A controller whose reading of the parameter stands still: how far the true one may go."""
+"""A controller with a constant scheduling input: the range of the true parameter with a stability
+proof.
+"""
 
 from __future__ import annotations
 
@@ -13,8 +15,7 @@ from symheli.threads import with_one_thread
 from synthesis.analysis.questions import stability
 from synthesis.plant.as_controller import as_controller
 from synthesis.plant.plant import Plant, require_plant
-from synthesis.worst.rates import Rate
-from synthesis.worst.rates import asked as limits
+from synthesis.worst.rates import Rate, limits
 
 MIN_TOLERANCE = 1e-6
 """Smallest permitted tolerance: twenty bisections, each with a proof; solvers are no more
@@ -23,8 +24,8 @@ accurate.
 
 
 class Largest(NamedTuple):
-    """`proven`: the largest value with a proof, 0 where even the least that was tried had none;
-    `failed`: the least without one, inf where all had one.
+    """Result of a bisection: `proven`, the largest value with a proof, 0 where even the least tried
+    had none; `failed`, the least without one, inf where all had one.
     """
 
     proven: float
@@ -34,7 +35,8 @@ class Largest(NamedTuple):
 def largest(
     proves: Callable[[float], bool], most: float, tolerance: float = 0.05, *, least: float = 1e-3
 ) -> Largest:
-    """The largest value up to `most` for which `proves` says yes, to `tolerance` of `most`.
+    """Search the largest value up to `most` for which `proves` returns True, to `tolerance` of
+    `most`.
 
     What is proven for a value is taken to hold for all below it; each returned number was tried.
 

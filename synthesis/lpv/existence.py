@@ -1,5 +1,5 @@
-"""Whether there is a controller: the two halves of `elimination` and what couples them, as a
-program whose blocks are imposed at points of the range of p.
+"""Existence of a controller: the two inequalities of `elimination` and their coupling, as a program
+whose blocks are imposed at points of the range of p.
 
 The points are few at first; between them the blocks are looked at on a finer grid, and where one is
 violated a point is added. Nothing is proven by that, and nothing need be: the certificate of the
@@ -87,8 +87,8 @@ class ExistenceProgram:
 
 
 class Solution(NamedTuple):
-    """Coefficients of X, Y (and of the bound of Y at the next sample) with the g they admit, what
-    the solver said, whether it `reached` its tolerance, and where it may start again.
+    """Coefficients of X, Y (and of the bound of Y at the next sample) with the g they admit, the
+    solver's answer, whether it `reached` its tolerance, and a point to start again from.
     """
 
     gamma: float
@@ -126,7 +126,7 @@ class Existence:
         self.points = first if p is None else np.unique(np.vstack([first, p]), axis=0)
 
     def _first(self, divisions: int) -> Array:
-        """Points (K, m) at which blocks are imposed at first."""
+        """Return the points (K, m) at which blocks are imposed at first."""
         if not 1 <= whole(divisions, "divisions", 1) <= MAX_DIVISIONS:
             raise InputError(f"divisions: expected 1 to {MAX_DIVISIONS}, got {divisions}")
         breaks = [set(b) for b in self.plant.breaks]
@@ -150,7 +150,7 @@ class Existence:
         return tensor_grid(axes)
 
     def least_gamma(self, solver: Solver) -> Solution:
-        """Minimise g, with points added where a block is violated between them."""
+        """Minimise g, adding points where a block is violated between them."""
         if len(self.points) == 1:
             return self._least(solver)
         start = None
@@ -171,8 +171,9 @@ class Existence:
         return self._solved(blocks, 1.0, solver, start)
 
     def least_share(self, found: Solution, largest: float, solver: Solver) -> float:
-        """Below this part of the g that was found there is none within a larger bound on X and Y;
-        0 where the program does not tell. At the present points alone: more of them raise g.
+        """Return the fraction of the g found below which none exists within a larger bound on X and
+        Y; 0 where the program does not decide. It holds for the present points: more of them raise
+        g.
         """
         within = self._least_within(
             largest, replace(solver, tolerance=COARSE_TOLERANCE), found.early
@@ -180,13 +181,13 @@ class Existence:
         return (1 - COARSE_TOLERANCE) * within.gamma / found.gamma if within.reached else 0.0
 
     def bounded(self, found: Solution) -> bool:
-        """Whether the bound on X and Y decides."""
+        """Whether the bound on X and Y is active."""
         each = (u.at(found.coefficients, self.points) for u in (self.X, self.Y) if u is not None)
         return any(np.linalg.eigvalsh(M).max() > ACTIVE_FRACTION * self.largest for M in each)
 
     def _added(self, found: Solution, gamma: float) -> bool:
-        """Whether a block is violated between the points at this g: then there are more of them,
-        where it is most, one in each cell of the present ones.
+        """Whether a block is violated between the points at this g: then points are added where it
+        is violated most, one in each cell of the present ones.
         """
         axes = [np.unique(x) for x in self.points.T]
         finer = CHECK_RATIO.get(len(axes), 2)
@@ -204,7 +205,7 @@ class Existence:
         return bool(chosen)
 
     def _excess(self, points: Array, found: Solution, gamma: float) -> Array:
-        """The largest eigenvalue (K,) of any half at each point."""
+        """Return the largest eigenvalue (K,) of any half at each point."""
         values = [
             np.linalg.eigvalsh(b.linear(found.coefficients) + b.constant)[:, -1]
             for b in self._halves_at(points, gamma, 0.0)
@@ -212,8 +213,8 @@ class Existence:
         return np.concatenate([v.reshape(-1, len(points)) for v in values]).max(axis=0)
 
     def widest(self, gamma: float, solver: Solver) -> Iterator[Solution]:
-        """For this g the X and Y whose product is farthest from one: first within the least bound
-        beyond which that hardly grows, then within larger ones.
+        """Return, for this g, the X and Y whose product is farthest from the identity: within the
+        least bound beyond which that hardly grows, then within larger ones.
         """
         for margin in SETTLED_MARGINS:
             before: Solution | None = None
@@ -230,7 +231,7 @@ class Existence:
                 yield before._replace(gamma=gamma)
 
     def _widest(self, gamma: float, margin: float, largest: float, solver: Solver) -> Solution:
-        """The same within this bound, with points added as for the least g."""
+        """Solve this within one bound, adding points as for the least g."""
         for _ in range(MAX_ROUNDS):
             blocks = [*self._halves(gamma, margin), *self._coupling(True, largest)]
             found = self._solved(blocks, -1.0, solver)
@@ -263,7 +264,7 @@ class Existence:
         )
 
     def _halves(self, gamma: float | None, margin: float) -> list[LyapunovBlocks]:
-        """Those of every point, for this g or for one that is sought."""
+        """Return the halves at every point, for this g or for an unknown one."""
         return self._halves_at(self.points, gamma, margin)
 
     def _halves_at(self, p: Array, gamma: float | None, margin: float) -> list[LyapunovBlocks]:
@@ -308,13 +309,13 @@ class Existence:
         return [blocks.finished(constant + margin * np.eye(N), level)]
 
     def _motions(self, unknown: UnknownFunction, p: Array) -> list[Array]:
-        """Every extreme dp/dt (K, m) at these points, per scaled time."""
+        """Return every extreme dp/dt (K, m) at these points, per scaled time."""
         if not unknown.moves:
             return [np.zeros(p.shape)]
         return self.plant.motions(p, used(unknown.basis))
 
     def _next(self, p: Array, margin: float) -> list[LyapunovBlocks]:
-        """S(p) <= Y(p(k+1)) to first order in the step, at its ends."""
+        """Impose S(p) <= Y(p(k+1)) to first order in the step, at its ends."""
         assert self.S is not None  # noqa: S101 - see `_halves_at`
         assert self.Y is not None  # noqa: S101
         out, one = [], np.eye(self.states)
@@ -328,7 +329,8 @@ class Existence:
         return out
 
     def _coupling(self, apart: bool, largest: float) -> list[LyapunovBlocks]:
-        """[X I; I Y] > 0, with g in place of I where they are to be `apart`; both below a bound.
+        """Impose [X I; I Y] > 0, with g in place of I if they are to be `apart`, and an upper bound
+        on both.
 
         Without one of the two the other is positive, or apart from zero by g.
         """
@@ -356,5 +358,5 @@ class Existence:
 
 
 def _below(M: Array, n: int) -> Array:
-    """[0 0; 0 M] with n rows of nothing first."""
+    """Return [0 0; 0 M] with n rows of zeros first."""
     return np.pad(M, [(0, 0)] * (M.ndim - 2) + [(n, 0), (n, 0)])

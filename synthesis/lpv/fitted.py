@@ -1,4 +1,4 @@
-"""Gains known at some p as functions of p, and as a controller in the units of its plant."""
+"""Gains computed at some p as functions of p, and as a controller in the units of its plant."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Fitted(NamedTuple):
 
 
 def fits(gains: Callable[[Array], Array], parameters: Sequence[Scheduling]) -> Iterator[Fitted]:
-    """`gains` (K, r, c) at p (K, m) as polynomials of rising degree, then as splines."""
+    """Yield `gains` (K, r, c) at p (K, m) as polynomials of rising degree, then as splines."""
     m = len(parameters)
     box = [(s.low, s.high) for s in parameters]
     p = lobatto_points(NODES.get(m, 7), box)
@@ -68,8 +68,9 @@ def cut_to_serve(
     parameter: Scheduling,
     serves: Callable[[Fitted, Array], Array],
 ) -> Fitted | None:
-    """`gains` of one parameter as a cubic spline whose segments are halved where it does not serve
-    ((K,) at p (K, 1)); None where that takes more than `MAX_SEGMENTS` or ones too short.
+    """Return `gains` of one parameter as a cubic spline whose segments are halved where the check
+    `serves` fails ((K,) at p (K, 1)); None where that takes more than `MAX_SEGMENTS` or segments
+    too short.
     """
     known: dict[float, Array] = {}
     knots = np.linspace(parameter.low, parameter.high, SEGMENTS[0] + 1)
@@ -93,7 +94,7 @@ def cut_to_serve(
 
 
 def _fit(basis: FunctionSpace, p: Array, values: Array) -> Fitted:
-    """To these values (K, r, c)."""
+    """Return the functions of this basis nearest to these values (K, r, c)."""
     size = np.abs(values).max(axis=0)
     rows, columns = (size.max(axis=k, keepdims=True, initial=0.0) for k in (1, 0))
     size = np.maximum(size, NEGLIGIBLE_ENTRY * np.sqrt(rows * columns))
@@ -115,7 +116,7 @@ def _bases(box: Sequence[tuple[float, float]]) -> Iterator[FunctionSpace]:
 def fitted(
     gains: Callable[[Array], Array], parameters: Sequence[Scheduling], accuracy: float
 ) -> Fitted:
-    """The first of the `fits` that is within `accuracy` of every gain, or the nearest of all."""
+    """Return the first of the `fits` within `accuracy` of every gain, or the nearest of all."""
     best: Fitted | None = None
     for fit in fits(gains, parameters):
         best = fit if best is None or fit.misfit < best.misfit else best
@@ -128,7 +129,9 @@ def fitted(
 def in_plant_units(
     plant: Plant, c: ScaledPlant, fit: Fitted, gamma: float, method: str
 ) -> Controller:
-    """The controller in the units of the plant, of gains in the scaled ones as functions of p."""
+    """Return the controller in the units of the plant, for gains in scaled ones as
+    functions of p.
+    """
     basis, M, misfit = fit
     ny = len(plant.measurements)
     n = M.shape[-1] - ny

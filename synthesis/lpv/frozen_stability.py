@@ -1,4 +1,4 @@
-"""Whether a loop is stable frozen at every p of its range, between points of a grid as well."""
+"""Stability of a loop frozen at every p of its range, between points of a grid as well."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ DECAY_FRACTION = 0.5
 
 
 class FrozenStability(NamedTuple):
-    """Whether a loop is `stable` frozen at every p, None where neither was shown; `p` (m,) is then,
-    or where it is not, the place.
+    """Whether a loop is `stable` frozen at every p, None if undecided; `p` (m,) is then, or for an
+    unstable loop, the place.
     """
 
     stable: bool | None
@@ -34,7 +34,7 @@ class FrozenStability(NamedTuple):
 
 
 def frozen_stability(loop: LPVStateSpace) -> FrozenStability:
-    """Stability of the loop frozen at each p of its range.
+    """Decide stability of the loop frozen at each p of its range.
 
     For every cell P solves a Lyapunov equation of its middle; where P does not serve the whole
     cell, by the Bernstein coefficients of A'P + PA, the cell is halved. With p at rest P may differ
@@ -55,8 +55,8 @@ def frozen_stability(loop: LPVStateSpace) -> FrozenStability:
 
 
 def _lyapunov(A: Array, dt: float | None) -> Array | None:
-    """The square root of P > 0, for which all states decay at a part of the rate of the slowest
-    mode; None where A is not stable.
+    """Return the square root of a P > 0 for which all states decay at a fraction of the rate of the
+    slowest mode; None where A is not stable.
     """
     with np.errstate(invalid="ignore"):  # of the permutation, which is not used
         _, (units, _) = linalg.matrix_balance(A, permute=False, separate=True)
@@ -80,7 +80,7 @@ def _lyapunov(A: Array, dt: float | None) -> Array | None:
 
 
 def _decrease(A: PolynomialMatrix, root: Array, dt: float | None) -> PolynomialMatrix:
-    """A'P + PA, or [-P A'P; PA -P], in the coordinates in which P is the identity."""
+    """Return A'P + PA, or [-P A'P; PA -P], in the coordinates in which P is the identity."""
     own = root @ A.coefficients @ np.linalg.inv(root)
     turned = np.swapaxes(own, -1, -2)
     if dt is None:
@@ -90,7 +90,7 @@ def _decrease(A: PolynomialMatrix, root: Array, dt: float | None) -> PolynomialM
 
 
 def _variation(A: PolynomialMatrix) -> list[float]:
-    """Of the coefficients along each axis."""
+    """Return the variation of the coefficients along each axis."""
     return [
         float(np.abs(np.diff(A.coefficients, axis=i)).max(initial=0.0)) for i in range(len(A.box))
     ]

@@ -37,8 +37,7 @@ from synthesis.lpv.worst_optimum import FrozenOptimum, worst_optimum
 from synthesis.plant.plant import Plant, require_plant
 from synthesis.plant.refusals import NOTHING_WRONG, failed, least_ranks, levels_above
 from synthesis.program.cone_program import LYAPUNOV, Solver
-from synthesis.worst.rates import Rate
-from synthesis.worst.rates import asked as limits
+from synthesis.worst.rates import Rate, limits
 
 Array = np.ndarray
 
@@ -198,7 +197,7 @@ def _robust(
     divisions: int,
     attempts: list[Attempt],
 ) -> Controller:
-    """For all models of the set, by the one of the shapes that serves the nominal one best."""
+    """Design for all models of the set, with the shape that is best for the nominal one."""
     starts = [least(plant, shape, divisions, USUAL, attempts) for shape in every]
     start = min(starts, key=lambda each: each.gamma)
     found = robust_plant(
@@ -223,7 +222,9 @@ def _nominal(
     *,
     free: bool = False,
 ) -> Controller:
-    """For one model, by the best of the shapes; those are `free` where none was asked for."""
+    """Design for one model, with the best of the shapes; they are `free` where the user requested
+    none.
+    """
     worst = worst_optimum(plant)
     if worst.level == 0 and (refusal := failed(plant, attempts)).reasons != (NOTHING_WRONG,):
         raise refusal  # no frozen model has a controller, and it is known why
@@ -241,7 +242,7 @@ def _nominal(
         if _fastest(found) <= fastest:
             break
     if slowest is None:
-        raise failed(plant, attempts, _both_asked(start.shape.untold(plant.parameters)))
+        raise failed(plant, attempts, _advice(start.shape.unmeasured_rates(plant.parameters)))
     return replace(slowest, attempts=tuple(attempts))
 
 
@@ -256,9 +257,10 @@ def _controllers(
     *,
     free: bool,
 ) -> Iterator[tuple[Controller, tuple[str, ...]]]:
-    """Those of the inequalities with what kept them from a lower gamma; where every parameter
-    stands still and X and Y are `free`, the central ones of the frozen models before those that are
-    far from it. Where X or Y moving stays above what no controller can beat, both move first.
+    """Yield controllers from the inequalities, with the reasons against a lower gamma. If every
+    parameter is constant and X and Y are `free`, central controllers of the frozen models precede
+    those far from the least gamma; if X or Y alone stays above the bound for every controller, both
+    depend on p first.
     """
     floor = worst.level
     still = free and floor > 0 and all(s.rate == 0 for s in plant.parameters)
@@ -278,7 +280,7 @@ def _controllers(
         if still and design.gamma > _far(min(factors)) * floor:
             yield from central()
             still = False
-        told = ", their rates neglected" if own.shape.untold(plant.parameters) else ""
+        told = ", their rates neglected" if own.shape.unmeasured_rates(plant.parameters) else ""
         method = f"output feedback, {own.shape}{told}"
         made = in_plant_units(plant, design.scaled, design.fit, design.gamma, method)
         made = replace(made, optimum=own.gamma, by_adjoint=own.shape.by_y)
@@ -289,18 +291,20 @@ def _controllers(
 
 
 def _far(asked: float) -> float:
-    """A gamma so many times the least one is far from it, where the least back-off is `asked`."""
+    """Return the ratio to the least gamma above which a design counts as far from it, where the
+    least requested back-off is `asked`.
+    """
     return FAR_ABOVE * max(1.0, asked / BACK_OFF[0])
 
 
-def _both_asked(untold: Sequence[str]) -> tuple[str, ...]:
-    """What to write instead of X and Y that both move with these."""
-    if not untold:
+def _advice(names: Sequence[str]) -> tuple[str, ...]:
+    """Return the advice where X and Y both depend on these parameters."""
+    if not names:
         return ()
     return (
-        f"X and Y both depend on {', '.join(untold)}, and a controller that is not told its rate"
-        " keeps no gamma near theirs: let X or Y be of degree 0 in it, as X=0, or give the plant a"
-        " lagged parameter, plant.lagged(...)",
+        f"X and Y both depend on {', '.join(names)}, and a controller without a measurement of its"
+        " rate keeps no gamma near theirs: let X or Y be of degree 0 in it, as X=0, or give a"
+        " lagged parameter to the plant, plant.lagged(...)",
     )
 
 
@@ -311,16 +315,16 @@ def _designs(
     factors: Sequence[float],
     attempts: list[Attempt],
 ) -> Iterator[tuple[Start, Design]]:
-    """First of the `other`, where X and Y both move and the controller is not told how fast, which
-    serves where parameters move slowly; as far as it is backed off, its gamma is still lower.
+    """Yield designs of `other` first, where X and Y both depend on p and dp/dt is not measured,
+    which suits slow parameters; only with back-offs whose gamma is still lower.
     """
     first: list[float] = []
     if other is not None:
         first = [f for f in factors if f * other.gamma < min(factors) * start.gamma]
         for design in settled(other, first, _recover, USUAL, attempts, neglecting=True):
             yield other, design
-    untold = bool(start.shape.untold(plant.parameters))  # asked for by hand
-    for design in settled(start, factors, _recover, USUAL, attempts, neglecting=untold):
+    neglected = bool(start.shape.unmeasured_rates(plant.parameters))  # requested by the user
+    for design in settled(start, factors, _recover, USUAL, attempts, neglecting=neglected):
         yield start, design
     if other is not None:
         rest = [f for f in factors if f not in first]
@@ -329,7 +333,9 @@ def _designs(
 
 
 def _limited(made: Controller, asked: float, fastest: float) -> tuple[str, ...]:
-    """What may have kept the controller from a lower gamma, or from its limits, a sentence each."""
+    """Return what may have kept the controller from a lower gamma, or from its limits, a sentence
+    each.
+    """
     out = []
     if made.optimum and made.promised > _far(asked) * made.optimum:
         out.append(
@@ -375,7 +381,9 @@ def _recover(
 
 
 def _fastest(made: Controller) -> float:
-    """The largest modulus of a pole, rad/s, of a continuous controller; 0 of another."""
+    """Return the largest modulus of a pole, rad/s, of a continuous controller; 0 for a
+    sampled one.
+    """
     model = made.model
     if model.dt is not None:
         return 0.0

@@ -56,7 +56,9 @@ def robust_plant(plant: Plant, start: float, least: Callable[[Plant], float]) ->
 
 
 def _consistent(plant: Plant, s: float, start: float, least: Callable[[Plant], float]) -> float:
-    """gamma with least(opened at gamma) = gamma, from below; inf where it grows without end."""
+    """Solve gamma = least(opened at gamma) by iteration from below; inf where it grows
+    without end.
+    """
     model = plant.model
     assert isinstance(model, UncertainStateSpace)  # noqa: S101
     gamma = start
@@ -71,7 +73,7 @@ def _consistent(plant: Plant, s: float, start: float, least: Callable[[Plant], f
 
 
 def opened(plant: Plant, out: float, into: float) -> Plant:
-    """The plant with the block's channels among its own: v times `out`, d times `into`."""
+    """Return the plant with the block's channels among its own: v times `out`, d times `into`."""
     model = plant.model
     assert isinstance(model, UncertainStateSpace)  # noqa: S101
     d, v = model.perturbation_inputs, model.perturbation_outputs
@@ -88,7 +90,9 @@ def opened(plant: Plant, out: float, into: float) -> Plant:
 
 
 def _even(plant: Plant) -> float:
-    """s that makes v as large as the performance, by their rows in the middle of the range."""
+    """Return s that makes v as large as the performance, by their rows in the middle of the
+    range.
+    """
     model = plant.model
     assert isinstance(model, UncertainStateSpace)  # noqa: S101
     middle = model.model.at(*(s.middle for s in model.parameters))

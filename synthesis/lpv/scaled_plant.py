@@ -1,4 +1,4 @@
-"""A plant in coordinates in which its synthesis is a matter of numbers of order one."""
+"""A plant in coordinates in which its synthesis has numbers of order one."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Array = np.ndarray
 MatricesAt = Callable[[Array], Generalized]
 
 POINTS = 9
-"""Values of p, on the diagonal of its box, from which coordinates are made."""
+"""Number of values of p, on the diagonal of its box, from which coordinates are computed."""
 REGULARIZATION = 1e-6
 """Fraction of the mean eigenvalue added to a solution of a Riccati equation, so that states
 without cost, or known exactly, have a scale too.
@@ -105,13 +105,13 @@ class ScaledPlant:
         return own._in(_balancing(own.at(line), dt))
 
     def _in(self, T: Array | None) -> ScaledPlant:
-        """With T z for z."""
+        """Return the plant with T z for z."""
         if T is None:
             return self
         return replace(self, left=np.linalg.solve(T, self.left), right=self.right @ T)
 
     def at(self, p: Array) -> Generalized:
-        """Matrices (K, ..) at p (K, m)."""
+        """Return the matrices (K, ..) at p (K, m)."""
         A, B1, B2, C1, C2, D11, D12, D21, D22 = self.matrices(p)
         root, L, R = np.sqrt(self.time), self.left, self.right
         u, y = self.controls, self.measurements[:, None]
@@ -128,8 +128,8 @@ class ScaledPlant:
         )
 
     def motions(self, p: Array, matters: Sequence[bool]) -> list[Array]:
-        """Every extreme dp/dt (K, m) at p (K, m) per unit of time: of a parameter whose rate is
-        another the value of that, of the others both signs of their limit; zero of those that do
+        """Return every extreme dp/dt (K, m) at p (K, m) per unit of time: the value of another
+        parameter where that is the rate, else both signs of the limit; zero for parameters that do
         not matter.
         """
         names = [s.name for s in self.parameters]
@@ -146,7 +146,7 @@ class ScaledPlant:
 
     @property
     def breaks(self) -> list[list[float]]:
-        """Where the plant is not one polynomial, ends included, of each parameter."""
+        """Breaks of the piecewise polynomials of each parameter, ends included."""
         out = []
         for s, factor in zip(self.parameters, factors_of(self.basis), strict=True):
             try:
@@ -158,13 +158,13 @@ class ScaledPlant:
 
 
 def _sizes(D: Array, axis: int) -> Array:
-    """Of each channel over all p; 1 where there is nothing."""
+    """Return the size of each channel over all p; 1 for a zero channel."""
     size = np.sqrt(np.square(D).sum(axis=axis).mean(axis=0))
     return np.where(size > 0, size, 1.0)
 
 
 def _balancing(plants: Generalized, dt: float | None) -> Array | None:
-    """T (n, n) with T'XT = T^-1 Y T^-T diagonal, X and Y the mean solutions of the Riccati
+    """Return T (n, n) with T'XT = T^-1 Y T^-T diagonal, X and Y the mean solutions of the Riccati
     equations of control and of estimation; with one of them alone T'XT = I, or T^-1 Y T^-T = I.
     """
     X, Y = _mean_cost(plants, dt), _mean_cost(plants.dual, dt)
@@ -180,8 +180,9 @@ def _balancing(plants: Generalized, dt: float | None) -> Array | None:
 
 
 def _mean_cost(plants: Generalized, dt: float | None) -> Array | None:
-    """Of a state under the best control that knows it: the mean of these matrices as parts of their
-    traces, times the geometric mean of the traces; None where there is no such control.
+    """Return the mean cost of a state under optimal full-information control: the mean of these
+    matrices divided by their traces, times the geometric mean of the traces; None where there is no
+    such control.
     """
     n = plants.A.shape[-1]
     every = (Generalized(*each) for each in zip(*plants, strict=True))
@@ -195,12 +196,12 @@ def _mean_cost(plants: Generalized, dt: float | None) -> Array | None:
 
 
 def _priced(D: Array) -> bool:
-    """Whether every control costs."""
+    """Whether every control has a cost."""
     return D.shape[1] == 0 or np.linalg.matrix_rank(D) == D.shape[1]
 
 
 def scaled_plant_of(plant: Plant, channel: float) -> ScaledPlant:
-    """ScaledPlant of the plant with performance in units of `channel`."""
+    """Return the scaled plant with performance in units of `channel`."""
     one = len(plant.parameters) == 1
     return ScaledPlant.of(
         lambda p: plant.matrices(p[:, 0] if one else p),
@@ -212,7 +213,7 @@ def scaled_plant_of(plant: Plant, channel: float) -> ScaledPlant:
 
 
 def depends(plant: Plant) -> list[bool]:
-    """On which parameters."""
+    """Return for each parameter whether the data depend on it."""
     c = scaled_plant_of(plant, 1.0)
     return [d > 0 for d in degrees_of(lambda p: list(c.at(p)), c.breaks)]
 
@@ -220,7 +221,7 @@ def depends(plant: Plant) -> list[bool]:
 def degrees_of(
     data: Callable[[Array], Sequence[Array]], breaks: Sequence[Sequence[float]]
 ) -> tuple[int, ...]:
-    """The degree in each parameter that `data` (arrays (K, ...) at p (K, m)) have on the widest
+    """Return the degree in each parameter of `data` (arrays (K, ...) at p (K, m)) on the widest
     cells, at most `MAX_DEGREE`.
     """
     sides = [max(pairwise(b), key=lambda side: side[1] - side[0]) for b in breaks]

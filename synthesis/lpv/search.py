@@ -1,5 +1,5 @@
-"""From a plant to X(p), Y(p) and the gains they promise: which of them moves and of what degree,
-how far from the least gamma, in a stated order.
+"""The search for X(p), Y(p) and gains: which of them depends on p and of what degree, and the
+distance from the least gamma, in a fixed order.
 
 Where X and Y both move with p the controller is not told dp/dt. With N = -X its state estimates
 that of the plant, and
@@ -39,15 +39,15 @@ Array = np.ndarray
 
 
 BACK_OFF = (1.02, 1.04, 1.01, 1.1, 1.2, 1.5)
-"""Multiples of the least gamma at which X and Y are settled, tried in turn."""
+"""Multiples of the least gamma at which X and Y are fixed, tried in turn."""
 LEVEL_TOLERANCE = 1e-6
 """Relative excess of a frozen gain over the promised one that counts as rounding."""
 UNKEPT = "frozen loops do not keep it"
-RATE_UNMEASURED = "p moves too fast for gains that are not told dp/dt"
+RATE_UNMEASURED = "p moves too fast for gains without a measurement of dp/dt"
 SHARP = "frozen loops keep it, no functions of p do"
 FAR_ABOVE = 1.05
-"""A gamma this many times the least one is said to be, one of a larger back-off that was asked for
-in proportion; before it gains that turn sharply become splines with as many knots as that takes.
+"""Ratio to the least gamma above which a note reports it, in proportion for a larger requested
+back-off; before it, gains that change steeply become splines with as many knots as needed.
 """
 MAX_RATE_LOSS = 1.05
 """Largest factor by which neglecting dp/dt in the gains may raise gamma."""
@@ -75,7 +75,7 @@ MAX_UNIT_RATIO = 30.0
 
 Gains = Callable[[Array], Array]
 Loop = Callable[[ScaledPlant, Gains, Array], tuple[Array, ...]]
-"""A, B, C, D (K, ..) of what is judged, at p (K, m)."""
+"""A, B, C, D (K, ..) of the loop to check, at p (K, m)."""
 
 
 class Start(NamedTuple):
@@ -88,7 +88,7 @@ class Start(NamedTuple):
 
     @property
     def gamma(self) -> float:
-        """In the units of the plant; inf where none was found."""
+        """Gamma in the units of the plant; inf where none was found."""
         return self.scaled.channel * self.found.gamma
 
 
@@ -105,7 +105,7 @@ class Design:
 
     @property
     def gamma(self) -> float:
-        """In the units of the plant."""
+        """Gamma in the units of the plant."""
         return self.found.gamma * self.scaled.channel
 
 
@@ -120,8 +120,8 @@ def best(
     attempts: list[Attempt],
     worst: FrozenOptimum = NOTHING_KNOWN,
 ) -> Start:
-    """The shape of the least gamma: of those of the lowest degree the best, then of higher degrees
-    while that lowers it, then with a larger bound on X and Y where that decides. No controller has
+    """Return the shape of the least gamma: of the lowest degree first, then of higher degrees while
+    that lowers it, then with a larger bound on X and Y where the bound is active. No controller has
     a gamma below the `worst` frozen optimum.
     """
     floor = worst.level
@@ -173,8 +173,8 @@ def least(
     *,
     largest: float = MATRIX_BOUNDS[0],
 ) -> Start:
-    """The least gamma of a shape, in a unit of performance that suits it, at first `channel`; with
-    the inequalities at this p (m,), too.
+    """Return the least gamma of a shape, in a suitable unit of performance, at first `channel`; the
+    inequalities are imposed at this p (m,), too.
     """
     for _ in tracked(f"least gamma, {shape}", range(3)):
         own = scaled_plant_of(plant, channel)
@@ -204,7 +204,7 @@ def settled(
     scaled, existence, lowest, _ = start
     if not math.isfinite(lowest.gamma):
         return
-    judged = loop or closed
+    of_loop = loop or closed
     sharp: dict[float, tuple[Solution, Gains]] = {}
 
     def noted(factor: float, message: str, outcome: str) -> None:
@@ -215,7 +215,7 @@ def settled(
         while sharp:
             factor = max(sharp)
             found, gains = sharp.pop(factor)
-            design, outcome = _tried(start, found, gains, judged, neglecting, with_knots)
+            design, outcome = _tried(start, found, gains, of_loop, neglecting, with_knots)
             noted(factor, "knots added", outcome)
             if design is not None:
                 yield design
@@ -230,7 +230,7 @@ def settled(
             with contextlib.suppress(np.linalg.LinAlgError):
                 if np.any(found.coefficients):
                     gains = recover(scaled, existence, found)
-                    design, outcome = _tried(start, found, gains, judged, neglecting, simplest)
+                    design, outcome = _tried(start, found, gains, of_loop, neglecting, simplest)
                     if outcome == SHARP:
                         sharp.setdefault(factor, (found, gains))
             noted(factor, found.message, outcome)
@@ -249,10 +249,12 @@ def _tried(
     neglecting: bool,
     fit_of: Callable[[ScaledPlant, Gains, Loop, Array, float], Fitted | None],
 ) -> tuple[Design | None, str]:
-    """The design of these gains, None where their loop does not keep gamma; and what came of it."""
+    """Return the design of these gains, None where their loop does not keep gamma; and the outcome
+    in words.
+    """
     scaled, existence, *_ = start
     reached = found.gamma
-    points = judged(existence.plant.parameters, existence.points)
+    points = check_points(existence.plant.parameters, existence.points)
     if neglecting:
         looped = closed(scaled, gains, points)
         reached = max(reached, level_kept(scaled, existence, found, looped, points))
@@ -272,8 +274,8 @@ def _tried(
 def simplest(
     scaled: ScaledPlant, gains: Gains, loop: Loop, points: Array, gamma: float
 ) -> Fitted | None:
-    """The simplest functions that are accurate and keep gamma, else the most accurate of those that
-    keep it, splines only where polynomials are far off; None where none does.
+    """Return the simplest functions that are accurate and keep gamma, else the most accurate that
+    keep it, splines only where polynomials are far off; None without any.
     """
     every = list(fits(gains, scaled.parameters))
     polynomials = [fit for fit in every if fit.basis.degrees]
@@ -289,8 +291,8 @@ def simplest(
 def with_knots(
     scaled: ScaledPlant, gains: Gains, loop: Loop, points: Array, gamma: float
 ) -> Fitted | None:
-    """Splines of one parameter with knots where gamma would not be kept without; None where they
-    do not come to an end.
+    """Return splines of one parameter, with knots added where gamma would not be kept without; None
+    where the refinement does not end.
     """
     if len(scaled.parameters) != 1:
         return None
@@ -303,9 +305,9 @@ def with_knots(
     return fit if fit is not None and serves(fit, points).all() else None
 
 
-def judged(parameters: Sequence[Scheduling], more: Array | None = None) -> Array:
-    """Points (K, m) at which frozen loops are judged, with `more`; a parameter that is the rate of
-    another is zero there.
+def check_points(parameters: Sequence[Scheduling], more: Array | None = None) -> Array:
+    """Return the points (K, m) at which frozen loops are checked, with `more`; a parameter that is
+    the rate of another is zero there.
     """
     count = CHECK_POINTS.get(len(parameters), 3)
     p = tensor_grid([np.linspace(s.low, s.high, count) for s in parameters])
@@ -317,13 +319,15 @@ def judged(parameters: Sequence[Scheduling], more: Array | None = None) -> Array
 
 
 def kept(scaled: ScaledPlant, gains: Gains, loop: Loop, p: Array, gamma: float) -> Iterator[bool]:
-    """Whether the loop frozen at each p (K, m), scaled, is stable and its gain below gamma."""
+    """Yield for each p (K, m), scaled, whether the frozen loop is stable and its gain below
+    gamma.
+    """
     for A, B, C, D in zip(*loop(scaled, gains, p), strict=True):
         yield below(A, B, C, D, gamma, scaled.dt)
 
 
 def closed(scaled: ScaledPlant, gains: Gains, p: Array) -> tuple[Array, ...]:
-    """The plant under [A B; C D]."""
+    """Return the plant under [A B; C D]."""
     plants, K = scaled.at(p), gains(p)
     k = K.shape[-1] - plants.C2.shape[-2]
     return plants.closed(K[:, :k, :k], K[:, :k, k:], K[:, k:, :k], K[:, k:, k:])
@@ -336,8 +340,8 @@ def level_kept(
     loop: tuple[Array, ...],
     p: Array,
 ) -> float:
-    """The least gamma, scaled, for which V proves the loop A, B, C, D (K, ..) at every p (K, m) and
-    extreme dp/dt; inf where there is none.
+    """Return the least gamma, scaled, for which V proves the loop A, B, C, D (K, ..) at every p (K,
+    m) and extreme dp/dt; inf where there is none.
     """
     X, Y = existence.X, existence.Y
     assert X is not None  # noqa: S101 - both move
@@ -355,14 +359,16 @@ def level_kept(
 
 
 def _joined(x: Array, w: Array) -> Array:
-    """[x -x; -x x + w] (K, 2n, 2n)."""
+    """Return [x -x; -x x + w] (K, 2n, 2n)."""
     return np.concatenate(
         [np.concatenate([x, -x], axis=2), np.concatenate([-x, x + w], axis=2)], axis=1
     )
 
 
 def _least_level(loop: tuple[Array, ...], P: Array, moving: Array) -> float:
-    """Of [A'P + PA + dP/dt, PB, C'; B'P, -g, D'; C, D, -g] <= 0, in coordinates where P is one."""
+    """Return the least g of [A'P + PA + dP/dt, PB, C'; B'P, -g, D'; C, D, -g] <= 0, in coordinates
+    where P is the identity.
+    """
     A, B, C, D = loop
     try:
         R = np.linalg.inv(np.linalg.cholesky(P))

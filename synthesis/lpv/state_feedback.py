@@ -21,8 +21,7 @@ from synthesis.lpv.scaled_plant import ScaledPlant, depends
 from synthesis.lpv.search import BACK_OFF, best, settled
 from synthesis.plant.plant import Plant, require_plant
 from synthesis.plant.refusals import conditions, failed, least_ranks, levels_above
-from synthesis.worst.rates import Rate
-from synthesis.worst.rates import asked as limits
+from synthesis.worst.rates import Rate, limits
 
 Array = np.ndarray
 

@@ -1,4 +1,6 @@
-"""The worst optimum of the models frozen at each p, which no scheduled controller can beat."""
+"""The largest optimum over the models frozen at each p, a lower bound for every scheduled
+controller.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,7 @@ if TYPE_CHECKING:
 Array = np.ndarray
 
 POINTS = {1: 65, 2: 5}
-"""Values of each parameter (more parameters: 3)."""
+"""Number of values of each parameter (more parameters: 3)."""
 MAX_MINIMA, MAX_EVALUATIONS, MAX_ROUNDS = 4, 16, 6
 """Between the points, the worst is searched near so many minima of the slack, with so many
 evaluations each, again while the level rises.
@@ -27,8 +29,8 @@ evaluations each, again while the level rises.
 
 
 class FrozenOptimum(NamedTuple):
-    """A level that no scheduled controller beats, and the p (m,) of the model that decides it; 0
-    and None where nothing is known.
+    """Lower bound on the level of every scheduled controller, and the p (m,) of the model that
+    decides it; 0 and None where none was found.
     """
 
     level: float = 0.0
@@ -36,8 +38,8 @@ class FrozenOptimum(NamedTuple):
 
 
 def worst_optimum(plant: Plant) -> FrozenOptimum:
-    """The largest optimum of H-infinity output feedback over models of the range, to a part in a
-    thousand; of level 0 where the Riccati equations of none have a solution.
+    """Return the largest optimum of H-infinity output feedback over models of the range, to a part
+    in a thousand; of level 0 where the Riccati equations of none have a solution.
 
     Without the part of a plant that is uncertain, and of some p only; of one parameter also of
     those between them where the worst may be.

@@ -197,7 +197,7 @@ def _variance(A: Array, B: Array, C: Array, dt: float | None) -> _Variance | Non
     """tr C W C' with A W + W A' + B B' = 0, sampled A W A' - W + B B' = 0; None where there is no
     W of a variance.
 
-    W is refined; what the steps still change, and the rounding of the sum, is what is not known.
+    W is refined; the last change, and the rounding of the sum, bound the error.
     """
 
     def solved(Q: Array) -> Array:

@@ -1,6 +1,4 @@
-"""Stabilising solutions of algebraic Riccati equations, believed only after their properties were
-checked.
-"""
+"""Stabilising solutions of algebraic Riccati equations, accepted only if their properties hold."""
 
 from __future__ import annotations
 
@@ -15,25 +13,25 @@ rounding leaves less, an eigenvalue on the axis taken for a stable one far more.
 """
 
 SEMIDEFINITE = 1e-8
-"""Negative eigenvalues below this part of the largest, or of one, are zero, in units in which the
-Hamiltonian matrix is balanced.
+"""Negative eigenvalues below this fraction of the largest, or of one, count as zero, in units in
+which the Hamiltonian matrix is balanced.
 """
 
 
 ROUNDING = 1e-13
-"""What is left of a difference below this part of its terms is none."""
+"""Entries of a difference below this fraction of its terms count as zero."""
 
 
 def without_rounding(value: Array, terms: Array) -> Array:
-    """A symmetric matrix that was computed from sums of this size: entries that are rounding are
-    zero. They would come out as solutions of either sign once balancing has raised them.
+    """Return a symmetric matrix, computed from sums of this size, with rounding errors set to zero.
+    Balancing would raise them to solutions of either sign.
     """
     symmetric = 0.5 * (value + value.T)
     return np.where(np.abs(symmetric) > ROUNDING * np.maximum(terms, terms.T), symmetric, 0.0)
 
 
 def stabilising(A: Array, R: Array, Q: Array) -> Array | None:
-    """X = X' >= 0 of A'X + XA + XRX + Q = 0 with A + RX stable, or None where there is none.
+    """Return X = X' >= 0 of A'X + XA + XRX + Q = 0 with A + RX stable, or None where there is none.
 
     From the stable invariant subspace of the Hamiltonian matrix [A R; -Q -A'], balanced by a
     symplectic scaling, so that the units of the states play no part. R and Q may be indefinite.

@@ -1,4 +1,6 @@
-"""Why no controller can be found, or none that is worth having, in sentences with names."""
+"""Diagnosis of a plant: why no controller exists, or why its gamma is not meaningful, in sentences
+with signal names.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +45,8 @@ def reasons(
     gamma: float | None = None,
     at: Sequence[object] | None = None,
 ) -> tuple[str, ...]:
-    """Why a synthesis for this plant must fail, or why its gamma says nothing, a sentence each.
+    """Return why a synthesis for this plant must fail, or why its gamma is not meaningful, a
+    sentence each.
 
     Modes that the controls cannot stabilise or the measurements cannot detect; controls without a
     price and measurements without noise; invariant zeros on the border of stability, where the
@@ -113,7 +116,9 @@ def _reasons(P: Generalized, names: Channels, dt: float | None, gamma: float | N
 
 
 def _modes(P: Generalized, names: Channels, dt: float | None, *, dual: bool = False) -> list[str]:
-    """Modes that cannot be stabilised; of the dual plant those that cannot be detected."""
+    """Return sentences on modes that cannot be stabilised; for the dual plant, on those that cannot
+    be detected.
+    """
     hidden = hidden_modes(
         P.A.T, P.B2.T, lambda value, size: unstable(value, size, sampled=dt is not None)
     )
@@ -140,7 +145,9 @@ def _place(mode: Mode, dt: float | None) -> str:
 
 
 def _singular(P: Generalized, names: Channels, dt: float | None) -> list[str]:
-    """Controls without a price, measurements without noise, zeros on the border of stability."""
+    """Return sentences on controls without a weight, measurements without noise, and zeros on the
+    stability boundary.
+    """
     if dt is not None:
         if np.any(np.abs(np.linalg.eigvals(P.A) + 1) < SINGULAR):
             return ["a mode at z = -1, half the sample frequency: sample at another rate"]
@@ -157,8 +164,8 @@ def _singular(P: Generalized, names: Channels, dt: float | None) -> list[str]:
 
 
 def unpriced(D12: Array, names: Sequence[str], where: str = "", *, dual: bool = False) -> list[str]:
-    """Directions of the controls `names` that D12 (.., nz, nu) does not see; of the dual plant, of
-    measurements that no disturbance enters. One sentence each.
+    """Return a sentence for each direction of the controls `names` that D12 (.., nz, nu) does not
+    see; for the dual plant, for measurements that no disturbance enters.
     """
     found: dict[str, None] = {}
     for each in D12.reshape(-1, *D12.shape[-2:]):
@@ -175,7 +182,9 @@ def unpriced(D12: Array, names: Sequence[str], where: str = "", *, dual: bool = 
 
 
 def free_directions(D12: Array) -> Array:
-    """Directions (nu, k) of the controls that D12 (nz, nu) does not see, in units of their own."""
+    """Return the directions (nu, k) of the controls that D12 (nz, nu) does not see, in units of
+    their own.
+    """
     nu = D12.shape[1]
     if not np.any(D12):
         return np.eye(nu)
@@ -187,7 +196,8 @@ def free_directions(D12: Array) -> Array:
 
 
 def axis_zeros(P: Generalized) -> list[Mode]:
-    """Invariant zeros of (A, B2, C1, D12) on the imaginary axis; D12 has full column rank.
+    """Return the invariant zeros of (A, B2, C1, D12) on the imaginary axis; D12 has full column
+    rank.
 
     They are the modes of the plant with z's part along D12 held at zero that the rest of z does not
     see.
@@ -221,8 +231,8 @@ def decided(
     at: Sequence[str],
     dt: float | None = None,
 ) -> tuple[str, ...]:
-    """What of a level `gamma` no scheduled controller can lower, at which of the frozen models
-    (leading axis, called `at`); and whether all keep it with the controls at rest.
+    """Return which part of a level `gamma` no scheduled controller can lower, at which of the
+    frozen models (leading axis, called `at`); and whether all keep it with the controls at rest.
 
     One is known that keeps `reached`: a floor above that is rounding.
     """
@@ -249,7 +259,8 @@ def decided_by(
     dt: float | None = None,
     reached: float = math.inf,
 ) -> list[str]:
-    """What of a level `gamma` no controller can lower, where that is all of it or more.
+    """Return sentences on the part of a level `gamma` that no controller can lower, where that is
+    all of it or more.
 
     Where a controller that keeps `reached` is known, a floor above that is rounding.
     """
@@ -269,8 +280,8 @@ def _unreachable(floor: Unreachable, names: Channels, gamma: float) -> list[str]
             " controls a lower price"
         ]
     return [
-        f"gamma = {gamma:.6g} is decided at one frequency: {_floor(floor, names)}; of the"
-        " loop elsewhere it says little"
+        f"gamma = {gamma:.6g} is limited at a single frequency: {_floor(floor, names)}; it does"
+        " not reflect the rest of the loop"
     ]
 
 
@@ -308,7 +319,7 @@ def _foremost(sizes: Array, names: tuple[str, ...]) -> str:
 
 
 def _direction(direction: Array, names: Sequence[str]) -> str:
-    """One signal by its name, a combination with its coefficients."""
+    """Return one signal by its name, a combination with its coefficients."""
     parts = [(c, n) for c, n in zip(direction, names, strict=True) if abs(c) > 1e-6]
     if len(parts) == 1:
         return str(parts[0][1])

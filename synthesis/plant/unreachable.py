@@ -1,4 +1,4 @@
-"""The part of a gain that no controller can lower, and where it comes from."""
+"""The part of a gain that no controller can lower, and its origin."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ class Unreachable(NamedTuple):
 
 
 def unreachable_gain(plant: Generalized, dt: float | None = None) -> Unreachable:
-    """The largest gain of the disturbances on the part of the performance that the controls do not
-    reach, and of the part of the disturbances that is not measured on the performance.
+    """Return the largest gain of the disturbances on the part of the performance that the controls
+    do not reach, and of the part of the disturbances that is not measured on the performance.
 
     Parrott's bound at each frequency: with N orthogonal to the columns of P12 there, N'(P11 + P12 Q
     P21) = N' P11 for every Q. On a grid of frequencies made closer around its top: never too high,
@@ -74,7 +74,7 @@ def unreachable_gain(plant: Generalized, dt: float | None = None) -> Unreachable
 
 
 def _speeds(A: Array, dt: float | None) -> Array:
-    """Logarithms of the poles (rad/s)."""
+    """Return the poles (rad/s), those of a sampled plant as log(z)/dt."""
     poles = np.linalg.eigvals(A).astype(complex)
     return poles if dt is None else np.log(poles[np.abs(poles) > 1e-12]) / dt
 
@@ -89,7 +89,7 @@ def _direct(plant: Generalized) -> Unreachable:
 
 
 def _largest(plant: Generalized, omega: Array, dt: float | None) -> tuple[Unreachable, Array]:
-    """The highest of these frequencies, and the gain of each."""
+    """Return the highest gain with its frequency, and the gain at each frequency."""
     A, B, C, D = plant.joined
     s = 1j * omega if dt is None else np.exp(1j * omega * dt)
     on_a_pole = (
@@ -128,8 +128,8 @@ def _adjoint(M: Array) -> Array:
 
 
 def _left_over(P: Array, terms: Array) -> Array:
-    """Projectors (k, n, n) on what is orthogonal to the columns of P (k, n, m); directions below
-    the rounding of their terms (k, n, m) are no columns.
+    """Return projectors (k, n, n) on the orthogonal complement of the columns of P (k, n, m);
+    directions below the rounding of their terms (k, n, m) are no columns.
     """
     size = np.linalg.norm(terms, axis=1)
     size = np.where(size > 0, size, 1.0)[:, None, :]

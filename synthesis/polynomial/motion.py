@@ -1,4 +1,6 @@
-"""How the parameters of a model may move: each at a rate of its own, or one as another says."""
+"""Motion of the parameters of a model: at independent rates, or with one parameter the rate of
+another.
+"""
 
 from __future__ import annotations
 
@@ -21,9 +23,7 @@ the other parameter are known.
 
 
 class Drift(NamedTuple):
-    """One way in which p moves: dp_i/dt is `rates[i]`, or parameter `ties[i]` where there is
-    one.
-    """
+    """One motion of p: dp_i/dt is `rates[i]`, or parameter `ties[i]` where there is one."""
 
     rates: tuple[float, ...]
     ties: tuple[int | None, ...]
@@ -44,7 +44,7 @@ class Motion(NamedTuple):
 
     @classmethod
     def of(cls, parameters: Sequence[Scheduling]) -> Motion:
-        """By their own limits."""
+        """Return the motion within the limits of these parameters."""
         names = [s.name for s in parameters]
         ties = tuple(names.index(s.rate) if isinstance(s.rate, str) else None for s in parameters)
         rates = tuple(
@@ -54,7 +54,7 @@ class Motion(NamedTuple):
         return cls(tuple((float(s.low), float(s.high)) for s in parameters), rates, ties)
 
     def suits(self, parameters: Sequence[Scheduling]) -> bool:
-        """Whether these parameters move so, but for the limits of those that no other ties."""
+        """Whether these parameters move so, except for the limits of those not tied to another."""
         own = Motion.of(parameters)
         if len(self.rates) != len(own.rates) or not all(r >= 0 for r in self.rates):
             return False
@@ -63,11 +63,11 @@ class Motion(NamedTuple):
 
     @property
     def tied(self) -> tuple[tuple[int, int], ...]:
-        """(i, j) for every p_i whose rate is p_j."""
+        """Pairs (i, j) for every p_i whose rate is p_j."""
         return tuple((i, j) for i, j in enumerate(self.ties) if j is not None)
 
     def drifts(self, varying: Sequence[bool]) -> Iterator[Drift]:
-        """Every extreme way to move, as far as P is `varying` with it."""
+        """Yield every extreme motion, as far as P is `varying` with it."""
         choices = [
             (0.0,) if not used or tie is not None or rate == 0 else (-rate, rate)
             for used, rate, tie in zip(varying, self.rates, self.ties, strict=True)
@@ -77,7 +77,7 @@ class Motion(NamedTuple):
             yield Drift(rates, ties)
 
     def reaches(self, box: Sequence[tuple[float, float]]) -> bool:
-        """Whether p can be somewhere in this box and stay in its ranges for good."""
+        """Whether p can be somewhere in this box and stay in its ranges forever."""
         for i, j in self.tied:
             (a, b), (c, d), jerk = box[i], box[j], self.rates[j]
             if math.isinf(jerk):
@@ -90,7 +90,9 @@ class Motion(NamedTuple):
         return True
 
     def cuts(self, axis: int, continuous: bool) -> tuple[float, ...]:
-        """Where a parameter that is the rate of another is cut."""
+        """Return the values at which the range of a parameter that is the rate of another
+        is cut.
+        """
         if all(j != axis for _, j in self.tied):
             return ()
         if continuous and math.isinf(self.rates[axis]):
@@ -100,7 +102,7 @@ class Motion(NamedTuple):
         return tuple(side * k / count for side in (low, high) for k in range(count))
 
     def span(self, i: int, cell: Sequence[tuple[float, float]], dt: float) -> tuple[float, float]:
-        """(least, largest) change of p_i in a sample while p is in this cell."""
+        """Return the (least, largest) change of p_i in a sample while p is in this cell."""
         j = self.ties[i]
         if j is None:
             return -self.rates[i] * dt, self.rates[i] * dt
@@ -109,5 +111,5 @@ class Motion(NamedTuple):
         return max(cell[j][0] * dt - slack, low * dt), min(cell[j][1] * dt + slack, high * dt)
 
     def at_rest(self) -> tuple[int, ...]:
-        """The parameters that are zero where p is frozen: those that are the rate of another."""
+        """Parameters that are zero where p is frozen: those that are the rate of another."""
         return tuple(j for _, j in self.tied)

@@ -1,5 +1,5 @@
-"""Cholesky's factorisation of a symmetric matrix of square blocks, most of which are zero: a band,
-where P is a spline; or none of which are, where functions of P overlap all over the range.
+"""Cholesky factorisation of a symmetric matrix of square blocks, sparse if P is a spline (a band),
+dense if functions of P overlap over the whole range.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class BlockCholesky:
                         self.columns[j][i] = -update
 
     def solve(self, b: Array) -> Array:
-        """x (size, v) with M x = b."""
+        """Return x (size, v) with M x = b."""
         if self.whole is not None:
             solved = linalg.cho_solve((self.whole, False), b.ravel(), check_finite=False)
             return solved.reshape(b.shape)

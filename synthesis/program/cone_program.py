@@ -1,4 +1,4 @@
-"""Semidefinite programs in conic form, and the solvers that take them.
+"""Semidefinite programs in conic form, and their solvers.
 
     minimise c' x  subject to  b - A x in a product of positive semidefinite cones
 
@@ -38,7 +38,7 @@ LYAPUNOV = "LYAPUNOV"
 
 
 class Answer(Enum):
-    """What the solver says of the program."""
+    """Status that the solver reports for the program."""
 
     SOLVED = "the solver reports a solution"
     INFEASIBLE = "the solver reports that no solution exists"
@@ -48,7 +48,7 @@ class Answer(Enum):
 
 @dataclass(frozen=True)
 class Solver:
-    """Which solver, and when it stops.
+    """Name of the solver, and its stopping criteria.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ class Solver:
 
     @property
     def options(self) -> dict[str, Any]:
-        """The settings in the solver's own words, as they are handed to it."""
+        """The settings in the solver's own names, as they are passed to it."""
         return {
             option: getattr(self, setting)
             for setting, options in _OPTIONS[self.name].items()
@@ -185,7 +185,7 @@ option.
 
 
 def general_solver(solver: Solver | str) -> Solver:
-    """A solver for any cone program; raises `InputError` for the one that is not."""
+    """Return a solver for any cone program; raise `InputError` for the one that is not."""
     solver = solver if isinstance(solver, Solver) else Solver(solver)
     if solver.name == LYAPUNOV:
         raise InputError(
@@ -197,7 +197,7 @@ def general_solver(solver: Solver | str) -> Solver:
 
 
 def installed_solvers() -> tuple[str, ...]:
-    """Semidefinite solvers for any program that can be used here.
+    """Return the installed semidefinite solvers for any program.
 
     Returns
     -------
@@ -222,8 +222,8 @@ def installed_solvers() -> tuple[str, ...]:
 
 @dataclass(frozen=True, eq=False)
 class ConeProgram:
-    """minimise c' x subject to b - A x in the product of semidefinite cones of `sizes`; the first
-    `equalities` rows are zero.
+    """The problem: minimise c' x subject to b - A x in the product of semidefinite cones of
+    `sizes`; the first `equalities` rows are zero.
     """
 
     c: Array
@@ -235,8 +235,8 @@ class ConeProgram:
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A solver's answer and point `x`, None where it gave none; `seconds` of solving, `message` in
-    the solver's words.
+    """A solver's answer and point `x`, None without one; `seconds` of solving, `message` of the
+    solver.
     """
 
     answer: Answer
@@ -246,7 +246,7 @@ class Candidate:
 
 
 def solve(program: ConeProgram, solver: Solver) -> Candidate:
-    """The solver's candidate. Never raises for a failed solve: that is an answer."""
+    """Return the solver's candidate. Never raises for a failed solve: that is an answer."""
     method: Callable[[ConeProgram, Solver], tuple[Answer, Any, str]] = {
         "CLARABEL": _clarabel,
         "SCS": _scs,
@@ -268,8 +268,8 @@ interrupted between two iterations.
 def _interruptible(
     method: Callable[[ConeProgram, Solver], Any], program: ConeProgram, solver: Solver
 ) -> tuple[Answer, Any, str]:
-    """Here where the solver looks up often enough, else in a process that an interrupt can end:
-    starting it takes half a second.
+    """Solve here if the solver can be interrupted often enough, else in a process that an interrupt
+    can end: starting it takes half a second.
     """
     operations = (sum(length(n) ** 3 for n in program.sizes) + len(program.c) ** 3) / 3
     if method is not _cvxpy and operations < SHORT_ITERATION:
@@ -287,8 +287,8 @@ process.
 
 
 def _bytes(program: ConeProgram) -> float:
-    """What the scaling matrices of the cones take, in an interior-point method; their factors take
-    a few times as much.
+    """Return the memory of the scaling matrices of the cones in an interior-point method, bytes;
+    their factors take a few times as much.
     """
     return 8.0 * sum(length(n) ** 2 for n in program.sizes)
 
@@ -346,7 +346,7 @@ def _scs(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
     )
     solution = engine.solve()
     word = str(solution["info"]["status"])
-    if word == "interrupted":  # SCS hears the keyboard itself
+    if word == "interrupted":  # SCS handles the interrupt itself
         raise KeyboardInterrupt
     if word.startswith("infeasible"):
         return Answer.INFEASIBLE, None, word

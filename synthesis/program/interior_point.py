@@ -75,9 +75,9 @@ CHUNK_ENTRIES = 2_000_000
 
 
 class Early(NamedTuple):
-    """A feasible P (K, n, n) and y in the middle of the cones, with the level <S, Z> / order of the
-    central path there and the least eigenvalue of a slack of every cone: where the method may start
-    on a program with more blocks.
+    """A feasible P (K, n, n) and y near the centre of the cones, with the level <S, Z> / order of
+    the central path there and the least eigenvalue of a slack of every cone: a starting point for a
+    program with more blocks.
     """
 
     P: Array
@@ -88,8 +88,8 @@ class Early(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Minimum(Candidate):
-    """Whether the gap that was asked for is `reached`, at least nearly; with the point at which it
-    first was `EARLY_GAP`, None where it never was.
+    """Result: whether the requested gap is `reached`, at least nearly; with the point at which it
+    first was below `EARLY_GAP`, None where it never was.
     """
 
     reached: bool = False
@@ -97,8 +97,8 @@ class Minimum(Candidate):
 
 
 def minimise(program: Program, solver: Solver, start: Early | None = None) -> Minimum:
-    """The least level, to the tolerance of the solver or as near as rounding, iterations and time
-    allow.
+    """Minimise the level, to the tolerance of the solver or as near as rounding, iterations and
+    time allow.
 
     The point has the coefficients of P as vectors, then the level; where it is not optimal, it is
     feasible to rounding or there is none. From `start`, of another program, and where that leads
@@ -160,7 +160,7 @@ def _minimised(program: Program, solver: Solver, solving: Task, start: Early | N
 
 
 def _digits(gap: float, tolerance: float) -> float:
-    """Of the level that are found, as far as they are asked for."""
+    """Return the number of accurate digits of the level, at most as many as requested."""
     return round(-math.log10(max(gap, tolerance)), 1) if gap < 1.0 else 0.0
 
 
@@ -174,9 +174,9 @@ class _Point(NamedTuple):
 
 
 class _Residuals(NamedTuple):
-    """What is missing: to the slacks `primal`, to the multipliers `dual` and `dual_y`, with their
-    sizes; <S, Z> `product`, relative to the level `gap`. `contradiction`: how nearly the
-    multipliers prove infeasibility.
+    """Residuals: of the slacks `primal`, of the multipliers `dual` and `dual_y`, with their sizes;
+    <S, Z> `product`, relative to the level `gap`. `contradiction`: relative residual of the
+    multipliers as a proof of infeasibility.
     """
 
     primal: list[Array]
@@ -195,23 +195,23 @@ class _Cone(Protocol):
     constant: Array
 
     def along(self, y: Array) -> Array:
-        """Matrices (m, N, N) from y."""
+        """Return the matrices (m, N, N) of y."""
         ...
 
     def across(self, Z: Array) -> Array:
-        """The adjoint of that, of the length of y."""
+        """Return the adjoint of `along`, of the length of y."""
         ...
 
     def linear(self, P: Array) -> Array:
-        """Matrices (m, N, N) from the coefficients of P."""
+        """Return the matrices (m, N, N) of the coefficients of P."""
         ...
 
     def add_adjoint(self, Z: Array, out: Array) -> None:
-        """To `out` (K, n, n) its share in <Z, linear(.)>."""
+        """Add to `out` (K, n, n) the contribution to <Z, linear(.)>."""
         ...
 
     def add_normal(self, H: Array, out: Normal) -> None:
-        """To the lower blocks of the normal equations those of P -> adjoint(H linear(P) H)."""
+        """Add to the lower blocks of the normal equations those of P -> adjoint(H linear(P) H)."""
         ...
 
 
@@ -271,8 +271,8 @@ class _Inequalities:
                 _add(out, (columns[j], columns[i]), blocks[j, i])
 
     def _of_places(self, H: Array, places: slice) -> Iterator[tuple[int, int, Array]]:
-        """(a, b, blocks), a >= b, of the normal equations between the matrices Q_a and Q_b of each
-        of these places.
+        """Yield (a, b, blocks), a >= b, of the normal equations between the matrices Q_a and Q_b
+        of each of these places.
         """
         f, n = self.blocks.fixed, self.blocks.fixed.shape[1]
         G, N = self.blocks.places, H.shape[1]
@@ -354,7 +354,7 @@ class _Multiplier:
 
 def _few(blocks: LyapunovBlocks) -> bool:
     """Whether so few coefficients are involved that their normal equations are summed over all
-    blocks sooner than those of every place are formed.
+    blocks faster than those of every place are formed.
     """
     if blocks.weights is None:
         return False
@@ -364,7 +364,7 @@ def _few(blocks: LyapunovBlocks) -> bool:
 
 
 def _contracted(g: Array, h: Array, blocks: Array) -> Array:
-    """sum_m g_mj h_mk blocks_m (j, k, v^2), the blocks (m, v, v)."""
+    """Return sum_m g_mj h_mk blocks_m (j, k, v^2), the blocks (m, v, v)."""
     pairs = (g[:, :, None] * h[:, None, :]).reshape(len(g), -1)
     return (pairs.T @ blocks.reshape(len(g), -1)).reshape(g.shape[1], h.shape[1], -1)
 
@@ -380,8 +380,8 @@ def _add(out: Normal, at: tuple[int, int], block: Array) -> None:
 
 
 def _on_vectors(K: Array, n: int) -> Array:
-    """Matrices on vectors of V -> the symmetric part of sum L V R, where K = sum vec(L) vec(R)' by
-    rows, (..., n^2, n^2).
+    """Return the map V -> the symmetric part of sum L V R as matrices on vectors, where K = sum
+    vec(L) vec(R)' by rows, (..., n^2, n^2).
     """
     a, b, _ = indices(n)
     K = np.moveaxis(K.reshape(-1, n, n, n, n), -1, 1)
@@ -404,7 +404,7 @@ class _Cones:
         self.order = sum(c.constant.shape[0] * c.constant.shape[1] for c in self.each)
 
     def start(self) -> _Point:
-        """Far inside the cones, wherever that is."""
+        """Return a starting point far inside the cones, wherever that is."""
         n = self.sizes.states
         far = max(MIN_START, self.size)
         S = [
@@ -414,24 +414,26 @@ class _Cones:
         return _Point(np.zeros((self.sizes.unknowns, n, n)), y, S, S)
 
     def near(self, start: Early) -> _Point:
-        """On the central path as far as a start of another program allows."""
+        """Return a starting point as close to the central path as the one of another program
+        allows.
+        """
         slacks = self.slacks(start.P, start.y)
         S = [_raised(slack, least) for slack, least in zip(slacks, start.least, strict=True)]
         return _Point(start.P, start.y, S, [start.level * np.linalg.inv(s) for s in S])
 
     def change(self, P: Array, y: Array) -> list[Array]:
-        """Of the slacks with P and y."""
+        """Return the change of the slacks with P and y."""
         return [cone.along(y) + cone.linear(P) for cone in self.each]
 
     def slacks(self, P: Array, y: Array) -> list[Array]:
-        """As they ought to be."""
+        """Return the slacks that belong to this P and y."""
         return [
             cone.constant + change
             for cone, change in zip(self.each, self.change(P, y), strict=True)
         ]
 
     def inside(self, point: _Point) -> bool:
-        """Whether the slacks as they ought to be are in the cones."""
+        """Whether the slacks that belong to P and y are in the cones."""
         try:
             for S in self.slacks(point.P, point.y):
                 np.linalg.cholesky(S)
@@ -440,7 +442,7 @@ class _Cones:
         return True
 
     def adjoint(self, Z: list[Array]) -> tuple[Array, Array]:
-        """(P', y') with <Z, change(P, y)> = <P', P> + <y', y>."""
+        """Return (P', y') with <Z, change(P, y)> = <P', P> + <y', y>."""
         out = np.zeros((self.sizes.unknowns, self.sizes.states, self.sizes.states))
         across = np.zeros(1 + self.sizes.multipliers)
         for cone, each in zip(self.each, Z, strict=True):
@@ -449,7 +451,7 @@ class _Cones:
         return out, across
 
     def residuals(self, point: _Point) -> _Residuals:
-        """Of slacks and multipliers at this point."""
+        """Return the residuals of slacks and multipliers at this point."""
         primal = [
             wanted - S for wanted, S in zip(self.slacks(point.P, point.y), point.S, strict=True)
         ]
@@ -473,8 +475,8 @@ class _Cones:
 
 
 def _raised(S: Array, least: float) -> Array:
-    """Matrices (m, N, N) with a multiple of the identity each that leaves no eigenvalue below the
-    least.
+    """Return matrices (m, N, N) plus the least multiple of the identity with no eigenvalue below
+    the limit.
     """
     missing = np.maximum(least - np.linalg.eigvalsh(S)[:, 0], 0.0)
     return S + missing[:, None, None] * np.eye(S.shape[-1])
@@ -485,7 +487,7 @@ def _largest(P: Array, y: Array) -> float:
 
 
 class _Scaling(NamedTuple):
-    """Nesterov and Todd's of one cone: r^-1 S r^-T = r' Z r = diag(values), H = (r r')^-1;
+    """Nesterov-Todd scaling of one cone: r^-1 S r^-T = r' Z r = diag(values), H = (r r')^-1;
     `inverse` is r^-1.
     """
 
@@ -505,34 +507,34 @@ class _Scaling(NamedTuple):
 
     @property
     def diagonal(self) -> Array:
-        """Slack and multiplier themselves."""
+        """Slack and multiplier in the scaled coordinates."""
         return self.values[:, :, None] * np.eye(self.values.shape[1])
 
     def of_slack(self, change: Array) -> Array:
-        """A change of the slack in the coordinates in which both are diagonal."""
+        """Return a change of the slack in the coordinates in which both are diagonal."""
         return symmetrized(self.inverse @ change @ np.swapaxes(self.inverse, 1, 2))
 
     def slack(self, scaled: Array) -> Array:
-        """The change of the slack that is `scaled` in them."""
+        """Return the change of the slack that is `scaled` in them."""
         return symmetrized(self.r @ scaled @ np.swapaxes(self.r, 1, 2))
 
     def multiplier(self, scaled: Array) -> Array:
-        """The change of the multiplier that is."""
+        """Return the change of the multiplier that is `scaled` in them."""
         return symmetrized(np.swapaxes(self.inverse, 1, 2) @ scaled @ self.inverse)
 
     def divided(self, M: Array) -> Array:
-        """T with (T diag + diag T)/2 = M."""
+        """Return T with (T diag + diag T)/2 = M."""
         return 2.0 * M / (self.values[:, :, None] + self.values[:, None, :])
 
     def extent(self, scaled: Array) -> tuple[float, float]:
-        """The least and the largest eigenvalue of `scaled` by the slack."""
+        """Return the least and the largest eigenvalue of `scaled` relative to the slack."""
         root = np.sqrt(self.values)
         found = np.linalg.eigvalsh(scaled / (root[:, :, None] * root[:, None, :]))
         return float(found.min()), float(found.max())
 
 
 class _NormalEquations:
-    """M (P, y) = adjoint(H change(P, y) H), factored."""
+    """The equations M (P, y) = adjoint(H change(P, y) H), factored."""
 
     def __init__(self, cones: _Cones, scalings: list[_Scaling]):
         self.cones, self.scalings = cones, scalings
@@ -552,7 +554,7 @@ class _NormalEquations:
         self.pivot = corner - np.einsum("ikl,jkl->ij", self.border, self.across)
 
     def times(self, P: Array, y: Array) -> tuple[Array, Array]:
-        """M (P, y), block by block."""
+        """Return M (P, y), block by block."""
         moved = self.cones.change(P, y)
         return self.cones.adjoint(
             [at.H @ M @ at.H for at, M in zip(self.scalings, moved, strict=True)]
@@ -564,8 +566,8 @@ class _NormalEquations:
         return smat(x - np.tensordot(y, self.across, axes=1), b.shape[-1]), y
 
     def solve(self, b: Array, d: Array) -> tuple[Array, Array]:
-        """(P, y) of the right-hand side (b, d), by conjugate gradients that the factors
-        precondition: near the end these know the equations to some digits only.
+        """Return (P, y) for the right-hand side (b, d), by conjugate gradients preconditioned with
+        the factors, which near the end are accurate to a few digits only.
         """
         P, y, rest, left = np.zeros_like(b), np.zeros_like(d), b, d
         along, pace, size = None, 0.0, _inner(b, d, b, d)
@@ -595,12 +597,14 @@ def _inner(P: Array, y: Array, Q: Array, z: Array) -> float:
 
 
 def _longest(least: float, share: float = 1.0) -> float:
-    """Of a step in a direction with this least eigenvalue, the part that stays in the cone."""
+    """Return the part of a step in a direction with this least eigenvalue that stays in the
+    cone.
+    """
     return min(1.0, share / -least) if least < 0 else 1.0
 
 
 def _step(cones: _Cones, point: _Point, at: _Residuals, feasible: bool) -> _Point | None:
-    """The next point, None where no step is left."""
+    """Return the next point, None where no step is possible."""
     scalings = [_Scaling.of(s, z) for s, z in zip(point.S, point.Z, strict=True)]
     normal = _NormalEquations(cones, scalings)
     diagonals = [scaling.diagonal for scaling in scalings]

@@ -1,4 +1,4 @@
-"""One constant change of coordinates in which the numbers of an LMI are of order one, whatever the
+"""A constant change of coordinates in which the numbers of an LMI are of order one, whatever the
 units of the states.
 """
 
@@ -49,7 +49,7 @@ scale.
 MAX_RESCALINGS = 3
 """Largest number of changes of scale."""
 LEVELS = (1.01, 2.0, 10.0, 100.0, 1e4)
-"""Multiples of the expected gain at which a storage function is sought in turn."""
+"""Multiples of the expected gain at which a storage function is computed in turn."""
 MAX_SWEEPS = 100
 """Largest number of sweeps of balancing."""
 
@@ -74,7 +74,7 @@ class Scaling(NamedTuple):
     multiplier: float = 1.0
 
     def fault(self, states: int) -> str | None:
-        """What keeps these from being coordinates of so many states, None where nothing does."""
+        """Return why these are not coordinates of this number of states; None where they are."""
         return structure.first(
             structure.coordinates(
                 self.left, self.right, (self.channel, self.time, self.multiplier), states
@@ -85,7 +85,7 @@ class Scaling(NamedTuple):
     def of_pieces(
         self, pieces: Iterable[ModelPiece], block: NormBounded | None = None
     ) -> tuple[ModelPiece, ...]:
-        """The pieces of a model in these units, those of the channels of a `block` too."""
+        """Return the pieces of a model in these units, those of the channels of a `block` too."""
 
         def scaled(piece: ModelPiece) -> ModelPiece:
             inputs, outputs = np.ones(piece.B.shape[2]), np.full(piece.C.shape[1], self.channel)
@@ -97,8 +97,8 @@ class Scaling(NamedTuple):
         return tuple(map(scaled, pieces))
 
     def storage(self, model: LinearModel, above: float) -> Array | None:
-        """P of a frozen model in these units, which dissipates strictly at the level 1 + `above` of
-        the channel; None where there is none.
+        """Return P of a frozen model in these units, which dissipates strictly at the level 1 +
+        `above` of the channel; None where there is none.
         """
         inner = linalg.inv(self.weight)
         share = 0.5 * above / (LEVELS[0] - 1.0)
@@ -107,34 +107,34 @@ class Scaling(NamedTuple):
         )
 
     def of_model(self, model: LinearModel) -> Matrices:
-        """A frozen model in these units."""
+        """Return a frozen model in these units."""
         every = self.of_matrices(Matrices(*(M[None] for M in (model.A, model.B, model.C, model.D))))
         return Matrices(*(M[0] for M in every))
 
     def of_matrices(self, model: Matrices, block: NormBounded | None = None) -> Matrices:
-        """The matrices (K, ...) of a model in these units, as `of_pieces`."""
+        """Return the matrices (K, ...) of a model in these units, as `of_pieces`."""
         return Matrices(*self.of_pieces([ModelPiece(0.0, 1.0, *model)], block)[0][2:])
 
     def to_physical(self, P: Array) -> Array:
-        """Lyapunov matrices in physical units from those in z."""
+        """Return Lyapunov matrices in physical units from those in z."""
         return symmetrized(self.channel**2 * self.left.T @ P @ self.left)
 
     def to_scaled(self, P: Array) -> Array:
-        """The inverse of `to_physical`."""
+        """Return the inverse of `to_physical`."""
         return symmetrized(self.right.T @ P @ self.right / self.channel**2)
 
 
 def scaling(lpv: LPVStateSpace, gain: float) -> Scaling:
-    """From the model at mid-range, and what drives and shows the states all over it; `gain` is the
-    expected one.
+    """Return the scaling by the model at mid-range and the inputs and outputs of the states over
+    the whole range; `gain` is the expected one.
     """
     s = lpv.scheduling
     return model_scaling(lpv.at(s.middle), gain, lpv.matrices(np.linspace(s.low, s.high, 9)))
 
 
 def block_scaling(lpv: LPVStateSpace, block: NormBounded, gain: float) -> Scaling:
-    """The same with a norm-bounded block: a multiplier of 1 in these units balances d to y with u
-    to v, as a constant one would.
+    """Return the same with a norm-bounded block: a multiplier of 1 in these units balances d to y
+    with u to v, as a constant one would.
     """
     d, v = slice(None, block.inputs), slice(len(lpv.outputs) - block.outputs, None)
     u, y = slice(block.inputs, None), slice(None, len(lpv.outputs) - block.outputs)
@@ -159,8 +159,8 @@ def block_scaling(lpv: LPVStateSpace, block: NormBounded, gain: float) -> Scalin
 
 
 def _response(lpv: LPVStateSpace, inputs: slice, outputs: slice) -> float:
-    """Largest gain of some frozen models from these inputs to these outputs; 0 where none is
-    stable.
+    """Return the largest gain of some frozen models from these inputs to these outputs; 0 where
+    none is stable.
     """
     s = lpv.scheduling
     found = [0.0]
@@ -171,7 +171,7 @@ def _response(lpv: LPVStateSpace, inputs: slice, outputs: slice) -> float:
 
 
 def model_scaling(model: LinearModel, gain: float, elsewhere: Matrices | None = None) -> Scaling:
-    """The same from one frozen model, with the size of its matrices `elsewhere` (K, ...).
+    """Return the scaling by one frozen model, with the size of its matrices `elsewhere` (K, ...).
 
     The Lyapunov function of order one is the sum of that by the outputs and the inverse of the
     Gramian of the inputs, between which those of the bounded real lemma lie: both go with the
@@ -224,8 +224,8 @@ def model_scaling(model: LinearModel, gain: float, elsewhere: Matrices | None = 
 
 
 def dissipative(units: Scaling, model: LinearModel, gain: float) -> Scaling | None:
-    """Units in which P = I is a storage function of a frozen model that dissipates strictly just
-    above the expected `gain`, and weight^-2 what it dissipates; None where there is none.
+    """Return units in which P = I is a storage function of a frozen model that dissipates strictly
+    just above the expected `gain`, and weight^-2 the dissipation; None where there is none.
 
     At that level a margin of one is reached, and by convexity a smaller one costs that share of
     what the level is above the norm.
@@ -255,8 +255,8 @@ def dissipative(units: Scaling, model: LinearModel, gain: float) -> Scaling | No
 
 
 def in_its_own_scale(found: Callable[[float], tuple[T, float, float]], expected: float) -> list[T]:
-    """What `found(expected)` brings, (result, bound, scale it was found in); again in the scale of
-    the bound while that is far off.
+    """Return the result of `found(expected)`, (result, bound, scale it was found in); again in the
+    scale of the bound while that is far off.
 
     The frozen gain is a scale that no search changes, but a moving p may have a gain of another
     order.
@@ -277,11 +277,11 @@ def in_its_own_scale(found: Callable[[float], tuple[T, float, float]], expected:
 
 
 def balance(A: Array, B: Array, C: Array) -> Array:
-    """d (n,) such that what enters each state of z = x/d from other states and inputs is as large
-    as what leaves it.
+    """Return d (n,) such that each state of z = x/d is driven by other states and inputs as
+    strongly as it drives other states and outputs.
 
     A (n, n) of sizes, its diagonal the states' own. Osborne's balancing of the whole system matrix;
-    a state that is reached or seen by nothing else ends at `MIN_BALANCED`.
+    a state without other couplings ends at `MIN_BALANCED`.
     """
     n = len(A)
     d, own = np.ones(n), np.abs(np.diag(A))
@@ -306,8 +306,8 @@ def balance(A: Array, B: Array, C: Array) -> Array:
 
 
 def _channel(gain: float, response: float) -> float:
-    """The gain expected; where that is nothing beside the `response` of the states to inputs and
-    outputs, a gain to begin with.
+    """Return the expected gain; where that is negligible beside the `response` of the states to
+    inputs and outputs, an initial gain.
     """
     return (
         gain
@@ -317,18 +317,20 @@ def _channel(gain: float, response: float) -> float:
 
 
 def _size(M: Array) -> float:
-    """Largest entry, 1 where there is none."""
+    """Return the largest entry, 1 where there is none."""
     return float(np.abs(M).max(initial=0.0)) or 1.0
 
 
 def _pace(A: Array) -> Array:
-    """How fast each state moves (n,), relative ones at least 1e-12 of the fastest."""
+    """Return the rate of each state (n,), relative to the fastest at least 1e-12."""
     size = np.maximum(np.linalg.norm(A, axis=0), np.linalg.norm(A, axis=1))
     return np.maximum(size, 1e-12 * _size(size))
 
 
 def _stabilised(A: Array, poles: Any, continuous: bool) -> Array:
-    """A with its poles moved inside the stability region by as little as the Gramians need."""
+    """Return A with its poles moved inside the stability region by as little as the
+    Gramians need.
+    """
     if continuous:
         shift = float(poles.real.max()) + 1e-6 * float(
             np.abs(poles).min() or np.abs(poles).max() or 1.0
@@ -338,7 +340,7 @@ def _stabilised(A: Array, poles: Any, continuous: bool) -> Array:
 
 
 def _gramian(A: Array, B: Array, continuous: bool, least: float = 1e-12) -> Array:
-    """With no eigenvalue below the fraction `least` of the largest."""
+    """Return the Gramian with no eigenvalue below the fraction `least` of the largest."""
     X = (
         linalg.solve_continuous_lyapunov(A, -B @ B.T)
         if continuous

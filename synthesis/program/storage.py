@@ -27,8 +27,8 @@ REDUCTION = 8.0
 
 
 class Storage(NamedTuple):
-    """x = T z and V = z'z: with the supply level^2 |u|^2 - |y|^2, V falls by z'Wz more than is
-    supplied, per unit of time or sample.
+    """A storage function V = z'z of x = T z: with the supply rate level^2 |u|^2 - |y|^2, V
+    decreases by z'Wz more than is supplied, per unit of time or sample.
     """
 
     T: Array
@@ -38,8 +38,8 @@ class Storage(NamedTuple):
 def strict_storage(
     A: Array, B: Array, C: Array, D: Array, level: float, *, discrete: bool
 ) -> Storage | None:
-    """The storage function of a model whose norm is below `level`, near the middle of all; None
-    where rounding leaves none.
+    """Return a storage function of a model whose norm is below `level`, near the centre of the set
+    of all; None where rounding leaves none.
 
     W is as large a share of the pace of the states as the level allows. By convexity a share t of
     W costs at most the share t of what the level is above the norm.
@@ -67,7 +67,7 @@ def strict_storage(
 def least_storage(
     A: Array, B: Array, C: Array, D: Array, level: float, W: Array, *, discrete: bool
 ) -> Array | None:
-    """The least P of a storage function that dissipates W at this level, None where there is
+    """Return the least P of a storage function that dissipates W at this level, None where there is
     none.
     """
     if discrete:
@@ -77,12 +77,12 @@ def least_storage(
 
 
 def _midway(A: Array) -> Array:
-    """From the state of a discrete model that of the continuous one, of the same norm and P."""
+    """Return the continuous model of the same norm and P for the state of a discrete one."""
     return (A + np.eye(len(A))) / math.sqrt(2.0)
 
 
 def _strict(A: Array, B: Array, C: Array, D: Array, level: float) -> tuple[Array, Array] | None:
-    """P and W."""
+    """Return P and W."""
     pace = _pace(A)
     share = 1.0
     while share > MIN_DISSIPATION:
@@ -95,7 +95,9 @@ def _strict(A: Array, B: Array, C: Array, D: Array, level: float) -> tuple[Array
 
 
 def _least(A: Array, B: Array, C: Array, D: Array, level: float, W: Array) -> Array | None:
-    """The least P with A'P + PA + C'C + W + (PB + C'D) R^-1 (PB + C'D)' = 0, R = level^2 - D'D."""
+    """Return the least P with A'P + PA + C'C + W + (PB + C'D) R^-1 (PB + C'D)' = 0, R = level^2 -
+    D'D.
+    """
     R = level**2 * np.eye(D.shape[1]) - D.T @ D
     if linalg.eigvalsh(R)[0] <= 0:
         return None
@@ -111,7 +113,7 @@ def _least(A: Array, B: Array, C: Array, D: Array, level: float, W: Array) -> Ar
 
 
 def _pace(A: Array) -> Array:
-    """(A'A)^1/2: by how much which states move."""
+    """Return (A'A)^1/2, the rates of the states."""
     _, values, directions = linalg.svd(A)
     values = np.maximum(values, 1e-13 * values[0])
     return symmetrized((directions.T * values) @ directions)

@@ -1,5 +1,5 @@
-"""The worst model of an uncertain one: a Delta of the set at which some frozen model has the
-largest gain, or the slowest mode.
+"""The worst model of an uncertain one: a Delta of the set with the largest gain of a frozen model,
+or the slowest mode.
 
 The derivative of a peak gain, or of a pole, by Delta is a matrix of rank two at most; the point of
 the ball that it grows fastest towards has its polar factor as direction. From some Deltas the
@@ -49,7 +49,7 @@ class Perturbed(NamedTuple):
 
 
 def worst_perturbation(unc: UncertainStateSpace, *, gains: bool) -> Perturbed:
-    """The worst Delta found: of the largest gain of a frozen model (inf: unstable), or with
+    """Return the worst Delta found: of the largest gain of a frozen model (inf: unstable), or with
     `gains` False of the fastest growing mode.
     """
     frozen = _Frozen.of(unc, gains)
@@ -104,7 +104,7 @@ class _Frozen(NamedTuple):
         )
 
     def closed(self, delta: Array, p: float) -> Matrices:
-        """With d = delta v + what is added to d."""
+        """Return the frozen model with d = delta v + the input d."""
         A, B, C, D = self.unc.model.matrices(p)
         K = np.zeros((B.shape[1], C.shape[0]))
         K[np.ix_(self.d, self.v)] = delta
@@ -112,7 +112,7 @@ class _Frozen(NamedTuple):
         return Matrices(A + B @ N @ K @ C, B @ N, C + D @ N @ K @ C, D @ N)
 
     def value(self, delta: Array, p: float) -> float:
-        """What is to be made large."""
+        """Return the objective of the ascent."""
         return self._value(self.closed(delta, p))
 
     def _value(self, at: Matrices) -> float:
@@ -128,7 +128,7 @@ class _Frozen(NamedTuple):
         return math.log(max(float(np.abs(poles).max()), 1e-300)) / self.unc.dt
 
     def slope(self, at: Matrices) -> Array:
-        """The derivative of the value by Delta, (nd, nv), up to a positive factor."""
+        """Return the derivative of the value by Delta, (nd, nv), up to a positive factor."""
         A, B, C, D = at
         E, G = B[:, self.d], C[self.v]
         if not self.gains:
@@ -152,7 +152,7 @@ class _Frozen(NamedTuple):
         return np.real(np.outer(np.conj(left[:, 0]) @ into, heard @ np.conj(right[0])))
 
     def climbed(self, delta: Array, value: float, p: float, bound: float) -> tuple[Array, float]:
-        """A better Delta at this p, and its value; the same where none was found."""
+        """Return a better Delta at this p, and its value; the same where none was found."""
         for _ in range(MAX_STEPS):
             at = self.closed(delta, p)
             left, sizes, right = np.linalg.svd(self.slope(at), full_matrices=False)

@@ -43,7 +43,7 @@ def test_a_search_over_a_box_keeps_to_its_budget_and_says_so(seconds):
 
 
 def test_a_search_that_was_not_made_is_not_claimed():
-    assert "no trajectory was looked for" in l2_gain(spring(damping=0.4), 0.1, search=None).details
+    assert "no trajectory was searched" in l2_gain(spring(damping=0.4), 0.1, search=None).details
     quick = Search(
         levels=3, dwells=2, starts=1, nodes=10, evaluations=2, steps=20, samples=100, seconds=60.0
     )
