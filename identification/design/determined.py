@@ -11,15 +11,15 @@ from symheli.lpv import FunctionSpace
 from symheli.values.arrays import Array
 
 PRIOR = 32.0
-"""What a recursion that keeps nothing awake pretends to know: so many eps samples, with a regressor
-at its largest, of coefficient 0.
+"""Prior information of a recursion without persistent excitation: this many eps samples, with a
+regressor at its largest, of coefficient 0.
 """
 
-BEYOND = 1000.0
-"""A coefficient is determined where the data say so many times more than what is pretended."""
+MIN_INFORMATION_RATIO = 1000.0
+"""Ratio of the information of the data to the prior above which a coefficient is determined."""
 
 
-def determined(d: Array, energy: Array, fed: Array, beyond: float = BEYOND) -> Array:
+def determined(d: Array, energy: Array, fed: Array, beyond: float = MIN_INFORMATION_RATIO) -> Array:
     """Which columns of a regressor matrix stand out of the span of those before it, (n,) of bool.
 
     `d` (n,) is the squared distance of each column from that span (the squared diagonal of the

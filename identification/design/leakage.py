@@ -20,8 +20,8 @@ MADE_OF_OUTPUTS = 0.5
 measurement of them.
 """
 
-PAST = 2
-"""Samples of p and the outputs that are known before the news at k."""
+PAST_SAMPLES = 2
+"""Number of samples of p and the outputs that are known before the sample k."""
 
 NOTHING_NEW = 1e-6
 """Of the spread of p from sample to sample; news below this is rounding."""
@@ -39,19 +39,22 @@ def share_from_outputs(arx: LPVARX, records: FlightRecord | Iterable[FlightRecor
     for record in as_records(records):
         y, s = record.columns(arx.outputs), scheduling_values(arx, record).reshape(len(record), -1)
         for part in record.segments():
-            n = part.stop - part.start - PAST
+            n = part.stop - part.start - PAST_SAMPLES
             if n > 0:
                 both = np.hstack([y[part], s[part]])
-                now.append(y[part][PAST:])
+                now.append(y[part][PAST_SAMPLES:])
                 past.append(
                     np.hstack(
                         [
                             np.ones((n, 1)),
-                            *(both[PAST - lag : PAST - lag + n] for lag in range(1, PAST + 1)),
+                            *(
+                                both[PAST_SAMPLES - lag : PAST_SAMPLES - lag + n]
+                                for lag in range(1, PAST_SAMPLES + 1)
+                            ),
                         ]
                     )
                 )
-                p.append(s[part][PAST:])
+                p.append(s[part][PAST_SAMPLES:])
     if not now:
         return np.zeros(len(arx.parameters))
     rows = np.hstack([np.vstack(past), np.vstack(now), np.vstack(p)])
@@ -82,7 +85,7 @@ def warn_of_own_past(arx: LPVARX, record: FlightRecord) -> None:
     y = (y - np.nanmean(y, axis=0)) / np.maximum(np.nanstd(y, axis=0), np.finfo(float).tiny)
     p = scheduling_values(arx, record).reshape(len(record), -1)
     for j, name in enumerate(arx.parameters):
-        for lag in range(PAST + 1):
+        for lag in range(PAST_SAMPLES + 1):
             rows = [
                 np.arange(part.start + lag, part.stop)
                 for part in record.segments()

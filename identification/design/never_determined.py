@@ -12,10 +12,10 @@ from symheli.records import FlightRecord
 from symheli.values import signals
 
 SAMPLES = 4
-"""Random samples for each regressor."""
+"""Number of random samples for each regressor."""
 
-ALGEBRA = 1e-9
-"""Of the largest singular value of random regressors; what lies below is zero by algebra."""
+STRUCTURAL_ZERO = 1e-9
+"""Singular values of random regressors below this fraction of the largest are structurally zero."""
 
 
 def never_determined(arx: LPVARX, group: Group) -> str:
@@ -59,4 +59,4 @@ def _repeated(arx: LPVARX, group: Group) -> int:
     )
     phi = regression(arx, record).phi[:, regressors]
     values = np.linalg.svd(phi / np.linalg.norm(phi, axis=0), compute_uv=False)
-    return int(np.sum(values <= ALGEBRA * values[0]))
+    return int(np.sum(values <= STRUCTURAL_ZERO * values[0]))

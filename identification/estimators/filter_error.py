@@ -34,20 +34,22 @@ noise with this many times its variance has as much power where models are used.
 seeds 1000 to 1004 of the study's flights; 10 to 100 differ little.
 """
 
-EXACT = 1e-9
-"""Variance of the Euler equations' own error, as a share of that of the attitude sensors."""
+MODEL_ERROR = 1e-9
+"""Error variance of the Euler equations, as a fraction of that of the attitude sensors."""
 
-ABOVE = 0.8
-"""Share of the Nyquist frequency above which a signal is taken to be noise."""
+NOISE_BAND = 0.8
+"""Fraction of the Nyquist frequency above which a signal is taken to be noise."""
 
-NEIGHBOURS = 1.0 + 2 * (2 / 3) ** 2 + 2 * (1 / 6) ** 2
-"""Lines of a Hann window's spectrum that count as one: neighbours are correlated."""
+LINES_PER_ESTIMATE = 1.0 + 2 * (2 / 3) ** 2 + 2 * (1 / 6) ** 2
+"""Number of lines of a Hann window's spectrum that count as one: neighbouring lines are
+correlated.
+"""
 
 LAGS = 25
-"""Samples over which scores are taken to be correlated."""
+"""Number of samples over which scores are taken to be correlated."""
 
 CHUNK = 256
-"""Samples whitened at a time."""
+"""Number of samples whitened at a time."""
 
 
 @dataclass(frozen=True)
@@ -261,10 +263,10 @@ def noise_level(signal: Array, segments: Sequence[slice]) -> tuple[float, float]
         window = np.hanning(len(x))
         line = np.linspace(x[0], x[-1], len(x))
         spectrum = np.abs(np.fft.rfft((x - line) * window)) ** 2
-        high = spectrum[int(ABOVE * len(spectrum)) :]
+        high = spectrum[int(NOISE_BAND * len(spectrum)) :]
         power += len(x) * float(np.mean(high)) / float(np.sum(window**2))
         weight += len(x)
-        spread += len(x) ** 2 * NEIGHBOURS / len(high)
+        spread += len(x) ** 2 * LINES_PER_ESTIMATE / len(high)
     return (power / weight, float(np.sqrt(spread)) / weight) if weight else (np.nan, np.inf)
 
 
@@ -294,7 +296,7 @@ class Noise(NamedTuple):
     @classmethod
     def of(cls, R: Array, left: Array, gust: float, remains: float) -> Noise:
         """Of sensors R, equations that leave (6,) and Euler's, which are exact."""
-        return cls(R, np.append(left, EXACT * R[6:]), gust, remains)
+        return cls(R, np.append(left, MODEL_ERROR * R[6:]), gust, remains)
 
 
 class Linearized(NamedTuple):

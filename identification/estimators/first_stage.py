@@ -10,9 +10,9 @@ from identification.design.excitation import RANK_TOLERANCE, column_scale, direc
 from identification.design.tall_factors import orthonormal, triangular
 from symheli.values.arrays import Array
 
-WEAK = 10.0
-"""A first-stage F below this leaves more than about a tenth of the bias of least squares. Source:
-Staiger and Stock (1997).
+MIN_F = 10.0
+"""First-stage F below which instruments are weak: more than about a tenth of the bias of least
+squares remains. Source: Staiger and Stock (1997).
 """
 
 

@@ -95,8 +95,8 @@ class FlightSource(Protocol):
         ...
 
 
-MOST = 10**9
-"""Samples in a window of instruments."""
+MAX_SAMPLES = 10**9
+"""Largest number of samples in a window of instruments."""
 
 Instruments = str | Sequence[str] | InstrumentSource | FlightSource
 """A source of instruments, or the names of signals of the record with the defaults of
@@ -161,9 +161,10 @@ class LaggedSignals:
     def instrument_lags(self, dt: float, first: int, memory: int) -> tuple[int, ...]:
         """Evenly over the window, whatever the memory of the structure."""
         window = max(USUAL_WINDOW, FEWEST * dt) if self.window is None else self.window
-        if not window / MOST < dt < np.inf:
+        if not window / MAX_SAMPLES < dt < np.inf:
             raise InputError(
-                f"dt: expected seconds, at least a {MOST}th of the window of {window:g} s, got {dt}"
+                f"dt: expected seconds, at least a {MAX_SAMPLES}th of the window of {window:g} s,"
+                f" got {dt}"
             )
         first = whole(first, "first")
         last = max(first + 1, round(window / dt))

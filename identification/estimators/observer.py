@@ -8,10 +8,9 @@ import numpy as np
 
 from symheli.values.arrays import Array
 
-DOUBT = 1e-4
-"""Variance of what drives the model beside its inputs, as a share of that of the noise on the
-outputs: small enough to whiten it, and enough to stay awake while a plant is stable, so that the
-estimate does not run away when it becomes unstable.
+PROCESS_NOISE = 1e-4
+"""Variance of the process noise, as a fraction of that of the output noise: small enough to whiten
+the outputs, large enough to keep the observer adapting.
 """
 
 
@@ -37,7 +36,7 @@ class Observer:
         n, ny, width = A.shape
         R = np.diag(size**2)
         P, drive = np.kron(np.eye(width // ny), R), np.zeros((width, width))
-        drive[:ny, :ny] = DOUBT * R
+        drive[:ny, :ny] = PROCESS_NOISE * R
         shift, gain = np.eye(width, k=-ny), np.empty((n, width, ny))
         for k in range(n):
             T = shift.copy()

@@ -22,7 +22,7 @@ from symheli.values.arrays import Array
 from symheli.values.numbers import whole
 
 ADVICE = "allow more evaluations, or fit a smaller structure"
-"""What to try where the search stops early."""
+"""Advice where the search stops early."""
 
 
 @dataclass(frozen=True)

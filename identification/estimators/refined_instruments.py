@@ -43,7 +43,7 @@ ADVICE = (
     'a plant that is unstable in open loop needs instruments=("name", ...), the external'
     ' excitation; where the model is simpler than the plant, method "iv" is the better one'
 )
-"""What to try where the iteration stops early."""
+"""Advice where the iteration stops early."""
 
 
 @dataclass(frozen=True)

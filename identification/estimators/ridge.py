@@ -24,7 +24,7 @@ from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 
 GRID = np.linspace(-14.0, 4.0, 37)
-"""Decades of the weight among which cross-validation looks before it refines."""
+"""Decades of the weight at which cross-validation is computed before it is refined."""
 
 
 @dataclass(frozen=True)

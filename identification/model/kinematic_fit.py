@@ -13,7 +13,8 @@ from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 
 NEGLIGIBLE = 1e-6
-"""Directions of the regressors weaker than this part of the strongest say nothing of a trim."""
+"""Directions of the regressors weaker than this fraction of the strongest do not determine a trim.
+"""
 
 
 def mean_trim(kin: KinematicARX, records: Sequence[FlightRecord]) -> Array:

@@ -19,11 +19,11 @@ from symheli.values.arrays import Array
 from symheli.values.kinematics import RIGID_BODY, kinematic_jacobian
 from symheli.values.signal import indices
 
-EXACT = 1e-9
-"""Largest error of an interpolated entry, as a share of the largest entry."""
+INTERPOLATION_TOLERANCE = 1e-9
+"""Largest error of an interpolated entry, as a fraction of the largest entry."""
 
-HIGHEST = 16
-"""Degree in each parameter at which interpolation gives up."""
+MAX_DEGREE = 16
+"""Highest degree in each parameter that interpolation tries."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -326,9 +326,9 @@ def interpolated(
     part: Callable[[Array], Matrices], line: Line, degree: int | None
 ) -> tuple[FunctionSpace, Matrices, Array]:
     """Basis, coefficients and check points of polynomials through matrices at any p, of `degree`
-    in each parameter, or raised until nothing is `EXACT` off.
+    in each parameter, or raised until nothing is `INTERPOLATION_TOLERANCE` off.
     """
-    for more in range(1, HIGHEST):
+    for more in range(1, MAX_DEGREE):
         degrees = [degree if degree is not None else d + more if d else 0 for d in line.degrees]
         basis = polynomials(degrees, line.ranges)
         points = interpolation_points(degrees, line.ranges)
@@ -340,6 +340,6 @@ def interpolated(
             for M, E in zip(fitted, exact, strict=True)
         )
         size = max(float(np.abs(M).max(initial=0.0)) for M in exact)
-        if degree is not None or error <= EXACT * size:
+        if degree is not None or error <= INTERPOLATION_TOLERANCE * size:
             break
     return basis, fitted, nodes

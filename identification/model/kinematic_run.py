@@ -21,13 +21,14 @@ from symheli.values.controllers import begun
 from symheli.values.kinematics import RIGID_BODY, kinematic_rates
 
 CORRECTIONS = 2
-"""Of the trapezoidal rule a step: each leaves a tenth of the error at 50 Hz."""
+"""Number of corrections of the trapezoidal rule a step: each leaves a tenth of the error at 50 Hz.
+"""
 
 STEEP = np.radians(89.0)
-"""Pitch beyond which the Euler angles say nothing."""
+"""Pitch (rad) beyond which the Euler angles are singular."""
 
 CONTROLS = ("d_lon", "d_lat", "d_col", "d_ped")
-"""What a controller answers, in this order."""
+"""Controls, in the order of a controller's outputs."""
 
 AIRSPEED = Signal("airspeed", "m/s")
 COMMANDED = (AIRSPEED, Signal("acceleration", "m/s^2"))

@@ -194,7 +194,7 @@ def _flagged(y: Array) -> Array:
 
 
 LARGEST = 1e150
-"""From here on the square of a measurement may overflow."""
+"""Largest measurement: the square of a larger one may overflow."""
 
 
 def fit_percent(y: object, yhat: object) -> Array:

@@ -10,14 +10,14 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.values.units import to_si
 
-SILENCE = 5.0
-"""A column that pauses for more than this many of its median steps is missing (NaN) in between."""
+MAX_PAUSE = 5.0
+"""A pause of a column longer than this many of its median steps is filled with NaN."""
 
 A_TURN = 0.9
 """Part of a turn that no angle moves by from one sample to the next."""
 
-FINER = 1e4
-"""A step that makes this many times as many samples as the column with most is refused."""
+MAX_UPSAMPLING = 1e4
+"""Largest number of samples, relative to the column with most, that a step may produce."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +78,7 @@ def on_one_axis(
             f" {first!r} ends at {stop:.3f} s; leave one of them out"
         )
     samples, logged = (stop - start) / dt, max(len(time) for time, _ in series.values())
-    if samples > FINER * logged:
+    if samples > MAX_UPSAMPLING * logged:
         raise InputError(
             f"{path}: {samples:.1e} steps of {dt:g} s for {logged} samples; dt is in seconds, or a"
             f" clock of the log is damaged (it runs from {start:.6g} to {stop:.6g} s)"
@@ -95,5 +95,5 @@ def _interpolate(grid: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.n
         exact = np.isclose(grid, time[after], rtol=0, atol=1e-9) | np.isclose(
             grid, time[after - 1], rtol=0, atol=1e-9
         )
-        out[(step > SILENCE * np.median(np.diff(time))) & ~exact] = np.nan
+        out[(step > MAX_PAUSE * np.median(np.diff(time))) & ~exact] = np.nan
     return out

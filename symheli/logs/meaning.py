@@ -197,7 +197,7 @@ def _unit(signal: str, values: np.ndarray) -> tuple[str | None, str]:
     known = np.abs(values[np.isfinite(values)])
     size = float(known.max()) if len(known) else 0.0
     if signal in RATES:
-        return ("deg/s", "name and size") if size > FASTEST else ("rad/s", "name")
+        return ("deg/s", "name and size") if size > MAX_RATE else ("rad/s", "name")
     if signal in ANGLES:
         most = np.pi / 2 if signal == "theta" else 2 * np.pi
         return ("deg", "name and size") if size > 1.05 * most else ("rad", "name")
@@ -210,8 +210,8 @@ def _unit(signal: str, values: np.ndarray) -> tuple[str | None, str]:
     return ("%", "name and size") if size == 100.0 else (None, "")
 
 
-FASTEST = 12.0
-"""rad/s: no helicopter turns faster; larger numbers are degrees a second."""
+MAX_RATE = 12.0
+"""Largest angular rate of a helicopter, rad/s; larger numbers are in deg/s."""
 
 PULSES = (1000.0, 2500.0)
-"""Longest pulse of a radio channel, us."""
+"""Range of pulse lengths of a radio channel, us."""

@@ -18,13 +18,15 @@ from symheli.logs.files import text
 from symheli.values.units import to_si
 
 SEPARATORS = {"\t": "tab", "|": "bar", ";": "semicolon", ",": "comma", " ": "blanks"}
-"""Tried in this order: what stands in names and numbers too comes last."""
+"""Separators in the order in which they are tried: those that also occur in names and numbers come
+last.
+"""
 
 LOOKED_AT = 20
 """Rows that decide on the separator."""
 
 MISSING = {"", "na", "n/a", "nan", "-nan", "null", "none", "#n/a"}
-"""Cells (lower case) that say that a sample is missing."""
+"""Cells (lower case) of a missing sample."""
 
 
 @dataclass(frozen=True, eq=False)

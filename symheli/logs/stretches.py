@@ -12,18 +12,18 @@ from typing import NamedTuple
 import numpy as np
 
 from symheli.logs.column import Column, forward
-from symheli.logs.meaning import FASTEST, RATES, Guess
+from symheli.logs.meaning import MAX_RATE, RATES, Guess
 from symheli.values.arrays import Array
 from symheli.values.units import to_si
 
-REST = 0.005
-"""rad/s: rates that vary by less than this over `WINDOW` are those of a vehicle at rest."""
+REST_RATE = 0.005
+"""Variation of the angular rates over `WINDOW`, rad/s, below which the vehicle is at rest."""
 
 WINDOW = 2.0
-"""s."""
+"""Length of the window, s."""
 
-SHORTEST = 5.0
-"""s: what is flown for less is not worth identifying from."""
+MIN_DURATION = 5.0
+"""Least duration, s, of a flight that is worth identifying from."""
 
 EVENTS = {"armed": ({10.0, 15.0}, {11.0}), "airborne": ({28.0}, {18.0})}
 """Numbers of ArduPilot's EV messages that begin and end a state."""
@@ -89,7 +89,7 @@ def stretches(columns: Mapping[str, Column], guesses: Mapping[str, Guess]) -> tu
 
 def longest(found: Sequence[Stretch]) -> Stretch | None:
     """The longest stretch of flight; None where the whole log is one, or none is long enough."""
-    flown = [s for s in found if s.flown and s.stop - s.start >= SHORTEST]
+    flown = [s for s in found if s.flown and s.stop - s.start >= MIN_DURATION]
     return max(flown, key=lambda s: s.stop - s.start) if flown and len(found) > 1 else None
 
 
@@ -152,14 +152,14 @@ def _seen(rates: Sequence[Column]) -> dict[str, _State]:
         time, values = rate.time[keep], rate.values[keep]
         if len(time) < 3:
             continue
-        fast = np.abs(values) > FASTEST
+        fast = np.abs(values) > MAX_RATE
         wild = min(wild, float(time[fast.argmax()]) if fast.any() else np.inf)
         starts = np.arange(time[0], time[-1], WINDOW)
         part = np.searchsorted(starts, time, side="right") - 1
         count = np.bincount(part, minlength=len(starts))
         mean = np.bincount(part, values, len(starts)) / np.maximum(count, 1)
         spread = np.bincount(part, (values - mean[part]) ** 2, len(starts)) / np.maximum(count, 1)
-        moving.append(_State(starts, 1.0 * (np.sqrt(spread) > REST)))
+        moving.append(_State(starts, 1.0 * (np.sqrt(spread) > REST_RATE)))
     if moving:
         starts = moving[0].time
         still = [all(m.at(t + 0.5 * WINDOW) == 0.0 for m in moving) for t in starts]

@@ -22,8 +22,8 @@ from symheli.values.summary import summarized
 Model = TypeVar("Model", LPVStateSpace, LinearModel)
 
 NEGLIGIBLE = 1e-7
-"""A state with a singular value below this fraction of the largest is not there: the roots of what
-Riccati solutions lose to rounding.
+"""A state with a singular value below this fraction of the largest counts as absent: the square
+root of the rounding of Riccati solutions.
 """
 
 

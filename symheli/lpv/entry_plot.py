@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
     from symheli.lpv.linear_family import LinearFamily
 
-PALEST = 0.15
-"""Strength of the first of many curves."""
+MIN_ALPHA = 0.15
+"""Opacity of the first of many curves."""
 
 
 def plot_entries(
@@ -74,7 +74,9 @@ def draw_scaled(
         largest = float(np.abs(along).max())
         unit = "" if name.unit == "1" else f" {name.unit}"
         curves = along.reshape(len(values), -1).T / (largest or 1.0)
-        for curve, alpha in zip(curves, np.linspace(PALEST, 1.0, len(curves) + 1)[1:], strict=True):
+        for curve, alpha in zip(
+            curves, np.linspace(MIN_ALPHA, 1.0, len(curves) + 1)[1:], strict=True
+        ):
             last = alpha == 1.0
             ax.plot(
                 values,

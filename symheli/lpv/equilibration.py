@@ -13,7 +13,7 @@ SINGULAR = 1e12
 """An equilibrated matrix with a larger condition number counts as singular."""
 
 
-NOISE = 1e-12
+NEGLIGIBLE_ENTRY = 1e-12
 """An entry smaller than this fraction of the largest of its row or column, after equilibration, is
 treated as zero when the units are chosen.
 """
@@ -64,7 +64,7 @@ def _logarithmic(size: Array) -> tuple[Array, Array]:
         scaled = row[:, None] * size * column
         noise = counted & (
             scaled
-            < NOISE
+            < NEGLIGIBLE_ENTRY
             * np.maximum(scaled.max(axis=1, keepdims=True), scaled.max(axis=0, keepdims=True))
         )
         if not np.any(noise):

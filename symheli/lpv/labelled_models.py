@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from symheli.lpv.lpv_state_space import LPVStateSpace
 
 VALUES = 21
-"""Of a scheduling parameter where none are named."""
+"""Default number of values of a scheduling parameter."""
 
 MATRICES = {
     "A": ("equation", "state"),

@@ -23,7 +23,7 @@ from symheli.values.signal import Signal, distinct, indices
 from symheli.values.units import per_second, to_si
 
 PREFIX = "controller_"
-"""Before the name of a controller's state that the plant has too."""
+"""Prefix of a controller's state whose name the plant has too."""
 
 
 class Positions(NamedTuple):

@@ -18,10 +18,10 @@ from symheli.values.signal import Signal, indices, signals
 from symheli.values.summary import as_table, summarized
 
 SAFETY = 2.0
-"""A covering set contains this many times the largest difference measured."""
+"""Safety factor of a covering set on the largest measured difference."""
 
 ROUNDING = 1e-12
-"""A perturbation may exceed the bound by this fraction of it."""
+"""Relative excess of a perturbation over its bound that counts as rounding."""
 
 
 @dataclass(frozen=True, eq=False)

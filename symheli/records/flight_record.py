@@ -37,8 +37,8 @@ GAP = 1.5
 """Two samples further apart than this many median steps have a gap between them."""
 
 
-FINER = 1e4
-"""`resample` refuses a step that makes this many times as many samples."""
+MAX_UPSAMPLING = 1e4
+"""Largest number of samples `resample` may produce, relative to the record."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -406,7 +406,7 @@ class FlightRecord:
         samples = (
             sum(float(self.time[part.stop - 1] - self.time[part.start]) for part in parts) / dt
         )
-        if samples > FINER * len(self):
+        if samples > MAX_UPSAMPLING * len(self):
             raise InputError(
                 f"dt of {dt:g} s makes {samples:.1e} samples of {len(self)}; dt is in seconds"
             )

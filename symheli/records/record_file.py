@@ -18,7 +18,7 @@ from symheli.values.whole_files import write_bytes
 SCHEMA, VERSION = "symheli flight record", 1
 
 DESCRIBED = "described"
-"""Entry of `meta` under which the text of what a file cannot hold comes back."""
+"""Entry of `meta` with the text of items that a file cannot hold."""
 
 
 class Content(NamedTuple):

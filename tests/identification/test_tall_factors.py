@@ -55,4 +55,4 @@ def test_a_block_is_some_tenths_of_a_second_of_work():
     """Of an hour at 50 Hz and 288 instruments: 180 000 rows, in blocks of 5000."""
     parts = tall_factors._blocks(np.broadcast_to(1.0, (180_000, 288)))
     assert sum(map(len, parts)) == 180_000
-    assert max(map(len, parts)) * 288**2 <= 1.2 * tall_factors.WORK
+    assert max(map(len, parts)) * 288**2 <= 1.2 * tall_factors.MAX_OPERATIONS

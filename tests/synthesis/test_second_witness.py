@@ -165,7 +165,7 @@ def test_an_error_shared_by_assembly_and_proof_is_found(case, analysis, monkeypa
     judge, P = cert.proof
     number = verify.rational()
     believed = (
-        verify.proven(judge._claim(P), cert.gamma)
+        verify.proven(judge._statement(P), cert.gamma)
         if analysis == "splines"
         else all(
             map(

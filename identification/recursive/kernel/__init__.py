@@ -18,9 +18,7 @@ from identification.recursive.kernel.configuration import Configuration
 from symheli.errors import CompilerWarning
 
 SOURCES = ("rls.h", "rls.c", "python.c")
-"""What the compiled kernel is made from, in this folder; the first two are all an autopilot
-needs.
-"""
+"""Source files of the compiled kernel, in this folder; an autopilot needs only the first two."""
 
 
 def kernel(configuration: Configuration) -> Any:

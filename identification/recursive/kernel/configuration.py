@@ -18,7 +18,7 @@ from symheli.lpv import Basis, Product
 from symheli.values.arrays import Array
 
 LANES = 8
-"""Rows start, and sums run, in steps of so many numbers."""
+"""Number of elements to which rows are aligned and by which sums advance."""
 
 HEADER, GROUP_HEADER = LANES, LANES
 COUNT, MILLIONS, FILLED = 0, 1, 2

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.design.determined import BEYOND, PRIOR, determined
+from identification.design.determined import MIN_INFORMATION_RATIO, PRIOR, determined
 from identification.recursive.kernel import configuration as at
 from identification.recursive.kernel.configuration import LANES, Configuration, Factor, GroupLayout
 from symheli.values.arrays import Array
@@ -267,7 +267,9 @@ class Kernel:
             solve_anew(a)
 
     def _is_determined(self, a: View, kept_awake: bool) -> bool:
-        beyond = (0.0 if a.header[at.DETERMINED] != 0 else 2.0) if kept_awake else BEYOND
+        beyond = (
+            (0.0 if a.header[at.DETERMINED] != 0 else 2.0) if kept_awake else MIN_INFORMATION_RATIO
+        )
         return bool(determined(a.d[: a.n], a.energy[: a.n], a.fed[: a.n], beyond).all())
 
     def _new_peaks(self, a: View, samples: Any, kept_awake: bool) -> None:

@@ -18,9 +18,9 @@ from symheli.lpv.bases.polynomials import factors_of
 from symheli.lpv.bases.product import Product
 from symheli.values.arrays import Array
 
-TWICE = 4
-"""Breaks of two bases that differ by at most this many units in the last place of the larger end of
-the range are one number, computed twice.
+MERGE_ULPS = 4
+"""Breaks of two bases that differ by at most this many units in the last place of the larger end
+of the range are the same number, computed twice.
 """
 WIDER = 1e6
 """Such breaks are joined only where the pieces on both sides are wider than they are apart by this
@@ -100,7 +100,7 @@ def _breaks(
     """
     unit = float(np.spacing(max(abs(low), abs(high))))
     # room for degree + 1 values of p that can be told apart
-    least = unit * max(TWICE, 8 * (degree + 1))
+    least = unit * max(MERGE_ULPS, 8 * (degree + 1))
     breaks = [low]
     for at in sorted({low, high, *(p.low for each in spaces for p in each)}):
         apart = at - breaks[-1]
@@ -108,7 +108,7 @@ def _breaks(
             continue
         if apart > least:
             breaks.append(at)
-        elif apart > TWICE * unit or not all(_joins(each, breaks[-1], at) for each in spaces):
+        elif apart > MERGE_ULPS * unit or not all(_joins(each, breaks[-1], at) for each in spaces):
             raise InputError(
                 f"the functions have breaks at {breaks[-1]!r} and at {at!r}, too near to one"
                 " another to tell the polynomial between them, and they are not the same: give"

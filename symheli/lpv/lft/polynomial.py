@@ -23,7 +23,7 @@ from symheli.values.arrays import Array
 from symheli.values.signal import signals
 
 ROUNDING = 16 * np.finfo(float).eps
-"""By how much of itself an entry of an LFT may be off: it was rounded when the LFT was made."""
+"""Relative rounding error of an entry of an LFT."""
 
 
 def from_lpv(lpv: LPVStateSpace) -> LFT:

@@ -13,7 +13,7 @@ from symheli.lpv.lft.model import LFT, Block, parts
 from symheli.values.arrays import Array
 
 SAMPLES = 12
-"""Points of the box at which the size of what depends on the parameters is looked at."""
+"""Number of points of the box at which the parameter-dependent part is evaluated."""
 
 
 def reduce(lft: LFT, tolerance: float) -> LFT:
