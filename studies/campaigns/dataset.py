@@ -188,7 +188,7 @@ class CampaignDataset:
                 **{name: ZarrArray.whole(*label) for name, label in labels.items()},
             }
         )
-        self._folder.say(self.attributes)
+        self._folder.write_attributes(self.attributes)
 
     @property
     def _rows(self) -> ZarrArray:

@@ -164,7 +164,7 @@ def _about(component: Component) -> str:
 
 
 def _outcome(notes: _Notes, effect: Effect, subscript: str) -> None:
-    """Return the results of a component: forces, moments, derivatives of its states, torque."""
+    """List the results of a component: forces, moments, derivatives of its states, torque."""
     for axis, value in zip("XYZLMN", (*effect.force, *effect.moment), strict=True):
         if value not in (0, real(f"{axis}_{{{subscript}}}")):
             notes.equal(f"{axis}_{{{subscript}}}", value)

@@ -102,7 +102,7 @@ class FlightDataset:
                 **{name: ZarrArray.whole(*labels) for name, labels in whole.items()},
             }
         )
-        folder.say(attributes)  # last: now it is a dataset
+        folder.write_attributes(attributes)  # last: now it is a dataset
         return cls(Path(path))
 
     def write(self, chunk: int, values: Array, duration: Array, lost: Array) -> None:

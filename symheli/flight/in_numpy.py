@@ -44,7 +44,7 @@ class InNumpy:
 
     def read(self, k: int) -> Array | None:
         """Return the inputs of the controller at sample k; None where the flight is lost."""
-        euler, air = _seen(self._x, self._wind(k))
+        euler, air = _measured(self._x, self._wind(k))
         self._truth[k] = *euler[:8], air
         if not (np.isfinite(self._x).all() and np.abs(euler[6:8]).max() <= MAX_BANK):
             self._found.lost[self._i] = k
@@ -101,7 +101,7 @@ class InNumpy:
             row[:] = *self._reading[:8], *self._euler[8:], *inputs, *self._commands[k], self._air
 
 
-def _seen(flight: Array, wind: Array) -> tuple[Array, float]:
+def _measured(flight: Array, wind: Array) -> tuple[Array, float]:
     """Euler-form state and true airspeed (m/s) from the quaternion form; wind in earth axes."""
     velocity = flight[:3] - np.array(body_to_earth(*flight[6:10])).T @ wind
     return euler_state(flight), float(np.linalg.norm(velocity))

@@ -48,7 +48,7 @@ def inward(value: float, towards: float) -> np.float32:
     return np.nextafter(number, NUMBER(towards)) if beyond and math.isfinite(value) else number
 
 
-def as_told(name: str, given: ArrayLike, count: int) -> Array:
+def checked_numbers(name: str, given: ArrayLike, count: int) -> Array:
     """`count` numbers, finite or not; raises `InputError` for another number of them."""
     out = np.asarray(given, NUMBER)
     if out.shape != (count,):

@@ -27,7 +27,7 @@ from symheli.flight.parameter_monitor import ParameterMonitor
 from symheli.flight.single_precision import (
     MAX_NUMBER,
     NUMBER,
-    as_told,
+    checked_numbers,
     increasing,
     inward,
     rounded,
@@ -382,9 +382,12 @@ class TableController:
         """
         n, s, nu, ny = self.numbers, self._own(state), len(self.inputs), len(self.outputs)
         with np.errstate(all="ignore"):  # NaN and infinity are handled below
-            seen, held = as_told("measured", measured, nu), as_told("reference", reference, nu)
-            at = as_told("trim", trim, ny)
-            elsewhere = at if others is None else as_told("others", others, ny)
+            seen, held = (
+                checked_numbers("measured", measured, nu),
+                checked_numbers("reference", reference, nu),
+            )
+            at = checked_numbers("trim", trim, ny)
+            elsewhere = at if others is None else checked_numbers("others", others, ny)
             s = follow_parameter(n, s, NUMBER(parameter), valid)
             s = commands(n, s, seen - held, at, elsewhere)
         return s.command.copy(), s

@@ -22,7 +22,7 @@ MAX_UPSAMPLING = 1e4
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """Samples (n,) of one column of a log and their instants in s (n,), as they stand there.
+    """Samples (n,) of one column of a log and their instants in s (n,), as logged.
 
     `time` None where the log has no clock; `unit` None where the log declares none, else one that
     `symheli.values.units.to_si` knows.
@@ -34,7 +34,9 @@ class Column:
 
 
 def forward(time: np.ndarray) -> np.ndarray:
-    """Mask of the samples whose instant is later than all before: repeats and steps back go."""
+    """Return the mask of the samples whose instant is later than all before: repeats and steps back
+    are dropped.
+    """
     return np.concatenate([[True], np.diff(np.maximum.accumulate(time)) > 0])
 
 
@@ -54,8 +56,8 @@ def continuous(column: Column, unit: str) -> Column:
 def on_one_axis(
     columns: Mapping[str, Column], dt: float, path: object
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Columns of different rates at steps of `dt` (s), interpolated linearly between neighbours,
-    from the first instant that all have seen to the last; time counts from there.
+    """Return columns of different rates at steps of `dt` (s), interpolated linearly between
+    neighbours, over the interval common to all; time counts from its start.
 
     Nothing is filtered: what is faster than half of 1 / dt folds back. Within a silence (more than
     5 median steps of that column) samples are missing. Raises `InputError` where no instant is

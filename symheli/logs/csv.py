@@ -79,8 +79,8 @@ def csv_columns(path: str | os.PathLike[str]) -> dict[str, Column]:
 
 
 def with_units(time: Array, columns: Sequence[tuple[Signal, Array]]) -> str:
-    """A table that `read_csv` reads without being told anything: "t [s],q [rad/s]", numbers to the
-    last bit, empty cells for NaN.
+    """Write a table that `read_csv` reads without options: "t [s],q [rad/s]", numbers to the last
+    bit, empty cells for NaN.
     """
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")

@@ -38,8 +38,8 @@ class _Element(NamedTuple):
 
 
 def check_mat5(file: Path) -> None:
-    """Raises `ValueError` for a file of version 5 whose elements do not fit; says nothing of one
-    of another version.
+    """Raise `ValueError` for a file of version 5 whose elements do not fit; files of other versions
+    are not checked.
     """
     data = memoryview(file.read_bytes())
     if len(data) < 4 or 0 in data[:4]:  # version 4 has no header

@@ -1,5 +1,5 @@
-"""What a column of a log probably is, by its name and its size: a suggestion for somebody to
-confirm, never used without being asked.
+"""Probable meaning of a column of a log, by its name and its size: a suggestion for the user to
+confirm, never used automatically.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from symheli.values.signal import UNITS
 
 @dataclass(frozen=True)
 class Guess:
-    """A column that may be `signal`, in `unit`; `why` says what both rest on."""
+    """A column that may be `signal`, in `unit`; `why` is the reason for both."""
 
     signal: str
     column: str

@@ -1,5 +1,5 @@
-"""Fewer states: truncation balanced over the whole range of the scheduling, for stable and unstable
-models alike.
+"""Model reduction: truncation balanced over the whole range of the scheduling, for stable and
+unstable models.
 """
 
 from __future__ import annotations
@@ -175,8 +175,8 @@ def _projected(model: Model, left: Array, right: Array) -> Model:
 
 
 def _comparable(full: LinearModel, small: LinearModel) -> tuple[LinearModel, LinearModel]:
-    """Both discrete: continuous models by one bilinear transformation, which keeps gains and the
-    nu-gap.
+    """Return both as discrete models: continuous ones by the same bilinear transformation, which
+    preserves gains and the nu-gap.
     """
     if full.dt is not None:
         return full, small

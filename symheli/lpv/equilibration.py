@@ -1,6 +1,4 @@
-"""What is zero and what is singular, whatever the units: matrices judged after their rows and
-columns are scaled.
-"""
+"""Zero and singular matrices in any units: decided after rows and columns are scaled."""
 
 from __future__ import annotations
 
@@ -20,8 +18,8 @@ treated as zero when the units are chosen.
 
 
 def equilibrate(size: Array) -> tuple[Array, Array]:
-    """Row and column factors that bring the largest entry of each to about one (zero rows and
-    columns keep 1).
+    """Return row and column factors that bring the largest entry of each to about one (zero rows
+    and columns keep 1).
 
     They start from the least-squares fit of log size by -log row - log column, so that row * size *
     column is the same whatever the units of rows and columns. Source: Curtis and Reid, J. Inst.

@@ -1,5 +1,5 @@
-"""Pictures and tables of a model over its scheduling parameter: Bode, singular values, Nyquist,
-poles, damping, step responses.
+"""Plots and tables of a model over its scheduling parameter: Bode, singular values, Nyquist, poles,
+damping, step responses.
 
 Each takes an LPVStateSpace, an LFT, a LinearFamily or a LinearModel. `p` are the values at which
 the parameter is frozen, with several parameters rows of them; by default seven over the range of

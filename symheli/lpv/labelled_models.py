@@ -82,8 +82,8 @@ def models_dataset(
 
 
 def coefficient_dataset(names: Names, matrices: Stacked, functions: str) -> xarray.Dataset:
-    """The coefficients of an LPV model: A over "function" (j of f_j), "equation" and "state", and
-    so on; `functions` says what they are.
+    """Return the coefficients of an LPV model: A over "function" (j of f_j), "equation" and
+    "state", and so on; `functions` describes them.
     """
     order = np.arange(len(matrices.A))
     variables: dict[str, Any] = {

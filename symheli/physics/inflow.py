@@ -148,8 +148,8 @@ def relaxed(c0: Any, c1: Any, ct_max: Any, mu2: Any, mu_z: Any, efficiency: Any)
 
 
 def vortex_ring(lam_hover: Any, mu2: Any, mu_z: Any) -> Any:
-    """Positive where momentum theory promises nothing: descending by more than half the hover
-    inflow at little forward speed.
+    """Return a function that is positive where momentum theory is invalid: descent at more than
+    half the hover inflow at little forward speed.
 
     `lam_hover` = sqrt(|C_T|/(2 eta_w)); covers every state with several inflow roots. Source:
     Leishman, Principles of Helicopter Aerodynamics (2006), section 2.13; the multiple-root bound mu

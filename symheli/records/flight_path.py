@@ -1,4 +1,6 @@
-"""Flight-path reconstruction: signals whose derivatives are known, fitted to what was measured."""
+"""Flight-path reconstruction: integrals of measured rates and accelerations, fitted to the measured
+states.
+"""
 
 from __future__ import annotations
 

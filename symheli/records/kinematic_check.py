@@ -47,7 +47,8 @@ SCALE_RATIO = 1.05
 
 @dataclass(frozen=True)
 class SensorCheck:
-    """What the others say of one signal: measured(t) = scale * true(t - delay) + bias.
+    """Sensor error of one signal, from the other signals: measured(t) = scale * true(t - delay) +
+    bias.
 
     Parameters
     ----------
@@ -238,7 +239,7 @@ def _scale(signal: Signal, found: Faults, limit: float) -> list[str]:
 
 
 def _partner(signal: str, found: Faults) -> str:
-    """What a signal is held against first."""
+    """Return the signal with which this one is compared first."""
     other = DRIVER.get(signal) or DRIVEN[signal]
     return other if other in (*found.scale, *found.delay) else "attitude"
 

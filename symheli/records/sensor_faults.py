@@ -76,7 +76,7 @@ class Estimate(NamedTuple):
 
 @dataclass(frozen=True)
 class Faults:
-    """What was found of each signal.
+    """Sensor errors of each signal.
 
     Parameters
     ----------
@@ -98,8 +98,8 @@ class Faults:
 
 
 def sensor_faults(record: FlightRecord) -> Faults:
-    """Of p q r phi theta, psi where recorded, and u v w ax ay az where all are; see
-    `check_kinematics`.
+    """Estimate the errors of p q r phi theta, psi where recorded, and u v w ax ay az where all are;
+    see `check_kinematics`.
     """
     missing = lacking(record.signals)
     if missing:
@@ -145,8 +145,8 @@ def sensor_faults(record: FlightRecord) -> Faults:
 def _units_and_delays(
     windows: Windows, signals: Mapping[str, Array], angles: Sequence[str]
 ) -> tuple[dict[str, tuple[float, ...]], Array]:
-    """What each angle may have to be divided by to be in radians, and how late it is (s), from the
-    one rate that it follows while angles are small.
+    """Return the factor by which each angle may have to be divided to be in radians, and its delay
+    (s), from the one rate that it follows while angles are small.
     """
     units: dict[str, tuple[float, ...]] = {}
     delays = np.zeros(len(angles))
@@ -166,7 +166,7 @@ def _units_and_delays(
 
 
 def _best(windows: Windows, kinematics: Kinematics, count: int) -> Reconstruction:
-    """Of the fits from several delays of `count` channels the one that explains most."""
+    """Return, of the fits from several delays of `count` channels, the one that explains most."""
     free = np.ones(len(kinematics.nominal), bool)
     fits = [reconstruct(windows, kinematics, free, np.full(count, start)) for start in STARTS]
     return max(fits, key=lambda fit: float(fit.explained.sum()))
@@ -174,8 +174,8 @@ def _best(windows: Windows, kinematics: Kinematics, count: int) -> Reconstructio
 
 @dataclass(frozen=True)
 class _Fit:
-    """A reconstruction whose drivers were read times `factors` (3,), and which of its parameters
-    are `free`; the others are not known.
+    """A reconstruction whose drivers were multiplied by `factors` (3,), and the mask of its `free`
+    parameters; the others are unknown.
     """
 
     found: Reconstruction
@@ -217,8 +217,9 @@ def _fit(
     tolerance: Array,
     rough: Reconstruction,
 ) -> _Fit:
-    """All parameters, from a fit that has the drivers' scales roughly. Those that the record does
-    not tell within `tolerance` (m,) are held: tilts, then scales, then biases, the last to be lost.
+    """Fit all parameters, starting from a fit with approximate scales of the drivers. Those that
+    the record does not determine within `tolerance` (m,) are fixed: tilts first, then scales, then
+    biases.
     """
     plain, count = make(windows, signals), len(rough.delays)
     scale, errors = rough.theta[:3], rough.errors[:3]
@@ -241,8 +242,8 @@ def _attitude_fit(
     units: Mapping[str, Sequence[float]],
     delays: Array,
 ) -> tuple[_Fit, dict[str, float]]:
-    """The fit of Euler's equations, and what the angles are to be divided by: with the fewest signs
-    turned of those that explain the record alike.
+    """Return the fit of Euler's equations, and the divisors of the angles: of equally good fits,
+    the one with the fewest signs changed.
 
     Turning phi, p, r and psi together changes nothing, nor theta, q, r and psi.
     """
@@ -268,7 +269,7 @@ def _attitude_fit(
 
 
 def _unexplained(found: Reconstruction) -> Array:
-    """What is left of each channel in each window (windows, c), over how it moves."""
+    """Return the residual of each channel in each window (windows, c), over its motion."""
     return found.left / (found.moves + TINY) + ROUNDING
 
 

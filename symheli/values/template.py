@@ -1,4 +1,4 @@
-"""Files kept beside the code as they are written out, but for a few marked places."""
+"""Templates: source files written out with a few marked places filled."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _MARK = re.compile(r"/\* @(\w+)@ \*/|@(\w+)@")
 
 
 def filled(path: Path, places: Mapping[str, object], names: Mapping[str, str] | None = None) -> str:
-    """The text of the file at `path` with each marked place @key@ filled and each of `names`
+    """Return the text of the file at `path` with each marked place @key@ filled and each of `names`
     renamed.
 
     A name is replaced where it begins: {"model_": "roll_"} turns model_init into roll_init. Raises

@@ -17,7 +17,7 @@ def graded(m, n, smallest=1.0, seed=0):
 @pytest.fixture
 def small_blocks(monkeypatch):
     """Of four times as many rows as columns: the triangles are cut in turn."""
-    monkeypatch.setattr(tall_factors, "WORK", 1.0)
+    monkeypatch.setattr(tall_factors, "MAX_OPERATIONS", 1.0)
 
 
 @pytest.mark.parametrize("smallest", [1.0, 1e-12])

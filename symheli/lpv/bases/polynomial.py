@@ -192,8 +192,8 @@ class Polynomial(Basis):
         return self.from_scaled(padded)
 
     def from_scaled(self, coefficients: Array) -> Array:
-        """Coefficients in this basis (n, ...) of sum_i x^i M_i, x from -1 at `low` to 1 at
-        `high`.
+        """Return the coefficients in this basis (n, ...) of sum_i x^i M_i, x from -1 at `low` to 1
+        at `high`.
         """
         flat = np.reshape(coefficients, (self.size, -1))
         return np.linalg.solve(self._powers.T, flat).reshape(np.shape(coefficients))

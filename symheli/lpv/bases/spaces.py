@@ -1,6 +1,4 @@
-"""Sums and products of function spaces: where the sum and the product of two functions live, and
-the coefficients of a function there.
-"""
+"""Sums and products of function spaces, and the coefficients of a function in them."""
 
 from __future__ import annotations
 
@@ -29,7 +27,7 @@ factor, and the functions do not jump: what joining changes is then below the ro
 
 
 def sum_space(a: FunctionSpace, b: FunctionSpace) -> FunctionSpace:
-    """A space that holds every f + g, f of `a` and g of `b`, factor by factor.
+    """Return a space that contains every f + g, f in `a` and g in `b`, factor by factor.
 
     Polynomials stay polynomials, other piecewise polynomials become `Patches` over the breaks of
     both. Raises `InputError` for functions that are neither, unless the other is a constant.
@@ -38,7 +36,9 @@ def sum_space(a: FunctionSpace, b: FunctionSpace) -> FunctionSpace:
 
 
 def product_space(a: FunctionSpace, b: FunctionSpace) -> FunctionSpace:
-    """A space that holds every f g, f of `a` and g of `b`: as `sum_space`, the degrees added."""
+    """Return a space that contains every f g, f in `a` and g in `b`: as `sum_space`, the degrees
+    added.
+    """
     return _combined(a, b, _product)
 
 
@@ -95,8 +95,8 @@ def _either(f: FunctionSpace, g: FunctionSpace, degree: Callable[[int, int], int
 def _breaks(
     spaces: Sequence[Sequence[Piece]], low: float, high: float, degree: int
 ) -> tuple[float, ...]:
-    """Those of every space between `low` and `high`; equal ones count once, and those that two
-    spaces computed of one number.
+    """Return the breaks of every space between `low` and `high`; equal ones count once, also those
+    that two spaces computed from one number.
     """
     unit = float(np.spacing(max(abs(low), abs(high))))
     # room for degree + 1 values of p that can be told apart
@@ -142,8 +142,8 @@ def _basis(factor: FunctionSpace) -> Basis:
 
 
 def _nodes(factor: FunctionSpace) -> Array:
-    """Points of one parameter at which the functions are told apart without loss of digits, none on
-    a break that they may jump at.
+    """Return points of one parameter at which the functions are distinguished without loss of
+    digits, none on a break at which they may jump.
     """
     if isinstance(factor, Polynomial):
         x = np.polynomial.legendre.leggauss(factor.size)[0]
