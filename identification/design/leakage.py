@@ -1,5 +1,5 @@
-"""What a model may hear of its own answer: through a scheduling signal made of the outputs, or
-through samples made of others.
+"""Leakage of outputs into regressors: through a scheduling signal computed from the outputs, or
+through resampled data.
 """
 
 from __future__ import annotations
@@ -78,8 +78,9 @@ def share_from_outputs(arx: LPVARX, records: FlightRecord | Iterable[FlightRecor
 
 
 def warn_of_own_past(arx: LPVARX, record: FlightRecord) -> None:
-    """Warns (`DataWarning`) where a scheduling parameter is the outputs, their squares or products,
-    now or up to two samples ago: a free run that follows the measured one is told its answer.
+    """Warn (`DataWarning`) where a scheduling parameter is the outputs, their squares or products,
+    now or up to two samples ago: a free run with the measured parameter then uses the measured
+    outputs.
     """
     y = record.columns(arx.outputs)
     y = (y - np.nanmean(y, axis=0)) / np.maximum(np.nanstd(y, axis=0), np.finfo(float).tiny)
@@ -115,8 +116,8 @@ def warn_of_own_past(arx: LPVARX, record: FlightRecord) -> None:
 
 
 def warn_of_leakage(arx: LPVARX, records: Sequence[FlightRecord]) -> None:
-    """Warns (`DataWarning`) where y(k) stands among its own regressors, or an input at k that it
-    depends on is left out of them.
+    """Warn (`DataWarning`) where y(k) is among its own regressors, or an input at k that it depends
+    on is not.
     """
     if arx.offset_rate or arx.scheduling_at == "now":
         for parameter, share in zip(arx.parameters, share_from_outputs(arx, records), strict=True):

@@ -40,7 +40,7 @@ def triangular(A: Array) -> Array:
 
 
 def _blocks(A: Array) -> list[Array]:
-    """Of rows, four times as many as columns at least."""
+    """Return blocks of rows, with at least four times as many rows as columns."""
     m, n = A.shape
     rows = max(int(MAX_OPERATIONS / max(n, 1) ** 2), 4 * n, 1)
     return np.array_split(A, max(m // rows, 1))

@@ -1,4 +1,4 @@
-"""Maximum likelihood for a rigid vehicle with noise on every sensor: the filter error method, by
+"""Filter error method: maximum likelihood for a rigid vehicle with noise on every sensor, by
 smoothing.
 """
 
@@ -143,7 +143,9 @@ class FilterError(Method):
         )
 
     def estimate(self, arx: LPVARX, records: Sequence[FlightRecord], data: Regression) -> Estimate:
-        """With the noise found in the details, and the covariance of all coefficients together."""
+        """Estimate the coefficients, with the noise in the details, and the joint covariance of all
+        coefficients.
+        """
         if not isinstance(arx, Aerodynamics):
             raise InputError(
                 "the filter error method needs known kinematics: fit a KinematicARX, or choose"
@@ -198,7 +200,9 @@ class FilterError(Method):
         )
 
     def _variances(self, records: Sequence[FlightRecord]) -> list[Array]:
-        """Of the sensors (8,) in each record; where one is too short to tell, as in the others."""
+        """Return the variances of the sensors (8,) in each record; where one is too short, those of
+        the others.
+        """
         found = np.array([noise_of_flight(r, self.noise or {}).variances for r in records])
         known = np.isfinite(found)
         weights = known * np.array([len(r) for r in records], float)[:, None]
@@ -223,8 +227,8 @@ class FilterError(Method):
 
 
 class FlightNoise(NamedTuple):
-    """Variances (8,) of the sensors' noise in one flight, NaN where it is too short to tell, and of
-    each the relative standard error (8,), 0 where it was given.
+    """Variances (8,) of the sensors' noise in one flight, NaN where it is too short, and the
+    relative standard error (8,) of each, 0 for given variances.
     """
 
     variances: Array
@@ -232,8 +236,8 @@ class FlightNoise(NamedTuple):
 
 
 def noise_of_flight(record: FlightRecord, given: Mapping[str, float]) -> FlightNoise:
-    """Of the sensors of u v w p q r phi theta: the standard deviations given, else from the
-    spectrum of the record.
+    """Return the noise of the sensors of u v w p q r phi theta: from the given standard deviations,
+    else from the spectrum of the record.
     """
     segments = record.segments()
     found = [
@@ -245,15 +249,17 @@ def noise_of_flight(record: FlightRecord, given: Mapping[str, float]) -> FlightN
 
 
 def noise_variance(signal: Array, segments: Sequence[slice]) -> float:
-    """Variance of white noise with the power a signal has above 0.8 of the Nyquist frequency; 0
-    where no segment is long enough to tell.
+    """Return the variance of white noise with the power that a signal has above 0.8 of the Nyquist
+    frequency; 0 where no segment is long enough.
     """
     found, _ = noise_level(signal, segments)
     return found if np.isfinite(found) else 0.0
 
 
 def noise_level(signal: Array, segments: Sequence[slice]) -> tuple[float, float]:
-    """The same with its relative standard error; NaN and infinity where nothing tells."""
+    """Return the same with its relative standard error; NaN and infinity where no segment is long
+    enough.
+    """
     power, weight, spread = 0.0, 0.0, 0.0
     for part in segments:
         x = signal[part]
@@ -271,7 +277,7 @@ def noise_level(signal: Array, segments: Sequence[slice]) -> tuple[float, float]
 
 
 def unbroken(arx: Aerodynamics, record: FlightRecord) -> list[slice]:
-    """Stretches in which everything was measured, long enough to say something."""
+    """Return stretches in which everything was measured, of sufficient length."""
     names = (*STATES, *arx.inputs, *arx.parameters)
     known = np.isfinite(record.columns(dict.fromkeys(names))).all(axis=1)
     out = []
@@ -389,8 +395,8 @@ class Stretch:
         return Linearized(F, left, L, H, Whitening.of(terms))
 
     def whitened(self, theta: Array, noise: Noise) -> Array:
-        """What the equations leave (m, 8), white and of variance 1 where `noise` is all there
-        is.
+        """Return the residuals (m, 8) of the equations, white and of variance 1 if `noise` is their
+        only cause.
         """
         _, left, _, _, white = self._linearized(theta, noise)
         return white.whitened(left)
@@ -422,7 +428,7 @@ class Stretch:
             yield out
 
     def smooth(self, theta: Array, change: Array, noise: Noise) -> None:
-        """Move the states, and the gust, to where the equations hold best with theta + `change`."""
+        """Adjust the states, and the gust, to fit the equations best with theta + `change`."""
         F, left, L, H, white = self._linearized(theta, noise)
         left[:, :6] -= F @ change
         pull = white.adjoint(white.whitened(left))
@@ -452,7 +458,7 @@ class Stretch:
 
 
 def _solved(normal: Array, right: Array) -> tuple[Array, Array]:
-    """Solution and inverse of normal equations, scaled to a unit diagonal."""
+    """Return solution and inverse of normal equations, scaled to a unit diagonal."""
     scale = np.sqrt(np.diag(normal))
     scale = np.where(scale > 0, scale, 1.0)
     factor = cho_factor(normal / np.outer(scale, scale), lower=True)

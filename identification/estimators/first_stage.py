@@ -1,4 +1,4 @@
-"""How strong instruments are: what of the worst direction of the regressors they explain."""
+"""Strength of instruments: the explained part of the worst direction of the regressors."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ class FirstStage(NamedTuple):
 
 
 def first_stage(phi: Array, Q: Array, names: tuple[str, ...], own: Array) -> FirstStage:
-    """Of regressors phi (m, n) on instruments with the orthonormal basis Q (m, k); those of `own`
-    (n,) instrument themselves.
+    """Return the first-stage regression of regressors phi (m, n) on instruments with the
+    orthonormal basis Q (m, k); those of `own` (n,) are their own instruments.
 
     The least eigenvalue of what k - k_own instruments explain of the regressors against what they
     do not, per degree of freedom, that of `own` taken off both: F = (m - k)/(k - k_own) rho^2/(1 -

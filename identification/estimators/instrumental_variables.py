@@ -83,14 +83,18 @@ class InstrumentalVariables(Method):
 
     @classmethod
     def default(cls) -> Method:
-        """There is none: only the flight knows its external excitation. Raises `InputError`."""
+        """Raise `InputError`: there is no default, since the external excitation of a flight must
+        be named.
+        """
         raise InputError(
             'method "iv" needs its instruments: InstrumentalVariables(("name", ...)), the external'
             " excitation added to the stabilised inputs"
         )
 
     def estimate(self, arx: LPVARX, records: Sequence[FlightRecord], data: Regression) -> Estimate:
-        """With the strength of the instruments in the details, and a remark where they are weak."""
+        """Estimate the coefficients, with the strength of the instruments in the details, and a
+        remark where they are weak.
+        """
         source = source_of(self.instruments)
         theta, weakest = instrumental_variables(arx, records, data, source)
         error = np.mean((data.y - data.phi @ theta) ** 2, axis=0)

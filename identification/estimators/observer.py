@@ -1,4 +1,4 @@
-"""A Kalman observer in place of the free run: bounded also where the plant is not."""
+"""A Kalman observer instead of the free run: bounded also for an unstable plant."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ the outputs, large enough to keep the observer adapting.
 
 @dataclass(frozen=True, eq=False)
 class Observer:
-    """For y = x + v, x(k) = -A(k) [x(k-1); x(k-2); ...] + known(k): A (n, ny, na ny), `gain` (n, na
-    ny, ny) of the past on the innovation.
+    """Observer of y = x + v, x(k) = -A(k) [x(k-1); x(k-2); ...] + known(k): A (n, ny, na ny),
+    `gain` (n, na ny, ny) of the past on the innovation.
 
     While the plant is stable the gain is small, and the innovation is v; where it is unstable the
     poles of the observer are its own mirrored at the unit circle, which leaves white noise white.
@@ -30,8 +30,8 @@ class Observer:
 
     @classmethod
     def of(cls, A: Array, size: Array) -> Observer:
-        """The time-varying Kalman gain for white noise v with standard deviations `size` (ny,),
-        from a past measured with that noise.
+        """Return the observer with the time-varying Kalman gain for white noise v with standard
+        deviations `size` (ny,), from a past measured with that noise.
         """
         n, ny, width = A.shape
         R = np.diag(size**2)
@@ -49,8 +49,8 @@ class Observer:
         return cls(A, gain)
 
     def innovations(self, equation_error: Array) -> Array:
-        """What the observer does not foresee of y, (n, ny, m), where A y = known + `equation_error`
-        (n, ny, m); linear in it.
+        """Return the innovations of y, (n, ny, m), where A y = known + `equation_error` (n, ny, m);
+        linear in it.
         """
         n, ny, m = equation_error.shape
         width = self.A.shape[2]

@@ -76,8 +76,8 @@ class OutputError(Method):
             raise InputError(f"tolerance: expected a number in (0, 1), got {self.tolerance}")
 
     def estimate(self, arx: LPVARX, records: Sequence[FlightRecord], data: Regression) -> Estimate:
-        """With `evaluations`, whether the search `converged` and its `message`, and the
-        `simulation_covariance` in the details.
+        """Estimate the coefficients, with `evaluations`, whether the search `converged`, its
+        `message`, and the `simulation_covariance` in the details.
         """
         source = None if self.instruments is None else source_of(self.instruments)
         starts = [starting_point(arx, records, data, source)]

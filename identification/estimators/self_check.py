@@ -47,8 +47,8 @@ def check_least_squares(arx: LPVARX, phi: Array, y: Array, theta: Array, method:
 
 
 def check_recursion(state: RLSState, phi: Array, y: Array) -> None:
-    """Raises `AccuracyError` unless the coefficients that moved sample by sample predict what those
-    solved from the factor predict.
+    """Raise `AccuracyError` unless the coefficients updated sample by sample predict the same as
+    those solved from the factor.
 
     With any forgetting; to 1e-8 of the spread of each output over phi (m, n), y (m, ny).
     """

@@ -1,5 +1,5 @@
-"""A rigid vehicle with identified aerodynamics along a record: ahead, free, or in the recorded
-loop.
+"""A rigid vehicle with identified aerodynamics along a record: predicted, simulated, or in the
+recorded loop.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class Run:
 
     @classmethod
     def along(cls, kin: KinematicARX, theta: Array, record: FlightRecord) -> Run:
-        """With the p of a record; NaN where p is missing."""
+        """Return the run with the p of a record; NaN where p is missing."""
         aero = kin.aerodynamics
         p = scheduling_values(aero, record)
         f = basis_values(aero, p)
@@ -122,7 +122,9 @@ def predict(run: Run, horizon: int) -> Array:
 
 
 def simulate(run: Run) -> Array:
-    """Free response (n, 8); a run that diverges is infinite to the end of its segment."""
+    """Return the free response (n, 8); a run that diverges is infinite to the end of its
+    segment.
+    """
     return _alone(run, lambda k, y: run.u[k])
 
 

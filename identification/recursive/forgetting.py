@@ -1,5 +1,5 @@
-"""How a recursive estimator lets old samples go, so that it follows what changes and never winds up
-when nothing excites it.
+"""Forgetting rules of a recursive estimator: it follows changes, without wind-up when excitation is
+missing.
 """
 
 from __future__ import annotations

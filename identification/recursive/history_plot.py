@@ -1,4 +1,4 @@
-"""How the coefficients of a recursive estimate settle, as a picture."""
+"""Plot of the coefficients of a recursive estimate over time."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ MAX_LEGEND = 12
 def plot_history(
     history: History, ax: Axes | None, output: str | None, regressors: Sequence[str] | None
 ) -> Axes:
-    """The coefficients of `output` (default: the first), of all regressors or of these, over time
-    (s), each by its last value, which the legend gives for up to `MAX_LEGEND` of them.
+    """Plot the coefficients of `output` (default: the first), of all regressors or of these, over
+    time (s), each divided by its last value, which the legend gives for up to `MAX_LEGEND` of them.
     """
     outputs, names = [str(y) for y in history.outputs], history.regressor_names
     column = _position(outputs[0] if output is None else output, outputs, "output")

@@ -1,4 +1,4 @@
-"""What a recursive estimator remembers, as a value."""
+"""State of a recursive estimator, as a value."""
 
 from __future__ import annotations
 

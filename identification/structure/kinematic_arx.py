@@ -186,7 +186,7 @@ class KinematicARX:
 
     @property
     def memory(self) -> int:
-        """How many samples before k the regressor of y(k) reaches back."""
+        """Number of samples before k to which the regressor of y(k) reaches back."""
         return self.aerodynamics.memory
 
 

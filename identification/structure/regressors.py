@@ -211,8 +211,8 @@ def check_units(signals: Iterable[Signal], record: FlightRecord) -> None:
 
 
 def units_of(names: Sequence[str], records: Sequence[FlightRecord]) -> tuple[Signal, ...]:
-    """The named signals with the unit the records declare; raises `InputError` where two records
-    disagree.
+    """Return the named signals with the unit the records declare; raise `InputError` where two
+    records disagree.
     """
     out = []
     for name in names:

@@ -83,7 +83,7 @@ class View:
 
 
 class Kernel:
-    """As the compiled `Kernel`, made from a `Configuration`."""
+    """NumPy twin of the compiled `Kernel`, made from a `Configuration`."""
 
     def __init__(self, configuration: Configuration):
         self._c = configuration
@@ -461,7 +461,7 @@ def is_outside(p: Any, factor: Factor) -> bool:
 
 
 def evaluate(factor: Factor, p: Any) -> Array:
-    """All functions of a factor at p, by Bernstein's form of the piece p lies in."""
+    """Return all functions of a factor at p, by Bernstein's form of the piece p lies in."""
     knots, coefficients = factor.knots, factor.bernstein
     piece = int(np.searchsorted(knots[1:-1], p, side="right"))
     x = (p - knots[piece]) / (knots[piece + 1] - knots[piece])
