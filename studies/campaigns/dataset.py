@@ -1,4 +1,4 @@
-"""What the cases of a campaign gave, as one dataset on disk in the Zarr format."""
+"""Results of the cases of a campaign, as one dataset on disk in the Zarr format."""
 
 from __future__ import annotations
 
