@@ -180,7 +180,7 @@ class Certificate:
     perturbation : array (nd, nv) or None
         Delta of the model of an uncertain one behind `lower`, None where the model is one.
     indicative : float
-        The bound at the points of a grid, where that was asked for: no proof. Else NaN.
+        The bound at the points of a grid, where the user requested one: no proof. Else NaN.
     proof : Proof or None
         The Lyapunov function and what verifies it.
 

@@ -31,9 +31,9 @@ def share_from_outputs(arx: LPVARX, records: FlightRecord | Iterable[FlightRecor
     """Share (parameters,) in [0, 1] of what is new in each scheduling parameter at k that the
     outputs at k explain.
 
-    New is what p and the outputs at k-1 and k-2 do not tell (linear regression). About 1 for a
-    filtered output, 0 for a command: above `MADE_OF_OUTPUTS` p(k) hands a model the outputs it has
-    to predict.
+    New is the residual of a linear regression on p and the outputs at k-1 and k-2. About 1 for a
+    filtered output, 0 for a command: above `MADE_OF_OUTPUTS` p(k) contains the outputs that a model
+    has to predict.
     """
     now, past, p = [], [], []
     for record in as_records(records):
@@ -106,8 +106,8 @@ def warn_of_own_past(arx: LPVARX, record: FlightRecord) -> None:
             if np.std(left) < NOTHING_NEW * np.std(known[:, -1]):
                 when = "now" if lag == 0 else f"{lag} sample{'s' if lag > 1 else ''} ago"
                 warnings.warn(
-                    f"{name} is made of the outputs {when}: a free run here follows the measured"
-                    " one and is told what it has to predict; on its own outputs it may be far"
+                    f"{name} is made of the outputs {when}: a free run with the measured one"
+                    " contains the outputs that it has to predict; on its own outputs it may be far"
                     " worse",
                     DataWarning,
                     stacklevel=3,
@@ -125,9 +125,9 @@ def warn_of_leakage(arx: LPVARX, records: Sequence[FlightRecord]) -> None:
                 term = "offset_rate" if arx.offset_rate else 'scheduling_at="now"'
                 warnings.warn(
                     f"{parameter} is made of the outputs ({100 * share:.0f} % of what is new in it"
-                    f" at k is in the outputs at k): with {term} the model is told what it has to"
-                    " predict, and one step and free run flatter; schedule on a command, or leave"
-                    f" {term} out and score with hold_p=True",
+                    f" at k is in the outputs at k): with {term} the regressors contain the"
+                    " outputs to predict, and the fits are too good; schedule on a command, or"
+                    f" leave {term} out and score with hold_p=True",
                     DataWarning,
                     stacklevel=3,
                 )

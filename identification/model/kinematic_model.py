@@ -125,7 +125,7 @@ class KinematicModel:
         """Details of the estimation method."""
         return self.aerodynamics.details
 
-    # --- what it says of a record ----------------------------------------------------------------
+    # --- predictions along a record --------------------------------------------------------------
 
     def predict(self, record: FlightRecord, horizon: int) -> Array:
         """Predictions (n, 8) `horizon` samples ahead: states known up to t - horizon, inputs and p

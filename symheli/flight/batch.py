@@ -111,7 +111,7 @@ def fly_batch(
 
     A flight comes out the same to the bit as `fly` alone makes it, whatever its neighbours, the
     number of workers and, where there are fused multiply-adds, the processor. Controllers written
-    in Python are asked flight by flight, a hundred times slower, and a `CompilerWarning` says so.
+    in Python are called flight by flight, a hundred times slower, with a `CompilerWarning`.
     Ctrl-C ends within a sample and raises `KeyboardInterrupt`; see `fly_campaign` for flights that
     are kept as they are done.
 

@@ -87,7 +87,7 @@ class TableController:
     fade : float
         Time constant, s, of the offset that joins the first command to the one in force before.
     monitor : ParameterMonitor
-        What is done with what is told of the parameter.
+        Filter, limits and fallback of the measured parameter.
     follow : {"command", "reading"}
         Whether it is scheduled by what is commanded of the parameter, or as its sensor reads it.
     misfit : float

@@ -1,7 +1,7 @@
 """The search for a proof, common to all relaxations: finer and finer P, margins in turn, a constant
 P last.
 
-A route says how to set its units, which P to try and how to try one; the ladder is one for all.
+A relaxation defines its units, the forms of P and one attempt; the sequence of attempts is common.
 """
 
 from __future__ import annotations

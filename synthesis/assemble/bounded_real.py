@@ -45,7 +45,7 @@ class Blocks(NamedTuple):
     """LMI blocks F = sum_j linear[., j] P_columns[j] + constant - weight g diag(0, I), svec'd along
     the last axis.
 
-    `columns` (k,) says which coefficients of P are involved; `linear` (m, k, n (n + 1)/2, L),
+    `columns` (k,) are the coefficients of P that are involved; `linear` (m, k, n (n + 1)/2, L),
     `constant` (m, L), of matrices (N, N) with L = N (N + 1)/2; `weight` (m,) > 0. `likely`:
     expected to be among the binding ones. `supply`: what a block adds, None without one.
     """

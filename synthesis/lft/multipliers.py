@@ -1,7 +1,7 @@
 """Multipliers for w = Delta z, Delta = diag(delta_i I), |delta_i| <= 1: quadratic constraints on
 (w, z) at every instant.
 
-A multiplier [Q S; S' R] claims [w; z]'[Q S; S' R][w; z] >= 0 for every Delta of the box. Four
+A multiplier [Q S; S' R] states [w; z]'[Q S; S' R][w; z] >= 0 for every Delta of the box. Four
 nested classes:
 
 small gain   t (|z|^2 - |w|^2) with one number t > 0, in the coordinates the LFT has D            R

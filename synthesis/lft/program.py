@@ -5,7 +5,7 @@ Continuous time, with w = Delta z and a multiplier [Q S; S' R]: for all (x, w, u
     2 x'P (A x + Bw w + Bu u) + [w; z]'[Q S; S' R][w; z] + y'y - gamma^2 u'u < 0,   P > 0,
 
 so that V = x'P x falls by more than y'y - gamma^2 u'u along every trajectory; discrete time:
-x(k+1)'P x(k+1) - x'P x. For w alone it says that the parameter loop is well posed.
+x(k+1)'P x(k+1) - x'P x. For w alone it states that the parameter loop is well posed.
 """
 
 from __future__ import annotations

@@ -80,7 +80,7 @@ class Controller:
     attempts : tuple of Attempt
         Every program that was solved.
     by_adjoint : bool
-        Whether `certify` looks at the adjoint of the loop.
+        Whether `certify` uses the adjoint of the loop.
     notes : tuple of str
         Reasons why the synthesis reached no lower gamma, or the controller no requested limit.
 

@@ -4,7 +4,7 @@ The Gramians are those of the closed loop, the block of the controller's states:
 do to them, and what they do to the performance, averaged over frozen p. One constant projection
 for all p keeps the dependence on p what it was (truncation with the closed loop as the weight:
 Enns 1984; Anderson and Liu, IEEE Trans. Automatic Control 34 (1989); one projection over p: Wood,
-Goddard and Glover, CDC 1996). Whether it was too much the analysis of the loop says.
+Goddard and Glover, CDC 1996). The analysis of the loop shows whether it was too much.
 """
 
 from __future__ import annotations

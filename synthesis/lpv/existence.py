@@ -1,10 +1,10 @@
 """Existence of a controller: the two inequalities of `elimination` and their coupling, as a program
 whose blocks are imposed at points of the range of p.
 
-The points are few at first; between them the blocks are looked at on a finer grid, and where one is
-violated a point is added. Nothing is proven by that, and nothing need be: the certificate of the
-closed loop proves. Blocks between points cost nothing in gamma, as the hull of their Bernstein
-coefficients would where an entry of B2 or C2 passes through zero.
+The points are few at first; between them the blocks are checked on a finer grid, and where one is
+violated a point is added. This proves nothing, and need not: the proof is the certificate of the
+closed loop. Points do not raise gamma, as the hull of Bernstein coefficients would where an entry
+of B2 or C2 passes through zero.
 """
 
 from __future__ import annotations

@@ -64,14 +64,14 @@ def output_feedback(
     """Design a dynamic controller from the measurements, of the order of the plant, for every p(t)
     within its range and rates.
 
-    X(p) belongs to what the measurements tell, Y(p) to what the controls can do. While only one of
-    them moves with a parameter the controller needs no rate of it; both pairs are tried. Both may
-    move with a parameter whose rate is another one (`plant.lagged`), or that stands still. Where
-    one of them moving does not come near the worst frozen optimum both do, and the controller is
-    not told dp/dt: `gamma` is then what the storage function of X and Y proves of that, and is
-    taken where it is at most 1.05 times what a controller could have that is told. Where parameters
-    stand still and the inequalities find nothing near that optimum, the gains are those of the
-    central H-infinity controllers of the frozen models.
+    X(p) is the matrix of the estimation inequality, Y(p) that of the control inequality. If only
+    one of them depends on a parameter, the controller does not need its rate; both pairs are tried.
+    Both may depend on a parameter whose rate is another one (`plant.lagged`), or that is constant.
+    If one of them does not come near the worst frozen optimum, both depend on p and the controller
+    neglects dp/dt: `gamma` is then proven with the storage function of X and Y for that controller,
+    and is accepted if it is at most 1.05 times the gamma with dp/dt measured. If parameters are
+    constant and the inequalities find nothing near that optimum, the gains are those of the central
+    H-infinity controllers of the frozen models.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def output_feedback(
         Degree in every parameter, one each, or functions; by default one of the two moves, with a
         degree that rises from 2 while that lowers gamma and gamma is above the worst optimum of the
         frozen models, which no controller can beat. Where both are given and move with a parameter
-        of a bounded rate, the controller is not told dp/dt, as above.
+        of a bounded rate, the controller neglects dp/dt, as above.
     back_off : float or sequence
         Multiples of the least gamma at which X and Y are settled, tried in turn until the gains are
         smooth functions of p: at the least itself a controller has poles without limit.

@@ -10,14 +10,14 @@ other, whatever dY/dt or dX/dt is, so that the gains know p alone (Gahinet 1996;
 
 The state of the controller is an estimate of the plant's, in whose coordinates its matrices stay
 of the size of the plant's even where X or Y tend to infinity, as X does where the measurements
-tell the disturbance: N = -X with M' = Y - X^-1, or M' = Y with N = Y^-1 - X. The last two terms
-cancel in the first case if X is constant, in the second if Y is.
+determine the disturbance: N = -X with M' = Y - X^-1, or M' = Y with N = Y^-1 - X. The last two
+terms cancel in the first case if X is constant, in the second if Y is.
 
 In discrete time the state of the controller is an estimate of the plant's, too: in the coordinates
 (x - x_k, x_k) the storage function is that of X and of W^-1, W = Y - X^-1. Where these are
 identities, with S <= Y(p(k+1)) in place of Y after the step, and gains in units of gamma, the
-inequality of the closed loop says that [A B; C D] of the loop, which is known but for left K right,
-is a contraction.
+inequality of the closed loop states that [A B; C D] of the loop, known except for left K right, is
+a contraction.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """The search for X(p), Y(p) and gains: which of them depends on p and of what degree, and the
 distance from the least gamma, in a fixed order.
 
-Where X and Y both move with p the controller is not told dp/dt. With N = -X its state estimates
-that of the plant, and
+If X and Y both depend on p the controller neglects dp/dt. With N = -X its state estimates that of
+the plant, and
 
     V = e' X e + x_k' (Y - X^-1)^-1 x_k,  e = x - x_k,
 

@@ -46,7 +46,7 @@ class PointDesign:
     hinf_norm : float
         Norm of that loop, recomputed from its matrices; inf where there is none.
     optimum : float
-        What no controller undercuts, to the accuracy asked for; NaN where it was not sought.
+        Lower bound for every controller, to the requested accuracy; NaN where it was not computed.
     reasons : tuple of str
         Sentences.
     limit : str

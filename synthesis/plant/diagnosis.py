@@ -62,7 +62,7 @@ def reasons(
     dt : float, optional
         Sample period, s; None: continuous.
     gamma : float, optional
-        A level that is wanted, or was reached.
+        A requested level, or the level reached.
     at : sequence, optional
         What to call each frozen model, for a family: "airspeed = 3 m/s".
 

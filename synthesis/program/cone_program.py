@@ -2,7 +2,7 @@
 
     minimise c' x  subject to  b - A x in a product of positive semidefinite cones
 
-(vectors as in `symmetric`), after some rows, where asked for, that are zero.
+(vectors as in `symmetric`), after optional rows that are zero.
 
 Clarabel and SCS are called directly; CVXOPT, MOSEK, SDPA and COPT, where installed, through cvxpy.
 Whatever a solver answers is a candidate: nothing is believed before it is verified.

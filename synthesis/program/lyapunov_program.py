@@ -2,7 +2,7 @@
 Lyapunov and Riccati inequalities are.
 
 Kept as those products, a block of N rows takes n N numbers for each coefficient of P and not n^2
-N^2/4, and all that an interior-point method asks of it is a few products of matrices.
+N^2/4, and an interior-point method only needs a few products of matrices with it.
 """
 
 from __future__ import annotations

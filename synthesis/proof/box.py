@@ -1,7 +1,7 @@
 """Verification of P(p) on the whole box, from the model and P alone, for every relaxation.
 
-Floating point: Bernstein coefficients, boxes halved until they tell, and a grid through the model's
-own code. Exact: the same boxes in rational arithmetic, and single p by `pointwise`. The
+Floating point: Bernstein coefficients, boxes halved until they decide, and a grid through the
+model's own code. Exact: the same boxes in rational arithmetic, and single p by `pointwise`. The
 inequalities themselves (`inequalities`), the regions and the algebra of polynomials are those from
 which the cone program was assembled; `pointwise` has none of them.
 """

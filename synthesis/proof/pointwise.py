@@ -1,10 +1,9 @@
 """The inequalities at single values of p, in any arithmetic, from the model's own matrices and the
 definition of P only.
 
-This is the second witness of a proof. What assembly and proof have in common (pieces of the model,
-cells, strips, the algebra of Bernstein coefficients; in several parameters the inequalities
-themselves) is not used here, so that an error there, which both would believe, does not pass here
-where it matters.
+This is the independent check of a proof. The code that assembly and proof have in common (pieces of
+the model, cells, strips, the algebra of Bernstein coefficients; in several parameters the
+inequalities themselves) is not used here, so that an error in it is detected.
 """
 
 from __future__ import annotations
