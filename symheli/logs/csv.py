@@ -27,8 +27,8 @@ def read_csv(
     time_unit: str | None = None,
 ) -> Table:
     """Read the columns named in `units`, unconverted, and the time in s; without `units` all
-    columns whose unit the header gives. An entry of `units` takes precedence over the header; for None the
-    unit of the header counts, and "1" where it gives none.
+    columns whose unit the header gives. An entry of `units` takes precedence over the header; for
+    None the unit of the header counts, and "1" where it gives none.
 
     `time` names the time column (in `time_unit`; default that of its header, or s); None where the
     file has none: its rows are then `dt` (s) apart. Empty cells are missing samples (NaN). Raises
