@@ -19,7 +19,7 @@ from symheli.errors import InputError
 Table = Mapping[str, Any]
 
 WIDTH = 100
-"""Of the lines of a file that is written, where it can be."""
+"""Width of the lines of a written file, where possible."""
 FILES = ("vehicle", "model")
 """Fields that may name a file."""
 
@@ -35,7 +35,7 @@ def choice(default: Any, said: str, least: float | None = None, empty: bool = Fa
 
 
 class _Wrong(Exception):
-    """What was expected."""
+    """Raised with the expected value."""
 
 
 def checked(kind: type, given: Table, complaints: list[str], where: str = "") -> dict[str, Any]:
@@ -80,8 +80,8 @@ def toml(value: Any) -> str:
 
 
 def entries(path: Path, verb: str, out: Path | None = None) -> dict[str, Any]:
-    """What a file of choices for this verb of the command line says. A folder `out`, by default
-    this one, and files that are there are beside it.
+    """Return the entries of a file of choices for this command. The folder `out`, by default this
+    one, and files that exist are relative to it.
 
     Raises `InputError` for a file that is not there, or no TOML.
     """
@@ -117,13 +117,13 @@ def beside(thing: Any, name: str, folder: Path) -> Any:
 
 
 def sentence(kind: type, name: str) -> str:
-    """What is said about a field."""
+    """Return the description of a field."""
     return next((f.metadata.get("said", "") for f in fields(kind) if f.name == name), "")
 
 
 def commented(entry: str, said: str) -> tuple[str, ...]:
-    """Lines of an entry of a file with a sentence about it, if any: beside it where there is room,
-    else before it.
+    """Return the lines of an entry of a file with its description, if any: beside it where there is
+    room, else before it.
     """
     if not said:
         return (entry,)
@@ -219,7 +219,7 @@ def _converted(hint: Any, value: Any, limits: Mapping[str, Any]) -> Any:
 
 
 def _either(hints: tuple[Any, ...], value: Any, limits: Mapping[str, Any]) -> Any:
-    """Of int | tuple[int, ...] | None."""
+    """Convert a value of type int | tuple[int, ...] | None."""
     if value is None and type(None) in hints:
         return None
     expected = []

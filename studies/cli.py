@@ -41,8 +41,9 @@ VERBS = (
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one verb; the exit status: 0 done, 1 failed with one sentence on stderr, 2 wrong usage,
-    130 interrupted. With --json what failed is on stdout too, as {"error": {"type", "message"}}.
+    """Run one command and return the exit status: 0 done, 1 failed with one sentence on stderr, 2
+    wrong usage, 130 interrupted. With --json a failure is on stdout too, as {"error": {"type",
+    "message"}}.
     """
     one_thread()
     arguments = None
@@ -73,7 +74,7 @@ def _run(arguments: argparse.Namespace) -> int:
             return _fail(error, arguments.json, f"{error.reason}; try a lower airspeed")
         except SymheliError as error:
             return _fail(error, arguments.json)
-        except BrokenPipeError:  # the reader, such as head, has seen enough
+        except BrokenPipeError:  # the reader, such as head, has closed the pipe
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return 0
         except OSError as error:
@@ -108,7 +109,9 @@ class UsageError(SymheliError):
 
 
 class Parser(argparse.ArgumentParser):
-    """Wrong usage is an exception, so that it is told as every failure is."""
+    """Parser that raises an exception for wrong usage, so that it is reported like every
+    failure.
+    """
 
     def error(self, message: str) -> NoReturn:
         """Print the usage and raise `UsageError`."""
@@ -140,7 +143,7 @@ def _nothing_written(_: argparse.Namespace) -> str:
 
 
 def _fail(error: Exception, asks_json: bool, sentence: str = "", status: int = 1) -> int:
-    """Say what failed, as `sentence` or in the words of the error, and return the exit status."""
+    """Print the failure, as `sentence` or as the text of the error, and return the exit status."""
     sentence = sentence or "\n  ".join(" ".join(s.split()) for s in str(error).splitlines())
     print(f"symheli: {sentence}", file=sys.stderr)
     if asks_json:
@@ -151,7 +154,7 @@ def _fail(error: Exception, asks_json: bool, sentence: str = "", status: int = 1
 
 
 class _Notes:
-    """What is warned of, each once, however many steps of the work say it."""
+    """Warnings, each printed once, however many steps of the work repeat it."""
 
     def __init__(self) -> None:
         self._said: set[str] = set()

@@ -1,4 +1,4 @@
-"""What a verb answers: text for a reader, data for a program."""
+"""Output of a command: text for a reader, data for a program."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def as_json(data: Any) -> str:
 
 
 def plain(value: Any) -> Any:
-    """The same content in the types JSON has."""
+    """Return the same content in JSON types."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if hasattr(value, "tolist"):

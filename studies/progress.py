@@ -48,7 +48,9 @@ class _Shown(Protocol):
     """A way to show the open tasks, the outermost first."""
 
     def show(self, tasks: list[_Open], now: float) -> None:
-        """Show how it stands."""
+        """Show the outermost task and the innermost one, with the remaining time of the outermost
+        that has a number of steps.
+        """
         ...
 
     def close(self) -> None:

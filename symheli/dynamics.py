@@ -41,7 +41,7 @@ Triple = tuple[Any, Any, Any]
 
 
 class Sum(NamedTuple):
-    """Everything the parts say at one motion."""
+    """Sum of the effects of all parts in one motion."""
 
     force: Triple
     moment: Triple
@@ -309,7 +309,7 @@ class Dynamics:
 
     @property
     def inflow_solver(self) -> Callable[..., Any]:
-        """How the inflow of a rotor is found: `inflow.solve`, or as printed."""
+        """The solver of a rotor's inflow: `inflow.solve`, or the printed form."""
         return inflow.relaxed if "relaxed_inflow" in self.printed else inflow.solve
 
     def _sections(self, par: Any) -> dict[str, SimpleNamespace]:

@@ -28,17 +28,17 @@ from symheli.values.signal import Signal, signals
 from symheli.values.summary import as_table, summarized
 
 NODES = (2, 4, 8, 16, 32, 64)
-"""Numbers of nodes of the Gauss-Legendre sum that are tried."""
+"""Numbers of nodes of the Gauss-Legendre quadrature, tried in turn."""
 SAMPLES = 500
-"""Random states at which the sum, the parameters and their ranges are judged."""
-CORNERS = 4096
-"""Most corners of the ranges of the variables that are looked at besides."""
-VARIES = 1e-11
+"""Number of random states at which the quadrature, the parameters and their ranges are checked."""
+MAX_CORNERS = 4096
+"""Largest number of corners of the variables' ranges that are checked in addition."""
+CONSTANT_ENTRY = 1e-11
 """An entry that changes over the samples by less than this fraction of its size is constant."""
-INDEPENDENT = 1e-10
-"""Part of the first pivot below which an entry is affine in the ones before it."""
-WIDER = 0.02
-"""The ranges of the parameters are those of the samples, wider by this fraction at both ends."""
+MIN_PIVOT = 1e-10
+"""Fraction of the first pivot below which an entry is an affine function of the preceding ones."""
+RANGE_MARGIN = 0.02
+"""The ranges of the parameters are those of the samples, widened by this fraction at both ends."""
 
 KINKS = {
     casadi.OP_FABS: "fabs",
@@ -55,7 +55,7 @@ KINKS = {
 
 @dataclass(frozen=True, eq=False)
 class Embedding:
-    """A quasi-LPV model and how its parameters depend on states and inputs.
+    """A quasi-LPV model with the functions from states and inputs to its parameters.
 
     x' = offset + A(p) (x - x0) + B(p) (u - u0), and y = y0 + C(p) (x - x0) + D(p) (u - u0), at
     p = parameters(x, u), for every x and u: `error` is the largest relative misfit at random states
@@ -185,7 +185,9 @@ def embed(
     rows = (*x_names, *y_names)
     moving = _moving(whole, names, rows, scheduled_by, samples)
     average = _averaged(whole, names, rows, moving, samples, z0, tolerance)
-    corners = np.array(list(product(*ranges))).T if 2 ** len(names) <= CORNERS else samples[:, :0]
+    corners = (
+        np.array(list(product(*ranges))).T if 2 ** len(names) <= MAX_CORNERS else samples[:, :0]
+    )
     M = np.array([np.array(average(z)) for z in np.hstack([samples, corners]).T])
     if not np.all(np.isfinite(M)):
         raise InputError("the model is not finite everywhere within the ranges")
@@ -234,8 +236,8 @@ def _moving(
         second = casadi.jacobian(casadi.vec(J[:, others]), z[others])
         evaluated = casadi.Function("second", [z], [casadi.densify(second)]).map(samples.shape[1])
         bends = np.abs(np.array(evaluated(samples)))
-        if np.any(bends > VARIES):
-            place, column = np.argwhere(bends > VARIES)[0].tolist()
+        if np.any(bends > CONSTANT_ENTRY):
+            place, column = np.argwhere(bends > CONSTANT_ENTRY)[0].tolist()
             pair = names[others[place // len(rows)]], names[others[column % len(others)]]
             raise InputError(
                 f"{rows[place % len(rows)]} cannot be factored: it is not affine in"
@@ -254,7 +256,7 @@ def _averaged(
     z0: Array,
     tolerance: float,
 ) -> casadi.Function:
-    """z to the matrix M with f(z) - f(z0) = M (z - z0)."""
+    """Return the function from z to the matrix M with f(z) - f(z0) = M (z - z0)."""
     z = casadi.SX.sym("z", len(names))  # type: ignore[arg-type]
     J = casadi.Function("J", [z], [casadi.jacobian(whole(z), z)])
     here = casadi.DM(z0)
@@ -339,13 +341,13 @@ def _independent(flat: Array) -> tuple[Array, Array]:
     """Entries (d,) that vary independently over the samples (K, m), and T (d + 1, m): all entries
     are (1, those) T.
     """
-    varies = np.flatnonzero(np.ptp(flat, axis=0) > VARIES * np.abs(flat).max(axis=0))
+    varies = np.flatnonzero(np.ptp(flat, axis=0) > CONSTANT_ENTRY * np.abs(flat).max(axis=0))
     if not len(varies):
         raise InputError("the model is linear: linearize it, no parameter is needed")
     moved = flat[:, varies] - flat[:, varies].mean(axis=0)
     _, R, order = qr(moved / np.abs(moved).max(axis=0), mode="economic", pivoting=True)  # type: ignore[assignment]
     diagonal = np.abs(np.diag(R))
-    chosen = np.sort(varies[order[: int(np.sum(diagonal > INDEPENDENT * diagonal[0]))]])
+    chosen = np.sort(varies[order[: int(np.sum(diagonal > MIN_PIVOT * diagonal[0]))]])
     functions = np.column_stack([np.ones(len(flat)), flat[:, chosen]])
     size = np.abs(functions).max(axis=0)
     T = np.zeros((len(size), flat.shape[1]))
@@ -361,7 +363,9 @@ def _scheduling(
     names: tuple[tuple[Signal, ...], tuple[Signal, ...], tuple[Signal, ...]],
     split: Callable[[Array], Matrices],
 ) -> tuple[Scheduling, ...]:
-    """The chosen entries as parameters, by the names and units of entries of A, B, C or D."""
+    """Return the chosen entries as parameters, with the names and units of entries of A, B,
+    C or D.
+    """
     flat = M.reshape(len(M), -1)
     order = split(np.arange(flat.shape[1], dtype=float)[None])
     label = {
@@ -370,7 +374,7 @@ def _scheduling(
         if len(names[2]) + len(names[0]) == M.shape[1] or str(entry.name)[0] in "AB"
     }
     low, high = flat[:, chosen].min(axis=0), flat[:, chosen].max(axis=0)
-    slack = WIDER * (high - low)
+    slack = RANGE_MARGIN * (high - low)
     return tuple(
         Scheduling(str(label[k]), label[k].unit, float(a), float(b))
         for k, a, b in zip(chosen.tolist(), low - slack, high + slack, strict=True)

@@ -1,4 +1,6 @@
-"""What can go wrong, by name: every message says what was expected, what came and what to try."""
+"""Exceptions and warnings: every message states the expected value, the given value and a
+remedy.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +8,8 @@ import difflib
 from collections.abc import Iterable
 from typing import Any
 
-FEW = 8
-"""So many names are all listed, beside the nearest."""
+MAX_LISTED_NAMES = 8
+"""Largest number of known names that are all listed besides the nearest ones."""
 
 
 class SymheliError(Exception):
@@ -26,7 +28,7 @@ class UnknownNameError(InputError):
         near = difflib.get_close_matches(str(name), known, n=3, cutoff=0.4)
         every = "known: " + ", ".join(known)
         hint = f"did you mean {' or '.join(repr(str(n)) for n in near)}?" if near else every
-        if near and len(known) <= FEW:
+        if near and len(known) <= MAX_LISTED_NAMES:
             hint += f" ({every})"
         super().__init__(f"unknown {kind} {str(name)!r}; {hint}")
         self._given = kind, str(name), known
@@ -57,7 +59,7 @@ class FlightLostError(SymheliError):
 
 
 class SynthesisError(SymheliError):
-    """No controller was found; `reasons` are sentences that say which mode, direction or weight
+    """No controller was found; `reasons` are sentences on the mode, direction or weight that
     decides.
     """
 
@@ -95,8 +97,8 @@ class SolverError(SymheliError):
 
 
 class AccuracyError(SymheliError):
-    """A result fails the check of its own computation: it is not as accurate as it has to be, and
-    is not returned.
+    """A result is less accurate than required by the check of its own computation, and is not
+    returned.
     """
 
 
@@ -115,12 +117,12 @@ class CompilerWarning(UserWarning):
 
 
 class DataWarning(UserWarning):
-    """Data, or a model made from them, may be misleading; the message says what was found and what
-    to do.
+    """Data, or a model made from them, may be misleading; the message gives the finding and a
+    remedy.
     """
 
 
 class ValidityWarning(DataWarning):
-    """The helicopter is outside the range in which its equations are known to hold; the message
-    says by how much, and gives the source of the limit.
+    """The helicopter is outside the validity range of its equations; the message gives by how much,
+    and the source of the limit.
     """

@@ -1,5 +1,5 @@
-"""Packages that not every use needs: imported where they are used, missed by the name of what
-brings them.
+"""Optional packages: imported where they are used; the error for a missing one names the extra that
+installs it.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from symheli.errors import InputError
 
 @contextmanager
 def extra(name: str, purpose: str) -> Iterator[None]:
-    """Around the import of a package of the extra `name`: `InputError` that says how to get it
-    where it is missing.
+    """Guard the import of a package of the extra `name`: raise `InputError` with the installation
+    command where it is missing.
 
     with extra("logs", "reading a ULog file"):
         import pyulog

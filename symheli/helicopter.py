@@ -118,8 +118,8 @@ class Helicopter:
         printed: Sequence[str] = (),
         smoothing: float = 0.0,
     ) -> Helicopter:
-        """By the name of a packaged airframe (`symheli.airframe.vehicle.vehicles()`) or the path of
-        a vehicle TOML file.
+        """Load a packaged airframe by name (`symheli.airframe.vehicle.vehicles()`) or a vehicle
+        TOML file by path.
         """
         return cls(
             load_vehicle(vehicle), governor, float(density), frozenset(printed), float(smoothing)
@@ -141,8 +141,8 @@ class Helicopter:
         return NamedVector(self.dynamics.parameters, np.array(self._values))
 
     def with_parameters(self, changes: Mapping[str, float]) -> Helicopter:
-        """The same helicopter with other numbers, {"body.mass": 9.0, "density": 1.1} in SI; names
-        as in `parameters`.
+        """Return the same helicopter with other numbers, {"body.mass": 9.0, "density": 1.1} in SI;
+        names as in `parameters`.
 
         Nothing is built or compiled anew: the compiled functions take the parameters as an
         argument.
@@ -154,12 +154,12 @@ class Helicopter:
         return self._sharing(replace(self, vehicle=vehicle, density=density))
 
     def in_air(self, density: float) -> Helicopter:
-        """The same helicopter in air of this density, kg/m^3."""
+        """Return the same helicopter in air of this density, kg/m^3."""
         return self if density == self.density else self.with_parameters({"density": density})
 
     def at_altitude(self, altitude: float) -> Helicopter:
-        """The same helicopter in the air of the standard atmosphere at `altitude` (m above sea
-        level).
+        """Return the same helicopter in the air of the standard atmosphere at `altitude` (m above
+        sea level).
         """
         return self.in_air(standard_atmosphere(altitude).density)
 
@@ -194,7 +194,7 @@ class Helicopter:
 
     @cached_property
     def _functions(self) -> dict[str, Function]:
-        """Compiled functions of (x, u, wind, par) by name, filled as they are asked for."""
+        """Compiled functions of (x, u, wind, par) by name, built on first use."""
         return {}
 
     @cached_property
@@ -329,16 +329,16 @@ class Helicopter:
         return right_hand_side(self)
 
     def latex(self, standalone: bool = False) -> str:
-        """Every component's equations and parameters in LaTeX: the body of a document, or with
-        `standalone` all of one.
+        """Return every component's equations and parameters in LaTeX: the body of a document, or
+        with `standalone` a complete one.
         """
         from symheli.equations import latex
 
         return latex(self, standalone=standalone)
 
     def compiled(self, name: Name) -> Function:
-        """One of the functions as machine code where a C compiler is there: the same numbers,
-        faster, numbers only.
+        """Return one of the functions as machine code where a C compiler is installed: the same
+        numbers, faster, numbers only.
         """
         function = self._compiled(name)
         symbols = [casadi.MX.sym(function.name_in(i), *function.size_in(i)) for i in range(3)]
@@ -346,7 +346,7 @@ class Helicopter:
         return Function(name, symbols, outputs, function.name_in()[:3], function.name_out())
 
     def numeric(self, name: Name) -> Numeric:
-        """The compiled function as a fast call on NumPy arrays."""
+        """Return the compiled function as a fast call on NumPy arrays."""
         kept = self.__dict__.setdefault("_numeric", {})
         if name not in kept:
             kept[name] = Numeric(self._compiled(name), self._values)

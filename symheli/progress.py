@@ -1,4 +1,4 @@
-"""How far long work is: it tells whoever asked, and shows nothing itself.
+"""Progress of long computations, reported to listeners; this module shows nothing itself.
 
 Work tells its tasks and their steps; `watched` names the listener, for everything that is called
 within, in the same thread. Without one, telling costs next to nothing.
@@ -53,7 +53,7 @@ class Progress:
 
     @property
     def count(self) -> str:
-        """How many of how many, as far as it is known, or the percentage."""
+        """Steps done and their total, as far as it is known, or the percentage."""
         if self.total is None:
             return f"{self.done:g}" if self.done else ""
         if self.percent:
@@ -132,8 +132,8 @@ class Task:
 
 @contextmanager
 def task(title: str, total: float | None = None, *, percent: bool = False) -> Iterator[Task]:
-    """A task of `total` steps, ended however its block is left; with `percent` only their share is
-    told.
+    """Run a task of `total` steps, ended however its block is left; with `percent` only the
+    percentage is reported.
     """
     depth = _depth.get()
     begun = Task(Progress(title, 0, total, depth=depth, percent=percent), _listener.get())
@@ -146,7 +146,7 @@ def task(title: str, total: float | None = None, *, percent: bool = False) -> It
 
 
 def tracked(title: str, items: Iterable[T], total: float | None = None) -> Iterator[T]:
-    """The items, a step finished whenever the next one is asked for."""
+    """Yield the items; a step is finished when the next one is requested."""
     if total is None and hasattr(items, "__len__"):
         total = len(items)  # type: ignore[arg-type]
     if total == 0:

@@ -1,4 +1,4 @@
-"""How many threads linear algebra takes.
+"""Number of threads of linear algebra.
 
 The matrices here are small: one thread is fastest, and threads that wait for each other on a busy
 machine cost several times the work.
@@ -21,7 +21,7 @@ BLAS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
 
 
 def with_one_thread(work: Callable[P, R]) -> Callable[P, R]:
-    """`work` with one thread of BLAS, where the environment does not say how many."""
+    """Run `work` with one thread of BLAS, where the environment does not set a number."""
 
     @wraps(work)
     def limited(*arguments: P.args, **options: P.kwargs) -> R:
@@ -33,8 +33,8 @@ def with_one_thread(work: Callable[P, R]) -> Callable[P, R]:
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """One thread of BLAS within, where the environment does not say how many; threads other than
-    the main one leave it as it is, since the number is the process's.
+    """Limit BLAS to one thread within the block, where the environment does not set a number;
+    threads other than the main one do not change it, since the number is the process's.
     """
     main = threading.current_thread() is threading.main_thread()
     if not main or any(name in os.environ for name in BLAS):
@@ -49,7 +49,7 @@ def one_thread() -> Iterator[None]:
 
 @cache
 def _libraries() -> Any:
-    """Those of this process, once NumPy and SciPy are there."""
+    """Return the BLAS libraries of this process, once NumPy and SciPy are loaded."""
     import scipy.linalg  # noqa: F401
     from threadpoolctl import ThreadpoolController
 

@@ -1,6 +1,4 @@
-"""What every analysis answers: the truth between two bounds, under which hypotheses, and by which
-route.
-"""
+"""The result of every analysis: upper and lower bound, hypotheses, and the proof."""
 
 from __future__ import annotations
 
@@ -47,7 +45,9 @@ class Status(Enum):
 
     @classmethod
     def without_proof(cls, answer: Answer) -> Status:
-        """What is known where nothing was proven and the last program tried was answered so."""
+        """Return the status where nothing was proven and the solver gave this answer to the last
+        program.
+        """
         return {Answer.INFEASIBLE: cls.INFEASIBLE, Answer.UNTRIED: cls.UNTRIED}.get(
             answer, cls.FAILED
         )
@@ -83,7 +83,7 @@ class Attempt(NamedTuple):
 
 
 class Evidence(Protocol):
-    """A model with the units and the rates of a claim, against which a Lyapunov function (with its
+    """A model with the units and rates of a statement, against which a Lyapunov function (with its
     multiplier) and a bound are checked.
     """
 
@@ -93,17 +93,17 @@ class Evidence(Protocol):
         ...
 
     def fault(self, lyapunov: Any, kind: Kind, rates: tuple[float, ...], /) -> str | None:
-        """What is wrong with the form of the proof, or keeps it from being about this claim; None
-        where nothing does.
+        """Return why the proof is invalid in form or not one of this statement; None where it is
+        valid.
         """
         ...
 
     def floating(self, lyapunov: Any, bound: float, /) -> bool:
-        """In floating point, with a margin for rounding."""
+        """Check in floating point, with a margin for rounding."""
         ...
 
     def exact(self, lyapunov: Any, bound: float, /) -> bool:
-        """In rational arithmetic."""
+        """Check in rational arithmetic."""
         ...
 
 
@@ -120,7 +120,7 @@ class Proof(NamedTuple):
     __repr__ = summarized
 
     def fault(self, kind: Kind, rates: tuple[float, ...]) -> str | None:
-        """What keeps this from being a proof of such a claim, None where nothing does."""
+        """Return why this is not a proof of such a statement; None where it is."""
         return self.evidence.fault(self.lyapunov, kind, rates)
 
     def floating(self, bound: float) -> bool:
@@ -128,7 +128,9 @@ class Proof(NamedTuple):
         return self.evidence.floating(self.lyapunov, bound)
 
     def exact(self, bound: float) -> bool:
-        """The same in rational arithmetic, and at some p through the model's own matrices."""
+        """Whether they hold in rational arithmetic, and at some p through the model's own
+        matrices.
+        """
         return self.evidence.exact(self.lyapunov, bound)
 
 
@@ -178,7 +180,7 @@ class Certificate:
     perturbation : array (nd, nv) or None
         Delta of the model of an uncertain one behind `lower`, None where the model is one.
     indicative : float
-        The bound at the points of a grid, where that was asked for: no proof. Else NaN.
+        The bound at the points of a grid, where the user requested one: no proof. Else NaN.
     proof : Proof or None
         The Lyapunov function and what verifies it.
 
@@ -225,10 +227,9 @@ class Certificate:
     _repr_html_ = as_table
 
     def __post_init__(self) -> None:
-        """The form of the claim, then the order of the bounds.
+        """Check the form of the statement, then the order of the bounds.
 
-        Raises `InputError` for what is no claim, `CertificateError` where two numbers contradict
-        each other: one of them is wrong.
+        Raises `InputError` for an invalid statement, `CertificateError` for contradictory numbers.
         """
         self._check_form()
         sign, moving = (-1.0, "upper bound") if self.kind == "decay rate" else (1.0, "lower bound")
@@ -289,7 +290,7 @@ class Certificate:
 
     @property
     def gap(self) -> float:
-        """gamma / lower, or upper / alpha: 1 means exact, inf that nothing is known; NaN for
+        """Ratio gamma / lower, or upper / alpha: 1 means exact, inf that nothing is proven; NaN for
         stability.
         """
         above, below = (
@@ -353,13 +354,13 @@ class Certificate:
         return plot_certificate(self, ax)
 
     def resting_on(self, sentences: Iterable[str]) -> Self:
-        """The same with further hypotheses."""
+        """Return the same certificate with further hypotheses."""
         return replace(self, hypotheses=(*self.hypotheses, *sentences))
 
     @property
     def fault(self) -> str | None:
-        """Why the claim cannot be what was proven, by its form alone: a sentence, None where
-        nothing is wrong or nothing is proven.
+        """Reason why the statement cannot follow from the proof, by its form alone: a sentence,
+        None where nothing is wrong or nothing is proven.
         """
         if self.proof is None:
             return None
@@ -375,8 +376,8 @@ class Certificate:
             return f"the proof was not made by an analysis: {error}"
 
     def __str__(self) -> str:
-        """What is proven, in three lines; `details` says the rest."""
-        lines = self._claim()
+        """Return the result in three lines; `details` has the rest."""
+        lines = self._summary()
         if self.lyapunov is not None:
             lines.append(
                 f"  {self.lyapunov.form}; {len(self.hypotheses)} hypotheses and the programs tried"
@@ -386,8 +387,8 @@ class Certificate:
             lines.append(f"  {len(self.attempts)} programs tried, in .details")
         return "\n".join(lines)
 
-    def _claim(self) -> list[str]:
-        """The first lines: of which kind, how it came out, in numbers."""
+    def _summary(self) -> list[str]:
+        """Return the first lines: kind, status and numbers."""
         lines = [f"{self.kind}, {self.method}: {self.status.value}"]
         if self.kind.endswith("gain"):
             lines.append(
@@ -404,10 +405,10 @@ class Certificate:
 
     @property
     def details(self) -> str:
-        """All of it: numbers, the form of the Lyapunov function, solver and times, every program
-        that was tried, every hypothesis.
+        """All of the certificate: numbers, the form of the Lyapunov function, solver and times, all
+        programs tried, all hypotheses.
         """
-        lines = self._claim()
+        lines = self._summary()
         if self.lyapunov is not None:
             lines.append(f"  {self.lyapunov.form}, condition number {self.conditioning:.2g}")
         lines.append(f"  {self.solver}; {self.seconds}")

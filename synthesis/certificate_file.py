@@ -1,10 +1,10 @@
-"""Certificates as JSON files, from which alone they are verified again.
+"""Certificates as JSON files that are sufficient to verify them again.
 
-A file has a schema and its version, the claim, and the proof: model, units and Lyapunov function.
-Every value is a number, a text or a list, an array with its shape, or a value of one of the `TYPES`
-by its name and fields. Doubles are written in the digits that give them back. What can be derived
-from the model (its pieces) is derived anew. Reading believes nothing: each value is checked where
-it is made, and the proof once more in floating point.
+A file has a schema and its version, the statement, and the proof: model, units and Lyapunov
+function. Every value is a number, a text or a list, an array with its shape, or a value of one of
+the `TYPES` by its name and fields. Doubles are written with all their digits. The polynomial pieces
+are derived from the model. Reading trusts no value: each is checked where it is made, and the proof
+again in floating point.
 """
 
 from __future__ import annotations
@@ -48,8 +48,8 @@ VERSION = 1
 def _former_units(
     left: Any, right: Any, inputs: Any, outputs: Any, time: Any, storage: Any, weight: Any
 ) -> Scaling:
-    """The scaling that older files hold as units of inputs, outputs and V: that of V is the square
-    of the channel's, or 1 where V is compared with the energy of inputs.
+    """Return the scaling of an older file, which holds units of inputs, outputs and V: that of V is
+    the square of the channel's, or 1 where V is compared with the energy of inputs.
     """
     return Scaling(left, right, outputs if storage == 1.0 else math.sqrt(storage), time, weight)
 
@@ -70,14 +70,16 @@ TYPES: dict[str, Any] = {
         ),
     )
 } | {"Spline": bases.CubicSpline, "Trajectory": SchedulingTrajectory, "Units": _former_units}
-"""What a file may contain, by its word there, which outlives the name of a class."""
+"""Types that a file may contain, by their name in the file, which does not change with the name of
+the class.
+"""
 WORDS = {kind: word for word, kind in TYPES.items()}
 
 LEFT_OUT = {LPVStateSpace: ("trim", "residuals")}
-"""What the model of a proof does without."""
+"""Fields of a model that a proof does not need."""
 
 LATER = ("perturbation",)
-"""Fields that files of this version may lack: what they were written of has none."""
+"""Fields that files of this version may lack: they were written before the field existed."""
 
 ROUTES = {
     "one parameter": one_parameter.Evidence,
@@ -89,11 +91,11 @@ DERIVED = {"pieces", "model"}
 
 def written(cert: Certificate, path: str | os.PathLike[str]) -> Path:
     """Write the certificate; see `Certificate.save`."""
-    claim = {f.name: getattr(cert, f.name) for f in fields(cert) if f.name != "proof"}
+    statement = {f.name: getattr(cert, f.name) for f in fields(cert) if f.name != "proof"}
     content = {
         "schema": SCHEMA,
         "version": VERSION,
-        **_encoded({**claim, "status": cert.status.name}),
+        **_encoded({**statement, "status": cert.status.name}),
         "proof": None if cert.proof is None else _encoded_proof(cert.proof),
     }
     return write_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
@@ -146,27 +148,27 @@ def _certificate(content: Mapping[str, Any]) -> Certificate:
             f"expected the fields of a certificate; missing: {', '.join(sorted(missing)) or 'none'}"
             f"; unknown: {', '.join(sorted(foreign)) or 'none'}"
         )
-    claim = {name: _decoded(content[name]) for name in names if name != "proof"}
-    if claim["status"] not in Status.__members__:
-        raise InputError(f"expected the name of a status, got {claim['status']!r:.60}")
-    claim["status"] = Status[claim["status"]]
-    if not isinstance(claim["verified"], bool):
-        raise InputError(f"verified must be true or false, got {claim['verified']!r:.60}")
+    statement = {name: _decoded(content[name]) for name in names if name != "proof"}
+    if statement["status"] not in Status.__members__:
+        raise InputError(f"expected the name of a status, got {statement['status']!r:.60}")
+    statement["status"] = Status[statement["status"]]
+    if not isinstance(statement["verified"], bool):
+        raise InputError(f"verified must be true or false, got {statement['verified']!r:.60}")
     for name, kind in (
         ("seconds", Seconds),
         ("worst", SchedulingTrajectory | None),
         ("perturbation", np.ndarray | None),
     ):
-        if not isinstance(claim[name], kind):
-            raise InputError(f"{name} is invalid: {claim[name]!r:.60}")
+        if not isinstance(statement[name], kind):
+            raise InputError(f"{name} is invalid: {statement[name]!r:.60}")
     for name, kind in (("hypotheses", str), ("attempts", Attempt)):
-        values = claim[name]
+        values = statement[name]
         if not isinstance(values, tuple) or not all(isinstance(v, kind) for v in values):
             raise InputError(f"{name} are invalid: {values!r:.60}")
-    if not isinstance(claim["method"], str) or not isinstance(claim["solver"], str):
+    if not isinstance(statement["method"], str) or not isinstance(statement["solver"], str):
         raise InputError("method and solver must be texts")
     proof = content["proof"]
-    cert = Certificate(**claim, proof=None if proof is None else _decoded_proof(proof))
+    cert = Certificate(**statement, proof=None if proof is None else _decoded_proof(proof))
     if cert.proof is not None:
         for s, rate in zip(cert.proof.evidence.parameters, cert.rates, strict=True):
             if motion(s, rate) not in cert.hypotheses:

@@ -1,4 +1,4 @@
-"""The forms of the Lyapunov function V that a proof can take, as one asks for them."""
+"""The forms of the Lyapunov function V that a user can request for a proof."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import numpy as np
 
 from symheli.errors import InputError
 
-MOST = 1024
-"""Segments of a parameter, at most: each has its inequalities, and a program of more takes hours to
-write, let alone to solve.
+MAX_SEGMENTS = 1024
+"""Largest number of segments: each has inequalities of its own, and larger programs take hours to
+assemble.
 """
 
 
@@ -35,16 +35,16 @@ class _InP:
             isinstance(segments, tuple | list)
             and segments
             and all(
-                isinstance(k, int | np.integer) and 1 <= k <= MOST
+                isinstance(k, int | np.integer) and 1 <= k <= MAX_SEGMENTS
                 for each in segments
                 for k in (each if isinstance(each, tuple) else (each,))
             )
         ):
             raise InputError(
-                f"segments must be an integer from 1 to {MOST}, or a tuple of them to try in turn,"
-                f" got {self.segments!r:.80}; each segment adds inequalities, and a larger program"
-                " is not solved in reasonable time: grade the knots (grading=2) towards where P"
-                " changes most, or narrow the range"
+                f"segments must be an integer from 1 to {MAX_SEGMENTS}, or a tuple of them to try"
+                f" in turn, got {self.segments!r:.80}; each segment adds inequalities, and a larger"
+                " program is not solved in reasonable time: grade the knots (grading=2) towards"
+                " where P changes most, or narrow the range"
             )
         object.__setattr__(self, "segments", None if segments is None else tuple(segments))
         if self.grading is not None and not self.grading >= 1:
@@ -53,29 +53,25 @@ class _InP:
             raise InputError(f"accept must be >= 1, got {self.accept!r}")
 
     def degrees(self, parameters: int) -> list[int | None]:
-        """One for each of so many parameters, None for the usual one; `InputError` for another
-        number of them.
-        """
+        """Return the degree in each of so many parameters, None for the default."""
         return _each(self.degree, parameters, "degree")
 
     def segments_tried(self, parameters: int) -> list[list[Any]] | None:
-        """Numbers of segments, one for each of so many parameters, to try in turn; None for the
-        usual ones.
-        """
+        """Return the numbers of segments of each parameter to try in turn; None for the default."""
         segments: Any = self.segments
         tried = segments and [_each(k, parameters, "segments") for k in segments]
         for each in tried or ():
-            if math.prod(each) > MOST:
+            if math.prod(each) > MAX_SEGMENTS:
                 raise InputError(
                     f"segments: {' x '.join(map(str, each))} of {parameters} parameters are"
-                    f" {math.prod(each)}, each with inequalities of its own; expected {MOST} at"
-                    " most"
+                    f" {math.prod(each)}, each with inequalities of its own; expected"
+                    f" {MAX_SEGMENTS} at most"
                 )
         return tried
 
     @property
     def near(self) -> float:
-        """`accept`, or what is usual."""
+        """`accept`, or its default."""
         return 2.0 if self.accept is None else self.accept
 
 
@@ -174,12 +170,13 @@ class Memory(_InP):
         super().__post_init__()
         if not (
             self.seconds > 0
-            and 1 <= self.across_segments <= MOST
+            and 1 <= self.across_segments <= MAX_SEGMENTS
             and self.across_degree in (1, 2, 3, 4)
         ):
             raise InputError(
-                f"expected seconds > 0, across_segments from 1 to {MOST} and across_degree 1 .. 4,"
-                f" got {self.seconds!r}, {self.across_segments!r} and {self.across_degree!r}"
+                f"expected seconds > 0, across_segments from 1 to {MAX_SEGMENTS} and across_degree"
+                f" 1 .. 4, got {self.seconds!r}, {self.across_segments!r} and"
+                f" {self.across_degree!r}"
             )
 
 
@@ -222,4 +219,4 @@ class HigherOrder(_InP):
 
 
 LyapunovForm = Spline | Memory | HigherOrder
-"""What `form` may be."""
+"""Type of `form`."""

@@ -1,5 +1,5 @@
-"""One loop's gain against the permitted rate of its parameter, from frozen to arbitrarily fast:
-what is proven, what a trajectory reaches, what is open.
+"""Gain of one loop against the permitted rate of its parameter, from frozen to arbitrarily fast:
+upper bounds, lower bounds, and the gap.
 """
 
 from __future__ import annotations
@@ -78,8 +78,8 @@ class GainCurve:
         parameter: str = "airspeed",
         rate_unit: str = "m/s^2",
     ) -> GainCurve:
-        """The curve of (form of the proof, permitted rate, certificate of the gain), at least one,
-        the least conservative form first.
+        """Return the curve of (form of the proof, permitted rate, certificate of the gain), at
+        least one, the least conservative form first.
         """
         found = list(found)
         lower: dict[float, float] = {}
@@ -98,21 +98,21 @@ class GainCurve:
 
     @property
     def held(self) -> str:
-        """The parameter at one value, in words: "an airspeed held"."""
+        """The parameter held constant, in words: "an airspeed held"."""
         article = "an" if self.parameter[:1] in "aeiou" else "a"
         return f"{article} {self.parameter} held"
 
     @property
     def growing(self) -> float:
-        """Least rate at which growth was found, inf: none."""
+        """Least rate at which an unstable trajectory was found, inf without one."""
         return min(
             (rate for rate, gain in self.lower.items() if math.isinf(gain)), default=math.inf
         )
 
     @property
     def best(self) -> dict[float, float]:
-        """{rate: least gain proven there}: what is proven for a larger rate holds for a smaller
-        one.
+        """Least gain proven at each rate, {rate: gain}: a proof for a larger rate holds for a
+        smaller one.
         """
         every = [(rate, gain) for gains in self.proven.values() for rate, gain in gains.items()]
         least = {
@@ -127,7 +127,7 @@ class GainCurve:
         return max(self.best.items(), default=(math.nan, math.inf))
 
     def verdict(self) -> str:
-        """What the curve says, in one or two sentences."""
+        """Summary of the curve, in one or two sentences."""
         if math.isinf(self.frozen):
             return f"the loop is unstable at {self.held}, so no gain can be proven."
         it = self.held.removesuffix(" held")

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 COLOURS = {"P(p)": BLUE, "P(p, lag)": GREEN}
 ATTAINED = "worst trajectory of the linear model"
-"""Label of the gains that no bound can be smaller than."""
+"""Label of the lower bounds."""
 
 
 def plot_gain_curve(
@@ -100,8 +100,8 @@ def plot_gain_curve(
 
 
 def _jumping(curve: GainCurve, ax: Any, left: float) -> list[str]:
-    """Lines across for the tests that prove something; the names of the others. Tests that agree to
-    1 % share a line.
+    """Draw horizontal lines for the tests that prove a gain for jumps, and return the names of the
+    others. Tests that agree to 1 % share a line.
     """
     together: dict[float, list[str]] = {}
     for test, gain in sorted(curve.jumping.items(), key=lambda item: item[1]):

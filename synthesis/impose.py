@@ -1,5 +1,5 @@
-"""How an inequality is imposed for every p of a range, as one asks for it; docs/relaxations.md says
-what each promises.
+"""The relaxations with which a user can impose an inequality for every p of a range;
+docs/relaxations.md describes them.
 """
 
 from __future__ import annotations
@@ -10,14 +10,14 @@ from typing import ClassVar
 from symheli.errors import InputError
 
 MARGINS = (1e-6, 1e-4)
-"""State blocks are held below -margin I in scaled coordinates, tried in turn."""
+"""Margins tried in turn: state blocks are held below -margin I in scaled coordinates."""
 FLOOR = 1e-6
 """P is held above floor I in scaled coordinates."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Strictly:
-    """How strictly: see `Bernstein`."""
+    """Margins of the inequalities: see `Bernstein`."""
 
     margins: tuple[float, ...] | None = None
     floor: float | None = None
@@ -32,18 +32,18 @@ class _Strictly:
 
     @property
     def tried(self) -> tuple[float, ...]:
-        """The margins, or the usual ones."""
+        """The margins, or their defaults."""
         return MARGINS if self.margins is None else self.margins
 
     @property
     def least(self) -> float:
-        """The floor, or the usual one."""
+        """The floor, or its default."""
         return FLOOR if self.floor is None else self.floor
 
 
-ELEVATION, SUBDIVISION, POINTS = 64, 10, 1024
-"""The most of each: beyond it the inequalities are too many for any solver, two to the power of a
-`subdivision` a parameter.
+MAX_ELEVATION, MAX_SUBDIVISION, MAX_POINTS = 64, 10, 1024
+"""Upper limits: with larger values there are too many inequalities for any solver (2^subdivision
+parts of each parameter).
 """
 
 
@@ -91,7 +91,8 @@ class Bernstein(_Strictly):
     def __post_init__(self) -> None:
         super().__post_init__()
         _counted(
-            elevation=(self.elevation, 0, ELEVATION), subdivision=(self.subdivision, 0, SUBDIVISION)
+            elevation=(self.elevation, 0, MAX_ELEVATION),
+            subdivision=(self.subdivision, 0, MAX_SUBDIVISION),
         )
 
 
@@ -128,7 +129,7 @@ class SumOfSquares(_Strictly):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _counted(elevation=(self.elevation, 0, ELEVATION))
+        _counted(elevation=(self.elevation, 0, MAX_ELEVATION))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -183,8 +184,8 @@ class Grid(_Strictly):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _counted(points=(self.points, 2, POINTS))
+        _counted(points=(self.points, 2, MAX_POINTS))
 
 
 Imposed = Bernstein | SumOfSquares | Vertices | Grid
-"""What `impose` may be."""
+"""Type of `impose`."""

@@ -1,4 +1,4 @@
-"""A block of bounded norm around a model, and what the S-procedure takes from it.
+"""A norm-bounded block around a model, and its supply rate in the S-procedure.
 
 For d = Delta v, |Delta| <= bound, and any lambda >= 0 the supply lambda (bound^2 v'v - d'd) is not
 negative: a dissipation inequality that holds with it added holds for every such Delta, constant or
@@ -29,7 +29,7 @@ class NormBounded(NamedTuple):
     bound: float
 
     def fault(self, lpv: LPVStateSpace) -> str | None:
-        """What keeps it from being a block of this model, None where nothing does."""
+        """Return why it is not a block of this model; None where it is."""
         found = structure.first(
             structure.whole(self.inputs, 1, "inputs of the block"),
             structure.whole(self.outputs, 1, "outputs of the block"),
@@ -47,7 +47,7 @@ class NormBounded(NamedTuple):
 
     @property
     def sentence(self) -> str:
-        """For which Delta a proof holds."""
+        """Sentence on the Delta for which a proof holds."""
         return (
             f"for every Delta ({self.inputs} x {self.outputs}) with |Delta|_2 <= {self.bound!r},"
             " constant or moving in any way, d = Delta v"
@@ -55,7 +55,7 @@ class NormBounded(NamedTuple):
 
 
 def open_block(unc: UncertainStateSpace, *, channels: bool) -> tuple[LPVStateSpace, NormBounded]:
-    """The model with its block open, inputs (d, u) and outputs (y, v), u and y only with
+    """Return the model with its block open, inputs (d, u) and outputs (y, v), u and y only with
     `channels`; and the block.
     """
     u, y = (unc.inputs, unc.outputs) if channels else ((), ())

@@ -1,1 +1,1 @@
-"""Before a fit: what a record can determine, and which experiment tells most."""
+"""Design of experiments: what a record determines, and which experiment is most informative."""

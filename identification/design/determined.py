@@ -1,4 +1,4 @@
-"""Which coefficients the data determine: one rule for a batch of regressors and for the factor of a
+"""Coefficients that the data determine: one rule for a batch of regressors and for the factor of a
 recursion.
 """
 
@@ -11,16 +11,17 @@ from symheli.lpv import FunctionSpace
 from symheli.values.arrays import Array
 
 PRIOR = 32.0
-"""What a recursion that keeps nothing awake pretends to know: so many eps samples, with a regressor
-at its largest, of coefficient 0.
+"""Prior information of a recursion without persistent excitation: this many eps samples, with a
+regressor at its largest, of coefficient 0.
 """
 
-BEYOND = 1000.0
-"""A coefficient is determined where the data say so many times more than what is pretended."""
+MIN_INFORMATION_RATIO = 1000.0
+"""Ratio of the information of the data to the prior above which a coefficient is determined."""
 
 
-def determined(d: Array, energy: Array, fed: Array, beyond: float = BEYOND) -> Array:
-    """Which columns of a regressor matrix stand out of the span of those before it, (n,) of bool.
+def determined(d: Array, energy: Array, fed: Array, beyond: float = MIN_INFORMATION_RATIO) -> Array:
+    """Return the mask (n,) of the columns of a regressor matrix that are independent of those
+    before.
 
     `d` (n,) is the squared distance of each column from that span (the squared diagonal of the
     triangular factor), `energy` (n,) its squared length, both by the weights of the samples; `fed`
@@ -51,8 +52,8 @@ def determined_columns(phi: Array, basis: FunctionSpace) -> Array:
 
 
 def largest(basis: FunctionSpace) -> Array:
-    """(n,) how large each function of a basis becomes, on a grid over its range; 1 for one that is
-    zero there.
+    """Return the largest magnitude (n,) of each function of a basis, on a grid over its range; 1
+    for one that is zero there.
     """
     points = 257 if basis.dimension == 1 else max(round(4096 ** (1 / basis.dimension)), 2)
     axes = np.meshgrid(

@@ -30,7 +30,7 @@ BINS = 10
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ExcitationReport:
-    """How well the scheduled regressors of a record determine the coefficients of a structure.
+    """Excitation of the scheduled regressors in a record, with the coefficients that it determines.
 
     Where the equations differ in their regressors, this is the report on the worst of them.
 
@@ -169,7 +169,7 @@ def excitation_report(
 
 
 def excitation_of(arx: LPVARX, data: Regression) -> ExcitationReport:
-    """The same for regressors already built."""
+    """Return the report for regressors already built."""
     reports = [_report(arx, data, group) for group in arx.groups]
     return max(reports, key=lambda report: (not report.sufficient, report.condition))
 
@@ -254,7 +254,9 @@ def distinct_values(p: Array, ranges: Sequence[tuple[float, float]]) -> int:
 
 
 def direction_in_words(direction: Array, names: tuple[str, ...], parts: int = 3) -> str:
-    """Its largest entries, such as "0.71 u(k-1) f0(p(k-1)) - 0.70 u(k-2) f0(p(k-2))"."""
+    """Return the largest entries of a direction, such as "0.71 u(k-1) f0(p(k-1)) - 0.70 u(k-2)
+    f0(p(k-2))".
+    """
     largest = [
         i for i in np.argsort(-np.abs(direction), kind="stable")[:parts] if abs(direction[i]) > 0.05
     ]

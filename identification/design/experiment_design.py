@@ -1,6 +1,4 @@
-"""Which experiment tells most: candidates compared by the information their records would hold,
-within limits.
-"""
+"""Comparison of experiments by the information of their records, within limits."""
 
 from __future__ import annotations
 

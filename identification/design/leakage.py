@@ -1,5 +1,5 @@
-"""What a model may hear of its own answer: through a scheduling signal made of the outputs, or
-through samples made of others.
+"""Leakage of outputs into regressors: through a scheduling signal computed from the outputs, or
+through resampled data.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ MADE_OF_OUTPUTS = 0.5
 measurement of them.
 """
 
-PAST = 2
-"""Samples of p and the outputs that are known before the news at k."""
+PAST_SAMPLES = 2
+"""Number of samples of p and the outputs that are known before the sample k."""
 
 NOTHING_NEW = 1e-6
 """Of the spread of p from sample to sample; news below this is rounding."""
@@ -32,27 +32,30 @@ def share_from_outputs(arx: LPVARX, records: FlightRecord | Iterable[FlightRecor
     """Share (parameters,) in [0, 1] of what is new in each scheduling parameter at k that the
     outputs at k explain.
 
-    New is what p and the outputs at k-1 and k-2 do not tell (linear regression). About 1 for a
-    filtered output, 0 for a command: above `MADE_OF_OUTPUTS` p(k) hands a model the outputs it has
-    to predict.
+    New is the residual of a linear regression on p and the outputs at k-1 and k-2. About 1 for a
+    filtered output, 0 for a command: above `MADE_OF_OUTPUTS` p(k) contains the outputs that a model
+    has to predict.
     """
     now, past, p = [], [], []
     for record in as_records(records):
         y, s = record.columns(arx.outputs), scheduling_values(arx, record).reshape(len(record), -1)
         for part in record.segments():
-            n = part.stop - part.start - PAST
+            n = part.stop - part.start - PAST_SAMPLES
             if n > 0:
                 both = np.hstack([y[part], s[part]])
-                now.append(y[part][PAST:])
+                now.append(y[part][PAST_SAMPLES:])
                 past.append(
                     np.hstack(
                         [
                             np.ones((n, 1)),
-                            *(both[PAST - lag : PAST - lag + n] for lag in range(1, PAST + 1)),
+                            *(
+                                both[PAST_SAMPLES - lag : PAST_SAMPLES - lag + n]
+                                for lag in range(1, PAST_SAMPLES + 1)
+                            ),
                         ]
                     )
                 )
-                p.append(s[part][PAST:])
+                p.append(s[part][PAST_SAMPLES:])
     if not now:
         return np.zeros(len(arx.parameters))
     rows = np.hstack([np.vstack(past), np.vstack(now), np.vstack(p)])
@@ -76,14 +79,15 @@ def share_from_outputs(arx: LPVARX, records: FlightRecord | Iterable[FlightRecor
 
 
 def warn_of_own_past(arx: LPVARX | KinematicARX, record: FlightRecord) -> None:
-    """Warns (`DataWarning`) where a scheduling parameter is the outputs, their squares or products,
-    now or up to two samples ago: a free run that follows the measured one is told its answer.
+    """Warn (`DataWarning`) where a scheduling parameter is the outputs, their squares or products,
+    now or up to two samples ago: a free run with the measured parameter then uses the measured
+    outputs.
     """
     y = record.columns(arx.outputs)
     y = (y - np.nanmean(y, axis=0)) / np.maximum(np.nanstd(y, axis=0), np.finfo(float).tiny)
     p = scheduling_values(arx, record).reshape(len(record), -1)
     for j, name in enumerate(arx.parameters):
-        for lag in range(PAST + 1):
+        for lag in range(PAST_SAMPLES + 1):
             rows = [
                 np.arange(part.start + lag, part.stop)
                 for part in record.segments()
@@ -103,8 +107,8 @@ def warn_of_own_past(arx: LPVARX | KinematicARX, record: FlightRecord) -> None:
             if np.std(left) < NOTHING_NEW * np.std(known[:, -1]):
                 when = "now" if lag == 0 else f"{lag} sample{'s' if lag > 1 else ''} ago"
                 warnings.warn(
-                    f"{name} is made of the outputs {when}: a free run here follows the measured"
-                    " one and is told what it has to predict; on its own outputs it may be far"
+                    f"{name} is made of the outputs {when}: a free run with the measured one"
+                    " contains the outputs that it has to predict; on its own outputs it may be far"
                     " worse",
                     DataWarning,
                     stacklevel=3,
@@ -113,8 +117,8 @@ def warn_of_own_past(arx: LPVARX | KinematicARX, record: FlightRecord) -> None:
 
 
 def warn_of_leakage(arx: LPVARX, records: Sequence[FlightRecord]) -> None:
-    """Warns (`DataWarning`) where y(k) stands among its own regressors, or an input at k that it
-    depends on is left out of them.
+    """Warn (`DataWarning`) where y(k) is among its own regressors, or an input at k that it depends
+    on is not.
     """
     if arx.offset_rate or arx.scheduling_at == "now":
         for parameter, share in zip(arx.parameters, share_from_outputs(arx, records), strict=True):
@@ -122,9 +126,9 @@ def warn_of_leakage(arx: LPVARX, records: Sequence[FlightRecord]) -> None:
                 term = "offset_rate" if arx.offset_rate else 'scheduling_at="now"'
                 warnings.warn(
                     f"{parameter} is made of the outputs ({100 * share:.0f} % of what is new in it"
-                    f" at k is in the outputs at k): with {term} the model is told what it has to"
-                    " predict, and one step and free run flatter; schedule on a command, or leave"
-                    f" {term} out and score with hold_p=True",
+                    f" at k is in the outputs at k): with {term} the regressors contain the"
+                    " outputs to predict, and the fits are too good; schedule on a command, or"
+                    f" leave {term} out and score with hold_p=True",
                     DataWarning,
                     stacklevel=3,
                 )

@@ -1,4 +1,4 @@
-"""Regressors that repeat each other by algebra: no record can tell them apart."""
+"""Regressors that are linearly dependent by structure: no record can distinguish them."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from symheli.records import FlightRecord
 from symheli.values import signals
 
 SAMPLES = 4
-"""Random samples for each regressor."""
+"""Number of random samples for each regressor."""
 
-ALGEBRA = 1e-9
-"""Of the largest singular value of random regressors; what lies below is zero by algebra."""
+STRUCTURAL_ZERO = 1e-9
+"""Singular values of random regressors below this fraction of the largest are structurally zero."""
 
 
 def never_determined(arx: LPVARX, group: Group) -> str:
-    """Why no record whatever determines the coefficients of a group, in a sentence; empty where a
-    rich one does.
+    """Return why no record determines the coefficients of a group, in a sentence; empty where a
+    rich record does.
     """
     twice = [name for name in (*arx.outputs, *arx.inputs) if name in arx.parameters]
     lost = _repeated(arx, group) if twice else 0
@@ -41,7 +41,7 @@ def never_determined(arx: LPVARX, group: Group) -> str:
 
 
 def _repeated(arx: LPVARX, group: Group) -> int:
-    """How many regressors of a group are combinations of others whatever the signals are.
+    """Return the number of regressors of a group that are combinations of others for all signals.
 
     Every signal is replaced by independent random numbers, one draw a name, so that a signal that
     is both output and scheduling parameter stays one: what depends on each other even so does it by
@@ -59,4 +59,4 @@ def _repeated(arx: LPVARX, group: Group) -> int:
     )
     phi = regression(arx, record).phi[:, regressors]
     values = np.linalg.svd(phi / np.linalg.norm(phi, axis=0), compute_uv=False)
-    return int(np.sum(values <= ALGEBRA * values[0]))
+    return int(np.sum(values <= STRUCTURAL_ZERO * values[0]))

@@ -8,7 +8,7 @@ import numpy as np
 
 from symheli.values.arrays import Array
 
-WORK = 4e8
+MAX_OPERATIONS = 4e8
 """Rows of a block times the square of its columns: some tenths of a second."""
 
 
@@ -40,7 +40,7 @@ def triangular(A: Array) -> Array:
 
 
 def _blocks(A: Array) -> list[Array]:
-    """Of rows, four times as many as columns at least."""
+    """Return blocks of rows, with at least four times as many rows as columns."""
     m, n = A.shape
-    rows = max(int(WORK / max(n, 1) ** 2), 4 * n, 1)
+    rows = max(int(MAX_OPERATIONS / max(n, 1) ** 2), 4 * n, 1)
     return np.array_split(A, max(m // rows, 1))

@@ -1,1 +1,3 @@
-"""From regressors to coefficients: least squares, instruments, penalties, output error."""
+"""Estimators of the coefficients from regressors: least squares, instruments, penalties, output
+error.
+"""

@@ -1,4 +1,4 @@
-"""Covariances that reach a few samples: block-banded Cholesky factors, and whitening by them."""
+"""Covariances over a few samples: block-banded Cholesky factors, and whitening with them."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from symheli.values.arrays import Array
 
 @dataclass(frozen=True, eq=False)
 class Whitening:
-    """Of e(k) = sum_i L_i(k) v(k-i) + .., a sum of such terms with white v: G with G G' the
-    covariance of e, blocks below the diagonal only as far as the sums reach.
+    """Whitening of e(k) = sum_i L_i(k) v(k-i) + .., a sum of such terms with white v: G with G G'
+    the covariance of e, blocks below the diagonal only as far as the sums reach.
 
     `band` is G in LAPACK's lower banded storage; `steps` are (m, size, size) blocks: the inverse of
     the diagonal ones, then that times the one i below.
@@ -26,8 +26,8 @@ class Whitening:
 
     @classmethod
     def of(cls, terms: Sequence[tuple[Sequence[Array], Array]]) -> Whitening:
-        """From each term's blocks L_0, L_1, .. (m, size, inputs) and variances (inputs,); raises
-        `AccuracyError` where the sum is singular to rounding, or no longer finite.
+        """Return the whitening from each term's blocks L_0, L_1, .. (m, size, inputs) and variances
+        (inputs,); raise `AccuracyError` where the sum is singular to rounding, or no longer finite.
         """
         reach = max(len(L) for L, _ in terms) - 1
         m, size = terms[0][0][0].shape[:2]

@@ -1,4 +1,4 @@
-"""From records to a model, by the method of choice."""
+"""Estimation of a model from records, by the chosen method."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Maximum likelihood for a rigid vehicle with noise on every sensor: the filter error method, by
+"""Filter error method: maximum likelihood for a rigid vehicle with noise on every sensor, by
 smoothing.
 """
 
@@ -34,20 +34,22 @@ noise with this many times its variance has as much power where models are used.
 seeds 1000 to 1004 of the study's flights; 10 to 100 differ little.
 """
 
-EXACT = 1e-9
-"""Variance of the Euler equations' own error, as a share of that of the attitude sensors."""
+MODEL_ERROR = 1e-9
+"""Error variance of the Euler equations, as a fraction of that of the attitude sensors."""
 
-ABOVE = 0.8
-"""Share of the Nyquist frequency above which a signal is taken to be noise."""
+NOISE_BAND = 0.8
+"""Fraction of the Nyquist frequency above which a signal is taken to be noise."""
 
-NEIGHBOURS = 1.0 + 2 * (2 / 3) ** 2 + 2 * (1 / 6) ** 2
-"""Lines of a Hann window's spectrum that count as one: neighbours are correlated."""
+LINES_PER_ESTIMATE = 1.0 + 2 * (2 / 3) ** 2 + 2 * (1 / 6) ** 2
+"""Number of lines of a Hann window's spectrum that count as one: neighbouring lines are
+correlated.
+"""
 
 LAGS = 25
-"""Samples over which scores are taken to be correlated."""
+"""Number of samples over which scores are taken to be correlated."""
 
 CHUNK = 256
-"""Samples whitened at a time."""
+"""Number of samples whitened at a time."""
 
 
 @dataclass(frozen=True)
@@ -141,7 +143,9 @@ class FilterError(Method):
         )
 
     def estimate(self, arx: LPVARX, records: Sequence[FlightRecord], data: Regression) -> Estimate:
-        """With the noise found in the details, and the covariance of all coefficients together."""
+        """Estimate the coefficients, with the noise in the details, and the joint covariance of all
+        coefficients.
+        """
         if not isinstance(arx, Aerodynamics):
             raise InputError(
                 "the filter error method needs known kinematics: fit a KinematicARX, or choose"
@@ -196,7 +200,9 @@ class FilterError(Method):
         )
 
     def _variances(self, records: Sequence[FlightRecord]) -> list[Array]:
-        """Of the sensors (8,) in each record; where one is too short to tell, as in the others."""
+        """Return the variances of the sensors (8,) in each record; where one is too short, those of
+        the others.
+        """
         found = np.array([noise_of_flight(r, self.noise or {}).variances for r in records])
         known = np.isfinite(found)
         weights = known * np.array([len(r) for r in records], float)[:, None]
@@ -221,8 +227,8 @@ class FilterError(Method):
 
 
 class FlightNoise(NamedTuple):
-    """Variances (8,) of the sensors' noise in one flight, NaN where it is too short to tell, and of
-    each the relative standard error (8,), 0 where it was given.
+    """Variances (8,) of the sensors' noise in one flight, NaN where it is too short, and the
+    relative standard error (8,) of each, 0 for given variances.
     """
 
     variances: Array
@@ -230,8 +236,8 @@ class FlightNoise(NamedTuple):
 
 
 def noise_of_flight(record: FlightRecord, given: Mapping[str, float]) -> FlightNoise:
-    """Of the sensors of u v w p q r phi theta: the standard deviations given, else from the
-    spectrum of the record.
+    """Return the noise of the sensors of u v w p q r phi theta: from the given standard deviations,
+    else from the spectrum of the record.
     """
     segments = record.segments()
     found = [
@@ -243,15 +249,17 @@ def noise_of_flight(record: FlightRecord, given: Mapping[str, float]) -> FlightN
 
 
 def noise_variance(signal: Array, segments: Sequence[slice]) -> float:
-    """Variance of white noise with the power a signal has above 0.8 of the Nyquist frequency; 0
-    where no segment is long enough to tell.
+    """Return the variance of white noise with the power that a signal has above 0.8 of the Nyquist
+    frequency; 0 where no segment is long enough.
     """
     found, _ = noise_level(signal, segments)
     return found if np.isfinite(found) else 0.0
 
 
 def noise_level(signal: Array, segments: Sequence[slice]) -> tuple[float, float]:
-    """The same with its relative standard error; NaN and infinity where nothing tells."""
+    """Return the same with its relative standard error; NaN and infinity where no segment is long
+    enough.
+    """
     power, weight, spread = 0.0, 0.0, 0.0
     for part in segments:
         x = signal[part]
@@ -261,15 +269,15 @@ def noise_level(signal: Array, segments: Sequence[slice]) -> tuple[float, float]
         window = np.hanning(len(x))
         line = np.linspace(x[0], x[-1], len(x))
         spectrum = np.abs(np.fft.rfft((x - line) * window)) ** 2
-        high = spectrum[int(ABOVE * len(spectrum)) :]
+        high = spectrum[int(NOISE_BAND * len(spectrum)) :]
         power += len(x) * float(np.mean(high)) / float(np.sum(window**2))
         weight += len(x)
-        spread += len(x) ** 2 * NEIGHBOURS / len(high)
+        spread += len(x) ** 2 * LINES_PER_ESTIMATE / len(high)
     return (power / weight, float(np.sqrt(spread)) / weight) if weight else (np.nan, np.inf)
 
 
 def unbroken(arx: Aerodynamics, record: FlightRecord) -> list[slice]:
-    """Stretches in which everything was measured, long enough to say something."""
+    """Return stretches in which everything was measured, of sufficient length."""
     names = (*STATES, *arx.inputs, *arx.parameters)
     known = np.isfinite(record.columns(dict.fromkeys(names))).all(axis=1)
     out = []
@@ -294,7 +302,7 @@ class Noise(NamedTuple):
     @classmethod
     def of(cls, R: Array, left: Array, gust: float, remains: float) -> Noise:
         """Of sensors R, equations that leave (6,) and Euler's, which are exact."""
-        return cls(R, np.append(left, EXACT * R[6:]), gust, remains)
+        return cls(R, np.append(left, MODEL_ERROR * R[6:]), gust, remains)
 
 
 class Linearized(NamedTuple):
@@ -387,8 +395,8 @@ class Stretch:
         return Linearized(F, left, L, H, Whitening.of(terms))
 
     def whitened(self, theta: Array, noise: Noise) -> Array:
-        """What the equations leave (m, 8), white and of variance 1 where `noise` is all there
-        is.
+        """Return the residuals (m, 8) of the equations, white and of variance 1 if `noise` is their
+        only cause.
         """
         _, left, _, _, white = self._linearized(theta, noise)
         return white.whitened(left)
@@ -420,7 +428,7 @@ class Stretch:
             yield out
 
     def smooth(self, theta: Array, change: Array, noise: Noise) -> None:
-        """Move the states, and the gust, to where the equations hold best with theta + `change`."""
+        """Adjust the states, and the gust, to fit the equations best with theta + `change`."""
         F, left, L, H, white = self._linearized(theta, noise)
         left[:, :6] -= F @ change
         pull = white.adjoint(white.whitened(left))
@@ -450,7 +458,7 @@ class Stretch:
 
 
 def _solved(normal: Array, right: Array) -> tuple[Array, Array]:
-    """Solution and inverse of normal equations, scaled to a unit diagonal."""
+    """Return solution and inverse of normal equations, scaled to a unit diagonal."""
     scale = np.sqrt(np.diag(normal))
     scale = np.where(scale > 0, scale, 1.0)
     factor = cho_factor(normal / np.outer(scale, scale), lower=True)

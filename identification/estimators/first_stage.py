@@ -1,4 +1,4 @@
-"""How strong instruments are: what of the worst direction of the regressors they explain."""
+"""Strength of instruments: the explained part of the worst direction of the regressors."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from identification.design.excitation import RANK_TOLERANCE, column_scale, direc
 from identification.design.tall_factors import orthonormal, triangular
 from symheli.values.arrays import Array
 
-WEAK = 10.0
-"""A first-stage F below this leaves more than about a tenth of the bias of least squares. Source:
-Staiger and Stock (1997).
+MIN_F = 10.0
+"""First-stage F below which instruments are weak: more than about a tenth of the bias of least
+squares remains. Source: Staiger and Stock (1997).
 """
 
 
@@ -26,8 +26,8 @@ class FirstStage(NamedTuple):
 
 
 def first_stage(phi: Array, Q: Array, names: tuple[str, ...], own: Array) -> FirstStage:
-    """Of regressors phi (m, n) on instruments with the orthonormal basis Q (m, k); those of `own`
-    (n,) instrument themselves.
+    """Return the first-stage regression of regressors phi (m, n) on instruments with the
+    orthonormal basis Q (m, k); those of `own` (n,) are their own instruments.
 
     The least eigenvalue of what k - k_own instruments explain of the regressors against what they
     do not, per degree of freedom, that of `own` taken off both: F = (m - k)/(k - k_own) rho^2/(1 -

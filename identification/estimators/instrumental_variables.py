@@ -16,7 +16,7 @@ from identification.design.excitation import (
     direction_in_words,
     spectrum,
 )
-from identification.estimators.first_stage import WEAK, FirstStage, first_stage
+from identification.estimators.first_stage import MIN_F, FirstStage, first_stage
 from identification.estimators.instruments import (
     FlightSource,
     Instruments,
@@ -38,7 +38,7 @@ NOISE_FREE = 1e-6
 """A residual below this part of every output biases no estimate."""
 
 LAGS = 25
-"""Samples over which residuals are taken to be correlated."""
+"""Number of samples over which residuals are taken to be correlated."""
 
 TINY = np.finfo(float).tiny
 
@@ -83,14 +83,18 @@ class InstrumentalVariables(Method):
 
     @classmethod
     def default(cls) -> Method:
-        """There is none: only the flight knows its external excitation. Raises `InputError`."""
+        """Raise `InputError`: there is no default, since the external excitation of a flight must
+        be named.
+        """
         raise InputError(
             'method "iv" needs its instruments: InstrumentalVariables(("name", ...)), the external'
             " excitation added to the stabilised inputs"
         )
 
     def estimate(self, arx: LPVARX, records: Sequence[FlightRecord], data: Regression) -> Estimate:
-        """With the strength of the instruments in the details, and a remark where they are weak."""
+        """Estimate the coefficients, with the strength of the instruments in the details, and a
+        remark where they are weak.
+        """
         source = source_of(self.instruments)
         theta, weakest = instrumental_variables(arx, records, data, source)
         error = np.mean((data.y - data.phi @ theta) ** 2, axis=0)
@@ -130,13 +134,13 @@ def _of_flown(
 
 
 def _weakness(weakest: FirstStage) -> tuple[Warning, ...]:
-    if weakest.F >= WEAK:
+    if weakest.F >= MIN_F:
         return ()
     return (
         DataWarning(
-            f"the instruments are weak (first-stage F {weakest.F:.2g}, usual least {WEAK:g}): along"
-            f" {weakest.direction} the estimate is nearly as biased as least squares; excite more,"
-            " name more instruments, widen their window, or lower the order or the degree"
+            f"the instruments are weak (first-stage F {weakest.F:.2g}, usual least {MIN_F:g}):"
+            f" along {weakest.direction} the estimate is nearly as biased as least squares; excite"
+            " more, name more instruments, widen their window, or lower the order or the degree"
         ),
     )
 

@@ -1,4 +1,4 @@
-"""Where instruments come from, and the rows they make: signals that know nothing of the noise, at
+"""Sources of instruments, and their regressors: signals that are independent of the noise, at
 several lags, times the functions of the scheduling parameter.
 """
 
@@ -55,8 +55,8 @@ class InstrumentSource(Protocol):
     """
 
     def instrument_signals(self, record: FlightRecord, names: tuple[str, ...]) -> Array:
-        """(n, k), a row a sample of `record`, NaN where unknown; `names` are the outputs and inputs
-        of the structure.
+        """Return the instruments (n, k), a row for each sample of `record`, NaN where unknown;
+        `names` are the outputs and inputs of the structure.
         """
         ...
 
@@ -95,8 +95,8 @@ class FlightSource(Protocol):
         ...
 
 
-MOST = 10**9
-"""Samples in a window of instruments."""
+MAX_SAMPLES = 10**9
+"""Largest number of samples in a window of instruments."""
 
 Instruments = str | Sequence[str] | InstrumentSource | FlightSource
 """A source of instruments, or the names of signals of the record with the defaults of
@@ -161,9 +161,10 @@ class LaggedSignals:
     def instrument_lags(self, dt: float, first: int, memory: int) -> tuple[int, ...]:
         """Evenly over the window, whatever the memory of the structure."""
         window = max(USUAL_WINDOW, FEWEST * dt) if self.window is None else self.window
-        if not window / MOST < dt < np.inf:
+        if not window / MAX_SAMPLES < dt < np.inf:
             raise InputError(
-                f"dt: expected seconds, at least a {MOST}th of the window of {window:g} s, got {dt}"
+                f"dt: expected seconds, at least a {MAX_SAMPLES}th of the window of {window:g} s,"
+                f" got {dt}"
             )
         first = whole(first, "first")
         last = max(first + 1, round(window / dt))
@@ -262,8 +263,8 @@ def column_space(W: Array) -> Array:
 def explained(
     arx: LPVARX, records: Sequence[FlightRecord], source: InstrumentSource | FlightSource
 ) -> tuple[list[FlightRecord], list[FlightRecord]]:
-    """The records, and the same with inputs and outputs replaced by what the instruments explain of
-    them (least squares, lags from 0 on).
+    """Return the records, and the same with inputs and outputs replaced by their projection on the
+    instruments (least squares, lags from 0 on).
 
     What is explained does not know the noise that feedback carries round. Both are NaN where an
     instrument is missing, so that both break at the same samples.

@@ -66,15 +66,17 @@ class Lasso(Method):
             )
 
     def estimate(self, arx: LPVARX, records: Sequence[FlightRecord], data: Regression) -> Estimate:
-        """With the `weight` of each output and how many coefficients it `kept` in the details."""
+        """Estimate the coefficients, with the `weight` of each output and the number of
+        coefficients it `kept` in the details.
+        """
         theta, weights = lasso(arx, data, self)
         kept = np.count_nonzero(theta, axis=0).tolist()
         return Estimate(theta=theta, details={"weight": weights.tolist(), "kept": kept})
 
 
 def lasso(arx: LPVARX, data: Regression, options: Lasso) -> tuple[Array, Array]:
-    """theta (n_regressors, ny), zero where a coefficient was not kept, and the weight (ny,) of each
-    output.
+    """Return theta (n_regressors, ny), zero for coefficients that are not kept, and the weight
+    (ny,) of each output.
     """
     theta, weights = np.zeros((arx.n_regressors, arx.ny)), np.zeros(arx.ny)
     for group in arx.groups:
@@ -103,8 +105,8 @@ def lasso(arx: LPVARX, data: Regression, options: Lasso) -> tuple[Array, Array]:
 
 
 def lasso_path(X: Array, y: Array) -> tuple[Array, Array]:
-    """All minimisers of |y - X b|^2 / (2 m) + price |b|_1: prices (K,), falling to 0, and b (K, n)
-    at them; straight lines between.
+    """Return all minimisers of |y - X b|^2 / (2 m) + price |b|_1: prices (K,), falling to 0, and b
+    (K, n) at them; straight lines between.
 
     The path is followed exactly, corner by corner: a coefficient joins where its correlation with
     the residual reaches the price, and leaves where it passes zero. A column that depends on those
@@ -161,8 +163,8 @@ def _next_corner(
     barred: Array,
     left: int,
 ) -> tuple[float, int]:
-    """How far the price falls until a coefficient joins, leaves (then which, else -1), or nothing
-    is left to pay.
+    """Return how far the price falls until a coefficient joins, leaves (then which, else -1), or
+    the price is zero.
     """
     step, leaves = price, -1
     for j in range(len(correlation)):
@@ -200,7 +202,9 @@ def _at(weight: float, prices: Array, path: Array) -> tuple[Array, float]:
 
 
 def _by_criterion(X: Array, y: Array, prices: Array, path: Array) -> tuple[Array, float]:
-    """The corner of the path whose kept coefficients, refitted, have the smallest criterion."""
+    """Return the corner of the path whose kept coefficients, refitted, have the smallest
+    criterion.
+    """
     found = {tuple(np.flatnonzero(b).tolist()): k for k, b in reversed(list(enumerate(path)))}
     corners = tracked("comparing corners", found)
     best = found[min(corners, key=lambda kept: _criterion(X, y, np.array(kept, dtype=int)))]
@@ -208,7 +212,7 @@ def _by_criterion(X: Array, y: Array, prices: Array, path: Array) -> tuple[Array
 
 
 def _pruned(X: Array, y: Array, kept: Array) -> Array:
-    """`kept` without the coefficients whose loss makes the criterion smaller, the best loss
+    """Return `kept` without the coefficients whose removal reduces the criterion, the best removal
     first.
     """
     score = _criterion(X, y, kept)

@@ -33,7 +33,7 @@ class LeastSquares(Method):
     shorthand: ClassVar[str] = "ls"
 
     def estimate(self, arx: LPVARX, records: Sequence[FlightRecord], data: Regression) -> Estimate:
-        """By an orthogonal factor for each group of equations with the same regressors."""
+        """Estimate by an orthogonal factor for each group of equations with the same regressors."""
         theta = least_squares_by_group(arx, data.phi, data.y)
         check_least_squares(arx, data.phi, data.y, theta, self.shorthand)
         return Estimate(theta=theta, covariance=least_squares_covariance(arx, data, theta))
@@ -70,8 +70,8 @@ def residual_covariance(arx: LPVARX, error: Array) -> Array:
 
 
 def least_squares_covariance(arx: LPVARX, data: Regression, theta: Array) -> Array | None:
-    """`white_covariance` of the least-squares coefficients theta with the covariance of their
-    residuals; None where no sample is left to tell that by.
+    """Return the `white_covariance` of the least-squares coefficients theta with the covariance of
+    their residuals; None where no degrees of freedom are left.
     """
     if len(data.phi) <= np.max(np.sum(arx.free, axis=0)):
         return None
@@ -80,8 +80,8 @@ def least_squares_covariance(arx: LPVARX, data: Regression, theta: Array) -> Arr
 
 
 def white_covariance(arx: LPVARX, phi: Array, residual: Array) -> Array:
-    """Covariance (ny, n, ny, n) of least-squares coefficients whose residuals are white with the
-    covariance `residual` (ny, ny), and independent of regressors phi (m, n) of full rank.
+    """Return the covariance (ny, n, ny, n) of least-squares coefficients whose residuals are white
+    with the covariance `residual` (ny, ny), and independent of regressors phi (m, n) of full rank.
 
     residual (x) (phi' phi)^-1 where all equations have the same regressors; else D_i phi_i' phi_j
     D_j residual_ij with D = (phi' phi)^-1 of the regressors of an equation. Zero for coefficients

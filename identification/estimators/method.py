@@ -1,4 +1,4 @@
-"""What an estimator is to `fit`: options that hold together, and one way from regressors to
+"""Interface of an estimator to `fit`: validated options, and one call from regressors to
 coefficients.
 """
 
@@ -82,7 +82,7 @@ class Method(ABC):
 
     @classmethod
     def default(cls) -> Method:
-        """What the shorthand stands for."""
+        """Return the method for the shorthand."""
         return cls()
 
 

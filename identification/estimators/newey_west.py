@@ -29,7 +29,7 @@ def long_run_covariance(parts: Iterable[Array], lags: int) -> Array:
 
 
 def _run_out(parts: Iterable[Array], lags: int) -> Iterator[Array]:
-    """The parts, and zeros at which the last moving sums end."""
+    """Yield the parts, and zeros at which the last moving sums end."""
     width = 0
     for rows in parts:
         width = rows.shape[1]

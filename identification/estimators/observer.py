@@ -1,4 +1,4 @@
-"""A Kalman observer in place of the free run: bounded also where the plant is not."""
+"""A Kalman observer instead of the free run: bounded also for an unstable plant."""
 
 from __future__ import annotations
 
@@ -8,17 +8,16 @@ import numpy as np
 
 from symheli.values.arrays import Array
 
-DOUBT = 1e-4
-"""Variance of what drives the model beside its inputs, as a share of that of the noise on the
-outputs: small enough to whiten it, and enough to stay awake while a plant is stable, so that the
-estimate does not run away when it becomes unstable.
+PROCESS_NOISE = 1e-4
+"""Variance of the process noise, as a fraction of that of the output noise: small enough to whiten
+the outputs, large enough to keep the observer adapting.
 """
 
 
 @dataclass(frozen=True, eq=False)
 class Observer:
-    """For y = x + v, x(k) = -A(k) [x(k-1); x(k-2); ...] + known(k): A (n, ny, na ny), `gain` (n, na
-    ny, ny) of the past on the innovation.
+    """Observer of y = x + v, x(k) = -A(k) [x(k-1); x(k-2); ...] + known(k): A (n, ny, na ny),
+    `gain` (n, na ny, ny) of the past on the innovation.
 
     While the plant is stable the gain is small, and the innovation is v; where it is unstable the
     poles of the observer are its own mirrored at the unit circle, which leaves white noise white.
@@ -31,13 +30,13 @@ class Observer:
 
     @classmethod
     def of(cls, A: Array, size: Array) -> Observer:
-        """The time-varying Kalman gain for white noise v with standard deviations `size` (ny,),
-        from a past measured with that noise.
+        """Return the observer with the time-varying Kalman gain for white noise v with standard
+        deviations `size` (ny,), from a past measured with that noise.
         """
         n, ny, width = A.shape
         R = np.diag(size**2)
         P, drive = np.kron(np.eye(width // ny), R), np.zeros((width, width))
-        drive[:ny, :ny] = DOUBT * R
+        drive[:ny, :ny] = PROCESS_NOISE * R
         shift, gain = np.eye(width, k=-ny), np.empty((n, width, ny))
         for k in range(n):
             T = shift.copy()
@@ -50,8 +49,8 @@ class Observer:
         return cls(A, gain)
 
     def innovations(self, equation_error: Array) -> Array:
-        """What the observer does not foresee of y, (n, ny, m), where A y = known + `equation_error`
-        (n, ny, m); linear in it.
+        """Return the innovations of y, (n, ny, m), where A y = known + `equation_error` (n, ny, m);
+        linear in it.
         """
         n, ny, m = equation_error.shape
         width = self.A.shape[2]

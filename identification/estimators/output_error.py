@@ -22,7 +22,7 @@ from symheli.values.arrays import Array
 from symheli.values.numbers import whole
 
 ADVICE = "allow more evaluations, or fit a smaller structure"
-"""What to try where the search stops early."""
+"""Advice where the search stops early."""
 
 
 @dataclass(frozen=True)
@@ -76,8 +76,8 @@ class OutputError(Method):
             raise InputError(f"tolerance: expected a number in (0, 1), got {self.tolerance}")
 
     def estimate(self, arx: LPVARX, records: Sequence[FlightRecord], data: Regression) -> Estimate:
-        """With `evaluations`, whether the search `converged` and its `message`, and the
-        `simulation_covariance` in the details.
+        """Estimate the coefficients, with `evaluations`, whether the search `converged`, its
+        `message`, and the `simulation_covariance` in the details.
         """
         source = None if self.instruments is None else source_of(self.instruments)
         starts = [starting_point(arx, records, data, source)]

@@ -46,8 +46,8 @@ class Recursion(Method):
         forgetting_of(self.forgetting)
 
     def estimate(self, arx: LPVARX, records: Sequence[FlightRecord], data: Regression) -> Estimate:
-        """The coefficients after the last sample; their covariance where nothing is forgotten: by
-        how much they have moved none could tell.
+        """Return the coefficients after the last sample; their covariance if the recursion does not
+        forget, since the change of varying coefficients is unknown.
         """
         forgetting = forgetting_of(self.forgetting)
         online = RecursiveLeastSquares(arx, forgetting).online()

@@ -43,7 +43,7 @@ ADVICE = (
     'a plant that is unstable in open loop needs instruments=("name", ...), the external'
     ' excitation; where the model is simpler than the plant, method "iv" is the better one'
 )
-"""What to try where the iteration stops early."""
+"""Advice where the iteration stops early."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,9 @@ class RefinedInstruments(Method):
             raise InputError(f"tolerance: expected a number > 0, got {self.tolerance}")
 
     def estimate(self, arx: LPVARX, records: Sequence[FlightRecord], data: Regression) -> Estimate:
-        """With `iterations`, whether they `converged` and the `noise` model in the details."""
+        """Estimate the coefficients, with `iterations`, whether they `converged` and the `noise`
+        model in the details.
+        """
         source = None if self.instruments is None else source_of(self.instruments)
         start, exogenous = starting_point(arx, records, data, source), None
         if source is not None:
@@ -131,8 +133,8 @@ def refined_instruments(
     start: Array,
     options: RefinedInstruments,
 ) -> Refinement:
-    """Iterate from theta `start`: simulate, instrument and filter by the model found so far, solve,
-    until nothing moves.
+    """Iterate from theta `start`: simulate, instrument and filter by the current model, solve,
+    until convergence.
 
     With y = x + v, x the noise-free response, A(p) y = B(p) u + A(p) v: filtered by the last
     A(p)^-1 the noise of the equation is v itself, and by the noise model white. The filter A(p)^-1
@@ -194,7 +196,7 @@ def _filter(A: Array, size: Array, *, simulate: bool) -> Filter:
 
 
 def _error(run: Stretch, theta: Array, by: Filter) -> Array:
-    """What the model does not explain of the outputs, (n - memory, ny)."""
+    """Return the residuals of the model's outputs, (n - memory, ny)."""
     return by((run.target - run.regressors() @ theta)[:, :, None])[:, :, 0]
 
 
@@ -230,7 +232,7 @@ def _whitened(signal: Array, noise: Array) -> Array:
 
 
 def _instrumented(arx: LPVARX, Z: Array, X: Array, y: Array) -> Array:
-    """b with Z'(y - X b) = 0, by the orthonormal factor of the scaled instruments."""
+    """Return b with Z'(y - X b) = 0, by the orthonormal factor of the scaled instruments."""
     scale = column_scale(X)
     Q, _ = orthonormal(Z / column_scale(Z))
     square = Q.T @ (X / scale)

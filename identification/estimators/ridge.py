@@ -1,5 +1,5 @@
-"""Ridge regression: coefficients the data hardly determine are held small, or held constant in
-p.
+"""Ridge regression: coefficients that the data hardly determine are kept small, or constant
+in p.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 
 GRID = np.linspace(-14.0, 4.0, 37)
-"""Decades of the weight among which cross-validation looks before it refines."""
+"""Decades of the weight at which cross-validation is computed before it is refined."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,9 @@ class Ridge(Method):
             raise InputError(f'towards: expected "constant" or "zero", got {self.towards!r}')
 
     def estimate(self, arx: LPVARX, records: Sequence[FlightRecord], data: Regression) -> Estimate:
-        """With the `weight` of each output and what it held small in the details."""
+        """Estimate the coefficients, with the `weight` of each output and the penalized
+        coefficients in the details.
+        """
         theta, weights = ridge(arx, data, self)
         details = {"weight": weights.tolist(), "towards": self.towards}
         return Estimate(theta=theta, details=details)

@@ -12,7 +12,7 @@ from identification.structure.lpvarx import LPVARX
 from symheli.errors import AccuracyError
 from symheli.values.arrays import Array
 
-ALLOWED = 1e3
+MAX_ROUNDINGS = 1e3
 """Permitted error in roundings of a sum: a backward stable method needs some tens."""
 
 
@@ -32,7 +32,7 @@ def check_least_squares(arx: LPVARX, phi: Array, y: Array, theta: Array, method:
     ).max(axis=1)
     pretended = PRIOR * np.outer(signals, largest(arx.basis)).reshape(-1, 1) ** 2 * np.abs(theta)
     allowed = np.finfo(float).eps * (
-        ALLOWED * np.sqrt(len(phi)) * np.outer(lengths, size) + 2 * pretended
+        MAX_ROUNDINGS * np.sqrt(len(phi)) * np.outer(lengths, size) + 2 * pretended
     )
     if not (np.abs(gradient) <= allowed).all():
         row, output = np.unravel_index(
@@ -47,8 +47,8 @@ def check_least_squares(arx: LPVARX, phi: Array, y: Array, theta: Array, method:
 
 
 def check_recursion(state: RLSState, phi: Array, y: Array) -> None:
-    """Raises `AccuracyError` unless the coefficients that moved sample by sample predict what those
-    solved from the factor predict.
+    """Raise `AccuracyError` unless the coefficients updated sample by sample predict the same as
+    those solved from the factor.
 
     With any forgetting; to 1e-8 of the spread of each output over phi (m, n), y (m, ny).
     """

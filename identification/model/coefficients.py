@@ -94,7 +94,7 @@ class Coefficients:
 
     @classmethod
     def of(cls, arx: LPVARX, theta: Array) -> Coefficients:
-        """From theta (n_regressors, ny) in the order of the regressors."""
+        """Return the coefficients of theta (n_regressors, ny) in the order of the regressors."""
         n, ny, d = arx.basis.size, arx.ny, len(arx.parameters)
         blocks = {
             "output": np.zeros((len(arx.output_lags), n, ny, ny)),

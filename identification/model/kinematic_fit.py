@@ -1,4 +1,4 @@
-"""What surrounds the regression of a `KinematicARX`: the trim its kinematics are linear about."""
+"""Trim of a `KinematicARX` about which its kinematics are linear."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 
 NEGLIGIBLE = 1e-6
-"""Directions of the regressors weaker than this part of the strongest say nothing of a trim."""
+"""Directions of the regressors weaker than this fraction of the strongest do not determine a trim.
+"""
 
 
 def mean_trim(kin: KinematicARX, records: Sequence[FlightRecord]) -> Array:
-    """(basis size, 8): what is flown where p stands still.
+    """Return the trim coefficients (basis size, 8): the mean flight at constant p.
 
     Least squares of the states on the functions of p and, where p is one parameter, on those
     times its rate: trims depend on it. Where the first parameter is a speed, the velocity is that
@@ -46,8 +47,8 @@ def mean_trim(kin: KinematicARX, records: Sequence[FlightRecord]) -> Array:
 
 
 def _level(trim: Array, airspeed: Array) -> Array:
-    """u v w (n, 3) of level flight at an airspeed without sideslip, at roll and pitch of a trim
-    (n, 8).
+    """Return u v w (n, 3) of level flight at an airspeed without sideslip, at roll and pitch of a
+    trim (n, 8).
     """
     climb = np.arctan(np.tan(trim[:, 7]) / np.cos(trim[:, 6]))
     return np.column_stack([airspeed * np.cos(climb), 0 * airspeed, airspeed * np.sin(climb)])

@@ -110,22 +110,22 @@ class KinematicModel:
 
     @property
     def covariance(self) -> Array | None:
-        """Of all coefficients together (6, n, 6, n), (equation, regressor, equation, regressor), as
-        of `LPVARXModel`; None where the method gives none.
+        """Covariance of all coefficients (6, n, 6, n), (equation, regressor, equation, regressor),
+        as of `LPVARXModel`; None where the method gives none.
         """
         return self.aerodynamics.covariance
 
     @property
     def method(self) -> str:
-        """How it was fitted."""
+        """Name of the estimation method."""
         return self.aerodynamics.method
 
     @property
     def details(self) -> Any:
-        """What the method said."""
+        """Details of the estimation method."""
         return self.aerodynamics.details
 
-    # --- what it says of a record ----------------------------------------------------------------
+    # --- predictions along a record --------------------------------------------------------------
 
     def predict(self, record: FlightRecord, horizon: int) -> Array:
         """Predictions (n, 8) `horizon` samples ahead: states known up to t - horizon, inputs and p
@@ -283,8 +283,8 @@ class KinematicModel:
         degree: int | None = None,
         draws: int = 0,
     ) -> UncertainStateSpace:
-        """`to_state_space` with every model of an ellipsoid of coefficients: what a certificate
-        must hold for if it is to hold for the vehicle.
+        """Return `to_state_space` with every model of an ellipsoid of coefficients: the set for
+        which a certificate must hold to hold for the vehicle.
 
         The ellipsoid covers the estimated covariance, with the offsets and what `outputs` and
         `inputs` leave out as they may be; kinematic rows are known numbers and carry no

@@ -19,11 +19,11 @@ from symheli.values.arrays import Array
 from symheli.values.kinematics import RIGID_BODY, kinematic_jacobian
 from symheli.values.signal import indices
 
-EXACT = 1e-9
-"""Largest error of an interpolated entry, as a share of the largest entry."""
+INTERPOLATION_TOLERANCE = 1e-9
+"""Largest error of an interpolated entry, as a fraction of the largest entry."""
 
-HIGHEST = 16
-"""Degree in each parameter at which interpolation gives up."""
+MAX_DEGREE = 16
+"""Highest degree in each parameter that interpolation tries."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ class Realization:
     def of(
         cls, kin: KinematicARX, theta: Array, trim: Array, inputs: tuple[Signal, ...], dt: float
     ) -> Realization:
-        """From coefficients (n, 6) and the trim (basis size, 8)."""
+        """Return the realization of coefficients (n, 6) and the trim (basis size, 8)."""
         lags = [len(r) for r in kin.aerodynamics.input_lag_ranges[0]]
         names = (*RIGID_BODY[: len(MOVING)], *inputs)
         memory = tuple((c, back) for c, n in enumerate(lags) for back in range(1, n))
@@ -74,7 +74,7 @@ class Realization:
         return cls(kin, theta, trim, (*RIGID_BODY, *remembered), inputs, memory, dt)
 
     def matrices(self, p: Array) -> Matrices:
-        """At each p (K,) or (K, parameters)."""
+        """Return the matrices at each p (K,) or (K, parameters)."""
         A, B = self._linear(p)
         C = np.broadcast_to(np.eye(len(STATES), A.shape[-1]), (len(p), len(STATES), A.shape[-1]))
         return Matrices(A, B, C, np.zeros((len(p), len(STATES), B.shape[-1])))
@@ -325,10 +325,10 @@ class Line(NamedTuple):
 def interpolated(
     part: Callable[[Array], Matrices], line: Line, degree: int | None
 ) -> tuple[FunctionSpace, Matrices, Array]:
-    """Basis, coefficients and check points of polynomials through matrices at any p, of `degree`
-    in each parameter, or raised until nothing is `EXACT` off.
+    """Return basis, coefficients and check points of polynomials through matrices at any p, of
+    `degree` in each parameter, or raised until the error is below `INTERPOLATION_TOLERANCE`.
     """
-    for more in range(1, HIGHEST):
+    for more in range(1, MAX_DEGREE):
         degrees = [degree if degree is not None else d + more if d else 0 for d in line.degrees]
         basis = polynomials(degrees, line.ranges)
         points = interpolation_points(degrees, line.ranges)
@@ -340,6 +340,6 @@ def interpolated(
             for M, E in zip(fitted, exact, strict=True)
         )
         size = max(float(np.abs(M).max(initial=0.0)) for M in exact)
-        if degree is not None or error <= EXACT * size:
+        if degree is not None or error <= INTERPOLATION_TOLERANCE * size:
             break
     return basis, fitted, nodes

@@ -1,5 +1,5 @@
-"""A rigid vehicle with identified aerodynamics along a record: ahead, free, or in the recorded
-loop.
+"""A rigid vehicle with identified aerodynamics along a record: predicted, simulated, or in the
+recorded loop.
 """
 
 from __future__ import annotations
@@ -21,13 +21,14 @@ from symheli.values.controllers import begun
 from symheli.values.kinematics import RIGID_BODY, kinematic_rates
 
 CORRECTIONS = 2
-"""Of the trapezoidal rule a step: each leaves a tenth of the error at 50 Hz."""
+"""Number of corrections of the trapezoidal rule a step: each leaves a tenth of the error at 50 Hz.
+"""
 
 STEEP = np.radians(89.0)
-"""Pitch beyond which the Euler angles say nothing."""
+"""Pitch (rad) beyond which the Euler angles are singular."""
 
 CONTROLS = ("d_lon", "d_lat", "d_col", "d_ped")
-"""What a controller answers, in this order."""
+"""Controls, in the order of a controller's outputs."""
 
 AIRSPEED = Signal("airspeed", "m/s")
 COMMANDED = (AIRSPEED, Signal("acceleration", "m/s^2"))
@@ -54,7 +55,7 @@ class Run:
 
     @classmethod
     def along(cls, kin: KinematicARX, theta: Array, record: FlightRecord) -> Run:
-        """With the p of a record; NaN where p is missing."""
+        """Return the run with the p of a record; NaN where p is missing."""
         aero = kin.aerodynamics
         p = scheduling_values(aero, record)
         f = basis_values(aero, p)
@@ -121,7 +122,9 @@ def predict(run: Run, horizon: int) -> Array:
 
 
 def simulate(run: Run) -> Array:
-    """Free response (n, 8); a run that diverges is infinite to the end of its segment."""
+    """Return the free response (n, 8); a run that diverges is infinite to the end of its
+    segment.
+    """
     return _alone(run, lambda k, y: run.u[k])
 
 

@@ -1,4 +1,4 @@
-"""The coefficients of an identified model with labelled axes."""
+"""Coefficients of an identified model as datasets with labelled axes."""
 
 from __future__ import annotations
 

@@ -29,8 +29,7 @@ if TYPE_CHECKING:
     import xarray
 
 LEAST_SQUARES = ("ls", "rls")
-"""Methods whose coefficients noise in the regressors biases, of which their covariance says
-nothing.
+"""Methods that are biased by noise in the regressors; their covariance does not include the bias.
 """
 
 

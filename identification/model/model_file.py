@@ -31,7 +31,7 @@ def write_mat(path: str | os.PathLike[str], content: Mapping[str, Any]) -> Path:
 
 
 def cells(**groups: Sequence[Signal]) -> dict[str, Array]:
-    """Names and units of groups of signals as cell arrays: outputs, outputs_units, .."""
+    """Return names and units of groups of signals as cell arrays: outputs, outputs_units, .."""
     return {
         f"{name}{ending}": np.array([text(s) for s in group], dtype=object)
         for name, group in groups.items()

@@ -1,4 +1,4 @@
-"""What a model says about a record: h steps ahead, or running free."""
+"""Predictions of a model along a record: h steps ahead, or in free run."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ class Recursion:
 
     @classmethod
     def along(cls, arx: LPVARX, theta: Array, record: FlightRecord) -> Recursion:
-        """The coefficients at every sample of `record`, and all that inputs and scheduling
-        contribute.
+        """Return the coefficients at every sample of `record`, and the contribution of inputs and
+        scheduling.
         """
         s = Samples.of(arx, record)
         n, na, split = (
@@ -92,8 +92,8 @@ def predict(run: Recursion, horizon: int) -> Array:
 
 
 def predict_holding(arx: LPVARX, theta: Array, record: FlightRecord, horizon: int) -> Array:
-    """Predictions (n, ny) of y(t) from outputs and p up to t - horizon and inputs up to t, p held
-    at its last known value.
+    """Return predictions (n, ny) of y(t) from outputs and p up to t - horizon and inputs up to t, p
+    held at its last known value.
 
     As an autopilot predicts that schedules on a measurement: the coefficients stay, and p does not
     change. NaN as in `predict`.
@@ -196,7 +196,7 @@ def _flagged(y: Array) -> Array:
 
 
 LARGEST = 1e150
-"""From here on the square of a measurement may overflow."""
+"""Largest measurement: the square of a larger one may overflow."""
 
 
 def named_fit(outputs: Sequence[Signal], record: FlightRecord, guess: Array) -> NamedVector:

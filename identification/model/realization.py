@@ -19,7 +19,9 @@ ROUTES = {"shifted": "lag", "direct": "now"}
 
 
 def route_for(arx: LPVARX, route: str | None) -> str:
-    """The exact route of a structure; raises `InputError` where another one is asked for."""
+    """Return the exact realization of a structure; raise `InputError` where another one is
+    requested.
+    """
     exact = next(name for name, at in ROUTES.items() if at == arx.scheduling_at)
     if route is None or route == exact:
         return exact
@@ -77,8 +79,8 @@ def direct(
     inputs: tuple[Signal, ...],
     dt: float,
 ) -> LPVStateSpace:
-    """Past outputs and inputs as the state, for coefficients at p(k); exact for any p(k), not
-    minimal.
+    """Return the realization with past outputs and inputs as the state, for coefficients at p(k);
+    exact for any p(k), not minimal.
 
     x(k) = [y(k-1) .. y(k-na), u(k-1) .. u(k-L)], L the largest input lag.
     """
@@ -134,8 +136,8 @@ def at(
 
 
 def _companion(A: Array, B: dict[int, Array], one: float, D: Array) -> Matrices:
-    """Observer form of A (na, ny, ny), B by lag; `one` stands where the shifts are; D only for its
-    products with A.
+    """Return the observer form of A (na, ny, ny), B by lag; `one` is the entry of the shifts; D
+    only for its products with A.
     """
     ny, nu = D.shape
     order = max(len(A), max(B, default=0))
@@ -172,7 +174,7 @@ def _observer(coefficients: Coefficients, j: int, one: float) -> Matrices:
 
 
 def _doubled(coefficients: Coefficients) -> tuple[FunctionSpace, Coefficients]:
-    """The same coefficients in polynomials of twice the degrees."""
+    """Return the same coefficients in polynomials of twice the degrees."""
     old, c = coefficients.basis, coefficients
     if old.degrees is None:
         raise InputError(
@@ -206,7 +208,7 @@ def _functions(basis: FunctionSpace) -> list[tuple[int, ...]]:
 def _with_feedthrough(
     coefficients: Coefficients, basis: FunctionSpace, stack: list[Matrices]
 ) -> list[Matrices]:
-    """Adds -A_i(p) B_0(p), interpolated exactly at as many nodes as the larger basis has
+    """Add -A_i(p) B_0(p), interpolated exactly at as many nodes as the larger basis has
     functions.
     """
     nodes = interpolation_points(basis.degrees or (), basis.ranges)

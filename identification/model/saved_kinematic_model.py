@@ -1,4 +1,4 @@
-"""An identified rigid vehicle as a file: JSON with a schema, every number exact; and for MATLAB."""
+"""Files of identified rigid vehicles: JSON with a schema, every number exact; and MATLAB."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""An identified model as a file: JSON with a schema, every number exact."""
+"""Files of identified models: JSON with a schema, every number exact."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def described_structure(structure: Any) -> dict[str, Any]:
 
 
 def described(model: LPVARXModel) -> dict[str, Any]:
-    """All of a model but its structure, in plain values."""
+    """Return all of a model but its structure, in plain values."""
     return {
         "units": {str(s): s.unit for s in (*model.outputs, *model.inputs, *model.parameters)},
         "dt": model.dt,
@@ -71,7 +71,7 @@ def load(path: str | os.PathLike[str], basis: FunctionSpace | None = None) -> LP
 def fields_of_structure(
     content: dict[str, Any], basis: FunctionSpace | None, path: str | os.PathLike[str]
 ) -> dict[str, Any]:
-    """What `described_structure` described, ready to make a structure of."""
+    """Return the fields of a structure from the output of `described_structure`."""
     given = dict(content["structure"])
     described = given.pop("basis")
     return {
@@ -101,7 +101,7 @@ def model_of(structure: LPVARX, content: dict[str, Any]) -> LPVARXModel:
 
 
 def _covariance_of(structure: LPVARX, content: dict[str, Any]) -> Array | None:
-    """Of all coefficients together, also from files of an earlier layout.
+    """Return the joint covariance of all coefficients, also from files of an earlier layout.
 
     Those of an `LPVARXModel` held it an equation at a time, (ny, n, n): with one output that is all
     of it, with several the model has none, since what was not kept between equations is unknown and

@@ -1,5 +1,5 @@
-"""Unbroken stretches of records along which a model runs free, and how its response moves with its
-coefficients.
+"""Unbroken stretches of records along which a model runs free, and the sensitivity of its response
+to its coefficients.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
-"""How a recursive estimator lets old samples go, so that it follows what changes and never winds up
-when nothing excites it.
+"""Forgetting rules of a recursive estimator: it follows changes, without wind-up when excitation is
+missing.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ import numpy as np
 
 from symheli.errors import InputError
 
-FLOOR = 1e-3
-"""Information that stays on each coefficient, in samples with its regressor at its largest."""
+MIN_INFORMATION = 1e-3
+"""Least information kept on each coefficient, in samples with its regressor at its largest."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Constant:
     """
 
     factor: float = 1.0
-    floor: float = FLOOR
+    floor: float = MIN_INFORMATION
 
     def __post_init__(self) -> None:
         if not 0 < self.factor <= 1:
@@ -101,7 +101,7 @@ class Variable:
     shortest: float = 50.0
     recent: float = 20.0
     usual: float = 1000.0
-    floor: float = FLOOR
+    floor: float = MIN_INFORMATION
 
     def __post_init__(self) -> None:
         for name in ("longest", "shortest", "recent", "usual"):
@@ -180,7 +180,7 @@ def forgetting_of(value: float | Forgetting, floor: float | None = None) -> Forg
         raise InputError(
             f"forgetting: expected a factor, Constant, Variable or Directional, got {value!r}"
         )
-    return Constant(float(value), FLOOR if floor is None else floor)
+    return Constant(float(value), MIN_INFORMATION if floor is None else floor)
 
 
 def check_floor(floor: float) -> None:

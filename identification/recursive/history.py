@@ -1,4 +1,4 @@
-"""What a recursive estimate did over a record."""
+"""History of a recursive estimate over a record."""
 
 from __future__ import annotations
 
@@ -102,9 +102,9 @@ class History:
         output: str | None = None,
         regressors: Sequence[str] | None = None,
     ) -> Axes:
-        """How the coefficients of `output` (default: the first) settle: those of all regressors, or
-        of some of `regressor_names`, over time (s), each by its last value. The frame is that of
-        the end; early estimates may leave it. Returns the axes; raises `UnknownNameError`.
+        """Plot the coefficients of `output` (default: the first): those of all regressors, or of
+        some of `regressor_names`, over time (s), each divided by its last value. The vertical range
+        suits the end; early estimates may leave it.
         """
         from identification.recursive.history_plot import plot_history
 

@@ -1,4 +1,4 @@
-"""How the coefficients of a recursive estimate settle, as a picture."""
+"""Plot of the coefficients of a recursive estimate over time."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from symheli.values.signal import Signal
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-FRAME = (-1.0, 3.0)
-"""Of the last value: what is shown; the first samples of an estimate may be anywhere."""
-LISTED = 12
-"""So many curves have their names in the legend."""
+VERTICAL_RANGE = (-1.0, 3.0)
+"""Vertical range relative to the last value; the first samples of an estimate may be anywhere."""
+MAX_LEGEND = 12
+"""Largest number of curves named in the legend."""
 
 
 def plot_history(
     history: History, ax: Axes | None, output: str | None, regressors: Sequence[str] | None
 ) -> Axes:
-    """The coefficients of `output` (default: the first), of all regressors or of these, over time
-    (s), each by its last value, which the legend gives for up to `LISTED` of them.
+    """Plot the coefficients of `output` (default: the first), of all regressors or of these, over
+    time (s), each divided by its last value, which the legend gives for up to `MAX_LEGEND` of them.
     """
     outputs, names = [str(y) for y in history.outputs], history.regressor_names
     column = _position(outputs[0] if output is None else output, outputs, "output")
@@ -33,10 +33,10 @@ def plot_history(
     for row in rows:
         along = history.coefficients[:, row, column]
         last = along[-1]
-        said = f"{names[row]}, {last:.3g}" if len(rows) <= LISTED else None
+        said = f"{names[row]}, {last:.3g}" if len(rows) <= MAX_LEGEND else None
         ax.plot(history.time, along / (last or 1.0), linewidth=0.9, label=said)
     ax.axhline(1.0, color=GREY, linewidth=0.8)
-    ax.set_ylim(*FRAME)
+    ax.set_ylim(*VERTICAL_RANGE)
     ax.set_xlabel(label(Signal("time", "s")))
     ax.set_ylabel(f"coefficients of {outputs[column]} by their last value")
     ax.margins(x=0.0)

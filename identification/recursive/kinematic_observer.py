@@ -1,5 +1,5 @@
-"""States of a rigid vehicle from noisy measurements: an extended Kalman filter on the identified
-model.
+"""Extended Kalman filter on the identified model: states of a rigid vehicle from noisy
+measurements.
 """
 
 from __future__ import annotations
@@ -71,21 +71,21 @@ class KinematicObserver:
         self.reset()
 
     def reset(self) -> None:
-        """Nothing is known: the next samples fill the past."""
+        """Delete the state: the next samples fill the past."""
         self._start: list[tuple[Array, Array]] = []
         self._x: Array | None = None
         self._p, self._u = np.zeros(0), np.zeros(0)
 
     @property
     def covariance(self) -> Array:
-        """(8, 8) of the error of the estimate, as far as model and noise are what they are said to
-        be; that of the sensors during a start.
+        """Covariance (8, 8) of the estimation error, if model and noise are correct; that of the
+        sensors during a start.
         """
         return np.diag(self._R) if self._x is None else self._P[:WIDE, :WIDE].copy()
 
     def step(self, y: object, u: object, p: object) -> Array:
-        """The states (8,) at one instant from y (8,), u (nu,) and p as measured there; NaN where
-        a start lacks a measurement.
+        """Return the states (8,) at one instant from y (8,), u (nu,) and p as measured there; NaN
+        where a start lacks a measurement.
 
         Raises `InputError` for wrong shapes and p outside the basis, `AccuracyError` where the
         estimate leaves the range of numbers; the next samples are then a start.
@@ -112,8 +112,8 @@ class KinematicObserver:
         return x[:WIDE].copy()
 
     def run(self, record: FlightRecord) -> Array:
-        """States (n, 8) along a record, each from the samples up to it; a gap resets. NaN and
-        errors as of `step`.
+        """Return the states (n, 8) along a record, each from the samples up to it; a gap resets.
+        NaN and errors as of `step`.
         """
         kin = self._model.structure
         prepared = kin.aerodynamics.prepared(record)
@@ -176,8 +176,8 @@ class KinematicObserver:
 
 
 def deviations(given: Mapping[str, float] | float, names: tuple[str, ...], what: str) -> Array:
-    """Standard deviations by name, or one for all; raises `UnknownNameError` for another name,
-    `InputError` for one missing or not positive.
+    """Return standard deviations by name, or one for all; raise `UnknownNameError` for another
+    name, `InputError` for one missing or not positive.
     """
     table = given if isinstance(given, Mapping) else dict.fromkeys(names, given)
     for name in table:

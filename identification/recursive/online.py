@@ -168,7 +168,7 @@ class Online:
 
 
 def aligned(size: int, dtype: type[np.floating]) -> Array:
-    """Zeros that start at a cache line, where the longest vector registers load fastest."""
+    """Return zeros that start at a cache line, where the longest vector registers load fastest."""
     raw = np.zeros(size * np.dtype(dtype).itemsize + 64, np.uint8)
     start = -raw.ctypes.data % 64
     return raw[start : start + size * np.dtype(dtype).itemsize].view(dtype)

@@ -98,18 +98,20 @@ class RecursiveLeastSquares:
 
     @property
     def regression(self) -> LPVARX:
-        """What the kernel solves: the structure, or the aerodynamics within its kinematics."""
+        """Regression of the kernel: the structure, or the aerodynamics within its kinematics."""
         structure = self.structure
         return structure.aerodynamics if isinstance(structure, KinematicARX) else structure
 
     @cached_property
     def configuration(self) -> Configuration:
-        """What the kernel is told; its `sizes` are the numbers of memory the estimator takes."""
+        """Configuration of the kernel; its `sizes` are the numbers of memory the estimator
+        takes.
+        """
         forgetting = forgetting_of(self.forgetting, self.floor)
         return Configuration(self.regression, forgetting, PRECISIONS[self.precision])
 
     def init(self) -> RLSState:
-        """The state that knows nothing."""
+        """Return the initial state, without information."""
         state, work = (
             np.zeros(size, self.configuration.dtype) for size in self.configuration.sizes
         )

@@ -1,4 +1,6 @@
-"""The recursive estimator in real time for a rigid vehicle: increments formed sample by sample."""
+"""The recursive estimator in real time for a rigid vehicle, with increments formed sample by
+sample.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a recursive estimator remembers, as a value."""
+"""State of a recursive estimator, as a value."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from symheli.errors import InputError
 from symheli.values.arrays import Array
 from symheli.values.summary import summarized
 
-NEVER = Constant(1.0)
-"""Nothing is forgotten."""
-STEPS = 12
-"""Of a refinement, at most."""
+NO_FORGETTING = Constant(1.0)
+"""Forgetting factor of a recursion that keeps all data."""
+MAX_REFINEMENTS = 12
+"""Largest number of steps of a refinement."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +135,7 @@ class RLSState:
         pretended of the coefficients is taken off again, and `theta` is as far away as `pretended`
         says. `as_it_stands`: the solution of R theta = Z, with which `theta` agrees to rounding.
         """
-        alone = not as_it_stands and self.configuration.forgetting == NEVER
+        alone = not as_it_stands and self.configuration.forgetting == NO_FORGETTING
         structure = self.configuration.structure
         out = np.zeros((structure.n_regressors, structure.ny))
         for layout in self.configuration.groups:
@@ -209,7 +209,7 @@ def _of_data_alone(theta: Array, R: Array, d: Array, fed: Array) -> Array:
     decide, less than a thousandth.
     """
     found, last = theta, np.inf
-    for _ in range(STEPS):
+    for _ in range(MAX_REFINEMENTS):
         inner = solve_triangular(R, fed[:, None] * found, unit_diagonal=True, trans=1)
         better = theta + solve_triangular(R, inner / d[:, None], unit_diagonal=True)
         step = float(np.abs(better - found).max(initial=0.0))

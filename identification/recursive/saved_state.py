@@ -36,8 +36,8 @@ def save(state: RLSState, path: str | os.PathLike[str]) -> None:
 
 
 def load(configuration: Configuration, path: str | os.PathLike[str]) -> RLSState:
-    """The state in `path`; raises `InputError` unless it is whole and belongs to an estimator of
-    this configuration.
+    """Load the state in `path`; raise `InputError` unless it is whole and belongs to an estimator
+    of this configuration.
     """
     content = _read(Path(path))
     if content.get("schema") != SCHEMA:
@@ -65,7 +65,9 @@ def load(configuration: Configuration, path: str | os.PathLike[str]) -> RLSState
 
 
 def description(configuration: Configuration) -> dict[str, Any]:
-    """What a state belongs to: every field of structure and forgetting, and the precision."""
+    """Return the configuration of a state: every field of structure and forgetting, and the
+    precision.
+    """
     return {
         "precision": np.dtype(configuration.dtype).name,
         "forgetting": repr(configuration.forgetting),
@@ -74,8 +76,8 @@ def description(configuration: Configuration) -> dict[str, Any]:
 
 
 def _fields(value: Any) -> dict[str, str]:
-    """Fields that are not at their default: a later version may add one without making old files
-    unreadable.
+    """Return the fields that are not at their default, so that a later version may add one and old
+    files stay readable.
     """
     given = {
         f.name: getattr(value, f.name)

@@ -1,1 +1,1 @@
-"""What is to be identified: signals, lags and functions of the scheduling, row by row."""
+"""Structure of a model: signals, lags and functions of the scheduling, row by row."""

@@ -22,7 +22,7 @@ from symheli.values.numbers import whole
 STATES = tuple(map(str, RIGID_BODY))
 MOVING = tuple(map(str, VELOCITIES))
 INCREMENTS: tuple[Signal, ...] = tuple(Signal(f"{s}_aero", s.unit) for s in VELOCITIES)
-"""What air and inertia add to the velocities over one sample."""
+"""Increments of the velocities by air and inertia over one sample."""
 
 FLAPPING = {"u": 1, "v": 1, "w": 1, "p": 2, "q": 2, "r": 1}
 """Lags where what is not measured is the flapping of a rotor: two more states, and two samples of
@@ -186,7 +186,7 @@ class KinematicARX:
 
     @property
     def memory(self) -> int:
-        """How many samples before k the regressor of y(k) reaches back."""
+        """Number of samples before k to which the regressor of y(k) reaches back."""
         return self.aerodynamics.memory
 
 

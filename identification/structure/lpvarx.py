@@ -1,6 +1,4 @@
-"""What is to be identified: which signals, which lags, which functions of the scheduling
-parameters.
-"""
+"""Structure of an LPV-ARX model: its signals, lags and functions of the scheduling parameters."""
 
 from __future__ import annotations
 
@@ -255,7 +253,7 @@ class LPVARX:
 
     @cached_property
     def memory(self) -> int:
-        """How many samples before k the regressor of y(k) reaches back."""
+        """Number of samples before k to which the regressor of y(k) reaches back."""
         return max((max(t.lag, t.p_lag) for t in self.terms), default=0)
 
     @cached_property
@@ -300,8 +298,8 @@ class LPVARX:
 
     @cached_property
     def groups(self) -> tuple[Group, ...]:
-        """Which outputs share their regressors: all of them, unless orders or delays differ between
-        equations.
+        """Groups of outputs with the same regressors: all of them, unless orders or delays differ
+        between equations.
         """
         members: dict[tuple[int, ...], list[int]] = {}
         for y in range(self.ny):
@@ -363,8 +361,8 @@ class LPVARX:
         return record
 
     def lti(self) -> LPVARX:
-        """The same signals, orders and delays with constant coefficients: the baseline that
-        scheduling must beat.
+        """Return the same signals, orders and delays with constant coefficients: the baseline for
+        scheduling.
         """
         constants: list[Basis] = [Polynomial(0, low, high) for low, high in self.basis.ranges]
         return replace(

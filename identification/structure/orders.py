@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 
 from symheli.errors import InputError, UnknownNameError
 
-LONGEST = 10_000
-"""Lags of a signal, samples."""
+MAX_LAG = 10_000
+"""Largest lag of a signal, samples."""
 
 Table = tuple[tuple[int, ...], ...]
 Orders = int | Mapping[str, "int | Mapping[str, int]"] | Sequence[Sequence[int]]
@@ -76,9 +76,9 @@ def _complete(
 
 
 def _order(value: object, name: str) -> int:
-    if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= LONGEST:
+    if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= MAX_LAG:
         raise InputError(
-            f"{name}: expected an integer from 0 to {LONGEST}, a mapping by signal name or one row"
+            f"{name}: expected an integer from 0 to {MAX_LAG}, a mapping by signal name or one row"
             " an output, got"
             f" {value!r:.80}"
         )

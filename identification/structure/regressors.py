@@ -17,10 +17,8 @@ from symheli.values import Signal
 from symheli.values.arrays import Array
 from symheli.values.sample_period import JITTER, same_period
 
-SIZES = 1e-70, 1e70
-"""A signal that nowhere exceeds the first, or somewhere the second, is refused: sums of its squares
-under- or overflow.
-"""
+SIZE_LIMITS = 1e-70, 1e70
+"""Least and largest permitted maximum of a signal: sums of squares outside under- or overflow."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +78,7 @@ class Regression:
         with np.errstate(over="ignore", invalid="ignore"):
             error = self.y - self.phi @ theta
         size = float(np.max(np.abs(error), initial=0.0))
-        if not size <= SIZES[1]:
+        if not size <= SIZE_LIMITS[1]:
             raise InputError(
                 f"the model leaves residuals of {size:.3g} on these records, whose squares"
                 " overflow; check its coefficients and the units of the records"
@@ -214,8 +212,8 @@ def check_units(signals: Iterable[Signal], record: FlightRecord) -> None:
 
 
 def units_of(names: Sequence[str], records: Sequence[FlightRecord]) -> tuple[Signal, ...]:
-    """The named signals with the unit the records declare; raises `InputError` where two records
-    disagree.
+    """Return the named signals with the unit the records declare; raise `InputError` where two
+    records disagree.
     """
     out = []
     for name in names:
@@ -232,7 +230,10 @@ def units_of(names: Sequence[str], records: Sequence[FlightRecord]) -> tuple[Sig
 
 
 def _check_size(name: str, signal: Array) -> None:
-    size, (low, high) = float(np.max(np.abs(signal), initial=0.0, where=np.isfinite(signal))), SIZES
+    size, (low, high) = (
+        float(np.max(np.abs(signal), initial=0.0, where=np.isfinite(signal))),
+        SIZE_LIMITS,
+    )
     if size > high or 0 < size < low:
         raise InputError(
             f"{name} reaches {size:.3g}, {'beyond' if size > high else 'below'} what squares can"

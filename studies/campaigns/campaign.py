@@ -52,8 +52,8 @@ class Uniform:
 
 @dataclass(frozen=True)
 class Case:
-    """One run of a trial: all its parameters. `key` is a digest of them: the same case has the same
-    key wherever it stands.
+    """One run of a trial: all its parameters. `key` is a digest of them, the same in every
+    campaign.
     """
 
     parameters: Mapping[str, Value]

@@ -1,4 +1,4 @@
-"""What the cases of a campaign gave, as one dataset on disk in the Zarr format."""
+"""Results of the cases of a campaign, as one dataset on disk in the Zarr format."""
 
 from __future__ import annotations
 
@@ -188,7 +188,7 @@ class CampaignDataset:
                 **{name: ZarrArray.whole(*label) for name, label in labels.items()},
             }
         )
-        self._folder.say(self.attributes)
+        self._folder.write_attributes(self.attributes)
 
     @property
     def _rows(self) -> ZarrArray:

@@ -1,5 +1,5 @@
-"""Which flight to fly for identification: candidate excitations and airspeed schedules, flown in
-the model and compared.
+"""Experiments for identification: candidate excitations and airspeed schedules, simulated and
+compared.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ KINDS = ("multisine", "prbs", "chirp")
 ACCELERATIONS = (1.0, 3.0)
 BANDS = ((0.1, 2.0), (0.1, 5.0))
 AMPLITUDES = (0.5, 1.0, 1.5)
-"""Factors on the amplitudes of the study."""
+"""Factors on the excitation amplitudes of the study."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Candidate:
 
     @property
     def name(self) -> str:
-        """In words."""
+        """Description in words."""
         return (
             f"{self.kind} {self.band[0]:g}-{self.band[1]:g} Hz x{self.amplitude:g},"
             f" {self.acceleration:g} m/s^2"

@@ -1,5 +1,5 @@
-"""Where scheduling pays: LPV beside LTI models of the same order, identified from transitions in
-wind and noise.
+"""Benefit of scheduling: LPV and LTI models of the same order, identified from transitions in wind
+and noise.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""Run a campaign: what is missing in its dataset is computed, and kept as it is found."""
+"""Execution of a campaign: cases that are missing in its dataset are computed, and stored one by
+one.
+"""
 
 from __future__ import annotations
 
@@ -23,8 +25,8 @@ from studies.transition.stored_stages import code_digest
 from symheli.errors import DataWarning, SymheliError
 from symheli.values.arrays import Array
 
-EVERY = 2.0
-"""Between two lines of progress, s, at least."""
+PROGRESS_INTERVAL = 2.0
+"""Least time between two lines of progress, s."""
 
 
 def run(
@@ -89,17 +91,19 @@ def run(
             DataWarning,
             stacklevel=2,
         )
-    told = _Told(len(rows), len(rows) - len(missing), sum(r in failed for r in rows if not again))
+    lines = _ProgressLines(
+        len(rows), len(rows) - len(missing), sum(r in failed for r in rows if not again)
+    )
     cases = [dataset.cases[row].parameters for row in missing]
     for i, outcome in outcomes(campaign.trial, cases, on):
         dataset.write(missing[i], outcome)
-        told.of(outcome)
+        lines.of(outcome)
     return dataset
 
 
 def columns_of(campaign: Campaign, on: Runner, path: Path | None = None) -> dict[str, Array]:
-    """Every quantity over the cases of the campaign, in their order (N,); with a `path` kept there
-    as `run` does.
+    """Return every quantity over the cases of the campaign, in their order (N,); with a `path`
+    stored there as by `run`.
 
     Raises `SymheliError` where a case has failed, when the others are done.
     """
@@ -109,14 +113,14 @@ def columns_of(campaign: Campaign, on: Runner, path: Path | None = None) -> dict
         values = dataset.values[rows]
         failed = {i: reasons[row] for i, row in enumerate(rows) if row in reasons}
     else:
-        told = _Told(len(campaign.cases), 0, 0)
+        lines = _ProgressLines(len(campaign.cases), 0, 0)
         values = np.full((len(campaign.cases), len(campaign.trial.units)), np.nan)
         failed = {}
         for i, one in outcomes(campaign.trial, [c.parameters for c in campaign.cases], on):
             values[i] = one.values
             if one.reason:
                 failed[i] = one.reason
-            told.of(one)
+            lines.of(one)
     if failed:
         first = min(failed)
         raise SymheliError(
@@ -129,8 +133,8 @@ def columns_of(campaign: Campaign, on: Runner, path: Path | None = None) -> dict
 def outcomes(
     trial: Trial, cases: Sequence[Mapping[str, Value]], on: Runner
 ) -> Iterator[tuple[int, Outcome]]:
-    """Number and outcome of each case, as they are found. A case under which processes ended, so
-    often as the runner tries, has failed.
+    """Yield number and outcome of each case as they are done. A case fails if its processes end as
+    often as the runner tries.
 
     Raises `SymheliError` where the runner is gone, or cannot hand a case to a worker.
     """
@@ -172,13 +176,13 @@ def _unable(trial: Trial, error: BaseException) -> SymheliError:
     )
 
 
-class _Told:
-    """Progress of a campaign: a line at once, then every so often, and at the end."""
+class _ProgressLines:
+    """Progress of a campaign on the terminal: a line at once, then at intervals, and at the end."""
 
     def __init__(self, count: int, there: int, failed: int):
         self._count, self._there, self._done, self._failed = count, there, there, failed
         self._begin = self._last = time.monotonic()
-        self._tell(f"{there} are there" if there else "")
+        self._print(f"{there} are there" if there else "")
 
     def of(self, outcome: Outcome) -> None:
         """One more."""
@@ -186,12 +190,14 @@ class _Told:
         self._failed += bool(outcome.reason)
         now = time.monotonic()
         left = self._count - self._done
-        if now - self._last >= EVERY or not left:
+        if now - self._last >= PROGRESS_INTERVAL or not left:
             self._last = now
             each = (now - self._begin) / (self._done - self._there)
-            self._tell(f"about {each * left:.0f} s to go" if left else f"{now - self._begin:.0f} s")
+            self._print(
+                f"about {each * left:.0f} s to go" if left else f"{now - self._begin:.0f} s"
+            )
 
-    def _tell(self, more: str) -> None:
+    def _print(self, more: str) -> None:
         failed = f"{self._failed} failed" if self._failed else ""
         said = ", ".join(filter(None, (f"{self._done} of {self._count} cases", failed, more)))
         progress(f"  {said}")

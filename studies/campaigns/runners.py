@@ -1,5 +1,5 @@
-"""Where cases of a campaign run: on a cluster of dask.distributed, in processes of this machine, or
-here.
+"""Runners of the cases of a campaign: a cluster of dask.distributed, processes of this machine, or
+this process.
 """
 
 from __future__ import annotations
@@ -20,11 +20,13 @@ from symheli.worker import ProcessEndedError
 if TYPE_CHECKING:
     import distributed
 
-PATIENCE = 10.0
-"""For a scheduler to answer, s."""
+SCHEDULER_TIMEOUT = 10.0
+"""Longest time to wait for a scheduler, s."""
 
-AHEAD = 3
-"""Calls handed to the cluster for each of its threads: none waits for this process."""
+CALLS_PER_THREAD = 3
+"""Number of calls handed to the cluster for each of its threads, so that no thread waits for this
+process.
+"""
 
 
 class Runner(Executor):
@@ -40,7 +42,7 @@ class Runner(Executor):
 
 
 class Here(Runner):
-    """In this process, one after the other."""
+    """Runner in this process, one case after the other."""
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         """A finished future."""
@@ -53,7 +55,7 @@ class Here(Runner):
 
 
 class InProcesses(Processes, Runner):
-    """In `count` processes of this machine (default: one a core)."""
+    """Runner in `count` processes of this machine (default: one a core)."""
 
     tries = 3
 
@@ -67,8 +69,8 @@ class InProcesses(Processes, Runner):
 
 
 class Cluster(Runner):
-    """On dask.distributed: processes of this machine (`local`), or a scheduler that is there
-    (`at`). A call whose worker is gone is given to another.
+    """Runner on dask.distributed: processes of this machine (`local`), or an existing scheduler
+    (`at`). A call whose worker is lost is given to another.
     """
 
     def __init__(self, connect: Callable[[], distributed.Client], window: int):
@@ -95,7 +97,7 @@ class Cluster(Runner):
             )
             return distributed.Client(own, set_as_default=False)
 
-        return cls(connect, AHEAD * count)
+        return cls(connect, CALLS_PER_THREAD * count)
 
     @classmethod
     def at(cls, address: str) -> Cluster:
@@ -106,14 +108,14 @@ class Cluster(Runner):
         with extra("campaigns", "a campaign on a cluster"):
             import distributed
         try:
-            client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
+            client = distributed.Client(address, timeout=SCHEDULER_TIMEOUT, set_as_default=False)
         except (OSError, ValueError, TypeError) as error:
             raise InputError(
                 f"no scheduler of dask.distributed answers at {address!r} ({error}); start one with"
                 " `dask scheduler`, or leave --scheduler out for the cores of this machine"
             ) from error
         threads: Any = client.ncores()
-        there = cls(lambda: client, AHEAD * max(sum(threads.values()), 1))
+        there = cls(lambda: client, CALLS_PER_THREAD * max(sum(threads.values()), 1))
         there._client = client
         return there
 
@@ -136,8 +138,8 @@ class Cluster(Runner):
 
 
 def runner(workers: int | None = None, scheduler: str | None = None) -> Runner:
-    """The runner that is there: the scheduler at that address, else a cluster of this machine, else
-    processes of it, which progress says; with one worker this process.
+    """Return the available runner: the scheduler at that address, else a cluster of this machine,
+    else processes of it, with a message; with one worker this process.
 
     Raises `InputError` where no scheduler answers, or dask.distributed is not there to ask it.
     """
@@ -163,8 +165,8 @@ def answers(
 
 
 def results(on: Runner, calls: Sequence[Callable[[], Any]]) -> Iterator[Any]:
-    """What each call returns, in their order, as soon as it and those before it are done; the first
-    exception ends it.
+    """Yield the results of the calls in their order, as soon as they are done; the first exception
+    ends it.
     """
     found: dict[int, Any] = {}
     due = 0

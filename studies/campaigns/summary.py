@@ -11,10 +11,10 @@ from studies.campaigns.dataset import CampaignDataset
 from studies.campaigns.trial import SECONDS
 from studies.output import columns
 
-WIDE = 6
-"""Quantities shown, where none are named."""
-LONG = 40
-"""Points of the grid shown."""
+MAX_QUANTITIES = 6
+"""Largest number of quantities shown by default."""
+MAX_POINTS = 40
+"""Largest number of grid points shown."""
 
 
 def table(campaign: Campaign, dataset: CampaignDataset, show: list[str] | None = None) -> str:
@@ -27,14 +27,14 @@ def table(campaign: Campaign, dataset: CampaignDataset, show: list[str] | None =
     rows = dataset.rows_of(campaign.cases)
     values = {name: dataset[name][rows] for name in show or dataset.units}
     shown = [n for n, v in values.items() if n in (show or ()) or np.isfinite(v).any()]
-    shown = shown if show else [n for n in shown if n != SECONDS][:WIDE]
+    shown = shown if show else [n for n in shown if n != SECONDS][:MAX_QUANTITIES]
     reasons = {row: reason for row, reason in dataset.reasons.items() if row in set(rows)}
     points: dict[tuple[Any, ...], list[int]] = {}
     for i, case in enumerate(campaign.cases):
         points.setdefault(tuple(case.parameters[n] for n in campaign.grid), []).append(i)
     units = [dataset.units.get(name, "") for name in shown]
     lines = [[*campaign.grid, "cases", *shown], [*([""] * len(campaign.grid)), "", *units]]
-    for point, at in list(points.items())[:LONG]:
+    for point, at in list(points.items())[:MAX_POINTS]:
         good = [i for i in at if rows[i] not in reasons]
         medians = [f"{_median(values[n][good]):.5g}" for n in shown]
         lines.append([*map(str, point), f"{len(good)}/{len(at)}", *medians])
@@ -42,8 +42,8 @@ def table(campaign: Campaign, dataset: CampaignDataset, show: list[str] | None =
         f"{campaign.trial.name}: medians of {len(rows)} cases, {len(reasons)} failed",
         columns(lines, left=len(campaign.grid)),
     ]
-    if len(points) > LONG:
-        said.append(f"... and {len(points) - LONG} points more")
+    if len(points) > MAX_POINTS:
+        said.append(f"... and {len(points) - MAX_POINTS} points more")
     said += [f"failed: {n} x {why}" for why, n in _counted(reasons).items()]
     return "\n".join([*said, f"every case: {dataset.path}"])
 

@@ -1,4 +1,4 @@
-"""What a campaign repeats: a function of its parameters that gives named numbers."""
+"""Trial of a campaign: a function of its parameters that returns named numbers."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from typing import Any
 from symheli.errors import InputError, UnknownNameError
 
 SECONDS = "seconds"
-"""The quantity every trial has: how long it took, s."""
+"""Quantity of every trial: its computing time, s."""
 
 RESERVED = frozenset({SECONDS, "case", "quantity", "unit", "values", "reason"})
-"""Names a dataset has for itself."""
+"""Names that a dataset reserves."""
 
 LONGEST_REASON = 240
 """Characters that are kept of why a case failed."""
@@ -76,7 +76,7 @@ class Trial:
 
     @property
     def units(self) -> dict[str, str]:
-        """Of everything that is kept of a case, in order."""
+        """Units of all quantities of a case, in order."""
         return {**self.quantities, SECONDS: "s"}
 
     def of_kind(self, name: str, value: Any) -> Value:
@@ -94,7 +94,7 @@ class Trial:
         return value
 
     def call(self, parameters: Mapping[str, Value]) -> Callable[[], Outcome]:
-        """What a worker is handed."""
+        """Return the call for a worker."""
         return partial(outcome, self.run, tuple(self.quantities), dict(parameters))
 
     @property
@@ -104,7 +104,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Of one case: its quantities in order, the time last; or why it failed."""
+    """Outcome of one case: its quantities in order, the time last; or the reason of its failure."""
 
     values: tuple[float, ...]
     reason: str = ""
@@ -130,5 +130,5 @@ def outcome(
 
 
 def reason_of(error: BaseException) -> str:
-    """One line that says what went wrong."""
+    """Return the reason of a failure in one line."""
     return " ".join(f"{type(error).__name__}: {error}".split())[:LONGEST_REASON]

@@ -12,7 +12,7 @@ Entry = "Argument | Group"
 
 @dataclass(frozen=True)
 class Argument:
-    """What argparse takes: the name, and its settings."""
+    """Arguments of argparse: the name, and its settings."""
 
     name: str
     settings: Mapping[str, Any]

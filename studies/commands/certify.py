@@ -1,5 +1,5 @@
-"""symheli certify: a proven gain of the lateral loop while the airspeed changes at a bounded
-rate.
+"""Command symheli certify: a proven gain of the lateral loop while the airspeed changes at a
+bounded rate.
 """
 
 from __future__ import annotations

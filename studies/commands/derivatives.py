@@ -21,7 +21,7 @@ ARGUMENTS = (
 
 
 def run(arguments: argparse.Namespace) -> Output:
-    """Sweep, tabulate, write where asked."""
+    """Sweep, tabulate, and write the requested files."""
     import numpy as np
 
     import symheli

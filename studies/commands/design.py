@@ -1,4 +1,4 @@
-"""symheli design: which excitation and which transition tell most, within limits."""
+"""Command symheli design: the most informative excitation and transition, within limits."""
 
 from __future__ import annotations
 

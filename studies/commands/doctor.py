@@ -46,7 +46,7 @@ ARGUMENTS = ()
 
 
 def run(arguments: argparse.Namespace) -> Output:
-    """Look, and exit with 1 where something required is missing."""
+    """Check the installation; exit with 1 where something required is missing."""
     from identification.recursive.kernel import compiled_kernel, compiled_kernels
     from symheli.codegen.compile import cache_directory, compiler
     from synthesis import installed_solvers

@@ -28,7 +28,7 @@ ARGUMENTS = (
 
 
 def run(arguments: argparse.Namespace) -> Output:
-    """Trim the grid, show it as letters, write it where asked."""
+    """Trim the grid, show it as letters, and write the requested files."""
     import numpy as np
 
     import symheli

@@ -59,13 +59,13 @@ ARGUMENTS = (
 
 
 def run(arguments: argparse.Namespace) -> Output:
-    """Write the file(s) and say which."""
+    """Write the file(s) and list them."""
     if arguments.format == "model":
-        return _said(_model(arguments))
+        return _list(_model(arguments))
     if arguments.format == "controller":
-        return _said(_controller(arguments))
+        return _list(_controller(arguments))
     if arguments.model and arguments.format == "mat":
-        return _said(_mat(arguments))
+        return _list(_mat(arguments))
     if arguments.model:
         raise InputError(
             f"--model applies to the formats model, controller and mat; {arguments.format} is"
@@ -98,7 +98,7 @@ def run(arguments: argparse.Namespace) -> Output:
             else (markdown(heli), "md")
         )
         written = (write_text(arguments.out or Path(f"{name}_equations.{suffix}"), content),)
-    return _said(written)
+    return _list(written)
 
 
 def _model(arguments: argparse.Namespace) -> tuple[Path, ...]:
@@ -147,5 +147,5 @@ def _named(arguments: argparse.Namespace, how: str) -> Path:
     return arguments.model
 
 
-def _said(written: tuple[Path, ...]) -> Output:
+def _list(written: tuple[Path, ...]) -> Output:
     return Output("\n".join(f"wrote {path}" for path in written), {"written": written})

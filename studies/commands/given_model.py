@@ -1,4 +1,4 @@
-"""Models from files instead of a vehicle: what `symheli identify --save` keeps, and families of
+"""Models from files instead of a vehicle: those of `symheli identify --save`, and families of
 matrices.
 """
 
@@ -92,7 +92,7 @@ def closed_loop(arguments: argparse.Namespace, lpv: LPVStateSpace) -> LPVStateSp
 
 
 def only_with_a_model(arguments: argparse.Namespace) -> None:
-    """Raises `InputError` for options that say something of --model where none is given."""
+    """Raise `InputError` for options that need --model where none is given."""
     names = [n for n in ("states", "inputs", "outputs") if getattr(arguments, n, None)]
     if names and arguments.model is None:
         raise InputError(f"--{', --'.join(names)} need a model from a file: give --model FILE")

@@ -26,20 +26,20 @@ if TYPE_CHECKING:
     from symheli.records import FlightRecord, KinematicCheck
 
 METHODS = ("ls", "rls", "ridge", "lasso", "iv", "riv", "oe")
-"""Those of `identification.fit`."""
+"""Methods of `identification.fit`."""
 
 HELP = (
     "fit an LPV-ARX model to a flight log and judge it on data it has not seen; with the log alone,"
     " say what it holds and suggest a command"
 )
 XPLANE = {"outputs": ("q", "theta"), "inputs": ("stick_lon",), "scheduling": "airspeed"}
-"""What is identified from an X-Plane log unless asked otherwise."""
+"""Default signals of an X-Plane log."""
 
-ASKED = (
+FIT_OPTIONS = (
     *("outputs", "inputs", "scheduling", "scheduling_from", "instruments", "orders", "test"),
     *("plot", "bands", "save", "loop"),
 )
-"""Options that ask for a fit; without any of them a log is only looked at, unless it can be
+"""Options that request a fit; without any of them a log is only surveyed, unless it can be
 identified at once.
 """
 
@@ -157,7 +157,7 @@ ARGUMENTS = (
 
 
 def run(arguments: argparse.Namespace) -> Output:
-    """Read, prepare, fit, judge; or look, where nothing says what to fit."""
+    """Read, preprocess, fit and validate; or survey the log, where no fit is requested."""
     from identification import against_constant
     from studies.log import in_feedback, report
 
@@ -168,11 +168,11 @@ def run(arguments: argparse.Namespace) -> Output:
             " FILE.toml`"
         )
     kind = "mapped" if arguments.map else _format(arguments)
-    if not any(getattr(arguments, name) for name in ASKED):
+    if not any(getattr(arguments, name) for name in FIT_OPTIONS):
         seen = _contents(arguments, kind)
         if not _at_once(arguments, kind, seen):
             return _survey(arguments, seen)
-    structure, training, test, prepared = _asked(arguments, kind)
+    structure, training, test, prepared = _requested(arguments, kind)
     record = prepared.record
     hold = not (arguments.commanded or prepared.scheduling.endswith("_command"))
     trim: Any = {"yes": "moving", "no": "still"}.get(
@@ -220,10 +220,10 @@ def run(arguments: argparse.Namespace) -> Output:
     return Output(text, data)
 
 
-def _asked(
+def _requested(
     arguments: argparse.Namespace, kind: str
 ) -> tuple[LPVARX, FlightRecord, FlightRecord | None, _Prepared]:
-    """The structure that is asked for, what it is fitted to, what is held out, and the record."""
+    """Return the requested structure, the data of the fit, the validation data, and the record."""
     from identification import LPVARX, Polynomial
     from studies.log.reading import scheduling_range
 
@@ -258,12 +258,12 @@ def _asked(
 
 
 def _format(arguments: argparse.Namespace) -> Format:
-    """What the log is said to be, or is by its content."""
+    """Return the format of the log: the given one, or that of its content."""
     return format_of(arguments.log) if arguments.format == "auto" else arguments.format
 
 
 def _contents(arguments: argparse.Namespace, kind: str) -> Contents:
-    """All columns of the log, or the signals of the map."""
+    """Return all columns of the log, or the signals of the map."""
     from symheli.logs.column import Column
     from symheli.logs.contents import Contents, contents_of
     from symheli.records import FlightRecord
@@ -283,7 +283,7 @@ def _at_once(arguments: argparse.Namespace, kind: str, seen: Contents) -> bool:
 
 
 def _survey(arguments: argparse.Namespace, seen: Contents) -> Output:
-    """What the log holds, and a command that would identify."""
+    """Return the content of the log, and a command that would identify a model."""
     from studies.log import survey_report
     from studies.log.suggestion import Suggestion, suggestion
     from symheli.logs.survey import survey
@@ -302,7 +302,7 @@ def _survey(arguments: argparse.Namespace, seen: Contents) -> Output:
 
 
 def _refused(hint: Suggestion) -> str:
-    """Why a command that would be suggested cannot fit its model; empty where it can."""
+    """Return why a suggested command could not fit its model; empty where it could."""
     from identification import fit
 
     parser = argparse.ArgumentParser()
@@ -315,7 +315,7 @@ def _refused(hint: Suggestion) -> str:
             arguments.map = Path(folder) / "aircraft.toml"
             write_text(arguments.map, hint.map)
         try:
-            structure, training, _, _ = _asked(
+            structure, training, _, _ = _requested(
                 arguments, "mapped" if arguments.map else _format(arguments)
             )
             fit(structure, training)
@@ -325,8 +325,8 @@ def _refused(hint: Suggestion) -> str:
 
 
 class _Signals(NamedTuple):
-    """What is predicted from what; `scheduling` None where it is made of others, or there is
-    none.
+    """Outputs and inputs of the model; `scheduling` is None if it is derived from others, or
+    absent.
     """
 
     outputs: tuple[str, ...]
@@ -409,7 +409,7 @@ def _prepared(
 
 
 def _write(arguments: argparse.Namespace, result: Any) -> Iterator[Path]:
-    """Pictures and the model, where asked for; the paths written."""
+    """Write the requested plots and the model; return their paths."""
     from identification import uncertainty
     from identification.model.lpvarx_model import LEAST_SQUARES
     from studies.log import figure
@@ -431,7 +431,7 @@ def _write(arguments: argparse.Namespace, result: Any) -> Iterator[Path]:
 
 
 def _orders(structure: Any, training: Any, test: Any, hold_p: bool) -> Output:
-    """A table of orders and degrees, judged on the held-out part."""
+    """Return a table of orders and degrees, compared on the validation data."""
     from identification import order_scan
 
     if test is None:

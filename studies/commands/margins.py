@@ -1,4 +1,4 @@
-"""symheli margins: how far the roll hold is from instability, and the attitude bandwidths, over
+"""Command symheli margins: stability margins of the roll hold, and the attitude bandwidths, over
 airspeed.
 """
 

@@ -80,7 +80,7 @@ def names(text: str) -> tuple[str, ...]:
 
 
 def picture(text: str) -> Path:
-    """A file that matplotlib knows how to write."""
+    """Return the path of a plot in a format that matplotlib can write."""
     path = Path(text)
     if path.suffix.lower() not in PICTURES:
         raise argparse.ArgumentTypeError(
@@ -178,7 +178,7 @@ CONDITION = (
         0.0,
     ),
 )
-"""The steady flight to trim."""
+"""Options of the steady flight to trim."""
 
 ON_A_RUNNER = (
     option(
@@ -218,7 +218,7 @@ def span(name: str, default: tuple[float, float], points: int, what: str) -> Arg
 
 
 def kept_on_a_runner(arguments: argparse.Namespace) -> str:
-    """What an interrupted campaign leaves."""
+    """Return a message on the finished part of an interrupted campaign."""
     if arguments.out:
         return f"what was finished is in {arguments.out}: the same command goes on from there"
     return "what was finished is kept where --out or a file of a campaign says so"

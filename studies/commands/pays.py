@@ -22,7 +22,7 @@ kept = kept_on_a_runner
 
 
 def run(arguments: argparse.Namespace) -> Output:
-    """Fly, fit, judge; it shows its own progress."""
+    """Simulate, fit and validate, showing progress."""
     from studies.campaigns import pays
     from studies.campaigns.runners import runner
 

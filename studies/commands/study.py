@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 HELP = "the main job: model, identification, guarantees, report"
 OVERRIDE = ("vehicle", "seed", "out", "quick")
-"""Options that win over the file."""
+"""Options that take precedence over the file."""
 
 ARGUMENTS = (
     positional(
@@ -48,7 +48,7 @@ ARGUMENTS = (
 
 def run(arguments: argparse.Namespace) -> Output:
     """Run the study; it shows its own progress and writes into the folder."""
-    configuration = _asked(arguments)
+    configuration = _configuration(arguments)
     if arguments.write_config is not None:
         return options.choices_written(configuration.text, arguments.write_config)
     from studies.transition.study import run_study
@@ -59,7 +59,7 @@ def run(arguments: argparse.Namespace) -> Output:
     return Output(f"{result.summary()}\n{told}", result.to_dict())
 
 
-def _asked(arguments: argparse.Namespace) -> Configuration:
+def _configuration(arguments: argparse.Namespace) -> Configuration:
     from studies.transition.configuration import Configuration
 
     given = {name: getattr(arguments, name) for name in OVERRIDE}
@@ -67,7 +67,7 @@ def _asked(arguments: argparse.Namespace) -> Configuration:
 
 
 def kept(arguments: argparse.Namespace) -> str:
-    """What an interrupted run leaves."""
+    """Return a message on the finished part of an interrupted run."""
     if arguments.write_config is not None:
         return "nothing was written, files that were there are unchanged"
-    return f"what was finished is in {_asked(arguments).out}; --resume goes on from there"
+    return f"what was finished is in {_configuration(arguments).out}; --resume goes on from there"

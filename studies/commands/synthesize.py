@@ -1,4 +1,4 @@
-"""symheli synthesize: a controller designed, certified as it flies, and flown."""
+"""Command symheli synthesize: a controller designed, certified as implemented, and simulated."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ HELP = (
     " servos and delay), fly it in turbulence"
 )
 OVERRIDE = ("vehicle", "model", "out")
-"""Options that win over the file."""
+"""Options that take precedence over the file."""
 
 ARGUMENTS = (
     positional(

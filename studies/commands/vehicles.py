@@ -25,7 +25,9 @@ ARGUMENTS = (
 
 
 def run(arguments: argparse.Namespace) -> Output:
-    """Name, title, source and assumptions of each; a vehicle file; the reference."""
+    """List name, title, source and assumptions of each vehicle; or print a vehicle file, or the
+    reference.
+    """
     from symheli.airframe.vehicle import load_vehicle
     from symheli.airframe.written import as_toml, reference
     from symheli.helicopter import Helicopter

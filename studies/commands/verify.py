@@ -39,7 +39,9 @@ def run(arguments: argparse.Namespace) -> Output:
 
 
 def _verified(file: str) -> tuple[Certificate, str, dict[str, Any]]:
-    """The certificate in a file, what exact arithmetic says of it, and the same for a program."""
+    """Return the certificate in a file, the result of exact arithmetic, and the same for a
+    program.
+    """
     from synthesis import Certificate
 
     cert = Certificate.load(file)

@@ -1,1 +1,1 @@
-"""Controllers designed, certified and flown along the transition."""
+"""Controllers designed, certified and simulated along the transition."""

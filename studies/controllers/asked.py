@@ -1,5 +1,5 @@
-"""What a controller is designed for: the choices of `symheli synthesize`, whose defaults are those
-of the study.
+"""Specification of a controller: the choices of `symheli synthesize`, whose defaults are those of
+the study.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from symheli.values.whole_files import write_text
 from synthesis.plant.parts import DISTURBANCE
 
 TOP, RATE = 13.0, 3.0
-"""Of the airspeed, m/s, and of its change, m/s^2."""
+"""Highest airspeed, m/s, and largest acceleration, m/s^2."""
 
 PERIOD, DELAY = 0.02, 0.02
-"""Of the controller's samples, and from a command to its servo, s."""
+"""Sample period of the controller, and delay from a command to its servo, s."""
 
 CONTROLS = ("d_lon", "d_lat", "d_col", "d_ped")
 GUSTS = ("u_w", "v_w", "w_w")
@@ -83,8 +83,8 @@ def _numbers(servo: Servo) -> tuple[float, ...]:
 
 @dataclass(frozen=True, kw_only=True)
 class Asked:
-    """What is designed, certified and flown. Raises `InputError` for what is of another type, out
-    of range, or without a size.
+    """Specification of the design, certification and simulation. Raises `InputError` for a wrong
+    type, a value out of range, or a signal without a size.
     """
 
     vehicle: str = choice(
@@ -97,39 +97,47 @@ class Asked:
             empty=True,
         ),
     )
-    out: Path = field(default=Path("controller"), metadata=about("folder of what is written"))
+    out: Path = field(default=Path("controller"), metadata=about("output folder"))
     airspeeds: tuple[float, ...] = choice((0.0, TOP), "lowest and highest, m/s", least=0)
-    acceleration: float = choice(RATE, "largest |dV/dt| that is permitted, m/s^2", least=0)
+    acceleration: float = choice(RATE, "largest permitted |dV/dt|, m/s^2", least=0)
     points: int = choice(POINTS, "airspeeds at which the vehicle is linearized", least=4)
-    degree: int = choice(DEGREE, "of the interpolation, entry by entry", least=1)
+    degree: int = choice(DEGREE, "degree of the entry-by-entry interpolation", least=1)
     states: tuple[str, ...] = choice(
         (),
-        'of the model that are kept, []: all; sideways alone ["v", "p", "r", "phi", "b1"]',
+        'states of the model to keep, []: all; lateral axis ["v", "p", "r", "phi", "b1"]',
         empty=True,
     )
-    controls: tuple[str, ...] = choice(CONTROLS, "what the controller commands")
-    measurements: tuple[str, ...] = choice(MEASUREMENTS, "what it reads")
+    controls: tuple[str, ...] = choice(CONTROLS, "outputs of the controller")
+    measurements: tuple[str, ...] = choice(MEASUREMENTS, "inputs of the controller")
     disturbances: tuple[str, ...] = choice(
-        GUSTS, "gusts, m/s; the name of a control: what is added to it"
+        GUSTS, "gusts, m/s; the name of a control: a disturbance added to it"
     )
-    period: float = choice(PERIOD, "of the controller's samples, s")
-    delay: float = choice(DELAY, "from a command to its servo, s: whole samples", least=0)
+    period: float = choice(PERIOD, "sample period of the controller, s")
+    delay: float = choice(DELAY, "delay from a command to its servo, s: whole samples", least=0)
     back_off: tuple[float, ...] = choice(
-        BACK_OFFS, "multiples of the least gain at which the controller is taken, tried in turn"
+        BACK_OFFS, "multiples of the least gain for which the controller is computed, tried in turn"
     )
-    order: int = choice(0, "states of the controller; 0: the fewest that cost 3 %", least=0)
-    knots: int = choice(0, "airspeeds of its table; 0: the fewest that cost 3 %", least=0)
-    flights: int = choice(4, "transitions flown in turbulence, each with its own gusts", least=1)
-    turbulence: float = choice(7.7, "mean wind at 20 ft of it (Dryden), m/s: light", least=0)
+    order: int = choice(
+        0, "order of the controller; 0: the least for at most 3 % more gain", least=0
+    )
+    knots: int = choice(
+        0, "number of airspeeds of its table; 0: the least for at most 3 % more gain", least=0
+    )
+    flights: int = choice(
+        4, "simulated transitions in turbulence, each with its own gusts", least=1
+    )
+    turbulence: float = choice(
+        7.7, "turbulence level: mean wind at 20 ft (Dryden), m/s; 7.7 is light", least=0
+    )
     sizes: Mapping[str, float] = field(
         default_factory=lambda: {**dict.fromkeys(GUSTS, GUST), **SIZES},
         metadata=about(
-            "what counts as 1 (m/s, rad/s, rad): disturbances expected, deviations, commands"
+            "values scaled to 1 (m/s, rad/s, rad): expected disturbances, deviations, commands"
         ),
     )
     noise: Mapping[str, float] = field(
         default_factory=lambda: dict(NOISE),
-        metadata=about("of each measurement, what counts as 1; a third of it is flown"),
+        metadata=about("noise of each measurement scaled to 1; the simulation has a third of it"),
     )
     servos: Mapping[str, tuple[float, ...]] = field(
         default_factory=lambda: {u: _numbers(servo) for u, servo in XCELL_SERVOS.items()},
@@ -164,8 +172,8 @@ class Asked:
 
     @classmethod
     def read(cls, path: Path | None, options: Mapping[str, Any]) -> Asked:
-        """The file (None: only defaults) with `options` in place of its entries of these names;
-        paths of the file are relative to it.
+        """Read the file (None: only defaults) with `options` in place of its entries of these
+        names; paths of the file are relative to it.
 
         Raises `InputError` for a file that cannot be read, or with everything that is wrong in it.
         """
@@ -180,16 +188,16 @@ class Asked:
             raise InputError(f"{path or 'options'}: {error}") from None
 
     def write(self, path: Path) -> Path:
-        """Write everything that was asked for, defaults too."""
+        """Write all choices, defaults too."""
         return write_text(path, self.text(path.parent))
 
     def text(self, folder: Path) -> str:
-        """The choices as a TOML file in this folder, with a sentence on each."""
+        """Return the choices as a TOML file in this folder, with a comment on each."""
         return "\n".join(self._lines(folder)) + "\n"
 
     def _lines(self, folder: Path) -> Iterator[str]:
-        yield "# symheli synthesize FILE designs, certifies and flies what this file asks for."
-        yield "# Paths are relative to this file; options of the command line win. SI and radians."
+        yield "# Specification of a controller for symheli synthesize FILE. SI units and radians."
+        yield "# Paths are relative to this file; options of the command line take precedence."
         yield ""
         tables = [f.name for f in fields(self) if isinstance(getattr(self, f.name), Mapping)]
         for f in fields(self):
@@ -208,20 +216,24 @@ class Asked:
 
     @property
     def sizes_of_performance(self) -> dict[str, float]:
-        """Of measurements, then commands."""
+        """Sizes of measurements, then commands."""
         return {name: self.sizes[name] for name in (*self.measurements, *self.controls)}
 
     @property
     def sizes_of_disturbances(self) -> dict[str, float]:
-        """By the name that each has in the plant."""
+        """Sizes of the disturbances by their names in the plant."""
         return {self.disturbance(name): self.sizes[name] for name in self.disturbances}
 
     def disturbance(self, name: str) -> str:
-        """The name in the plant: of one that is added to a control its own."""
+        """Return the name of a disturbance in the plant, a separate one where it is added to a
+        control.
+        """
         return f"{name}{DISTURBANCE}" if name in self.controls else name
 
     def servo(self, control: str) -> Servo | None:
-        """As it was given, with the rate limit that is flown; None where there is none."""
+        """Return the given servo with the rate limit of the simulation; None where there is
+        none.
+        """
         if control not in self.servos:
             return None
         return replace(

@@ -1,5 +1,5 @@
-"""What is proven of each controller that flies: the gain of its loop with the baseline, servos and
-delay, sampled.
+"""Proven gains of the simulated controllers: the loop with the baseline, servos and delay,
+sampled.
 """
 
 from __future__ import annotations
@@ -27,7 +27,9 @@ segments, or two more digits, move a proven gain by a thousandth of it for sever
 
 @dataclass(frozen=True, kw_only=True)
 class CertifiedControllers:
-    """The proofs, `model` of each the name of the controller; none where none was asked for."""
+    """Certificates by controller, `model` of each the name of the controller; empty where none was
+    requested.
+    """
 
     bounds: tuple[Bound, ...]
 
@@ -64,20 +66,22 @@ def controller_questions(
 
 
 def proofs(name: str, loop: LPVStateSpace) -> list[Bound]:
-    """What a controller of that name is asked for."""
+    """Return the proofs requested for a controller of that name."""
     return (jumping if name == LFT else bounded)(name, loop)
 
 
 def bounded(name: str, loop: LPVStateSpace) -> list[Bound]:
-    """The gain of a loop at the permitted acceleration; no lower bound but the frozen gain is
-    looked for.
+    """Certify the gain of a loop at the permitted acceleration; the only lower bound is the frozen
+    gain.
     """
     found = synthesis.l2_gain(loop, RATE, form=FORM, solver=SOLVER, search=None)
     return [Bound(name, CHANNEL, RATE, PLAIN, found)]
 
 
 def jumping(name: str, loop: LPVStateSpace) -> list[Bound]:
-    """The gain of a loop when airspeed may jump, and where none is proven that of `bounded`."""
+    """Certify the gain of a loop when airspeed may jump, and where none is proven that of
+    `bounded`.
+    """
     found = synthesis.l2_gain(loop, math.inf, solver=SOLVER, search=None)
     own = [Bound(name, CHANNEL, math.inf, CONSTANT, found)]
     return own if found.verified else [*own, *bounded(name, loop)]

@@ -1,4 +1,4 @@
-"""The controllers of the study, each sampled and of few states, by name; or why there is none."""
+"""Controllers of the study, sampled and of low order, by name; or the reason why there is none."""
 
 from __future__ import annotations
 
@@ -48,12 +48,12 @@ BASELINE, IDENTIFIED = "LPV from the baseline", "LPV from the identified model"
 NAMES = (LQR, HINF, LFT, BASELINE, IDENTIFIED)
 
 FASTEST = np.pi / PERIOD
-"""Of a pole of the controller, rad/s: half the sample frequency."""
+"""Largest modulus of a pole of the controller, rad/s: half the sample frequency."""
 
 SLOW: dict[str, Any] = {"back_off": BACK_OFFS, "fastest": FASTEST}
 
 AIRSPEEDS = 14
-"""Points of the schedules, evenly over the range."""
+"""Number of airspeeds of the schedules, evenly over the range."""
 
 ORDERS = (8, 9, 10, 12, 14, 16)
 DEGREES = (2, 3, 4, 6)
@@ -64,7 +64,9 @@ loop may become by the reduction.
 
 
 JUDGED_AT, DRAWS = (0.0, 6.5, 13.0), 50
-"""Airspeeds (m/s) at which an identified model is judged, and draws from what its data allow."""
+"""Airspeeds (m/s) at which an identified model is checked, and the number of draws from its
+uncertainty.
+"""
 
 LOOKED_AT = np.linspace(0.0, TOP, 9)
 """Airspeeds, m/s, at which that is."""
@@ -99,7 +101,7 @@ class Design:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Designs:
-    """Every design, and the baseline sampled as it is flown and certified."""
+    """All designs, and the sampled baseline for simulation and certification."""
 
     designs: tuple[Design, ...]
     plant: Plant
@@ -140,7 +142,7 @@ def from_equations(
 
 
 def from_data(identified: KinematicModel) -> Callable[[], Controller]:
-    """How the last of `NAMES` is made."""
+    """Return the design from data, the last of `NAMES`."""
     return partial(output_feedback, design_plant(identified_model(identified), 0.0), RATE, **SLOW)
 
 
@@ -185,8 +187,8 @@ def design(name: str, make: Callable[[], Controller | LPVStateSpace], plant: Pla
 
 
 def verdict(identified: KinematicModel, controller: LPVStateSpace, record: FlightRecord) -> str:
-    """Whether the identified model is fit for a loop with this controller, by the flight that it
-    was identified from, and what stands against it: a sentence.
+    """Decide whether the identified model is fit for a loop with this controller, by its
+    identification flight, and return the objections in a sentence.
     """
     rest = (0.0,) * (len(identified.parameters) - 1)
     found = fit_for_control(
@@ -215,7 +217,7 @@ def verdict_in_words(found: FitForControl) -> str:
 
 
 def lqr_schedule(heli: Helicopter) -> LPVStateSpace:
-    """The gain-scheduled LQR of the study's flights, checked behind its servos."""
+    """Design the gain-scheduled LQR of the study's flights, checked with its servos."""
     autopilot = gain_scheduled_lqr(heli, 0.0, TOP, PERIOD, AIRSPEEDS, XCELL_SERVOS)
     return autopilot.scheduled_controller.model
 

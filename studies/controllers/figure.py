@@ -1,4 +1,4 @@
-"""Every flight of every controller: against the size of the gusts, and seed by seed."""
+"""Figures of every flight of every controller: against the size of the gusts, and seed by seed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every controller flown through the same gusts in the nonlinear helicopter."""
+"""Simulation of every controller in the same gusts with the nonlinear helicopter."""
 
 from __future__ import annotations
 
@@ -34,17 +34,19 @@ from symheli.errors import ValidityWarning
 from symheli.flight import XCELL_SERVOS, Sensor
 
 LOW, HIGH = 0.5, 12.0
-"""Ends of the transition, m/s; at the permitted acceleration between."""
+"""Lowest and highest airspeed of the transition, m/s; the acceleration between them is the
+permitted one.
+"""
 
 STEADY, ALTITUDE = (-2.0, 1.0, 0.0), 20.0
 """The steady wind (north, east, down, m/s), and the height of the turbulence, m."""
 
 WINDS = (7.7, 15.4, 23.2)
-"""Sizes of the turbulence, as mean winds at 20 ft, m/s: light, moderate, severe."""
+"""Turbulence levels as mean winds at 20 ft, m/s: light, moderate, severe."""
 
 BEYOND = (0.0, 1.9, 3.9, 34.8, 52.2)
-"""Further sizes at which the proven gains are tried: from still air, where noise is all that
-disturbs, to more than any weather.
+"""Further levels at which the proven gains are tested: from still air, with sensor noise only, to
+more than any weather.
 """
 
 SEEDS, FEW_SEEDS = 20, 4
@@ -63,34 +65,34 @@ class Flown:
 
     @property
     def lost(self) -> int:
-        """How many flights were lost."""
+        """Number of flights that were lost."""
         return sum(flight.lost for flight in self.flights)
 
     def of(self, measure: Callable[[Measures], float]) -> tuple[float, float]:
-        """Median and largest of a measure."""
+        """Return median and largest value of a measure."""
         values = [measure(flight) for flight in self.flights]
         return float(np.median(values)), float(np.max(values))
 
     @property
     def ratio(self) -> float:
-        """The median of the energy ratio."""
+        """Median of the energy ratio."""
         return self.of(lambda flight: flight.ratio)[0]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FlownControllers:
-    """What was flown, by controller and within that by size."""
+    """Simulated flights, by controller and within that by size."""
 
     flown: tuple[Flown, ...]
     seeds: int
     duration: float
 
     def of(self, name: str) -> list[Flown]:
-        """Of one controller, by size."""
+        """Return the flights of one controller, by size."""
         return [one for one in self.flown if one.name == name]
 
     def at(self, wind: float) -> list[Flown]:
-        """Of all controllers, in turbulence of one size."""
+        """Return the flights of all controllers, in turbulence of one size."""
         return [one for one in self.flown if one.wind == wind]
 
     def exceeded(self, name: str, gain: float) -> Flown | None:
@@ -101,12 +103,12 @@ class FlownControllers:
         return min(above, key=lambda f: f.wind, default=None)
 
     def ranked(self, wind: float) -> list[Flown]:
-        """Those that lost no flight, the least median energy ratio first."""
+        """Return the controllers that lost no flight, the least median energy ratio first."""
         return sorted((f for f in self.at(wind) if not f.lost), key=lambda f: f.ratio)
 
 
 def transition() -> AirspeedSchedule:
-    """There and back at the acceleration that the certificates permit."""
+    """Return the transition forth and back at the acceleration that the certificates permit."""
     return AirspeedSchedule.transition(LOW, HIGH, acceleration=RATE, hold=3.0)
 
 
@@ -120,7 +122,9 @@ def plans(designs: Designs) -> Iterator[tuple[str, float, FlightPlan]]:
 
 
 def plan(controller: LPVStateSpace, wind: float) -> FlightPlan:
-    """The transition with that controller in turbulence of one size, servos, noise and delay."""
+    """Return the transition with that controller in turbulence of one size, servos, noise and
+    delay.
+    """
     return FlightPlan(
         transition(),
         dt=PERIOD,
@@ -133,7 +137,9 @@ def plan(controller: LPVStateSpace, wind: float) -> FlightPlan:
 
 
 def fly_controllers(vehicle: str, designs: Designs, seeds: Sequence[int]) -> FlownControllers:
-    """Every controller and size with every seed: the same gusts and noise for all of them."""
+    """Simulate every controller and size with every seed: the same gusts and noise for all
+    of them.
+    """
     heli = Helicopter.load(vehicle, governor="pi")
     asked = list(plans(designs))
     each = measures(heli, [p for *_, p in asked], seeds) if asked else []
@@ -156,7 +162,9 @@ def fly_controllers(vehicle: str, designs: Designs, seeds: Sequence[int]) -> Flo
 def measures(
     heli: Helicopter, plans: Sequence[FlightPlan], seeds: Sequence[int], workers: int | None = None
 ) -> list[Measures]:
-    """Of every plan with every seed; how long a flight was beyond the equations is one of them."""
+    """Return the measures of every plan with every seed, with the time outside the validity range
+    of the equations.
+    """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ValidityWarning)
         return measured(fly_batch(heli, plans, seeds=seeds, workers=workers).data)

@@ -18,7 +18,7 @@ VELOCITIES = MEASUREMENTS[:3]
 ACCELERATION = "acceleration_command"
 
 DEGREE = 4
-"""Of the continuous model in airspeed."""
+"""Degree in airspeed of the continuous model."""
 
 
 def identified_model(model: KinematicModel) -> LPVStateSpace:

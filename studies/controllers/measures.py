@@ -1,4 +1,4 @@
-"""What a flight was like: errors, limits, and the energy ratio that a proven gain speaks of."""
+"""Measures of a flight: errors, limits, and the energy ratio that a proven gain bounds."""
 
 from __future__ import annotations
 
@@ -45,12 +45,14 @@ class Measures:
 
 
 def measured(flights: Iterable[FlightData], asked: Asked = STUDY) -> list[Measures]:
-    """Of every flight."""
+    """Return the measures of every flight."""
     return [of_flight(flown, asked) for flown in flights]
 
 
 def of_flight(flown: FlightData, asked: Asked = STUDY) -> Measures:
-    """Of one flight, with the performance and the disturbances that a controller was asked for."""
+    """Return the measures of one flight, for the performance and the disturbances of the
+    controller's specification.
+    """
     column, travel = flown.columns(), flown.heli.travel
     noise = noise_of(flown)
     true = {y: column[y] - noise[:, i] for i, y in enumerate(MEASUREMENTS)}
@@ -87,7 +89,7 @@ def performance(column: dict[str, Array], true: dict[str, Array], asked: Asked =
 
 
 def noise_of(flown: FlightData) -> Array:
-    """What the sensors added to the measured states (n, 8)."""
+    """Return the sensor noise in the measured states (n, 8)."""
     readings = Readings.of(flown.plan.sensors or {}, flown.clock.dt)
     white = Disturbances.of([flown.plan], [flown.course], readings).white
     if white is None:

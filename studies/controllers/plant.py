@@ -29,13 +29,13 @@ def baseline(heli: Helicopter, asked: Asked = STUDY) -> LPVStateSpace:
 
 
 def of_family(family: LinearFamily, asked: Asked) -> LPVStateSpace:
-    """Linear models along airspeed, those states of them that are asked for, interpolated."""
+    """Interpolate linear models along airspeed, with the requested states of them."""
     kept = family.select(asked.states) if asked.states else family
     return kept.interpolate("polynomial", asked.degree, rate=asked.acceleration)
 
 
 def disturbed(model: LPVStateSpace, asked: Asked) -> LPVStateSpace:
-    """With what is added to a control as an input of its own, where that is asked for."""
+    """Add an input for the disturbance of a control, where requested."""
     both = [name for name in asked.disturbances if name in asked.controls]
     if not both:
         return model
@@ -70,7 +70,9 @@ def actuator(servo: Servo, name: str, late: float) -> LinearModel:
 
 
 def unweighted(model: LPVStateSpace, asked: Asked = STUDY) -> Plant:
-    """With gusts, controls, and the measured states and commands as performance."""
+    """Return the plant with gusts, controls, and the measured states and commands as
+    performance.
+    """
     return Plant(
         model,
         disturbances=signals(asked.sizes_of_disturbances),
@@ -81,15 +83,15 @@ def unweighted(model: LPVStateSpace, asked: Asked = STUDY) -> Plant:
 
 
 def weighted(plant: Plant, asked: Asked = STUDY) -> Plant:
-    """With every signal in its size, and noise on the measurements."""
+    """Return the plant with every signal in its size, and noise on the measurements."""
     sizes = {name: 1 / size for name, size in asked.sizes_of_performance.items()}
     noise = {name: asked.noise[name] for name in asked.measurements}
     return plant.weighted({**asked.sizes_of_disturbances, **sizes}).with_noise(noise)
 
 
 def design_plant(model: LPVStateSpace, held: float = PERIOD / 2, asked: Asked = STUDY) -> Plant:
-    """What is designed for: continuous, with actuators of low order behind the delay and the half
-    sample that a command is `held` for, where the model does not have that already.
+    """Return the plant of the design: continuous, with actuators of low order behind the delay and
+    the half sample that a command is `held` for, where the model does not have that already.
     """
     servos = {u: asked.servo(u) for u in asked.controls}
     late = asked.delay + held
@@ -100,8 +102,8 @@ def design_plant(model: LPVStateSpace, held: float = PERIOD / 2, asked: Asked = 
 
 
 def flown_plant(model: LPVStateSpace, asked: Asked = STUDY) -> Plant:
-    """What is certified: the servos as they are, the delay exact, sampled; a model that is sampled
-    stays as it is.
+    """Return the plant of the certificate: the servos unchanged, the delay exact, sampled; a
+    sampled model stays unchanged.
     """
     servos = {u: asked.servo(u) for u in asked.controls}
     behind = unweighted(model, asked).with_servo({u: s for u, s in servos.items() if s is not None})
@@ -111,7 +113,7 @@ def flown_plant(model: LPVStateSpace, asked: Asked = STUDY) -> Plant:
 
 
 def closed(plant: Plant, controller: object) -> LPVStateSpace:
-    """The loop, from gusts and noise to performance."""
+    """Return the loop, from gusts and noise to performance."""
     loop = plant.close(controller)
     assert isinstance(loop, LPVStateSpace)  # noqa: S101
     return loop

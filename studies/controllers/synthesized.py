@@ -1,5 +1,5 @@
-"""A controller that was asked for: designed, reduced, sampled, tabulated, certified as it flies,
-flown.
+"""Synthesis of a specified controller: designed, reduced, sampled, tabulated, certified as
+implemented, simulated.
 """
 
 from __future__ import annotations
@@ -66,20 +66,20 @@ from synthesis.loops.sampled_loop import SampledLoop
 from synthesis.worst.frozen import norm
 
 KNOTS = (2, 3, 5, 9, 17, 33)
-"""Airspeeds of the table that are tried in turn."""
+"""Numbers of airspeeds of the table, tried in turn."""
 LOOKED_AT = 9
 """Airspeeds at which the frozen gain of the loop is."""
-MANY = 12
-"""With more states in the loop, its P(p) is straight in airspeed."""
-INSIDE = (0.04, 0.08)
-"""So much of the range, beside its ends, the transition that is flown leaves free."""
+MAX_STATES_OF_SPLINE = 12
+"""Number of states of the loop above which P(p) is affine in airspeed."""
+RANGE_MARGINS = (0.04, 0.08)
+"""Fractions of the range, at its ends, that the simulated transition leaves free."""
 
 Given = LinearFamily | LPVARXModel | KinematicModel
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Synthesized:
-    """What came of it.
+    """Results of a synthesis.
 
     `made`: the controller of the synthesis; `table`: what flies; `sampled`: the proof of its loop;
     `flights`, `measures`: each transition; none without a vehicle; `seconds` of each step.
@@ -95,7 +95,7 @@ class Synthesized:
 
     @property
     def lost(self) -> int:
-        """How many flights were lost."""
+        """Number of flights that were lost."""
         return sum(one.lost for one in self.measures)
 
     @property
@@ -175,7 +175,8 @@ def synthesized(asked: Asked, given: Given | None = None) -> Synthesized:
 
 
 def model_of(asked: Asked, given: Given | None = None) -> LPVStateSpace:
-    """What is designed for, over airspeed, with its disturbances; sampled where it was identified.
+    """Return the model of the design over airspeed, with its disturbances; sampled where it was
+    identified.
 
     Raises `InputError` for a model sampled otherwise than the controller, one that is not over
     airspeed or not over all that are asked for, and for what it does not have.
@@ -206,7 +207,9 @@ def model_of(asked: Asked, given: Given | None = None) -> LPVStateSpace:
 
 
 def _airspeed(model: LPVStateSpace, asked: Asked) -> Scheduling:
-    """The airspeeds that are asked for; raises `InputError` where the model is not over them."""
+    """Return the requested range of airspeeds; raise `InputError` where the model is not
+    over them.
+    """
     low, high = asked.airspeeds
     over = ", ".join(f"{p.name} ({p.unit})" for p in model.parameters)
     size = ratio("m/s", model.parameters[0].unit)
@@ -224,7 +227,7 @@ def _airspeed(model: LPVStateSpace, asked: Asked) -> Scheduling:
 
 
 def plants(model: LPVStateSpace, asked: Asked) -> tuple[Plant, Plant]:
-    """What is designed for, in continuous time, and what is flown, sampled."""
+    """Return the plant of the design, in continuous time, and that of the simulation, sampled."""
     if model.dt is None:
         return design_plant(model, asked.period / 2, asked), flown_plant(model, asked)
     smooth = of_degree(continuous(model), DEGREE)  # the half sample of the hold is in it
@@ -268,7 +271,9 @@ def tabulated(made: synthesis.Controller, plant: Plant, asked: Asked) -> TableCo
 def certified(table: TableController, plant: Plant, promised: float) -> SampledLoop:
     """The proven gain of the loop that flies, on the fit of its plant."""
     states = len(closed(plant, table).states)
-    options: dict[str, Any] = {"form": FORM, "solver": SOLVER} if states > MANY else {}
+    options: dict[str, Any] = (
+        {"form": FORM, "solver": SOLVER} if states > MAX_STATES_OF_SPLINE else {}
+    )
     return synthesis.certify_sampled(
         table, plant, promised=promised, cover=False, search=None, **options
     )
@@ -280,7 +285,7 @@ def flights_of(table: TableController, asked: Asked) -> tuple[FlightData, ...]:
     """
     heli = Helicopter.load(asked.vehicle, governor="pi")
     low, high = asked.airspeeds
-    ends = low + INSIDE[0] * (high - low), high - INSIDE[1] * (high - low)
+    ends = low + RANGE_MARGINS[0] * (high - low), high - RANGE_MARGINS[1] * (high - low)
     controller: object = table
     if len(table.outputs) < len(heli.inputs):
         ideal = Helicopter.load(asked.vehicle, governor="ideal")

@@ -1,4 +1,4 @@
-"""What is told and written of a synthesized controller: sentences, numbers, a page, the files."""
+"""Report on a synthesized controller: sentences, numbers, a page, the files."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ FLIGHT = (
 
 
 def write(found: Synthesized) -> list[Path]:
-    """Table, certificate, choices, numbers and page, into the folder that was asked for."""
+    """Write table, certificate, choices, numbers and page into the requested folder."""
     out = found.asked.out
     out.mkdir(parents=True, exist_ok=True)
     written = [found.table.save(out / TABLE)]
@@ -64,7 +64,7 @@ def answer(found: Synthesized) -> str:
 
 
 def sentences(found: Synthesized) -> list[str]:
-    """What else there is to say."""
+    """Return further remarks."""
     a = found.asked
     worst = found.sampled.certificate.frozen
     out = [
@@ -106,7 +106,7 @@ def sentences(found: Synthesized) -> list[str]:
 
 
 def gains(found: Synthesized) -> list[tuple[str, str, str]]:
-    """Promised, frozen, proven, flown: each with what it is of."""
+    """Return the promised, frozen, proven and simulated gains, each with its meaning."""
     certificate, (median, most) = found.sampled.certificate, found.ratios
     a = found.asked
     low, high = a.airspeeds
@@ -128,7 +128,7 @@ def gains(found: Synthesized) -> list[tuple[str, str, str]]:
 
 
 def text(found: Synthesized, written: list[Path]) -> str:
-    """What the terminal shows."""
+    """Return the text for the terminal."""
     wrapped = "\n".join(_wrapped(sentences(found)))
     lines = [*_wrapped([answer(found)]), ""]
     lines += [f"  {name:9s} {value:>5s}  {of}" for name, value, of in gains(found)]
@@ -137,7 +137,7 @@ def text(found: Synthesized, written: list[Path]) -> str:
 
 
 def data(found: Synthesized) -> dict[str, Any]:
-    """What a program would read."""
+    """Return the data for a program."""
     a, certificate, (median, most) = found.asked, found.sampled.certificate, found.ratios
     return {
         "vehicle": a.vehicle,

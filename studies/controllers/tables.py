@@ -1,4 +1,4 @@
-"""What was designed, proven and flown, as tables and sentences."""
+"""Tables and sentences on designs, proofs and simulated flights."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ MEASURES: dict[str, Callable[[Measures], float]] = {
 
 
 def every(study: Outcome) -> list[Table]:
-    """Those that the study has reached."""
+    """Return the parts that the study has computed."""
     out = []
     if study.controllers is not None:
         out.append(designed(study.controllers, study.certified_controllers))
@@ -45,7 +45,7 @@ def every(study: Outcome) -> list[Table]:
 
 
 def designed(found: Designs, proofs: CertifiedControllers | None) -> Table:
-    """A row a controller: its order, and gains from synthesis to proof."""
+    """Return a row for each controller: its order, and gains from synthesis to proof."""
     table = Table(
         "Controllers: gain from gusts and noise to deviations and commands, each in its size",
         [
@@ -81,7 +81,7 @@ def designed(found: Designs, proofs: CertifiedControllers | None) -> Table:
 
 
 def flown(found: FlownControllers, proofs: CertifiedControllers | None) -> Table:
-    """A row a controller and size of turbulence: median and worst over the seeds."""
+    """Return a row for each controller and size of turbulence: median and worst over the seeds."""
     table = Table(
         f"Flown: a transition of {found.duration:.0f} s at up to {RATE:g} m/s^2, {found.seeds}"
         " seeds; median and worst",
@@ -109,7 +109,9 @@ def flown(found: FlownControllers, proofs: CertifiedControllers | None) -> Table
 
 
 def beyond(found: FlownControllers) -> list[str]:
-    """How many flights went faster than the equations of the helicopter are known to hold for."""
+    """Return a sentence on the flights outside the validity range of the equations of the
+    helicopter.
+    """
     every = [flight.beyond for one in found.flown for flight in one.flights]
     if not any(every):
         return []
@@ -169,7 +171,9 @@ def exceeded(found: FlownControllers, proofs: CertifiedControllers) -> Table:
 
 
 def conclusions(study: Outcome) -> list[str]:
-    """Who won and by how much, and whether hypotheses of the certificates broke."""
+    """Return the ranking of the controllers, and whether hypotheses of the certificates were
+    violated.
+    """
     found = study.flown_controllers
     if found is None or not found.flown:
         return []
@@ -205,7 +209,7 @@ def _worst(one: Flown) -> float:
 
 
 def hypotheses(found: FlownControllers) -> str:
-    """Whether the flights kept to range and rate of the certificates."""
+    """Return whether the flights kept to range and rate of the certificates."""
     some = [one for wind in WINDS for one in found.at(wind)]
     if not any(_broke(one) for one in some):
         return "Every flight kept to the range and the rate of the certificates."

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def controllers_to_dict(study: Outcome) -> dict[str, Any]:
-    """What the study has reached of them; null where it has not."""
+    """Return the results of the study on controllers; null where there are none."""
     proofs, flown = study.certified_controllers, study.flown_controllers
     return {
         "designs": study.controllers and [_design(d) for d in study.controllers.designs],

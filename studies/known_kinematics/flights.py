@@ -1,4 +1,4 @@
-"""One aggressive flight to identify from, one to judge by."""
+"""An aggressive flight for identification, and one for validation."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ RAMPS = (1.5, 3.0, 4.0, 2.0, 3.5, 2.5)
 """Peak accelerations, m/s^2, in turn."""
 
 HOLD = 3.0
-"""At each airspeed, s."""
+"""Time at each airspeed, s."""
 
 LONGEST = 150.0
-"""Of the aggressive flight, s."""
+"""Length of the aggressive flight, s."""
 
 LINES = (0.02, 4.0)
 """Of the multisines, Hz."""
@@ -100,7 +100,7 @@ def _ramps(
     longest: float,
     targets: tuple[float, ...] = TARGETS,
 ) -> AirspeedSchedule:
-    """As many of the targets as `longest` (s) allows."""
+    """Return as many of the targets as `longest` (s) allows."""
     for count in range(len(targets), 0, -1):
         peaks = tuple(accelerations[i % len(accelerations)] for i in range(count))
         schedule = AirspeedSchedule(targets[:count], peaks, (hold,) * count)

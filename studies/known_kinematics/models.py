@@ -1,4 +1,6 @@
-"""What is identified, and how: fixed on the seeds 1000 to 1004, before any mark was read."""
+"""Structures and method of the identification, fixed on the seeds 1000 to 1004 before any
+validation.
+"""
 
 from __future__ import annotations
 

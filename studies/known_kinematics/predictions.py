@@ -1,4 +1,4 @@
-"""What a model predicts one second ahead, beside the states without noise."""
+"""Predictions of a model one second ahead, compared with the states without noise."""
 
 from __future__ import annotations
 
@@ -21,5 +21,5 @@ def states_of(heli: Helicopter, record: FlightRecord) -> Array:
 
 
 def fits_of(truth: Array, guess: Array) -> dict[str, float]:
-    """In percent, by output."""
+    """Return the fits in percent, by output."""
     return dict(zip(OUTPUTS, fit_percent(truth, guess).tolist(), strict=True))

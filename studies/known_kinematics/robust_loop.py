@@ -41,8 +41,8 @@ def robust_loop(model: KinematicModel) -> UncertainStateSpace:
 
 
 def verdict(proven: float, exact: float, flown: float) -> Verdict:
-    """Against the exact model: its proven gain is at most the certificate's, its flown one above
-    it, or neither.
+    """Compare with the exact model: its proven gain is at most the certificate's, its lower bound
+    above it, or neither.
     """
     if math.isinf(proven):
         return "no certificate"

@@ -1,4 +1,4 @@
-"""Exact models with the airspeed held, and how far identified ones are from them."""
+"""Exact models at frozen airspeed, and their distance from identified ones."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def sampled(model: LinearModel, axis: Axis, servos: bool = False) -> LinearModel
 
 
 def delayed(model: LinearModel) -> LinearModel:
-    """The same with every input one sample later."""
+    """Return the same with every input one sample later."""
     nx, nu = model.B.shape
     A = np.block([[model.A, model.B], [np.zeros((nu, nx + nu))]])
     B = np.vstack([np.zeros((nx, nu)), np.eye(nu)])
@@ -108,14 +108,14 @@ def delayed(model: LinearModel) -> LinearModel:
 
 
 def frozen_axes(model: KinematicModel, truth: Truth) -> FrozenAxes:
-    """An identified model at `SPEEDS`, in the axes of the truth."""
+    """Return an identified model at `SPEEDS`, in the axes of the exact models."""
     return {
         name: tuple(frozen(model, AXES[name], float(v)) for v in SPEEDS) for name in truth.models
     }
 
 
 def frozen(model: KinematicModel, axis: Axis, airspeed: float) -> LinearModel:
-    """An identified model of an axis in level flight, named as the truth is."""
+    """Return an identified model of an axis in level flight, with the names of the exact model."""
     p = (airspeed, 0.0) if len(model.parameters) == 2 else airspeed
     commands = {u.removesuffix("_command"): u for u in map(str, model.inputs)}
     part = model.at(p, axis.outputs, [commands[u] for u in axis.inputs])

@@ -1,1 +1,1 @@
-"""From the log of somebody's flight to a fitted model and an honest table."""
+"""Identification from a user's log: a fitted model and a validation table."""

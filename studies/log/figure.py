@@ -1,4 +1,4 @@
-"""What a model says beside what was measured: one step ahead, 1 s ahead and in free run."""
+"""Figure of predictions and measurements: one step ahead, 1 s ahead and in free run."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def save(picture: Figure, path: Path) -> Path:
 
 
 def _fits(models: tuple[Scored, ...], output: str) -> str:
-    """Of each model in percent, the horizons in order."""
+    """Return the fits of each model in percent, the horizons in order."""
 
     def shown(scored: Scored) -> str:
         fits = (scored.held_out or scored.in_sample).by_horizon.values()

@@ -34,7 +34,7 @@ def judged(result: AgainstConstant, gains: Gains) -> FitForControl:
 
 
 def text(found: FitForControl) -> str:
-    """The table, under a line that says what it is."""
+    """Return the table, under a heading."""
     return f"fit for control in this loop:\n{found}"
 
 

@@ -1,4 +1,4 @@
-"""Opening a log of any known format, with the signals that are asked for."""
+"""Reader of a log of any known format, with the requested signals."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def read(
     units: Mapping[str, str],
     time_unit: str | None = None,
 ) -> FlightRecord:
-    """The record, on a uniform step where `dt` (s) says so; a time column is in `time_unit`.
+    """Return the record, on a uniform step if `dt` (s) is given; a time column is in `time_unit`.
 
     X-Plane logs declare their units. Of a table, what `check_kinematics` compares is read too where
     it is there. Elsewhere `units` declares those of `signals`, before the header of a table; the

@@ -1,4 +1,4 @@
-"""What was read, how well it excites, how well it fits: as text and as data."""
+"""Report of an identification: data, excitation and fit, as text and as data."""
 
 from __future__ import annotations
 
@@ -162,7 +162,9 @@ def _fits(scores: Scores | None) -> dict[str, Any] | None:
 
 
 def _coefficients(model: LPVARXModel) -> dict[str, Any]:
-    """Of 1, p, p^2, ... by lag, as `identification.Coefficients.monomial` arranges them."""
+    """Return the coefficients of 1, p, p^2, ... by lag, as `identification.Coefficients.monomial`
+    arranges them.
+    """
     values = model.coefficients.monomial()
     return {
         **values._asdict(),
@@ -243,7 +245,7 @@ def _method(result: AgainstConstant) -> str:
 
 
 def _horizons(result: AgainstConstant) -> list[str]:
-    """What the predictions know of p."""
+    """Return which p the predictions use."""
     p = result.scheduled.structure.scheduling
     if result.scheduled.structure.basis.size == 1 and not result.scheduled.structure.offset_rate:
         return []
@@ -274,7 +276,7 @@ def _slow(result: AgainstConstant) -> dict[str, Any]:
 
 
 def _certainty(result: AgainstConstant) -> list[str]:
-    """What the residuals of the fit say, and how certain its coefficients are."""
+    """Return the residual tests of the fit, and the certainty of its coefficients."""
     model = result.scheduled
     lags = min(25, len(result.training) // 20)
     analysis = f"in sample, {residual_analysis(model, result.training, lags)}"

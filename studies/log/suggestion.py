@@ -1,4 +1,4 @@
-"""How a log could be identified: a best guess to check, and what is missing for a better one."""
+"""Suggestion of a command that identifies a model from a log, and of missing information."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ class Suggestion:
 def suggestion(
     found: Survey, *, dt: float | None = None, signal_map: Path | None = None
 ) -> Suggestion:
-    """What is missing, and a command where outputs and inputs are guessed; `dt` (s) and
-    `signal_map` as somebody has said already.
+    """Return the missing information, and a command where outputs and inputs are guessed; `dt` (s)
+    and `signal_map` as given by the user.
     """
     there = found.moving
     missing = _missing(found, there)
@@ -103,7 +103,7 @@ def suggestion(
 
 
 def _beginning(found: Survey, used: list[Guess]) -> float:
-    """Where columns with clocks of their own begin to be known together, from where time counts."""
+    """Return the instant from which all columns with clocks of their own are known."""
     return max(found.motions[guess.column].start or 0.0 for guess in used)
 
 
@@ -140,7 +140,7 @@ def _missing(found: Survey, there: Mapping[str, Guess]) -> tuple[str, ...]:
             if found.step
             else ""
         )
-        sentences.append(f"a clock: say how far apart the rows are, --dt SECONDS{hint}")
+        sentences.append(f"a clock: give the time between rows, --dt SECONDS{hint}")
     if not {"p", "q", "r"} & there.keys():
         sentences.append("angular rates p, q, r: what an identification best predicts")
     if not {"phi", "theta"} & there.keys():

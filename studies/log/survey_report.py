@@ -1,4 +1,4 @@
-"""What a log holds and what is suggested, as text and as data."""
+"""Report of a survey of a log with a suggested command, as text and as data."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LISTED = 60
 
 
 def text(found: Survey, hint: Suggestion) -> str:
-    """What is there, what moves, what is missing, and a command to copy."""
+    """Return content, motion, missing information, and a command to copy."""
     moving = [name for name, motion in found.motions.items() if motion.moves]
     used = {guess.column for guess in found.guesses.values()}
     others = [name for name in moving if name not in used]
@@ -54,7 +54,7 @@ def text(found: Survey, hint: Suggestion) -> str:
 
 
 def data(found: Survey, hint: Suggestion) -> dict[str, Any]:
-    """The same for a program; the command as the words of a shell."""
+    """Return the same for a program; the command as the words of a shell."""
     by_column = {guess.column: guess for guess in found.guesses.values()}
     return {
         "log": found.log.name,
@@ -119,7 +119,7 @@ def _table(found: Survey) -> str:
 
 
 def _stretches(found: Survey) -> list[str]:
-    """The longest, in order of time, with a mark at what is suggested."""
+    """Return the longest stretches, in order of time, with a mark at the suggested one."""
     kept = sorted(found.stretches, key=lambda one: one.start - one.stop)[:MOST]
     rows = [
         [
@@ -137,7 +137,7 @@ def _stretches(found: Survey) -> list[str]:
 
 
 def _airspeed(found: Survey) -> list[str]:
-    """Its range in m/s: what a schedule can cover."""
+    """Return the range of the airspeed, m/s, which a schedule can cover."""
     guess = found.guesses.get("airspeed")
     if guess is None or not found.motions[guess.column].moves:
         return []
@@ -161,7 +161,7 @@ def _listed(names: list[str]) -> str:
 
 
 def _copy(hint: Suggestion) -> list[str]:
-    """For a shell: the map, if one is needed, and the command."""
+    """Return the map, if one is needed, and the command, for a shell."""
     line = shlex.join(hint.command or ())
     if hint.map is None:
         return [line]

@@ -24,8 +24,8 @@ LONGITUDINAL = (("u", "w", "q", "theta", "a1"), ("d_lon", "d_col"))
 
 @dataclass(frozen=True)
 class AtAirspeed:
-    """What the loops of one model stand at one airspeed (m/s): the roll hold d_lat = HOLD phi, and
-    the responses to the sticks.
+    """Margins and bandwidths of one model at one airspeed (m/s): the roll hold d_lat = HOLD phi,
+    and the responses to the sticks.
     """
 
     airspeed: float
@@ -35,7 +35,7 @@ class AtAirspeed:
 
 
 def behind_servo(model: LinearModel, name: str) -> LinearModel:
-    """With the servo of the input `name` and the delay before it."""
+    """Return the model with the servo of the input `name` and the delay before it."""
     return model.driven_by({name: XCELL_SERVOS[name].linear(name)}).driven_by(
         {name: pade_delay(name, DELAY)}
     )

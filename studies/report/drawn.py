@@ -52,7 +52,9 @@ class Drawn:
 
 
 def drawn(pictures: Iterable[tuple[str, str, str, Figure]], folder: Path) -> list[Drawn]:
-    """Write (name, caption, source, figure) as PNG, SVG and PDF, and give what the page shows."""
+    """Write (name, caption, source, figure) as PNG, SVG and PDF, and return the figure of
+    the page.
+    """
     import matplotlib
     import matplotlib.pyplot as plt
 
@@ -109,8 +111,9 @@ def _curves(figure: Figure) -> Iterator[tuple[Any, str]]:
 
 
 def _axes(figure: Figure) -> list[dict[str, Any]]:
-    """Of each panel: its box in points from the upper left, what lies at its edges, whether on a
-    logarithmic scale, and the names of its curves. By these a page reads numbers off the curves.
+    """Return for each panel its box in points from the upper left, the values at its edges, whether
+    it has a logarithmic scale, and the names of its curves, by which a page reads numbers off the
+    curves.
     """
     width, height = 72 * figure.get_size_inches()
     out = []

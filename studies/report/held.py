@@ -1,5 +1,5 @@
-"""Every model with the airspeed held, at many airspeeds: poles, responses, derivatives. What the
-slider of the report moves over.
+"""Models at frozen airspeed, at many airspeeds: poles, responses, derivatives, for the slider of
+the report.
 """
 
 from __future__ import annotations
@@ -60,7 +60,9 @@ every stage, and most stages leave the models as they are.
 
 
 def held_to_dict(study: Outcome) -> dict[str, Any] | None:
-    """Of the exact models and their interpolation, and of the identified ones that are there."""
+    """Return the data of the exact models and their interpolation, and of the identified ones that
+    are there.
+    """
     if study.baseline is None:
         return None
     models = (study.baseline, study.identification, study.known_kinematics)
@@ -170,7 +172,7 @@ def _axis(axis: Axis) -> dict[str, Any]:
 
 
 def _poles(model: LinearModel) -> dict[str, Any]:
-    """Those in the upper half plane."""
+    """Return the poles in the upper half plane."""
     poles = np.asarray(continuous_poles(model))
     upper = poles[np.imag(poles) >= -1e-9]
     return {

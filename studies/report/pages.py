@@ -1,4 +1,4 @@
-"""How the templates of the reports are rendered."""
+"""Rendering of the templates of the reports."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ FOLDER = Path(__file__).resolve().parent
 
 
 def environment() -> Environment:
-    """Of the templates: text is escaped, a name that is not given is an error."""
+    """Return the environment of the templates: text is escaped, an undefined name is an error."""
     import jinja2
 
     return jinja2.Environment(

@@ -1,4 +1,4 @@
-"""Where the numbers of a report come from: date, source, command, machine."""
+"""Provenance of the numbers of a report: date, source, command, machine."""
 
 from __future__ import annotations
 
@@ -32,7 +32,9 @@ def provenance() -> dict[str, str]:
 
 @cache
 def source(root: Path) -> str:
-    """The commit checked out in root, and whether files differ from it; the version without one."""
+    """Return the commit checked out in root, and whether files differ from it; the version without
+    one.
+    """
     git = shutil.which("git")
     if git is None or not (root / ".git").exists():
         return f"version {version('symheli')}"
@@ -53,12 +55,12 @@ def source(root: Path) -> str:
 
 
 def command() -> str:
-    """What started this process, as one would type it."""
+    """Return the command that started this process."""
     return " ".join([Path(sys.argv[0]).name, *sys.argv[1:]])
 
 
 def processor() -> str:
-    """Its name and the number of its cores."""
+    """Return the name of the processor and the number of its cores."""
     try:
         found = re.search(r"model name\s*: (.*)", Path("/proc/cpuinfo").read_text(encoding="utf-8"))
         name = found[1] if found else ""

@@ -1,4 +1,4 @@
-"""What the methods of the study come from."""
+"""Sources of the methods of the study."""
 
 from __future__ import annotations
 

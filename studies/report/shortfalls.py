@@ -1,5 +1,5 @@
-"""Negative results of a run of the study, and computations that failed: two tables, each row with
-its reason and where results.json has it.
+"""Negative results of a run of the study, and failed computations: two tables, each row with its
+reason and its place in results.json.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ KINDS = {
 
 
 class Row(NamedTuple):
-    """What was found, why, its path in results.json, and which of `KINDS` it is; `failed` where the
-    computation broke off, so that nothing was found.
+    """A finding, its reason, its path in results.json, and its kind among `KINDS`; `failed` where
+    the computation broke off without a result.
     """
 
     what: str
@@ -54,7 +54,7 @@ class Row(NamedTuple):
 
 
 def shortfalls(study: Outcome) -> list[Row]:
-    """Everything negative that was found, and everything that failed."""
+    """Return all negative results, and all failures."""
     return [
         *_models(study),
         *_marks(study),
@@ -77,7 +77,7 @@ def failures(study: Outcome) -> Table:
 
 
 def counted(study: Outcome) -> list[str]:
-    """How many results are negative, by kind, and what failed, in sentences."""
+    """Return the number of negative results, by kind, and the failures, in sentences."""
     found = shortfalls(study)
     kinds = Counter(row.kind for row in found if not row.failed)
     out = []
@@ -208,8 +208,8 @@ def _proofs(study: Outcome) -> Iterator[Row]:
 
 
 def _why(b: Bound, bounds: Sequence[Bound]) -> tuple[str, bool]:
-    """Why there is no certificate, by what any search among the same airspeeds has found, and
-    whether that is since the solver failed.
+    """Return why there is no certificate, by the result of any search among the same airspeeds, and
+    whether the solver failed.
     """
     c, same = b.certificate, (b.channel, b.model, b.rate)
     attained = max(o.certificate.lower for o in bounds if (o.channel, o.model, o.rate) == same)

@@ -37,8 +37,8 @@ RATES = {"pitch/flap": "q", "roll/flap": "p"}
 
 @dataclass(frozen=True)
 class Axis:
-    """What is identified: outputs from inputs; `mode` names the rotor mode it must find and the
-    outputs with a pass mark.
+    """An axis to identify: outputs from inputs; `mode` names the rotor mode to reproduce and the
+    outputs with an acceptance threshold.
     """
 
     name: str
@@ -130,7 +130,7 @@ def mode_misses(heli: Helicopter, model: LPVARXModel, mode: str) -> dict[float, 
 
 
 def judged(heli: Helicopter, axis: Axis, model: LPVARXModel, test: FlightRecord) -> Judged:
-    """Validity `model` on a record it has not seen."""
+    """Validate `model` on a record that is not in the fit."""
     return Judged(
         scores=scores(model, test, horizon=HORIZON), mode_miss=mode_misses(heli, model, axis.mode)
     )

@@ -112,8 +112,9 @@ def run_campaign(
     on: Runner,
     path: Path | None = None,
 ) -> MarksOverSeeds:
-    """Fly, identify and judge with the default seed and `seeds` others (new schedules, excitation
-    and noise each); a case is a seed, kept in the dataset at `path` where one is given.
+    """Simulate, identify and validate with the default seed and `seeds` others (new schedules,
+    excitation and noise each); a case is a seed, stored in the dataset at `path` and computed only
+    once.
     """
     asked = Campaign(marks.TRIAL, grid={"seed": range(seeds + 1)}, fixed={"vehicle": vehicle})
     return MarksOverSeeds(tuple(_rows(columns_of(asked, on, path))), seeds)

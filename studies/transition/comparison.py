@@ -1,5 +1,5 @@
-"""Baseline and identified models on equal terms: predictions of the test flights, and models with
-airspeed held.
+"""Comparison of baseline and identified models on equal terms: predictions of the test flights, and
+models at frozen airspeed.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ CHANNELS = {LONGITUDINAL.name: ("d_lon", "q"), LATERAL.name: ("d_lat", "p")}
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ComparedAxis:
-    """Who predicts one axis of one test flight how well."""
+    """Predictions of one axis of one test flight by all models."""
 
     axis: Axis
     noise: str
@@ -76,7 +76,7 @@ class FrozenAxis:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Comparison:
-    """All that was compared."""
+    """All comparisons."""
 
     predictions: tuple[ComparedAxis, ...]
     frozen: tuple[FrozenAxis, ...]

@@ -1,5 +1,5 @@
-"""What the study says, in short sentences from its numbers: the question's answer first, what it
-rests on after it; long lists are tables.
+"""Conclusions of the study, in short sentences from its numbers: the answer first, its basis after
+it; long lists are tables.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def of_its_own(study: Outcome) -> bool:
 
 
 def question(study: Outcome) -> str:
-    """What a reader wants to know first."""
+    """Return the main question of the study and its answer."""
     if of_its_own(study):
         return "Does it hover, where does it trim, is it stable, and can a controller be certified?"
     return (
@@ -118,12 +118,12 @@ def _first_controller(study: Outcome) -> Iterator[str]:
 
 
 def abstract(study: Outcome) -> list[str]:
-    """What was done and found, for a reader of nothing else."""
+    """Return the abstract: methods and results."""
     return [*_answer(study), *_models(study), *_flights(study), *_limits(study)]
 
 
 def conclusions(study: Outcome) -> list[str]:
-    """What to do, and what it rests on."""
+    """Return recommendations, and their basis."""
     return [
         *_where_lft_is_enough(study),
         *_models(study),
@@ -135,7 +135,7 @@ def conclusions(study: Outcome) -> list[str]:
 
 
 def loops(study: Outcome) -> dict[str, GainCurve]:
-    """What was proven of the baseline of each loop, by channel."""
+    """Return the proofs of the baseline of each loop, by channel."""
     return {
         channel: gain_curve(study.bounds, "baseline", channel, name)
         for channel, name in LOOP_NAMES.items()
@@ -195,7 +195,7 @@ def _more(one: float, other: float) -> str:
 
 
 def _where_lft_is_enough(study: Outcome) -> Iterator[str]:
-    """When to take which."""
+    """Yield when to use which model."""
     tried = {c: v for c, v in loops(study).items() if set(v.jumping) & set(LFT_TESTS)}
     if not tried:
         return
@@ -222,7 +222,7 @@ def _where_lft_is_enough(study: Outcome) -> Iterator[str]:
 
 
 def _models(study: Outcome) -> Iterator[str]:
-    """How much the LFT loses as a model, how close identification comes."""
+    """Yield the error of the LFT as a model, and that of identification."""
     found = study.known_kinematics
     if found is None:
         return
@@ -254,7 +254,7 @@ def _within(gap: float, hold: float, margin: float) -> str:
 
 
 def _flights(study: Outcome) -> Iterator[str]:
-    """Who flew best."""
+    """Yield the ranking of the controllers in flight."""
     found = study.flown_controllers
     if found is None or not found.flown:
         return
@@ -274,13 +274,13 @@ def _flights(study: Outcome) -> Iterator[str]:
 
 
 def _limits(study: Outcome) -> Iterator[str]:
-    """What the certificates do not say."""
+    """Yield the limits of the certificates."""
     if study.flown_controllers is not None and study.flown_controllers.flown:
         yield hypotheses(study.flown_controllers)
 
 
 def _acceleration(study: Outcome) -> Iterator[str]:
-    """What scheduling is worth in prediction."""
+    """Yield the benefit of scheduling on acceleration in prediction."""
     found = study.known_kinematics
     if found is None:
         return
@@ -322,7 +322,7 @@ def _recursion(study: Outcome) -> Iterator[str]:
 
 
 def _controllers(study: Outcome) -> Iterator[str]:
-    """What bounded rates are worth in flight, and what was proven of the loops that fly."""
+    """Yield the benefit of bounded rates in flight, and the proofs of the simulated loops."""
     found, proofs = study.flown_controllers, study.certified_controllers
     if found is None:
         return
@@ -360,17 +360,19 @@ def _controllers(study: Outcome) -> Iterator[str]:
 
 
 def certificates(study: Outcome) -> list[str]:
-    """What the proofs for the loop with a margin are about: a sentence for each acceleration."""
+    """Return the statements of the proofs for the loop with a margin: a sentence for each
+    acceleration.
+    """
     own = [b for b in study.bounds if b.channel == "robust" and b.certificate.kind == "l2 gain"]
     out = []
     for rate in sorted({b.rate for b in own}):
-        told = list(_told([b for b in own if b.rate == rate]))
+        told = list(_statements([b for b in own if b.rate == rate]))
         if told:
             out.append(f"Loop with a margin, {rate_text(rate)}: {'; '.join(told)}.")
     return out
 
 
-def _told(own: list[Bound]) -> Iterator[str]:
+def _statements(own: list[Bound]) -> Iterator[str]:
     by_model = {b.model: b for b in own if b.form not in (CONSTANT, *LFT_TESTS)}
     exact, allowed, estimate = (by_model.get(name) for name in ("exact", ALLOWED, ESTIMATE))
     if allowed is not None:

@@ -1,5 +1,5 @@
-"""What a run of the study is asked for, in a TOML file: written with its defaults, read with every
-complaint at once, kept beside the results.
+"""Configuration of a run of the study, in a TOML file: written with its defaults, read with all
+errors at once, stored beside the results.
 """
 
 from __future__ import annotations
@@ -31,9 +31,7 @@ KEPT = "study.toml"
 
 @dataclass(frozen=True, kw_only=True)
 class Configuration:
-    """All that a run may be asked for. Raises `InputError` for what is of another type or out of
-    range.
-    """
+    """All options of a run. Raises `InputError` for a wrong type or a value out of range."""
 
     vehicle: str = choice("xcell60", "packaged airframe, or a vehicle file")
     seed: int = choice(0, "of excitation and noise", least=0)
@@ -46,7 +44,8 @@ class Configuration:
 
     @classmethod
     def of(cls, given: Mapping[str, Any], source: str = "the configuration") -> Configuration:
-        """What the entries of a table ask for; `effort` holds what differs from its defaults.
+        """Return the configuration of a table's entries; `effort` holds differences from its
+        defaults.
 
         Raises `InputError` with everything that is wrong, by the name of the key.
         """
@@ -70,11 +69,13 @@ class Configuration:
         return cls.of({**said, **options}, str(path or "options"))
 
     def write(self, path: Path) -> Path:
-        """Write everything that was asked for, defaults too."""
+        """Write all options, defaults too."""
         return write_text(path, self.text(path.parent, active=True))
 
     def text(self, folder: Path, active: bool = False) -> str:
-        """The file as it stands in this folder: [effort] as comments to change, or `active`."""
+        """Return the file as it stands in this folder: [effort] as comments to change, or
+        `active`.
+        """
         return "\n".join(self._lines(folder, active)) + "\n"
 
     def _lines(self, folder: Path, active: bool) -> Iterator[str]:
@@ -92,7 +93,7 @@ class Configuration:
 
 
 def _effort(quick: bool, changes: Any, complaints: list[str]) -> Effort:
-    """The usual effort, or that of a look, with these changes."""
+    """Return the default effort, or that of a quick look, with these changes."""
     base = Effort.look() if quick else Effort()
     if isinstance(changes, Effort):
         return changes

@@ -1,4 +1,4 @@
-"""How much the main job does."""
+"""Amount of work of a run of the study."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ GLANCE = Search(levels=6, dwells=5, starts=1, nodes=60, evaluations=8, samples=2
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is done: the whole study, or a look (`quick`). Raises `InputError` for what is of
-    another type or out of range.
+    """Amount of work: the whole study, or a quick look (`quick`). Raises `InputError` for a wrong
+    type or a value out of range.
     """
 
     ramps: int = choice(12, "changes of airspeed in the flights that are identified", least=2)

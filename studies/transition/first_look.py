@@ -1,5 +1,5 @@
-"""What one asks first of a helicopter: does it hover, where does it trim, how does it move by
-itself, what margins has a simple loop.
+"""First analysis of a helicopter: hover, trims, open-loop stability, and the margins of a simple
+loop.
 """
 
 from __future__ import annotations
@@ -114,7 +114,9 @@ class FirstLook:
 
 
 def first_look(family: LinearFamily, travel: dict[str, float]) -> FirstLook:
-    """Of linear models along airspeed with their trims, and the travel of each control, rad."""
+    """Return the first analysis of linear models along airspeed with their trims, and the travel of
+    each control, rad.
+    """
     trims = family.known_trims("the first look")
     at = np.unique(np.linspace(0, len(family) - 1, POINTS).round().astype(int))
     shown = []

@@ -55,16 +55,16 @@ class TransitionPlan:
     def test(
         self, heli: Helicopter, autopilot: Autopilot, acceleration: float = 3.2
     ) -> FlightRecord:
-        """A transition no fit has seen: hover, 13 m/s, hover at 3.2 m/s^2, other multisines, other
-        noise.
+        """Return a transition for validation: hover, 13 m/s, hover at 3.2 m/s^2, other multisines,
+        other noise.
         """
         return self._fly(
             heli, AirspeedSchedule.transition(0.0, TOP, acceleration, hold=2.0), autopilot, 3000
         )
 
     def gentle(self, heli: Helicopter, autopilot: Autopilot, ramps: int = 10) -> FlightRecord:
-        """Slow ramps (1 m/s^2) with long holds and lower frequencies: what the barely damped slow
-        modes need to be seen.
+        """Return slow ramps (1 m/s^2) with long holds and lower frequencies, which excite the
+        lightly damped slow modes.
         """
         schedule = AirspeedSchedule.varied(0.0, TOP, (1.0,) * ramps, 4.0, seed=4000 + self.seed)
         return self._fly(heli, schedule, autopilot, 5000, lowest=0.03)
@@ -98,7 +98,9 @@ class TransitionPlan:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Flights:
-    """What is identified, what judges, each {noise: record}, and the gentle flight."""
+    """Records for identification and for validation, each {noise: record}, and the gentle
+    flight.
+    """
 
     training: Mapping[str, FlightRecord]
     test: Mapping[str, FlightRecord]
@@ -115,7 +117,7 @@ class Flights:
 
 
 def fly_transitions(heli: Helicopter, seed: int, ramps: int, gentle_ramps: int) -> Flights:
-    """Training and test without and with noise, and the gentle flight."""
+    """Simulate training and test flights without and with noise, and the gentle flight."""
     autopilot = autopilot_for(heli)
     clean = TransitionPlan(seed, ramps=ramps)
     plans = dict(zip(NOISES, (clean, clean.noisy()), strict=True))
@@ -127,5 +129,5 @@ def fly_transitions(heli: Helicopter, seed: int, ramps: int, gentle_ramps: int) 
 
 
 def autopilot_for(heli: Helicopter, dt: float = 0.02) -> Autopilot:
-    """The gain-scheduled LQR all flights of the study share."""
+    """Return the gain-scheduled LQR common to all flights of the study."""
     return gain_scheduled_lqr(heli, 0.0, TOP, dt)

@@ -1,4 +1,4 @@
-"""What can be proven about the lateral loop: gain against permitted acceleration, for baseline and
+"""Certificates of the lateral loop: gain against permitted acceleration, for baseline and
 identified model.
 """
 
@@ -77,8 +77,8 @@ def scaled(lpv: LPVStateSpace) -> LPVStateSpace:
 
 
 def gust_loop(family: LinearFamily, degree: int = 3) -> LPVStateSpace:
-    """Closed loop from a lateral gust v_w (m/s) to r (rad/s) and phi (rad), continuous, cubic
-    element-wise fit.
+    """Return the closed loop from a lateral gust v_w (m/s) to r (rad/s) and phi (rad), continuous,
+    cubic element-wise fit.
     """
     return close(family.select(STATES, ["d_lat", "v_w"]).interpolate("polynomial", degree), "gust")
 
@@ -86,8 +86,8 @@ def gust_loop(family: LinearFamily, degree: int = 3) -> LPVStateSpace:
 def servo_loop(
     model: LPVStateSpace, gains: Mapping[tuple[str, str], float] = ATTITUDE_HOLD
 ) -> LPVStateSpace:
-    """Closed loop from disturbances at d_lat and d_ped to r and phi, each in its size, sampled at
-    50 Hz.
+    """Return the closed loop from disturbances at d_lat and d_ped to r and phi, each in its size,
+    sampled at 50 Hz.
     """
     return scaled(close(model, "inputs", gains))
 
@@ -111,7 +111,7 @@ def servo_loops(
 
 
 def has_lft(loop: LPVStateSpace) -> bool:
-    """Whether the LFT tests have anything to say: polynomial entries, stable when frozen."""
+    """Whether the LFT tests are applicable: polynomial entries, stable when frozen."""
     return isinstance(loop.basis, Polynomial) and math.isfinite(synthesis.frozen_gain(loop).gain)
 
 
@@ -219,7 +219,7 @@ def _lft_bound(name: str, channel: str, lpv: LPVStateSpace, form: str) -> list[B
 def allowed_bounds(
     channel: str, loop: UncertainStateSpace, rates: Sequence[float], form: Spline
 ) -> list[Proof]:
-    """Gains of every model that the flights allow; no lower bound is looked for."""
+    """Return gains of every model that the flights allow; no lower bound is searched."""
     return [partial(_allowed_bound, channel, loop, rate, form) for rate in rates]
 
 
@@ -247,7 +247,7 @@ def curves(found: Sequence[Bound]) -> list[GainCurve]:
 
 
 def unit_of(channel: str) -> str:
-    """Of the gain of a channel."""
+    """Return the unit of the gain of a channel."""
     return "1" if channel in ("servo", "robust", "controllers") else "(rad/s, rad)/(m/s)"
 
 
@@ -257,7 +257,7 @@ def proven(b: Bound) -> float:
 
 
 def gain_curve(found: Sequence[Bound], model: str, channel: str, title: str) -> GainCurve:
-    """What the bounds of one loop say about its gain."""
+    """Return the gain curve of the bounds of one loop."""
     own = [
         b for b in found if (b.model, b.channel, b.certificate.kind) == (model, channel, "l2 gain")
     ]
@@ -266,5 +266,5 @@ def gain_curve(found: Sequence[Bound], model: str, channel: str, title: str) -> 
 
 
 def rate_text(rate: float) -> str:
-    """The rate as a reader would say it."""
+    """Return the rate in words."""
     return "frozen" if rate == 0 else "arbitrarily fast" if math.isinf(rate) else f"{rate:g} m/s^2"

@@ -1,4 +1,4 @@
-"""Every axis identified from the training flights and judged on the test flights."""
+"""Identification of every axis from the training flights, and validation on the test flights."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class NoisyModes:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Identification:
-    """What was identified.
+    """Identified models of all axes.
 
     `gentle` is the lateral model of the gentle flight; `first_stage` the first-stage F of the
     instruments in the direction they explain worst, `update_times` the seconds of one recursive
@@ -60,7 +60,7 @@ class Identification:
     update_times: Mapping[str, float]
 
     def of(self, axis: Axis, noise: str) -> IdentifiedAxis:
-        """That of one axis."""
+        """Return the identification of one axis."""
         return next(one for one in self.axes if (one.axis, one.noise) == (axis, noise))
 
 

@@ -58,7 +58,7 @@ class Rival:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class KnownKinematics:
-    """What was found.
+    """Results of the models with known kinematics.
 
     `flown`: seconds of each flight; `simulator`: the vehicle that the instruments are flown in;
     `model`: that over airspeed and acceleration; `margins`: b(P, C) of each of `LOOPS` around the
@@ -162,7 +162,7 @@ def _interpolated(baseline: BaselineModel) -> FrozenAxes:
 def _arx(
     training: Sequence[FlightRecord],
 ) -> dict[str, tuple[list[LPVARXModel], FrozenAxes]]:
-    """LPV-ARX as in the sections before, of each axis alone and of all together."""
+    """Identify LPV-ARX models as in the sections before, of each axis alone and of all together."""
     alone = {"longitudinal": LONGITUDINAL, "lateral": LATERAL}
     each = {name: fit(axis.structure(), training, "ls") for name, axis in alone.items()}
     whole = fit(ALL.structure(), training, "ls")

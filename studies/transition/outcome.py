@@ -1,4 +1,4 @@
-"""What a run of the study found."""
+"""Results of a run of the study."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is proven of the closed loops, stage by stage."""
+"""Proofs of the closed loops, stage by stage."""
 
 from __future__ import annotations
 
@@ -25,7 +25,9 @@ from synthesis.worst.frozen import FrozenGain
 
 @dataclass(frozen=True, kw_only=True)
 class GustProofs:
-    """Of the lateral gust loop; `exact_frozen` is the frozen gain of the exact linearizations."""
+    """Proofs of the lateral gust loop; `exact_frozen` is the frozen gain of the exact
+    linearizations.
+    """
 
     bounds: tuple[Bound, ...]
     exact_frozen: float
@@ -33,15 +35,15 @@ class GustProofs:
 
 @dataclass(frozen=True, kw_only=True)
 class LongitudinalProofs:
-    """Of the longitudinal gust loop."""
+    """Proofs of the longitudinal gust loop."""
 
     bounds: tuple[Bound, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
 class ServoProofs:
-    """Of the servo loop at 50 Hz; `frozen_peaks` says where the frozen gain of each model is
-    largest.
+    """Proofs of the servo loop at 50 Hz; `frozen_peaks` are the airspeeds of the largest frozen
+    gain of each model.
     """
 
     bounds: tuple[Bound, ...]
@@ -51,7 +53,7 @@ class ServoProofs:
 
 @dataclass(frozen=True, kw_only=True)
 class RobustProofs:
-    """Of the loop with a margin at 50 Hz."""
+    """Proofs of the loop with a margin at 50 Hz."""
 
     bounds: tuple[Bound, ...]
 

@@ -113,7 +113,7 @@ def whole(cell: str) -> str:
 
 
 def title(study: Outcome) -> str:
-    """Of the page."""
+    """Return the title of the page."""
     if not of_its_own(study):
         return "LFT against LPV along the transition"
     return study.heli.vehicle.title if study.heli else Path(study.vehicle).stem
@@ -138,7 +138,7 @@ def _written(results: dict[str, Any], out: Path) -> Path:
 
 
 def _headline(study: Outcome) -> dict[str, object]:
-    """What the page says in sentences, and the numbers at its head."""
+    """Return the sentences of the page, and the numbers at its head."""
     gust = [
         b
         for b in study.bounds

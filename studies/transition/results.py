@@ -1,5 +1,5 @@
-"""Every number of the report with its unit, as a program would read it: results.schema.json says
-what is where.
+"""All numbers of the report with their units for programs, as results.schema.json describes
+them.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ LIBRARIES = ("symheli", "casadi", "numpy", "scipy", "cvxpy", "clarabel")
 
 
 def to_dict(study: Outcome) -> dict[str, Any]:
-    """What the study has reached; null where it has not."""
+    """Return the results computed so far; null where there are none."""
     return {
         "schema": SCHEMA,
         "vehicle": study.vehicle,
@@ -66,7 +66,7 @@ def to_dict(study: Outcome) -> dict[str, Any]:
         "flights": study.flights and _flights(study.flights),
         "identification": study.identification and _identification(study.identification),
         "comparison": study.comparison and _comparison(study.comparison),
-        "known_kinematics": study.known_kinematics and _known(study.known_kinematics),
+        "known_kinematics": study.known_kinematics and _known_kinematics(study.known_kinematics),
         "guarantees": _guarantees(study),
         "controllers": controllers_to_dict(study),
         "held": held_to_dict(study),
@@ -278,7 +278,7 @@ def _both(baseline: Iterable[float], identified: Iterable[float], unit: str) -> 
     return {"baseline": values(baseline, unit), "identified": values(identified, unit)}
 
 
-def _known(found: KnownKinematics) -> dict[str, Any]:
+def _known_kinematics(found: KnownKinematics) -> dict[str, Any]:
     return {
         "training_flights": [
             {"name": name, "duration": value(seconds, "s")} for name, seconds in found.flown.items()

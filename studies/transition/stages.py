@@ -33,8 +33,8 @@ GIVEN = ("vehicle", "seed", "heli")
 
 @dataclass(frozen=True)
 class Stage:
-    """A function that fills the field `name` of an `Outcome`; `title` is what a reader is told
-    meanwhile.
+    """A function that fills the field `name` of an `Outcome`; `title` is its name in progress
+    messages.
 
     Its parameters without default are entries of the effort, earlier stages, or `GIVEN`: nothing
     else can decide its result. It may return `Questions`, which processes answer. `cost` is about
@@ -48,7 +48,7 @@ class Stage:
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        """What it is computed from."""
+        """Parameters on which the result depends."""
         each = signature(self.compute).parameters.values()
         return tuple(p.name for p in each if p.default is Parameter.empty)
 
@@ -63,7 +63,7 @@ class Stage:
         return tuple(name for name in self.parameters if name not in ENTRIES | {*GIVEN})
 
     def found(self, outcome: Outcome, effort: Effort) -> Any:
-        """Its result, or its questions."""
+        """Return its result, or its questions."""
         sources = {name: effort if name in ENTRIES else outcome for name in self.parameters}
         return self.compute(**{name: getattr(source, name) for name, source in sources.items()})
 
@@ -140,5 +140,5 @@ STAGES = (
 
 
 def stages(effort: Effort) -> tuple[Stage, ...]:
-    """Those that this effort asks for."""
+    """Return the stages that this effort requests."""
     return tuple(s for s in STAGES if s.name != "longitudinal" or effort.longitudinal_rates)

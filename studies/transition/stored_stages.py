@@ -1,5 +1,5 @@
-"""Finished stages of a study on disk, each whole or not at all, for a run that goes on where
-another stopped.
+"""Finished stages of a study on disk, each complete or absent, for a run that resumes a stopped
+one.
 
 A stage is stored as JSON and arrays, see `stage_file`, below a line with the key of what it was
 computed from and the digest of its bytes. The key covers what the stage reads of the effort and the
@@ -35,12 +35,12 @@ LIBRARIES = ("casadi", "numpy", "scipy", "cvxpy", "clarabel")
 
 
 class NotUsable(SymheliError):
-    """A stage that is stored and cannot be taken; the message says why."""
+    """Raised for a stored stage that cannot be used; the message gives the reason."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Stored:
-    """What was computed, and the seconds it took."""
+    """Result of a stage, and the seconds it took."""
 
     result: Any
     seconds: float
@@ -72,7 +72,7 @@ class StoredStages:
         return path
 
     def load(self, name: str, part: int | None = None) -> Stored | None:
-        """What is stored; None where nothing is.
+        """Return the stored result; None where there is none.
 
         Raises `NotUsable` for what another version, vehicle, effort or seed has left, and for what
         is damaged.
@@ -148,7 +148,7 @@ def _digest(parts: Iterable[str]) -> str:
 
 @cache
 def code_digest() -> str:
-    """Of every source file of the four packages, and of the packaged vehicles."""
+    """Return a digest of every source file of the four packages, and of the packaged vehicles."""
     root, digest = Path(__file__).resolve().parents[2], hashlib.sha256()
     for package in PACKAGES:
         for path in sorted((root / package).rglob("*")):

@@ -150,8 +150,8 @@ class _Run:
         self._keep(stage, Stored(result=result, seconds=sum(one.seconds for one in found)))
 
     def _keep(self, stage: Stage, found: Stored) -> None:
-        """Store the result of a stage, and write what there is."""
-        _say(f"{stage.title}: {found.seconds:.1f} s of work")
+        """Store the result of a stage, and write the results so far."""
+        _print(f"{stage.title}: {found.seconds:.1f} s of work")
         self.stored.save(stage.name, found)
         self.study = with_stage(self.study, stage, found)
         write_results(self.study, self.stored.folder.parent)
@@ -160,7 +160,7 @@ class _Run:
 
 
 def timed(work: Callable[[], Any]) -> Stored:
-    """What a function returns, and how long it took."""
+    """Return the result of a function, and its time."""
     begin = time.perf_counter()
     result = work()
     return Stored(result=result, seconds=time.perf_counter() - begin)
@@ -183,14 +183,14 @@ def with_stage(study: Study, stage: Stage, found: Stored) -> Study:
 
 
 def _taken(stored: StoredStages, stage: Stage) -> Stored | None:
-    """A stored stage, or None with the reason said."""
+    """Return a stored stage, or None with the reason printed."""
     try:
         found = stored.load(stage.name)
     except NotUsable as reason:
-        _say(f"{reason}: not taken")
+        _print(f"{reason}: not taken")
         return None
     if found is not None:
-        _say(f"{stage.title}: taken from {stored.folder} ({found.seconds:.1f} s when computed)")
+        _print(f"{stage.title}: taken from {stored.folder} ({found.seconds:.1f} s when computed)")
     return found
 
 
@@ -200,8 +200,8 @@ def _shown(title: str) -> Iterator[None]:
     begin = time.perf_counter()
     with task(title):
         yield
-    _say(f"{title}: {time.perf_counter() - begin:.1f} s")
+    _print(f"{title}: {time.perf_counter() - begin:.1f} s")
 
 
-def _say(sentence: str) -> None:
+def _print(sentence: str) -> None:
     print(f"  {sentence}", file=sys.stderr, flush=True)

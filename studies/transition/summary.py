@@ -1,4 +1,4 @@
-"""What is printed when the study is done: the answer, and what it rests on."""
+"""Text printed at the end of the study: the answer, and its basis."""
 
 from __future__ import annotations
 

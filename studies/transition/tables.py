@@ -201,7 +201,7 @@ def experiment(study: Outcome) -> Table:
 
 
 def scores(study: Outcome, noise: str) -> Table:
-    """Identified models on the unseen transition."""
+    """Return the table of identified models on the validation transition."""
     table = Table(
         "Identified LPV-ARX (order 3, quadratic in p, 50 Hz) on a transition it has not seen,"
         f" {noise}: fit in percent",
@@ -254,7 +254,7 @@ def modes(study: Outcome) -> Table:
 
 
 def comparison(compared: ComparedAxis) -> Table:
-    """Who predicts best, 1 s ahead and in free run."""
+    """Return the comparison of predictions, 1 s ahead and in free run."""
     outputs, predictions = compared.axis.outputs, compared.found.predictions
     table = Table(
         f"{compared.axis.name}, {compared.noise}: one step / 1 s ahead / free run on the unseen"
@@ -296,7 +296,7 @@ def verdicts(study: Outcome) -> list[str]:
 
 
 def findings(study: Outcome) -> list[str]:
-    """What the numbers of the identification and of the proofs say, in sentences."""
+    """Return findings of the identification and of the proofs, in sentences."""
     found = study.identification
     out = [] if found is None else [_other_inputs(found), _real_time(found)]
     for name, peak in study.servo.frozen_peaks.items() if study.servo else ():
@@ -325,7 +325,7 @@ def findings(study: Outcome) -> list[str]:
 
 
 def _other_inputs(found: Identification) -> str:
-    """What measuring all inputs is worth to the lateral axis."""
+    """Return the benefit of measuring all inputs for the lateral axis."""
     plain, rich = (
         found.of(axis, NOISES[0]).scores.ahead for axis in (LATERAL, LATERAL_WITH_COLLECTIVE)
     )
@@ -337,7 +337,7 @@ def _other_inputs(found: Identification) -> str:
 
 
 def _real_time(found: Identification) -> str:
-    """How much of the sample period an update takes."""
+    """Return the fraction of the sample period that an update takes."""
     each = ", ".join(
         f"{1e6 * seconds:.2g} us ({name})" for name, seconds in found.update_times.items()
     )
@@ -355,7 +355,7 @@ def _real_time(found: Identification) -> str:
 
 
 def known_kinematics(found: KnownKinematics) -> list[Table]:
-    """Who predicts how well, who is how close for feedback."""
+    """Return the comparison of predictions, and of models for feedback."""
     outputs = list(found.rivals[0].ahead)
     fits = Table(
         "1 s ahead on the unseen transition, against its states without noise: fit in percent",
@@ -389,7 +389,7 @@ def known_kinematics(found: KnownKinematics) -> list[Table]:
 
 
 def scheduling(found: KnownKinematics) -> Table:
-    """What scheduling is worth: one model less another, output by output."""
+    """Return the benefit of scheduling: one model minus another, output by output."""
     outputs = list(found.rivals[0].ahead)
     table = Table(
         "What moving coefficients are worth: change of the fit 1 s ahead, in points",

@@ -1,5 +1,5 @@
-"""Reading the file of an identified linear model: equations and parameters in the source's units,
-converted to SI; one message names everything that is wrong with its line.
+"""Reader of files of identified linear models: equations and parameters in the source's units,
+converted to SI; one message lists all errors with their lines.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ _OPERATIONS: dict[type, Callable[..., Any]] = {
     ast.USub: operator.neg,
 }
 _ROUNDING = 1e-9
-"""Far above rounding, far below any unit or nonlinearity."""
+"""Relative tolerance: far above rounding, far below any unit or nonlinearity."""
 
 
 class LinearEquations(NamedTuple):
-    """What the file holds, in SI: units of states and inputs by name, coefficients (states, states
+    """Content of the file in SI: units of states and inputs by name, coefficients (states, states
     and inputs) of the derivatives, and parameters.
     """
 
@@ -50,7 +50,7 @@ class LinearEquations(NamedTuple):
 
 
 class LinearModelFile:
-    """The text of such a file, its tables and everything that was found wrong."""
+    """Text of such a file, its tables and all errors found."""
 
     def __init__(self, path: str, text: str):
         self.path, self.lines = path, text.splitlines()
@@ -80,8 +80,8 @@ class LinearModelFile:
         self.problems.append(problem(self.lines, section, entry, wrong))
 
     def _table(self, name: str) -> Mapping[str, Any]:
-        """One of the sections; where it is missing that is noted, and one of nearly that name is
-        taken.
+        """Return one of the sections; where it is missing, note that and take one with nearly that
+        name.
         """
         found = self.tables.get(name)
         if isinstance(found, dict):
@@ -195,7 +195,7 @@ class LinearModelFile:
         return row
 
     def _units_fit(self, state: str, signals: list[str], row: Array, theirs: Array) -> None:
-        """Note the terms of an equation that say another thing in SI than in the file's units."""
+        """Note the terms of an equation whose units are inconsistent in SI."""
         wrong = []
         for name, made, given in zip(signals, row, theirs, strict=True):
             if name in self._factors:
@@ -215,7 +215,7 @@ class LinearModelFile:
 
 
 def _quantity(given: Any) -> Quantity:
-    """A parameter in the SI unit of what it declares; the `InputError` says all that is wrong."""
+    """Return a parameter in the SI unit of its declaration; the `InputError` lists all errors."""
     wrong = []
     table = given if isinstance(given, dict) else {}
     if not table:
@@ -257,7 +257,7 @@ def _parsed(text: str) -> tuple[ast.AST, list[str]]:
 
 
 def _parts(node: ast.AST, text: str) -> Iterator[ast.AST]:
-    """Names and numbers of an expression."""
+    """Yield names and numbers of an expression."""
     match node:
         case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATIONS:
             yield from _parts(left, text)

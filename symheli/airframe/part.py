@@ -1,6 +1,4 @@
-"""A component in its place in one airframe: where it sits, what drives it, and under which names it
-speaks.
-"""
+"""A component installed in an airframe: its place, its inputs, and the names of its signals."""
 
 from __future__ import annotations
 
@@ -36,19 +34,19 @@ class Part:
 
     @property
     def entries(self) -> dict[str, Entry]:
-        """What it asks of its section, without the optional entries that are not there."""
+        """Entries of its section, without optional entries that are absent."""
         own = self.component.entries
         asked = {name: e for name, e in own.items() if not e.optional or name in self.given}
         return {**asked, **(PLACE if self.placed else {})}
 
     @property
     def subscript(self) -> str:
-        """What marks its forces in print."""
+        """Subscript of its forces in print."""
         return self.component.subscript + self.suffix
 
     @property
     def states(self) -> tuple[Signal, ...]:
-        """Its own states as the vehicle names them."""
+        """Its states by the vehicle's names."""
         return tuple(Signal(f"{s}{self.suffix}", s.unit) for s in self.component.states)
 
     @property
@@ -69,7 +67,7 @@ class Part:
         own: Mapping[str, Any],
         flow: Flow,
     ) -> Effect:
-        """Its effect about the c.g. and under the vehicle's names; arguments as in
+        """Evaluate its effect about the c.g. and under the vehicle's names; arguments as in
         `Component.evaluate`, of the vehicle.
         """
         inner = self.component.evaluate(

@@ -1,6 +1,4 @@
-"""What no airframe can be, and what none is: impossible numbers, and numbers that a wrong unit
-explains better than any helicopter.
-"""
+"""Plausibility of an airframe: impossible numbers, and numbers that a wrong unit would explain."""
 
 from __future__ import annotations
 
@@ -16,7 +14,7 @@ from symheli.values.units import dimension, to_si, units_of
 
 
 class Scale(NamedTuple):
-    """What numbers of one airframe are compared with: main-rotor radius (m) and mass (kg)."""
+    """Reference quantities of an airframe: main-rotor radius (m) and mass (kg)."""
 
     radius: float
     mass: float
@@ -79,7 +77,7 @@ RANGES: Mapping[str, Range] = {
 }
 """{kind of quantity: plausible range}, wider than any helicopter by a factor of two or more."""
 
-USUAL = {
+USUAL_SOURCE = {
     "rad": "deg",
     "rad/s": "rpm",
     "1/rad": "1/deg",
@@ -88,10 +86,10 @@ USUAL = {
     "kg m^2": "kg cm^2",
     "W": "hp",
 }
-"""What a number is most often in that was not converted to this unit."""
+"""Unit in which a number most often is, by SI unit, when it was not converted."""
 
-IMPLIED = {"rad": "deg", "rad/s": "rpm", "1/rad": "1/deg"}
-"""The unit in which a number is easier to doubt."""
+READABLE_UNIT = {"rad": "deg", "rad/s": "rpm", "1/rad": "1/deg"}
+"""Unit in which a message prints a number, by SI unit."""
 
 
 def impossibilities(
@@ -174,8 +172,8 @@ def _doubt(q: Quantity, kind: Range, compared: float, scale: Scale | None) -> st
     means = (
         f"is {kind.name} = {compared:.4g} {kind.unit}".rstrip()
         if kind.name
-        else f"is {q.value / to_si(IMPLIED[q.unit])[0]:.4g} {IMPLIED[q.unit]}"
-        if q.unit in IMPLIED
+        else f"is {q.value / to_si(READABLE_UNIT[q.unit])[0]:.4g} {READABLE_UNIT[q.unit]}"
+        if q.unit in READABLE_UNIT
         else "is outside of every helicopter's range"
     )
     plausible = f"plausible is {kind.low:g} to {kind.high:g} {kind.unit}".rstrip()
@@ -187,7 +185,7 @@ def _meant(q: Quantity, kind: Range, scale: Scale | None) -> str:
     given = q.given or q.unit
     number = q.value / to_si(given, q.unit)[0]
     units = [u for u in units_of(dimension(q.unit)) if u != given]
-    units.sort(key=lambda u: u != USUAL.get(q.unit))
+    units.sort(key=lambda u: u != USUAL_SOURCE.get(q.unit))
     values = {unit: number * to_si(unit, q.unit)[0] for unit in units}
     fit = [unit for unit in units if kind.among(values[unit], scale)[1]][:2]
     said = " or ".join(f"{number:g} {u}, {values[u]:.4g} {q.unit}" for u in fit)

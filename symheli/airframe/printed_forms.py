@@ -1,5 +1,5 @@
-"""Where the source is ambiguous or wrong this project decided otherwise; each printed form is an
-option by name.
+"""Printed forms of equations that are ambiguous or wrong in the source; each is an option
+by name.
 """
 
 from __future__ import annotations

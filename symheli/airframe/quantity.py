@@ -11,12 +11,12 @@ from symheli.errors import InputError, UnknownNameError
 from symheli.values.units import dimension, to_si, units_of
 
 KEYS = ("value", "unit", "source", "assumed", "unusual", "ref")
-"""What an entry of a data file may say."""
+"""Permitted keys of an entry of a data file."""
 
 
 class Quantity(NamedTuple):
-    """A value in SI, its SI unit, where it was published, whether it is an assumption (`source`
-    then says why), and the name of the entry it is taken from where it has no value of its own.
+    """A value in SI, its SI unit, its source, whether it is an assumption (`source` then gives the
+    reason), and the name of the entry it is taken from where it has no value of its own.
 
     `unusual`: meant although no other airframe has it. `given`: the unit it was written in.
     """

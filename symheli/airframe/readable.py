@@ -1,5 +1,5 @@
-"""The text of a TOML file that was typed by hand: every line that is no TOML is found in one go,
-and one message says everything that is wrong, line by line.
+"""Reader of TOML files written by hand: all invalid lines are found at once, and one message lists
+all errors, line by line.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ UNREADABLE: Mapping[str, Any] = {"unreadable": True}
 Problem = tuple[int, str]
 """Line (0: of none) and what is wrong, with its place."""
 
-_MOST = 50
-"""So many broken lines are looked for."""
+_MAX_BROKEN_LINES = 50
+"""Largest number of invalid lines that are reported."""
 
 
 def readable(text: str) -> tuple[dict[str, Any], list[tuple[int, str]]]:
@@ -26,7 +26,7 @@ def readable(text: str) -> tuple[dict[str, Any], list[tuple[int, str]]]:
     each of those; the entry of such a line is `UNREADABLE`.
     """
     lines, wrong = text.splitlines(), []
-    for _ in range(_MOST):
+    for _ in range(_MAX_BROKEN_LINES):
         try:
             return tomllib.loads("\n".join(lines) + "\n"), wrong
         except tomllib.TOMLDecodeError as error:
@@ -43,7 +43,7 @@ def readable(text: str) -> tuple[dict[str, Any], list[tuple[int, str]]]:
 
 
 def _stand_in(line: str) -> str:
-    """What is read in place of a broken line: the section, or the entry without its value."""
+    """Return a replacement of an invalid line: the section, or the entry without its value."""
     if line.rstrip().endswith("{ unreadable = true }"):
         return ""
     if header := re.match(r"\s*\[+\s*([\w.]+)\s*[^\]]*$", line):
@@ -53,7 +53,7 @@ def _stand_in(line: str) -> str:
 
 
 def _hint(line: str, what: str) -> str:
-    """What usually makes a line no TOML."""
+    """Return the usual cause of an invalid line."""
     if "overwrite" in what or "twice" in what:
         return ": it stands there already, keep one of the two"
     if re.search(r"\d,\d", line):
@@ -74,13 +74,13 @@ def _hint(line: str, what: str) -> str:
 
 
 def broken_lines(unread: list[tuple[int, str]]) -> list[Problem]:
-    """What `readable` found, with its place."""
+    """Return the errors that `readable` found, with their place."""
     return [(line, f"line {line}, not valid TOML: {wrong}") for line, wrong in unread]
 
 
 def problem(lines: Sequence[str], section: str, entry: str, wrong: str, name: str = "") -> Problem:
-    """What is wrong with an entry of a section, or with the section; `name`: what the section is
-    called, where it is misspelt.
+    """Describe an error of an entry of a section, or of the section; `name`: the name of the
+    section as written, if misspelt.
     """
     line = _line(lines, section, entry) or _line(lines, section, "")
     called = f"{name or section}.{entry}" if entry else f"[{name or section}]"

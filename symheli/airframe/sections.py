@@ -50,11 +50,11 @@ CONTROLS = {
     ),
 }
 FIXED = {"body": BODY, "drivetrain": DRIVETRAIN, "controls": CONTROLS}
-"""Sections every airframe has, {entry: what it asks}; every other section is a component."""
+"""Sections of every airframe, {entry: its description}; every other section is a component."""
 
 PLACE = {
     "x": Entry("m", "reference point from the centre of gravity, forward", kind="distance"),
     "y": Entry("m", "reference point from the centre of gravity, right", kind="distance"),
     "z": Entry("m", "reference point from the centre of gravity, down", kind="distance"),
 }
-"""Optional entries of a component's section: where its reference point lies, body axes."""
+"""Optional entries of a component's section: the position of its reference point, body axes."""

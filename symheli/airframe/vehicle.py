@@ -36,7 +36,7 @@ class Vehicle:
 
     @property
     def entries(self) -> dict[str, Mapping[str, Entry]]:
-        """What each section asks, {section: {entry: `Entry`}}."""
+        """Entries of each section, {section: {entry: `Entry`}}."""
         return entries_of(self.sections, self.components)
 
     def values(self, section: str) -> dict[str, float]:
@@ -59,9 +59,9 @@ class Vehicle:
         return [name for name, quantity in self.quantities.items() if quantity.assumed]
 
     def with_values(self, changes: Mapping[str, float], source: str = "set by hand") -> Vehicle:
-        """The same airframe with other values (SI), {"body.mass": 9.0}; entries that refer to a
-        changed one follow it. Raises `InputError` for what no airframe can be, warns
-        (`DataWarning`) of what none is.
+        """Return the same airframe with other values (SI), {"body.mass": 9.0}; entries that refer
+        to a changed one follow it. Raises `InputError` for impossible values, warns (`DataWarning`)
+        of implausible ones.
         """
         for name, value in changes.items():
             if name not in self.quantities:

@@ -29,13 +29,11 @@ WIRING = ("component", "controls", "flow")
 """Keys of a component's section that are no quantities."""
 
 LINEAR = ".linear.toml"
-"""How a file ends that holds an identified linear model in place of an airframe."""
+"""Suffix of a file with an identified linear model in place of an airframe."""
 
 
 class VehicleFile:
-    """The text of a vehicle file, its tables, where in the text each entry stands, and everything
-    that was found wrong.
-    """
+    """Text of a vehicle file, its tables, the line of each entry, and all errors found."""
 
     def __init__(self, path: str, text: str, folder: Path | None = None):
         self.path, self.lines, self.folder = path, text.splitlines(), folder
@@ -207,8 +205,8 @@ class VehicleFile:
         entry: Entry,
         known: Mapping[str, Mapping[str, Quantity]],
     ) -> Quantity:
-        """An entry, from those with a value `known` where it refers to one; the message does not
-        say where.
+        """Return an entry, from those with a value `known` where it refers to one; the message has
+        no line number.
         """
         written = self._entries.get((section, name), name)
         table = self.tables[self._written.get(section, section)].get(written)
@@ -309,13 +307,15 @@ class VehicleFile:
 
 
 class _AlreadySaidError(Exception):
-    """What is wrong was noted where it stands."""
+    """Raised for an error that has been noted at its place."""
 
 
 def entries_of(
     sections: Iterable[str], parts: Mapping[str, Part]
 ) -> dict[str, Mapping[str, Entry]]:
-    """What each section asks; sections that are neither fixed nor a part are left out."""
+    """Return the entries of each section; sections that are neither fixed nor a part are
+    left out.
+    """
     return {
         section: FIXED[section] if section in FIXED else parts[section].entries
         for section in sections
@@ -324,7 +324,7 @@ def entries_of(
 
 
 def _read(table: Any, unit: str) -> Quantity:
-    """`read_quantity` for a place that is said elsewhere."""
+    """Call `read_quantity` for an entry whose place another message gives."""
     try:
         return read_quantity("", table, unit)
     except InputError as error:

@@ -1,6 +1,4 @@
-"""An airframe as a vehicle file that says of every entry what it means, and the reference of all
-entries there are.
-"""
+"""Writer of vehicle files with a comment on every entry, and of the reference of all entries."""
 
 from __future__ import annotations
 
@@ -72,7 +70,7 @@ def _table(entries: Mapping[str, Entry]) -> Iterator[str]:
 
 
 def _bounds(entry: Entry) -> str:
-    """What the entry must be and what it plausibly is."""
+    """Return the permitted and the plausible range of an entry."""
     must = f"whole number >= {entry.least}" if entry.least is not None else ""
     must = must or ("> 0" if entry.positive else "")
     plausible = str(RANGES[entry.kind]).rstrip() if entry.kind in RANGES else ""
@@ -86,7 +84,7 @@ def _others(entry: Entry) -> str:
 
 
 def _comment(entry: Entry) -> Iterator[str]:
-    """What stands above an entry."""
+    """Yield the comment above an entry."""
     said = (entry.meaning, entry.unit if dimension(entry.unit) else "", _bounds(entry))
     yield f"# {'; '.join(text for text in said if text)}"
 

@@ -1,5 +1,5 @@
-"""From CasADi functions to lists of scalar operations, and from those to C for one flight or many
-side by side, or NumPy.
+"""Translation of CasADi functions to lists of scalar operations, and of those to C for one flight
+or many side by side, or to NumPy.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Which operations of a program only one side of a selection needs."""
+"""Operations of a program that only one side of a selection needs."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ None: always computed.
 """
 
 COST = {"sqrt": 10, "div": 10}
-"""What an operation takes, in units of a product."""
-WORTHWHILE = 20
-"""Cost from which a side is worth a branch; below it both sides are computed faster than a wrong
-guess is repaired.
+"""Cost of an operation relative to a multiplication."""
+MIN_BRANCH_COST = 20
+"""Cost of a side from which a branch is generated; below it computing both sides is faster than a
+mispredicted branch.
 """
 
 
 def branches(program: Program) -> list[Side]:
-    """For each operation the innermost side of a selection that all its users are on; sides that
-    are not worth a branch are left out.
+    """Return for each operation the innermost side of a selection that all its users are on; sides
+    that are not worth a branch are left out.
     """
     homes = _homes(program)
     cost: Counter[Side] = Counter()
@@ -31,7 +31,7 @@ def branches(program: Program) -> list[Side]:
     for side in sorted(
         {home for home in homes if home is not None}
     ):  # inner sides first: they come before what they are inside of
-        if cost[side] < WORTHWHILE:
+        if cost[side] < MIN_BRANCH_COST:
             outer[side] = homes[side[0]]
             cost[homes[side[0]]] += cost[side]
 

@@ -38,7 +38,7 @@ class Layout:
 
     @property
     def _advice(self) -> str:
-        """What GCC does not choose by itself.
+        """Compiler pragmas for choices that GCC does not make by itself.
 
         A point alone waits for roots and quotients, one after the other: a selection made by a
         branch does not wait for the side that is not taken, nor for the condition. Four fifths of
@@ -52,8 +52,8 @@ class Layout:
 
     @property
     def prelude(self) -> str:
-        """What every generated source begins with: headers, the elementary functions and the type
-        of a scalar for all lanes.
+        """The beginning of every generated source: headers, the elementary functions and the
+        type of a scalar for all lanes.
         """
         return f"""#include <math.h>
 #include <stdlib.h>
@@ -105,8 +105,8 @@ def _in_line(program: Program, layout: Layout) -> list[str]:
 
 
 def _in_branches(program: Program) -> list[str]:
-    """For one point alone: operations that only one side of a selection needs are computed only
-    where it is taken.
+    """Write code for one point only: operations that only one side of a selection needs are
+    computed only where it is taken.
     """
     homes = branches(program)
     inside: dict[Side, list[int]] = {}

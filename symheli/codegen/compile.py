@@ -1,4 +1,6 @@
-"""CasADi functions and C source as machine code where a C compiler is there, kept by content."""
+"""Compilation of CasADi functions and C source to machine code, if a C compiler is installed,
+cached by content.
+"""
 
 from __future__ import annotations
 
@@ -34,8 +36,8 @@ one flight takes 1.3 times as long with that.
 
 
 def cache_directory() -> Path:
-    """Where compiled functions are kept: $SYMHELI_CACHE, else symheli in $XDG_CACHE_HOME or
-    ~/.cache.
+    """Return the directory of compiled functions: $SYMHELI_CACHE, else symheli in $XDG_CACHE_HOME
+    or ~/.cache.
     """
     given = os.environ.get("SYMHELI_CACHE")
     return (
@@ -71,8 +73,8 @@ def _not_compiled(reason: str) -> None:
 
 
 def compiled(function: casadi.Function) -> casadi.Function:
-    """The same function as machine code, or unchanged (with one `CompilerWarning`) where that is
-    not possible.
+    """Return the same function as machine code, or unchanged (with one `CompilerWarning`) where
+    that is not possible.
     """
     generator = casadi.CodeGenerator("symheli_code.c")
     generator.add(function)
@@ -146,7 +148,7 @@ def loaded(path: Path) -> ctypes.CDLL:
 
 @functools.cache
 def _cpu() -> str:
-    """Model and features of this processor: -march=native code must not travel to another one."""
+    """Return model and features of this processor: -march=native code is not portable."""
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
     except OSError:

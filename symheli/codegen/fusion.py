@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from symheli.codegen.program import Builder, Program, rewritten
 
 LATENCY = {"add": 3, "sub": 3, "mul": 4, "fma": 4, "div": 13, "sqrt": 20}
-"""Cycles until a result can be used, on processors of these years; 1 for what is not here."""
+"""Latency of an operation in cycles, on current processors; 1 for operations not listed."""
 
 
 def fused(given: Program, varying: Sequence[int]) -> Program:
@@ -39,7 +39,7 @@ def fused(given: Program, varying: Sequence[int]) -> Program:
 
 
 def _ready(given: Program) -> list[int]:
-    """When each operation is done if nothing but its arguments keeps it waiting, cycles."""
+    """Return when each operation is done if only its arguments delay it, cycles."""
     out: list[int] = []
     for o in given.operations:
         out.append(LATENCY.get(o.name, 1) + max((out[a] for a in o.arguments), default=0))

@@ -40,7 +40,7 @@ class Operation:
     element: tuple[int, int] = (0, 0)
 
     def on(self, arguments: tuple[int, ...]) -> Operation:
-        """The same operation on other arguments."""
+        """Return the same operation on other arguments."""
         return Operation(self.name, arguments, self.value, self.element)
 
 
@@ -119,7 +119,9 @@ class Program:
 
 
 def _renamed(operation: Operation, inputs: Sequence[int]) -> Operation:
-    """An input operation counted among these inputs only; any other operation as it is."""
+    """Return an input operation with its number among these inputs only; any other operation
+    unchanged.
+    """
     if operation.name != "input" or operation.element[0] not in inputs:
         return operation
     return replace(

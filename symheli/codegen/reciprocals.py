@@ -9,8 +9,8 @@ from symheli.codegen.program import Builder, Program, rewritten
 
 
 def reciprocals(given: Program, varying: Sequence[int]) -> Program:
-    """The program with divisors that are constant, used more than once, or independent of the
-    `varying` inputs inverted once.
+    """Return the program with divisors that are constant, used more than once, or independent of
+    the `varying` inputs inverted once.
     """
     uses, depends = (
         Counter(o.arguments[1] for o in given.operations if o.name == "div"),

@@ -130,7 +130,9 @@ class _Translator(Builder):
         return None
 
     def _extreme(self, condition: int, yes: int, no: int) -> int:
-        """condition ? yes : no, as the smaller or larger of the two where that is what it says."""
+        """Translate condition ? yes : no, as the smaller or larger of the two where it is
+        equivalent to that.
+        """
         o = self.operations[condition]
         if o.name == "le" and o.arguments in ((yes, no), (no, yes)):
             return self.apply("min" if o.arguments == (yes, no) else "max", yes, no)

@@ -1,4 +1,4 @@
-"""The parts of the airframe, one file each: pure functions from motion and controls to forces.
+"""Components of the airframe, one file each: pure functions from motion and controls to forces.
 
 A part is found by the name of its file: a new one is a new file that defines `COMPONENT`, here or
 beside the vehicle file, and a section in the vehicle file (docs/vehicles.md has an example).

@@ -1,4 +1,4 @@
-"""What every part of the airframe answers."""
+"""Interface of every component of the airframe."""
 
 from __future__ import annotations
 

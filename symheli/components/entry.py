@@ -1,4 +1,4 @@
-"""What a part, or a section every airframe has, asks of the vehicle file."""
+"""Entries of a vehicle file that a component, or a section of every airframe, requires."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What main and tail rotor share: disc geometry and profile power."""
+"""Common equations of main and tail rotor: disc geometry and profile power."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ class Disc(NamedTuple):
 
 
 def disc(radius: Any, chord: Any, blades: Any, Om: Any, rho: Any, flow: Flow) -> Disc:
-    """From radius and chord (m), number of blades, and speed Om (rad/s) in air of density rho
-    (kg/m^3).
+    """Return the disc geometry from radius and chord (m), number of blades, and speed Om (rad/s) in
+    air of density rho (kg/m^3).
     """
     solidity = flow.name(r"\sigma", blades * chord / (pi * radius))
     tip_speed = flow.name("V_{tip}", Om * radius)

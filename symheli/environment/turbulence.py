@@ -133,8 +133,10 @@ STATIONARY = np.array([[1.0, 0.5], [0.5, 0.5]])
 """Covariance of the states z1 = 1/(1+s), z2 = z1/(1+s) of white noise of intensity 2."""
 OUTPUT = np.array([math.sqrt(3.0), 1 - math.sqrt(3.0)]) / math.sqrt(2.0)
 """sqrt(3) z1 + (1 - sqrt(3)) z2 has the variance 2."""
-FORGOTTEN = 1e3
-"""Lengths after which nothing is left of a gust: exp(-1000) is 0, and 1000 exp(-1000) is."""
+MAX_LENGTHS = 1e3
+"""Number of turbulence lengths after which a gust has decayed to zero: exp(-1000) is 0, and 1000
+exp(-1000) too.
+"""
 
 
 @functools.cache
@@ -145,7 +147,7 @@ def _machine_code() -> ctypes.CDLL | None:
 
 
 def _steps(flown: np.ndarray, length: float) -> np.ndarray:
-    return np.minimum(flown / length, FORGOTTEN)
+    return np.minimum(flown / length, MAX_LENGTHS)
 
 
 def _first_order(steps: np.ndarray, white: np.ndarray) -> np.ndarray:

@@ -64,7 +64,7 @@ class Wind:
 
     @property
     def is_steady(self) -> bool:
-        """Whether it never changes."""
+        """Whether the wind is constant."""
         return not self.gusts and self.turbulence is None
 
     def history(self, time: object, airspeed: object) -> np.ndarray:

@@ -51,7 +51,7 @@ def latex(heli: Helicopter, standalone: bool = False) -> str:
 
 
 def markdown(heli: Helicopter) -> str:
-    """The same as one page of Markdown, each equation in dollars."""
+    """Return the document as one page of Markdown, each equation in dollars."""
     parts = [f"# {heading(heli)}", _REMARK.replace("_", r"\_")]
     for section in listing(heli):
         parts += [f"## {section.title}", section.text.replace("_", r"\_")]
@@ -70,7 +70,7 @@ def markdown(heli: Helicopter) -> str:
 
 
 def heading(heli: Helicopter) -> str:
-    """What the document is about."""
+    """Return the subject of the document."""
     options = f", as printed: {', '.join(sorted(heli.printed))}" if heli.printed else ""
     return f"Equations of motion: {heli.vehicle.title}, {heli.governor} governor{options}"
 

@@ -1,4 +1,4 @@
-"""CasADi functions in SymPy, and evaluated with any number of digits.
+"""CasADi functions as SymPy expressions, and evaluated with any number of digits.
 
 Both walk the instructions of the function (`Tape`) with an arithmetic of their own. Nothing is
 simplified on the way, and constants are the binary numbers CasADi holds, exactly: 0.1 is not 1/10.

@@ -1,5 +1,5 @@
-"""Every component's equations as they are computed: the code is evaluated with symbols, and what it
-names is kept.
+"""Equations of every component as computed: the code is evaluated with symbols, and its named
+expressions are recorded.
 """
 
 from __future__ import annotations
@@ -75,8 +75,8 @@ class _Notes:
 
 
 def listing(heli: Helicopter) -> tuple[Section, ...]:
-    """The equations of `heli`: rigid body, components in the order they are evaluated, drivetrain,
-    attitude and position in flight.
+    """Return the equations of `heli`: rigid body, components in the order they are evaluated,
+    drivetrain, attitude and position in flight.
     """
     s = _symbols(heli)
     motion = Motion(*[vars(s)[name] for name in Motion._fields])
@@ -164,7 +164,7 @@ def _about(component: Component) -> str:
 
 
 def _outcome(notes: _Notes, effect: Effect, subscript: str) -> None:
-    """What is left to say of a component: forces, moments, derivatives of its states, torque."""
+    """List the results of a component: forces, moments, derivatives of its states, torque."""
     for axis, value in zip("XYZLMN", (*effect.force, *effect.moment), strict=True):
         if value not in (0, real(f"{axis}_{{{subscript}}}")):
             notes.equal(f"{axis}_{{{subscript}}}", value)

@@ -1,5 +1,5 @@
-"""From the code's names and SymPy expressions to the field's symbols, in LaTeX that papers, GitHub
-and matplotlib can all set.
+"""Names of the code and SymPy expressions as LaTeX symbols that papers, GitHub and matplotlib can
+all set.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ _GREEK = {
 
 
 def symbol_of(name: str) -> str:
-    r"""LaTeX of a name of the code: head and subscript, Greek where it stands for that: d_col is
-    \delta_{col}, a1_aft is a_{1,aft}.
+    r"""Return the LaTeX of a name of the code: head and subscript, Greek letters by name: d_col is
+    \\delta_{col}, a1_aft is a_{1,aft}.
     """
     match = re.fullmatch(r"([A-Za-z]+?)(\d*)(?:_(\w+))?", name)
     if not match:
@@ -61,8 +61,8 @@ def upright(latex: str) -> str:
 
 
 def printed(expression: Any) -> str:
-    """LaTeX of an expression whose symbols are named in LaTeX; floats that stand for fractions or
-    multiples of pi print as those.
+    """Return the LaTeX of an expression whose symbols are named in LaTeX; floats that represent
+    fractions or multiples of pi print as those.
     """
     expression = sympy.sympify(expression)
     return _Printer().doprint(
@@ -71,8 +71,8 @@ def printed(expression: Any) -> str:
 
 
 def _exact(number: sympy.Float) -> sympy.Expr:
-    """The small fraction, or fraction of pi, that a float stands for, to rounding; the float itself
-    where there is none.
+    """Return the small fraction, or fraction of pi, that a float represents, to rounding; the float
+    itself where there is none.
     """
     for unit in (sympy.Integer(1), sympy.pi, 1 / sympy.pi):
         value = float(number / unit)

@@ -1,4 +1,4 @@
-"""A CasADi function as its list of operations, to be carried out in any arithmetic."""
+"""A CasADi function as its list of operations, evaluated in any arithmetic."""
 
 from __future__ import annotations
 

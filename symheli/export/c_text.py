@@ -53,12 +53,14 @@ def define(name: str, value: object, comment: str = "") -> str:
 
 
 def in_comment(text: str) -> str:
-    """A text of somebody's own in a C comment: on one line, and not its end."""
+    """Return user text for a C comment: on one line, and without the end of a comment."""
     return " ".join(text.split()).replace("*/", "* /").replace("/*", "/ *")
 
 
 def index_macros(prefix: str, names: Sequence[Signal], notes: Sequence[str] = ()) -> list[str]:
-    """The index of every signal, with its unit and what `notes`, one each, say of it."""
+    """Return the index of every signal as a macro, with its unit and the corresponding one of
+    `notes`.
+    """
     return [
         define(f"{prefix}{identifier(s)}", i, in_comment(f"{s.unit}, {note}" if note else s.unit))
         for i, (s, note) in enumerate(zip(names, notes or [""] * len(names), strict=True))

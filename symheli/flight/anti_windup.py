@@ -10,12 +10,12 @@ from scipy.linalg import solve_discrete_are
 from symheli.errors import InputError
 from symheli.values.arrays import Array
 
-TRUST = tuple(10.0**k for k in range(-4, 7))
-"""Variance of what is applied against that of what is commanded, tried from the fastest observer to
-the slowest.
+VARIANCE_RATIOS = tuple(10.0**k for k in range(-4, 7))
+"""Ratios of the variance of the applied to that of the commanded input, tried from the fastest
+observer to the slowest.
 """
-SLACK = 1e-6
-"""Rounding of an eigenvalue's magnitude."""
+RADIUS_TOLERANCE = 1e-6
+"""Rounding error of an eigenvalue's modulus."""
 
 
 def observer_gains(A: Array, B: Array, C: Array) -> Array:
@@ -23,9 +23,9 @@ def observer_gains(A: Array, B: Array, C: Array) -> Array:
 
     Those of a Kalman filter that reads the states from the applied commands, white noise of 1 on
     every input: with all commands at their limits the states then follow these instead of winding
-    up, A - L C stable. Of the ladder `TRUST` the fastest is taken, the same at all airspeeds, for
-    which no set of saturated commands, the others free, is less stable than the controller itself:
-    frozen airspeeds, no proof for moving ones.
+    up, A - L C stable. The fastest of the `VARIANCE_RATIOS` is taken, the same at all airspeeds,
+    for which no set of saturated commands, the others free, is less stable than the controller
+    itself: frozen airspeeds, no proof for moving ones.
 
     Parameters
     ----------
@@ -44,9 +44,9 @@ def observer_gains(A: Array, B: Array, C: Array) -> Array:
     if not C.size:
         return np.zeros((len(A), A.shape[1], C.shape[1]))
     alone = np.array([_radius(M) for M in A])
-    for trust in TRUST:
+    for trust in VARIANCE_RATIOS:
         L = np.stack([_kalman(*at, trust) for at in zip(A, B, C, strict=True)])
-        if (saturated_radius(A, L, C) <= np.maximum(alone, 1.0) + SLACK).all():
+        if (saturated_radius(A, L, C) <= np.maximum(alone, 1.0) + RADIUS_TOLERANCE).all():
             return L
     return np.zeros_like(L)
 

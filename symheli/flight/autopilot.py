@@ -112,10 +112,8 @@ class Autopilot:
         )
 
 
-SOFTER = (1.0, 0.5, 0.25, 0.125)
-"""Input scales tried in turn, as shares of `INPUT_SCALE`, until the loop with servos and delay is
-stable.
-"""
+INPUT_SCALE_FACTORS = (1.0, 0.5, 0.25, 0.125)
+"""Factors on `INPUT_SCALE` tried in turn until the loop with servos and delay is stable."""
 
 
 def gain_scheduled_lqr(
@@ -173,7 +171,7 @@ def gain_scheduled_lqr(
         [_plant(family[k], servos, dt) for k in range(len(family))],
     )
     radius = np.inf
-    for softer in SOFTER:
+    for softer in INPUT_SCALE_FACTORS:
         gains = np.stack([_lqr(model, softer * INPUT_SCALE) for model in designs])
         radius = max(
             _closed_loop_radius(plant, K, design.states)

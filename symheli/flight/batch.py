@@ -25,9 +25,9 @@ from symheli.values.arrays import Array
 from symheli.values.summary import as_table, summarized
 
 CHUNK = 2 * SIDE_BY_SIDE.lanes
-"""Flights a worker takes at a time."""
-ALONE = 3
-"""So many flights are flown one by one: faster than beside empty lanes."""
+"""Number of flights that a worker process takes at a time."""
+MAX_SINGLE_FLIGHTS = 3
+"""Largest number of flights that are simulated one by one: this is faster than with empty lanes."""
 
 Schedules = AirspeedSchedule | FlightPlan | Sequence[AirspeedSchedule | FlightPlan]
 Progress = Callable[[int, int], None]
@@ -77,7 +77,7 @@ class FlightBatch(Sequence[FlightRecord]):
 
     @property
     def plans(self) -> tuple[FlightPlan, ...]:
-        """What was flown."""
+        """Plans of the flights."""
         return tuple(flown.plan for flown in self.data)
 
     @property
@@ -111,7 +111,7 @@ def fly_batch(
 
     A flight comes out the same to the bit as `fly` alone makes it, whatever its neighbours, the
     number of workers and, where there are fused multiply-adds, the processor. Controllers written
-    in Python are asked flight by flight, a hundred times slower, and a `CompilerWarning` says so.
+    in Python are called flight by flight, a hundred times slower, with a `CompilerWarning`.
     Ctrl-C ends within a sample and raises `KeyboardInterrupt`; see `fly_campaign` for flights that
     are kept as they are done.
 
@@ -191,8 +191,8 @@ def fly_in_chunks(
     workers: int | None,
     chunks: Sequence[Sequence[int]] | None = None,
 ) -> Iterator[tuple[Sequence[int], list[FlightData]]]:
-    """Positions of plans that were flown together, with what came of them, as they are done;
-    `chunks` says which belong together.
+    """Yield positions of plans that were flown together, with their results, as they are done;
+    `chunks` lists those that belong together.
     """
     if not isinstance(heli, Helicopter):
         raise InputError(f"expected a Helicopter, got {heli!r:.80}; try Helicopter.load('xcell60')")
@@ -215,7 +215,7 @@ def fly_in_chunks(
             alike.setdefault(id(flights.equipment(plans[i])), []).append(i)
         flown: dict[int, FlightData] = {}
         for group in alike.values():
-            layout = SIDE_BY_SIDE if len(group) > ALONE else Layout()
+            layout = SIDE_BY_SIDE if len(group) > MAX_SINGLE_FLIGHTS else Layout()
             flown |= zip(group, flights.fly([plans[i] for i in group], layout), strict=True)
         return [flown[i] for i in chunk]
 

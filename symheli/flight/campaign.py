@@ -1,4 +1,4 @@
-"""Campaigns: flights that are kept on disk as they are done, and go on after a stop."""
+"""Campaigns: flights stored on disk as they are done, which can be resumed."""
 
 from __future__ import annotations
 
@@ -163,7 +163,7 @@ def _rows(flown: Sequence[FlightData], kept: Sequence[Signal], longest: int) -> 
 def _kept(
     heli: Helicopter, plans: Sequence[FlightPlan], wanted: Sequence[str] | None
 ) -> tuple[Signal, ...]:
-    """Signals of the dataset: those of any plan, or the wanted ones of them."""
+    """Return the signals of the dataset: those of any plan, or the requested ones of them."""
     every = tuple(dict.fromkeys(s for plan in plans for s in signals_of(heli, plan)))
     return every if wanted is None else tuple(every[i] for i in indices(wanted, every, "signal"))
 
@@ -220,7 +220,7 @@ def _texts(plans: Sequence[FlightPlan]) -> list[dict[str, Any]]:
 
 
 def _without_seeds(texts: Sequence[Any]) -> list[Any]:
-    """Those that differ in more than seeds."""
+    """Return the plans that differ in more than seeds."""
 
     def bare(value: Any) -> Any:
         if isinstance(value, dict):

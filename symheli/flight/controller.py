@@ -26,7 +26,7 @@ MEASURED = signals(("u", "v", "w", "p", "q", "r", "phi", "theta"))
 """Measured states: a controller receives the readings of their sensors."""
 ROTOR = signals(("Om", "om_i"))
 """Rotor states, passed on without sensor errors; present with the PI governor."""
-TOLD = (*MEASURED, *ROTOR)
+CONTROLLER_INPUTS = (*MEASURED, *ROTOR)
 SCHEDULING = (Signal("airspeed", "m/s"), Signal("acceleration", "m/s^2"))
 """Signals by which a controller can be scheduled."""
 EVERY_SPEED = Scheduling("airspeed", "m/s", 0.0, 1.0)
@@ -50,7 +50,12 @@ def deviations(given: object) -> LPVStateSpace:
             f" {type(given).__name__}"
         )
     return turned(
-        model, {y: y.removesuffix(ERROR) for y in model.inputs if y.removesuffix(ERROR) in TOLD}
+        model,
+        {
+            y: y.removesuffix(ERROR)
+            for y in model.inputs
+            if y.removesuffix(ERROR) in CONTROLLER_INPUTS
+        },
     )
 
 
@@ -115,7 +120,7 @@ class ScheduledController:
                 f"{', '.join(rates)}: the rate of a command is integrated by a TableController,"
                 " within its limits: TableController.of(model)"
             )
-        require_names("measured signal", self.model.inputs, TOLD)
+        require_names("measured signal", self.model.inputs, CONTROLLER_INPUTS)
         require_names("helicopter input", self.model.outputs, INPUTS)
         names = tuple(s.name for s in self.model.parameters)
         require_parameters(
@@ -144,9 +149,9 @@ class ScheduledController:
         every measured state and a row for every input of the helicopter.
         """
         m, n = self.model, self.order
-        out = np.zeros((m.basis.size, n + len(INPUTS), n + len(TOLD)))
+        out = np.zeros((m.basis.size, n + len(INPUTS), n + len(CONTROLLER_INPUTS)))
         rows = [n + i for i in indices(m.outputs, INPUTS, "output")]
-        columns = [n + i for i in indices(m.inputs, TOLD, "input")]
+        columns = [n + i for i in indices(m.inputs, CONTROLLER_INPUTS, "input")]
         out[:, :n, :n] = m.A
         out[:, :n, columns] = m.B
         out[:, rows, :n] = m.C
@@ -201,7 +206,9 @@ class ScheduledController:
                 f"state: expected the {self.order} numbers of init() or of the step before, got"
                 f" {state!r:.80}"
             )
-        error = np.array([measured[s] - reference[s] if s in measured else 0.0 for s in TOLD])
+        error = np.array(
+            [measured[s] - reference[s] if s in measured else 0.0 for s in CONTROLLER_INPUTS]
+        )
         at = [measured["airspeed"], 0.0] if self.follow == "reading" else list(p.array)
         M, n = self.matrices(np.array([at]))[0], self.order
         answer = M @ np.concatenate([state, error])

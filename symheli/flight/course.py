@@ -18,8 +18,8 @@ CONTROL_PERIOD = 0.02  # s; slower sampling still flies at about this period
 INTEGRATION_STEP = (
     0.005  # s; the error over a flight stays below 1e-5 of each state's peak (see tests)
 )
-MOST = 1e9
-"""Samples of a flight: half a year at 50 Hz, and beyond the memory of any record."""
+MAX_SAMPLES = 1e9
+"""Largest number of samples of a flight: half a year at 50 Hz, beyond the memory of any record."""
 
 
 @dataclass(frozen=True)
@@ -49,13 +49,13 @@ class Clock:
 
     def samples(self, plan: FlightPlan) -> int:
         """Control samples of a plan: those whose record sample is complete; raises `InputError` for
-        more than `MOST`.
+        more than `MAX_SAMPLES`.
         """
         count = plan.schedule.duration / plan.dt * self.every
-        if not count <= MOST:
+        if not count <= MAX_SAMPLES:
             raise InputError(
                 f"a flight of {plan.schedule.duration:.3g} s takes {count:.3g} samples, more than"
-                f" {MOST:.0e}: fly a shorter schedule"
+                f" {MAX_SAMPLES:.0e}: fly a shorter schedule"
             )
         return math.floor(plan.schedule.duration / plan.dt + 1e-9) * self.every
 

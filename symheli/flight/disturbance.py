@@ -1,4 +1,4 @@
-"""What chance and the plans bring into flights: noise of the sensors, wind, excitation."""
+"""Disturbances of flights: noise of the sensors, wind, excitation."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from symheli.values.arrays import Array
 
 @dataclass(frozen=True, eq=False)
 class Disturbances:
-    """Of N flights over n control samples, zeros after the end of each; an axis of length 1 is
-    shared.
+    """Disturbances of N flights over n control samples, zeros after the end of each; an axis of
+    length 1 is shared.
 
     wind (N or 1, n or 1, 3) north east down, m/s; `added` to the inputs (N or 1, n or 1, 4), rad;
     standard normal numbers for the measured states `white` (N, n, 8) and for the airspeed
@@ -33,7 +33,9 @@ class Disturbances:
     def of(
         cls, plans: Sequence[FlightPlan], courses: Sequence[Course], readings: Readings
     ) -> Disturbances:
-        """The same for the same seeds, whatever else flies."""
+        """Return the disturbances of these plans, the same for the same seeds, independent of the
+        other flights.
+        """
         longest = max(len(course.time) for course in courses)
         calm = cls(_winds(plans, courses, longest), _excitations(plans, courses), None, None)
         return calm.with_noise(plans, courses, readings)
@@ -41,7 +43,7 @@ class Disturbances:
     def with_noise(
         self, plans: Sequence[FlightPlan], courses: Sequence[Course], readings: Readings
     ) -> Disturbances:
-        """The same with numbers drawn for the sensors that are noisy."""
+        """Return the same with random numbers for the noisy sensors."""
         shape = len(plans), max(len(course.time) for course in courses)
         white = np.empty((*shape, 8)) if readings.noise[:8].any() else None
         white_air = np.zeros(shape) if readings.noise[8] else None

@@ -1,5 +1,5 @@
-"""What is built into a helicopter for its flights: controller, sensors, servos and the delay before
-them, as numbers for a clock.
+"""Equipment of a helicopter for its flights: controller, sensors, servos and the delay before them,
+as numbers for a clock.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from symheli.helicopter import Helicopter
 from symheli.values.arrays import Array
 from symheli.values.controllers import PureController, StatefulController
 
-FOREVER = 2**40
-"""Larger than the number of steps of any flight."""
+MAX_STEPS = 2**40
+"""Number of steps that no flight reaches."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ class Readings:
 
 @dataclass(frozen=True, eq=False)
 class Equipment:
-    """All that flights of one campaign have in common; `late` counts integration steps."""
+    """Equipment common to all flights of one campaign; `late` counts integration steps."""
 
     controller: PureController | StatefulController
     readings: Readings
@@ -69,7 +69,7 @@ class Equipment:
         servos: Mapping[str, Servo] | None,
         delay: float,
     ) -> Equipment:
-        """From the parts of a plan."""
+        """Return the equipment of a plan."""
         return cls(
             controller,
             Readings.of(sensors or {}, clock.dt),
@@ -81,4 +81,4 @@ class Equipment:
 
 def _whole(seconds: float, step: float) -> int:
     """Steps that last so long, rounded up; more than any flight has where that is very long."""
-    return min(math.ceil(min(seconds / step, FOREVER) - 1e-9), FOREVER)
+    return min(math.ceil(min(seconds / step, MAX_STEPS) - 1e-9), MAX_STEPS)

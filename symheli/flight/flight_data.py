@@ -8,7 +8,7 @@ import numpy as np
 
 from symheli.flight.course import Clock, Course
 from symheli.flight.disturbance import excitation_of
-from symheli.flight.in_numpy import LEVEL
+from symheli.flight.in_numpy import MAX_BANK
 from symheli.flight.plan import FlightPlan
 from symheli.helicopter import Helicopter
 from symheli.records.flight_record import FlightRecord
@@ -20,7 +20,7 @@ WIND = ("wind_n", "wind_e", "wind_d")
 
 @dataclass(frozen=True, eq=False)
 class FlightData:
-    """One flight: its plan and course, `out` (kept, nx + 9) as the loop leaves it, and the control
+    """One flight: its plan and course, `out` (kept, nx + 9) from the closed loop, and the control
     sample at which it was `lost`, or -1.
     """
 
@@ -33,7 +33,7 @@ class FlightData:
 
     @property
     def kept(self) -> int:
-        """Record samples flown."""
+        """Number of record samples of the flight."""
         flown = len(self.course.time) if self.lost < 0 else self.lost
         return -(-flown // self.clock.every)
 
@@ -50,7 +50,7 @@ class FlightData:
         return self._block(block)[:, i]
 
     def _block(self, name: str) -> Array:
-        """Signals that come from one place, side by side (kept, ...)."""
+        """Return the signals of one source, side by side (kept, ...)."""
         flown = slice(0, self.kept * self.clock.every, self.clock.every)
         time, p = self.course.time, self.course.p
         match name:
@@ -66,8 +66,8 @@ class FlightData:
         return self.course.reference[flown]
 
     def record(self) -> FlightRecord | None:
-        """Everything until the end, or until it was lost; None where that is less than two
-        samples.
+        """Return the record until the end, or until the flight was lost; None where that is less
+        than two samples.
         """
         if self.kept < 2:
             return None
@@ -91,7 +91,7 @@ class FlightData:
         return note if self.lost < 0 else f"{note}; {self.cause()}"
 
     def cause(self) -> str:
-        """When and how the flight was lost, and what was at its limit before."""
+        """Return when and how the flight was lost, and which limit was reached before."""
         k = self.lost
         text = (
             f"the flight was lost at {self.course.time[k]:.2f} s near {self.course.p[k, 0]:.1f} m/s"
@@ -99,7 +99,7 @@ class FlightData:
         nx, last = len(self.heli.states), self.out[max(self.kept - 1, 0)]
         signs = []
         for name, i in (("bank", 6), ("pitch", 7)):
-            if 0.8 * LEVEL < abs(last[i]) < np.pi:  # as read: noise may say anything
+            if 0.8 * MAX_BANK < abs(last[i]) < np.pi:  # as read: noise may say anything
                 signs.append(f"{name} {np.degrees(last[i]):.0f} deg")
         second = self.out[max(0, self.kept - round(1 / self.plan.dt)) : self.kept, nx + 4 : nx + 8]
         share = (
@@ -122,12 +122,12 @@ ADVICE = "reduce excitation, noise, gusts, delay or acceleration, or use another
 
 
 def signals_of(heli: Helicopter, plan: FlightPlan) -> tuple[Signal, ...]:
-    """What the record of a plan holds, in order."""
+    """Return the signals of the record of a plan, in order."""
     return tuple(signal for signal, _, _ in _table(heli, plan))
 
 
 def _table(heli: Helicopter, plan: FlightPlan) -> list[tuple[Signal, str, int]]:
-    """Each signal of a record with the block it stands in and its column there."""
+    """Return for each signal of a record its block and its column there."""
     nx = len(heli.states)
     table = [(s, "out", i) for i, s in enumerate((*heli.states, *heli.inputs))]
     table += [(Signal(f"e_{s}", s.unit), "added", i) for i, s in enumerate(heli.inputs)]

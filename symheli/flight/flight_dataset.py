@@ -102,17 +102,17 @@ class FlightDataset:
                 **{name: ZarrArray.whole(*labels) for name, labels in whole.items()},
             }
         )
-        folder.say(attributes)  # last: now it is a dataset
+        folder.write_attributes(attributes)  # last: now it is a dataset
         return cls(Path(path))
 
     def write(self, chunk: int, values: Array, duration: Array, lost: Array) -> None:
-        """One chunk of flights, `duration` last: it says that they are there."""
+        """Write one chunk of flights, `duration` last, which marks them as complete."""
         self._folder.write("values", chunk, values)
         self._folder.write("lost", chunk, lost)
         self._folder.write("duration", chunk, duration)
 
     def _check(self) -> None:
-        """Raises `InputError` unless all arrays are said to be of one size and kind."""
+        """Raise `InputError` unless all arrays are declared with one size and kind."""
         values = self._values
         if len(values.shape) != 3:
             raise InputError(f"{self.path}: no dataset of flights (values {values.shape})")
@@ -141,28 +141,28 @@ class FlightDataset:
 
     @property
     def time(self) -> Array:
-        """Of the samples (n,), s."""
+        """Time of the samples (n,), s."""
         return self._folder.whole("time")
 
     @property
     def signals(self) -> tuple[Signal, ...]:
-        """What is kept of every flight."""
+        """Signals of every flight."""
         names, units = self._folder.whole("signal").tolist(), self._folder.whole("unit").tolist()
         return tuple(Signal(str(n), str(u)) for n, u in zip(names, units, strict=True))
 
     @property
     def duration(self) -> Array:
-        """What was flown of each flight (N,), s; NaN where it is still to be."""
+        """Duration of each flight (N,), s; NaN where it has not been flown."""
         return self._folder.whole("duration")
 
     @property
     def finished(self) -> Array:
-        """Which flights (N,) are there."""
+        """Mask (N,) of the flights that are complete."""
         return np.isfinite(self.duration)
 
     @property
     def lost(self) -> Array:
-        """Which flights (N,) were lost."""
+        """Mask (N,) of the flights that were lost."""
         return self._folder.whole("lost")
 
     @property
@@ -189,7 +189,9 @@ class FlightDataset:
         return out
 
     def record(self, i: int) -> FlightRecord:
-        """One flight; `InputError` where it is not flown yet or lasted less than two samples."""
+        """Return one flight; `InputError` where it has not been flown yet or lasted less than two
+        samples.
+        """
         block = self._folder.chunk("values", i // self._chunk_size) if 0 <= i < len(self) else None
         flown = float(self.duration[i]) if block is not None else np.nan
         if block is None or not np.isfinite(flown):

@@ -1,4 +1,4 @@
-"""From plans to flights: what plans share is made once, chance is drawn flight by flight."""
+"""Flights of plans: what plans share is computed once, random numbers are drawn for each flight."""
 
 from __future__ import annotations
 
@@ -22,13 +22,15 @@ from symheli.helicopter import Helicopter
 from symheli.values.arrays import Array
 from symheli.values.controllers import PureController, StatefulController
 
-KEPT = 256
-"""Courses that are kept for the next plan that has the same."""
+MAX_CACHED_COURSES = 256
+"""Largest number of courses that are cached for plans with the same course."""
 
 
 @dataclass
 class Flights:
-    """Flights of one helicopter; keeps controllers, courses and equipment that plans share."""
+    """Flights of one helicopter, with a cache of the controllers, courses and equipment that plans
+    share.
+    """
 
     heli: Helicopter
     _controllers: dict[Hashable, PureController | StatefulController] = field(default_factory=dict)
@@ -39,7 +41,9 @@ class Flights:
     _lock: Any = field(default_factory=Lock)
 
     def controller(self, plan: FlightPlan) -> PureController | StatefulController:
-        """That of a plan, sampled; an LQR over the commanded airspeeds where it names none."""
+        """Return the controller of a plan, sampled; an LQR over the commanded airspeeds where it
+        names none.
+        """
         dt = getattr(plan.controller, "dt", None)
         clock = Clock.of(plan, dt if isinstance(dt, float | int) and dt > 0 else None)
         if plan.controller is not None:
@@ -59,21 +63,23 @@ class Flights:
         return self._controllers[key]
 
     def clock(self, plan: FlightPlan) -> Clock:
-        """Raises `InputError` where the controller's period does not divide that of the record."""
+        """Return the clock of a plan; raise `InputError` where the controller's period does not
+        divide that of the record.
+        """
         return Clock.of(plan, self.controller(plan).dt)
 
     def course(self, plan: FlightPlan) -> Course:
-        """What a plan is held to; the last ones are kept."""
+        """Return the course of a plan; the last ones are cached."""
         key = (plan.schedule, plan.dt, self.clock(plan), plan.wind.steady, plan.trims)
         with self._lock:
             if key not in self._courses:
                 self._courses[key] = Course.of(self.heli, plan, self.clock(plan))
-                if len(self._courses) > KEPT:
+                if len(self._courses) > MAX_CACHED_COURSES:
                     del self._courses[next(iter(self._courses))]
             return self._courses[key]
 
     def equipment(self, plan: FlightPlan) -> Equipment:
-        """What is built in; the same object for plans that can fly side by side."""
+        """Return the equipment of a plan; the same object for plans that can fly side by side."""
         key = (id(self.controller(plan)), id(plan.sensors), id(plan.servos), plan.delay, plan.dt)
         if key not in self._equipment:
             self._equipment[key] = Equipment.of(
@@ -102,7 +108,7 @@ class Flights:
         )
 
     def stop(self) -> None:
-        """Ask every flight under way to end at its next sample, and let none start."""
+        """Stop every running flight at its next sample, and start none."""
         self._stopped = True
         for loops in list(self._under_way):
             loops.stop()

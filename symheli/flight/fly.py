@@ -21,8 +21,8 @@ def fly(
     """Fly a schedule in the nonlinear model under any controller and return its record.
 
     The reference at each moment is the quasi-steady trim of the commanded airspeed and acceleration
-    in the steady wind. The controller sees what is recorded of u v w p q r phi theta. The whole
-    flight is one call into machine code, but for controllers written in Python, which are asked at
+    in the steady wind. The controller receives the recorded u v w p q r phi theta. The whole flight
+    is one call into machine code, except for controllers written in Python, which are called at
     every sample: several times slower.
 
     Parameters

@@ -1,4 +1,6 @@
-"""The closed loop without a compiler, one flight at a time: closed_loop.c line by line."""
+"""The closed loop without a compiler, one flight at a time: a translation of closed_loop.c line by
+line.
+"""
 
 from __future__ import annotations
 
@@ -16,8 +18,8 @@ from symheli.values.arrays import Array
 if TYPE_CHECKING:
     from symheli.flight.loops import Flown, Loops
 
-LEVEL = 1.4
-"""Bank or pitch (rad) beyond which a flight is lost."""
+MAX_BANK = 1.4
+"""Bank or pitch angle (rad) beyond which a flight is lost."""
 
 
 class InNumpy:
@@ -41,10 +43,10 @@ class InNumpy:
         self._p = loops.heli.parameters.array
 
     def read(self, k: int) -> Array | None:
-        """What the controller is told at sample k; None where the flight is lost."""
-        euler, air = _seen(self._x, self._wind(k))
+        """Return the inputs of the controller at sample k; None where the flight is lost."""
+        euler, air = _measured(self._x, self._wind(k))
         self._truth[k] = *euler[:8], air
-        if not (np.isfinite(self._x).all() and np.abs(euler[6:8]).max() <= LEVEL):
+        if not (np.isfinite(self._x).all() and np.abs(euler[6:8]).max() <= MAX_BANK):
             self._found.lost[self._i] = k
             return None
         r, d = self._loops.equipment.readings, self._loops.disturbances
@@ -62,7 +64,7 @@ class InNumpy:
         return np.concatenate([reading, euler[-2:]])
 
     def command(self, k: int, u: Array) -> None:
-        """Fly to the next sample."""
+        """Apply the commands and integrate to the next sample."""
         loops = self._loops
         clock, servos, late = loops.clock, loops.equipment.servos, loops.equipment.late
         u = np.clip(
@@ -88,7 +90,7 @@ class InNumpy:
             )
 
     def end(self) -> None:
-        """Nothing is left to be freed."""
+        """Do nothing: no memory has to be freed."""
 
     def _wind(self, k: int) -> Array:
         return self._winds[min(k, len(self._winds) - 1)]
@@ -99,7 +101,7 @@ class InNumpy:
             row[:] = *self._reading[:8], *self._euler[8:], *inputs, *self._commands[k], self._air
 
 
-def _seen(flight: Array, wind: Array) -> tuple[Array, float]:
+def _measured(flight: Array, wind: Array) -> tuple[Array, float]:
     """Euler-form state and true airspeed (m/s) from the quaternion form; wind in earth axes."""
     velocity = flight[:3] - np.array(body_to_earth(*flight[6:10])).T @ wind
     return euler_state(flight), float(np.linalg.norm(velocity))

@@ -14,7 +14,7 @@ from symheli.flight.controller import ROTOR, SCHEDULING, ScheduledController
 from symheli.flight.course import Clock, Course
 from symheli.flight.disturbance import Disturbances
 from symheli.flight.equipment import Equipment
-from symheli.flight.in_numpy import LEVEL, InNumpy
+from symheli.flight.in_numpy import MAX_BANK, InNumpy
 from symheli.flight.plan import READ
 from symheli.helicopter import Helicopter
 from symheli.integrate.equations import equations
@@ -31,9 +31,9 @@ READINGS = (*signals(READ), *ROTOR)
 
 @dataclass(frozen=True, eq=False)
 class Flown:
-    """What came of N flights: `out` (N, kept, nx + 9) with the states as read, inputs, commands and
-    airspeed at the record's samples, anything after the end of a flight; `lost` (N,) the control
-    sample at which a flight was, or -1.
+    """Results of N flights: `out` (N, kept, nx + 9) with the states as measured, inputs, commands
+    and airspeed at the record's samples, undefined after the end of a flight; `lost` (N,) the
+    control sample at which a flight was lost, or -1.
     """
 
     out: Array
@@ -63,7 +63,7 @@ class Loops:
         self._stop = np.zeros(1, np.intc)
 
     def stop(self) -> None:
-        """Ask every flight under way to end at its next sample."""
+        """Stop every running flight at its next sample."""
         self._stop[0] = 1
 
     def fly(self, layout: Layout) -> Flown:
@@ -148,7 +148,7 @@ class Loops:
             "every": self.clock.every,
             "substeps": self.clock.substeps,
             "step": self.clock.step,
-            "level": LEVEL,
+            "level": MAX_BANK,
             "stop": self._stop,
         }
         return structure(members)
@@ -169,7 +169,9 @@ class Loops:
         return found
 
     def _answered(self, plant: _InSteps | InNumpy, course: Course) -> None:
-        """Read, ask the controller, advance, to the end of a course or until the flight is lost."""
+        """Measure, call the controller, advance, to the end of a course or until the flight is
+        lost.
+        """
         answer = begun(self.equipment.controller)
         names = signals((*self.heli.states, *self.heli.inputs))
         told = READINGS if governed(self.heli) else READINGS[: len(READ)]
@@ -250,6 +252,8 @@ def _courses(arrays: Sequence[Array], longest: int) -> Array:
 
 
 def _strides(array: Array) -> tuple[int, int]:
-    """Entries of (N, n, m) from flight to flight and sample to sample, 0 along a shared axis."""
+    """Return the strides of (N, n, m) from flight to flight and sample to sample, 0 along a shared
+    axis.
+    """
     flights, samples, width = array.shape
     return samples * width if flights > 1 else 0, width if samples > 1 else 0

@@ -1,4 +1,4 @@
-"""What a controller does with the scheduling parameter it is given, a wrong one too."""
+"""Treatment of the measured scheduling parameter by a controller: filter, limits and fallback."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from symheli.errors import InputError
 
 @dataclass(frozen=True)
 class ParameterMonitor:
-    """How a controller follows a measured scheduling parameter, such as an airspeed: filter, range
-    and fallback.
+    """Treatment of a measured scheduling parameter, such as an airspeed: filter, range and
+    fallback.
 
     A good reading is held at the ends of the table, filtered (`lag`) and followed at `rate` at
     most, the rate for which the loop is certified. A bad one (no number, said to be invalid,

@@ -19,14 +19,14 @@ from symheli.flight.sensor import Sensor
 from symheli.flight.servo import Servo, one_each
 from symheli.values.numbers import whole
 
-SHORTEST = 1e-6
-"""Seconds between samples."""
+MIN_SAMPLE_PERIOD = 1e-6
+"""Least sample period, s."""
 
 LONGEST_DELAY = 1.0
 """s, from command to servo."""
 
-LOUDEST = 1000
-"""Decibels, above or below the signal."""
+MAX_NOISE_DB = 1000
+"""Largest noise level, dB above or below the signal."""
 
 READ = (*map(str, MEASURED), "airspeed")
 """Signals that have a sensor."""
@@ -34,7 +34,7 @@ Trims = Literal["quasi-steady", "level"]
 
 
 class Options(TypedDict, total=False):
-    """What `fly` and `fly_batch` take beside the schedule; see `FlightPlan`."""
+    """Options of `fly` and `fly_batch` besides the schedule; see `FlightPlan`."""
 
     dt: float
     controller: object
@@ -114,9 +114,10 @@ class FlightPlan:
     def __post_init__(self) -> None:
         _expect("schedule", self.schedule, AirspeedSchedule)
         dt = _number("dt", self.dt, "a positive number of seconds")
-        if not SHORTEST <= dt:
+        if not MIN_SAMPLE_PERIOD <= dt:
             raise InputError(
-                f"dt must be a positive number of seconds, from {SHORTEST:g} on, got {self.dt}"
+                f"dt must be a positive number of seconds, from {MIN_SAMPLE_PERIOD:g} on,"
+                f" got {self.dt}"
             )
         if math.floor(self.schedule.duration / dt + 1e-9) < 2:
             raise InputError(
@@ -132,8 +133,10 @@ class FlightPlan:
             raise InputError("give either noise_db or sensors: both define the measurement errors")
         if self.noise_db is not None:
             level = _number("noise_db", self.noise_db, "a number of decibels, as 30")
-            if abs(level) > LOUDEST:
-                raise InputError(f"noise_db: expected -{LOUDEST} to {LOUDEST} dB, got {level:g}")
+            if abs(level) > MAX_NOISE_DB:
+                raise InputError(
+                    f"noise_db: expected -{MAX_NOISE_DB} to {MAX_NOISE_DB} dB, got {level:g}"
+                )
         object.__setattr__(self, "seed", whole(self.seed, "seed"))
         object.__setattr__(self, "wind", _wind(self.wind))
         _each("servos", self.servos, Servo, INPUTS)
@@ -151,8 +154,8 @@ class FlightPlan:
             raise UnknownNameError("kind of trims", self.trims, get_args(Trims))
 
     def seeded(self, seed: int) -> FlightPlan:
-        """The same flight with other random numbers: sensors' noise from `seed`, turbulence and
-        excitation from their own seed plus `seed`.
+        """Return the same flight with other random numbers: sensors' noise from `seed`, turbulence
+        and excitation from their own seed plus `seed`.
         """
         seed = whole(seed, "seed")
         stirred = self.excitation and replace(self.excitation, seed=self.excitation.seed + seed)

@@ -1,4 +1,4 @@
-"""A plan as JSON: to be read, and to tell whether two plans are one."""
+"""A plan as JSON, for reading and for comparing two plans."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 
 
 def described(value: Any) -> Any:
-    """Numbers, words, arrays, mappings and dataclasses as JSON, anything else by its type and what
-    it holds.
+    """Return numbers, words, arrays, mappings and dataclasses as JSON, anything else by its type
+    and content.
     """
     if value is None or isinstance(value, bool | int | str):
         return str(value) if isinstance(value, str) else value

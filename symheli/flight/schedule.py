@@ -1,4 +1,4 @@
-"""How airspeed is commanded over time."""
+"""Commanded airspeed over time."""
 
 from __future__ import annotations
 

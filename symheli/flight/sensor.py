@@ -1,4 +1,4 @@
-"""What a sensor makes of a signal."""
+"""Sensors: delay, sampling, bias, noise and quantization of a signal."""
 
 from __future__ import annotations
 

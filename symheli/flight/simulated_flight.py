@@ -1,4 +1,4 @@
-"""A flight of record once more, in a simulator that knows neither noise nor gusts."""
+"""Repetition of a recorded flight in a simulation without noise and gusts."""
 
 from __future__ import annotations
 
@@ -14,8 +14,10 @@ from symheli.helicopter import Helicopter
 from symheli.records.flight_record import FlightRecord
 from symheli.values.arrays import Array
 
-ALIGNED = 1e-3
-"""Of a sample period: how far the samples of a record may lie from those of its plan."""
+TIME_TOLERANCE = 1e-3
+"""Largest difference of the sample times of a record from those of its plan, as a fraction of the
+sample period.
+"""
 
 
 @dataclass(frozen=True)
@@ -100,7 +102,7 @@ def _same_samples(whole: FlightRecord, record: FlightRecord) -> Array:
     nearest = np.rint((record.time - whole.time[0]) / whole.dt).astype(int)
     inside = (nearest >= 0) & (nearest < len(whole))
     if not inside.all() or not np.allclose(
-        whole.time[nearest], record.time, rtol=0, atol=ALIGNED * whole.dt
+        whole.time[nearest], record.time, rtol=0, atol=TIME_TOLERANCE * whole.dt
     ):
         raise InputError(
             f"the record has other samples than its plan ({record.time[0]:.6g} to"

@@ -12,7 +12,7 @@ from symheli.errors import InputError
 from symheli.values.arrays import Array, frozen
 
 NUMBER = np.float32
-LARGEST = np.finfo(NUMBER).max
+MAX_NUMBER = np.finfo(NUMBER).max
 
 
 def rounded(given: object, name: str, shape: Sequence[int | None]) -> Array:
@@ -43,12 +43,12 @@ def increasing(given: object, name: str) -> Array:
 
 def inward(value: float, towards: float) -> np.float32:
     """The next number in this direction, the largest of them for infinity."""
-    number = NUMBER(np.clip(value, -float(LARGEST), float(LARGEST)))
+    number = NUMBER(np.clip(value, -float(MAX_NUMBER), float(MAX_NUMBER)))
     beyond = float(number) < value if towards > 0 else float(number) > value
     return np.nextafter(number, NUMBER(towards)) if beyond and math.isfinite(value) else number
 
 
-def as_told(name: str, given: ArrayLike, count: int) -> Array:
+def checked_numbers(name: str, given: ArrayLike, count: int) -> Array:
     """`count` numbers, finite or not; raises `InputError` for another number of them."""
     out = np.asarray(given, NUMBER)
     if out.shape != (count,):

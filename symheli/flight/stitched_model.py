@@ -27,8 +27,8 @@ _TABLES = {"linear": PiecewiseLinear, "spline": CubicSpline}
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StitchedModel:
-    """dx/dt = n(x) + f0(p) + A(p) (x_a - x0(p)) + B(p) (u - u0(p)), looked up at the filtered
-    airspeed p.
+    """Stitched model dx/dt = n(x) + f0(p) + A(p) (x_a - x0(p)) + B(p) (u - u0(p)), interpolated at
+    the filtered airspeed p.
 
     n(x) is exact: omega x V, gravity, attitude kinematics and, where `inertia` is given, the
     gyroscopic moments. The tables hold what is left of each point model. x_a is x with the velocity
@@ -111,8 +111,8 @@ class StitchedModel:
         kind: Literal["linear", "spline"] = "linear",
         inertia: tuple[float, float, float, float] | None = None,
     ) -> StitchedModel:
-        """From a continuous family with all rigid-body states and its trims; tables straight
-        between the anchors, or "spline".
+        """Return the stitched model of a continuous family with all rigid-body states and its
+        trims; tables straight between the anchors, or "spline".
         """
         speeds = family.over_airspeed("a stitched model")
         if family.dt is not None:

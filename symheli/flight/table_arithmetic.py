@@ -15,12 +15,12 @@ import numpy as np
 from symheli.values.arrays import Array
 from symheli.values.summary import summarized
 
-NEVER = 2**30
-"""A count of samples that is not reached."""
+MAX_COUNT = 2**30
+"""Count of samples that is never reached."""
 
 
 class Status(IntFlag):
-    """What happened in a step of a `TableController`, as flags.
+    """Events of a step of a `TableController`, as flags.
 
     `SATURATED`: a command is at its limit. `PARAMETER`: the reading of the scheduling parameter was
     implausible and was ignored. `FALLBACK`: it was implausible for too long, and the controller
@@ -42,7 +42,7 @@ class Status(IntFlag):
 
 
 class Entry(IntEnum):
-    """How a command begins: at its trim, at the command in force, or it is under way."""
+    """Initial value of a command: its trim, the command in force, or none as it is under way."""
 
     GROUND = 0
     IN_FORCE = 1
@@ -51,9 +51,8 @@ class Entry(IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class Numbers:
-    """What the arithmetic reads: `knots` (K,), `matrices` (K, n + ny, n + nu + ny) with
-    [A B L; C D 0] and, one an output, the ends of its command `low`, `high`, whether it
-    `integrates`; float32.
+    """Numbers of the arithmetic: `knots` (K,), `matrices` (K, n + ny, n + nu + ny) with [A B L; C D
+    0] and, one an output, the ends of its command `low`, `high`, whether it `integrates`; float32.
 
     `fade` is the part of an offset that is left after a sample, `step` the most that the parameter
     in use moves in one, `gain` that of the filter before (1: none), `frozen` and `hold` count
@@ -82,7 +81,7 @@ class Numbers:
 
 @dataclass(frozen=True, eq=False)
 class TableState:
-    """What a `TableController` keeps from sample to sample; every step returns a new one.
+    """State of a `TableController` between samples; every step returns a new one.
 
     Parameters
     ----------
@@ -135,7 +134,9 @@ class TableState:
 
     @classmethod
     def ground(cls, n: Numbers, flown: Array) -> TableState:
-        """Filters and integrators at zero; commands begin at their trim."""
+        """Return the state on the ground: filters and integrators at zero; commands begin at their
+        trim.
+        """
         zeros = np.zeros(len(n.low), np.float32)
         return cls(flown, np.zeros(n.order, np.float32), zeros, zeros, zeros.astype(int))
 
@@ -145,17 +146,17 @@ class TableState:
 
 
 def follow_parameter(n: Numbers, s: TableState, reading: np.float32, valid: bool) -> TableState:
-    """The state whose parameter in use has moved towards a reading, or what stands for a bad one;
-    its `status` is of that alone.
+    """Return the state whose parameter in use has moved towards a reading, or towards the
+    replacement of an invalid one; its `status` concerns that alone.
     """
     status, target = Status.FINE, s.target
-    same = min(s.same + 1, NEVER - 1) if reading == s.reading else 0
+    same = min(s.same + 1, MAX_COUNT - 1) if reading == s.reading else 0
     if valid and n.plausible[0] <= reading <= n.plausible[1] and same < n.frozen:
         bad = 0
         target = _clip(reading, n.knots[0], n.knots[-1])
     else:
         status |= Status.PARAMETER
-        bad = min(s.bad + 1, NEVER)
+        bad = min(s.bad + 1, MAX_COUNT)
         if not s.started or bad > n.hold:
             status |= Status.FALLBACK
             target = n.fallback
@@ -243,5 +244,5 @@ def _times(M: Array, v: Array) -> Array:
 
 
 def _clip(value: Any, low: Any, high: Any) -> Any:
-    """Between the ends; NaN stays."""
+    """Limit to the ends; NaN stays."""
     return np.where(value < low, low, np.where(value > high, high, value))[()]

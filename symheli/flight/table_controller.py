@@ -17,23 +17,23 @@ from symheli.dynamics import INPUTS
 from symheli.errors import InputError, UnknownNameError
 from symheli.flight.controller import (
     COMMAND,
+    CONTROLLER_INPUTS,
     SCHEDULING,
-    TOLD,
     Follow,
     ScheduledController,
     require_names,
 )
 from symheli.flight.parameter_monitor import ParameterMonitor
 from symheli.flight.single_precision import (
-    LARGEST,
+    MAX_NUMBER,
     NUMBER,
-    as_told,
+    checked_numbers,
     increasing,
     inward,
     rounded,
 )
 from symheli.flight.table_arithmetic import (
-    NEVER,
+    MAX_COUNT,
     Entry,
     Numbers,
     TableState,
@@ -87,7 +87,7 @@ class TableController:
     fade : float
         Time constant, s, of the offset that joins the first command to the one in force before.
     monitor : ParameterMonitor
-        What is done with what is told of the parameter.
+        Filter, limits and fallback of the measured parameter.
     follow : {"command", "reading"}
         Whether it is scheduled by what is commanded of the parameter, or as its sensor reads it.
     misfit : float
@@ -139,7 +139,7 @@ class TableController:
         indices(self.integrates, self.outputs, "output that integrates")
         object.__setattr__(self, "integrates", tuple(map(str, self.integrates)))
         own = tuple(f"{y}{COMMAND}" for y in self.integrates)
-        require_names("measured signal", self.inputs, (*TOLD, *own))
+        require_names("measured signal", self.inputs, (*CONTROLLER_INPUTS, *own))
         read = tuple(Signal(s, "rad") if s in own else s for s in self.inputs)
         object.__setattr__(self, "inputs", read)
         object.__setattr__(self, "parameter", Signal(self.parameter))
@@ -224,7 +224,7 @@ class TableController:
 
     @cached_property
     def numbers(self) -> Numbers:
-        """What the arithmetic reads, here and in C."""
+        """Numbers of the arithmetic, here and in C."""
         a, (low, high) = self.monitor, self._ends
         fallback = 0.5 * (low + high) if a.fallback is None else a.fallback
         if not low <= fallback <= high:
@@ -257,9 +257,9 @@ class TableController:
 
     @cached_property
     def model(self) -> LPVStateSpace:
-        """What flies within its limits, for an analysis: outputs added to the trim, the
-        coefficients the 32-bit numbers of the table, straight between the knots. Only the rounding
-        of sums and products in flight is left out.
+        """The controller within its limits as a model for analysis: outputs added to the
+        trim, the coefficients the 32-bit numbers of the table, straight between the knots. Only the
+        rounding of sums and products in flight is left out.
 
         A command that integrates is a state more, <name>_held, its deviation from the trim, which
         is also what an input <name>_command reads; that the trim moves under it is left out.
@@ -311,8 +311,8 @@ class TableController:
         return ScheduledController(self.model, self.follow)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write it as JSON, every number exact; a reader sees the old file or the new one. Raises
-        `SymheliError` where the file cannot be written.
+        """Write the controller as JSON, every number exact; a reader sees the old file or the new
+        one. Raises `SymheliError` where the file cannot be written.
         """
         from symheli.flight.table_file import save
 
@@ -332,8 +332,8 @@ class TableController:
     def init(
         self, command: ArrayLike | None = None, axes: Collection[str] | None = None
     ) -> TableState:
-        """States, filters and integrators on the ground; the parameter in use starts at the next
-        good reading.
+        """Return states, filters and integrators on the ground; the parameter in use starts at the
+        next valid reading.
 
         With `command` (ny,), rad, the one in force now: the first step answers just that, whatever
         is measured then, and what it differs by from the controller's own fades away (or stays,
@@ -363,8 +363,8 @@ class TableController:
         valid: bool = True,
         others: ArrayLike | None = None,
     ) -> tuple[Array, TableState]:
-        """Commands (ny,), float32, in rad, at one sample, and the state of the next, whose `status`
-        says what was met with.
+        """Return the commands (ny,), float32, in rad, at one sample, and the next state, whose
+        `status` lists the events of the step.
 
         Parameters
         ----------
@@ -382,9 +382,12 @@ class TableController:
         """
         n, s, nu, ny = self.numbers, self._own(state), len(self.inputs), len(self.outputs)
         with np.errstate(all="ignore"):  # NaN and infinity are handled below
-            seen, held = as_told("measured", measured, nu), as_told("reference", reference, nu)
-            at = as_told("trim", trim, ny)
-            elsewhere = at if others is None else as_told("others", others, ny)
+            seen, held = (
+                checked_numbers("measured", measured, nu),
+                checked_numbers("reference", reference, nu),
+            )
+            at = checked_numbers("trim", trim, ny)
+            elsewhere = at if others is None else checked_numbers("others", others, ny)
             s = follow_parameter(n, s, NUMBER(parameter), valid)
             s = commands(n, s, seen - held, at, elsewhere)
         return s.command.copy(), s
@@ -440,7 +443,7 @@ class TableController:
         return {str(s): known[s] for s in self.inputs if s in known}
 
     def _provided(self, told: NamedVector) -> float:
-        """The parameter in the unit of the table, of what a flight tells."""
+        """Return the parameter in the unit of the table from the signals of a flight."""
         if self.parameter == UNSCHEDULED.name:
             return UNSCHEDULED.middle
         for signal, value in zip(told.signals, told.array, strict=True):
@@ -468,12 +471,12 @@ class TableController:
         return self.rate if self.monitor.rate is None else self.monitor.rate
 
     def _largest_step(self) -> np.float32:
-        """What the parameter in use may move by in a sample: rounding its sum takes it no farther
-        than the rate allows.
+        """Return the largest change of the parameter in use in a sample: rounding its sum takes it
+        no farther than the rate allows.
         """
         most = self._rate * self.dt
         if most == 0.0 or math.isinf(most):
-            return min(NUMBER(most), LARGEST)
+            return min(NUMBER(most), MAX_NUMBER)
         rounding = float(np.spacing(np.abs(self.knots).max()))
         if most <= 2 * rounding:
             raise InputError(
@@ -483,7 +486,7 @@ class TableController:
         return inward(most - rounding, -math.inf)
 
     def _samples(self, seconds: float, least: int) -> int:
-        return int(max(min(math.floor(min(seconds / self.dt, NEVER) + 1e-9), NEVER), least))
+        return int(max(min(math.floor(min(seconds / self.dt, MAX_COUNT) + 1e-9), MAX_COUNT), least))
 
 
 def _limits(given: object, outputs: Sequence[str]) -> Mapping[str, tuple[float, float]]:

@@ -57,7 +57,7 @@ def load(path: str | os.PathLike[str]) -> TableController:
 
 
 def _written(value: Any) -> Any:
-    """With infinity, for which JSON has no number, as a word."""
+    """Return infinity, for which JSON has no number, as a word."""
     if isinstance(value, dict):
         return {key: _written(one) for key, one in value.items()}
     if isinstance(value, list | tuple):

@@ -16,8 +16,8 @@ from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
 from symheli.values.arrays import Array
 from symheli.values.signal import Signal
 
-BETWEEN = 4
-"""Points between two knots at which a table is compared with what it is of."""
+CHECKS_PER_INTERVAL = 4
+"""Number of points between two knots at which a table is compared with its original."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class Tabulated:
 
     @property
     def parameter(self) -> Signal:
-        """What the table is over, with its unit."""
+        """The signal over which the table is given, with its unit."""
         return Signal(self.model.scheduling.name, self.model.scheduling.unit)
 
     @property
@@ -61,7 +61,9 @@ class Tabulated:
         return np.array([str(y).endswith(RATE) for y in self.model.outputs], bool)
 
     def knots(self, given: int | Sequence[float]) -> Array:
-        """So many at equal distances, or those given, in the range of the model; float32."""
+        """Return this number of equidistant knots, or the given ones, in the range of the model;
+        float32.
+        """
         low, high = self.model.scheduling.low, self.model.scheduling.high
         if isinstance(given, int):
             if isinstance(given, bool) or given < 2:
@@ -84,7 +86,7 @@ class Tabulated:
         return Matrices(A, B, each * C, each * D)
 
     def matrices(self, knots: Array, correction: object | None) -> Array:
-        """[A B L; C D 0] (K, n + ny, n + nu + ny), L designed or as given."""
+        """Return [A B L; C D 0] (K, n + ny, n + nu + ny), L designed or given."""
         A, B, C, D = self.at(knots.astype(float))
         none = np.zeros((len(knots), len(self.outputs), len(self.outputs)))
         return np.block([[A, B, self._corrections(correction, A, B, C)], [C, D, none]])
@@ -94,7 +96,7 @@ class Tabulated:
         model: of A, B, C, D the worst.
         """
         at = knots.astype(float)
-        steps = np.arange(BETWEEN + 1) / (BETWEEN + 1)
+        steps = np.arange(CHECKS_PER_INTERVAL + 1) / (CHECKS_PER_INTERVAL + 1)
         p = np.append((at[:-1, None] + np.diff(at)[:, None] * steps).ravel(), at[-1])
         n = len(self.model.states)
         own = n + len(self.model.inputs)

@@ -22,7 +22,7 @@ def warn_of_flown(heli: Helicopter, flown: Sequence[FlightData]) -> None:
 
 
 def warn_of_plans(heli: Helicopter, plans: Sequence[FlightPlan]) -> None:
-    """The same of what is commanded, before it is flown."""
+    """Warn in the same way of commanded flights, before they are flown."""
     schedules = [plan.schedule for plan in plans]
     _warn(heli, np.array([max(s.start, *s.targets) for s in schedules]), "commanded")
 

@@ -20,10 +20,10 @@ from symheli.integrate.tableau import CASH_KARP, DORMAND_PRINCE, Pair
 from symheli.values.arrays import Array
 
 SCALE = {"m/s": 1.0, "rad/s": 1.0, "1": 0.1, "m": 1.0, "rad": 0.1}
-"""Size of a state by its unit: what `absolute` is a fraction of."""
-NEAR = 0.01
-"""How near, as a share of the step, it ends to the place of a switch. What is left of the error
-that the switch makes is the square of that.
+"""Typical size of a state by its unit; `absolute` is a fraction of it."""
+SWITCH_TOLERANCE = 0.01
+"""Accuracy of the location of a switch, as a fraction of the step. The remaining error of the
+switch is the square of that.
 """
 
 
@@ -191,7 +191,8 @@ def _head(pair: Pair, switches: int) -> str:
     rows = ", ".join(map(values, pair.a))
     return (
         f"#define STAGES {stages}\n#define AT_END {pair.at_end}\n#define SWITCHES {switches}\n"
-        f"#define NEAR {NEAR!r}\nstatic const double A[{stages}][{stages}] = {{{rows}}},"
+        f"#define NEAR {SWITCH_TOLERANCE!r}\n"
+        f"static const double A[{stages}][{stages}] = {{{rows}}},"
         f" B[{stages}] = {values(pair.b)}, E[{stages}] = {values(pair.error)};\n"
     )
 
@@ -200,7 +201,9 @@ def _first_switch(before: Array, after: Array) -> float:
     """As `first_switch` in adaptive.c."""
     with np.errstate(all="ignore"):
         share = before / (before - after)
-        share = share[(before * after < 0) & (share > NEAR) & (share < 1 - NEAR)]
+        share = share[
+            (before * after < 0) & (share > SWITCH_TOLERANCE) & (share < 1 - SWITCH_TOLERANCE)
+        ]
     return min(share.tolist(), default=1.0)
 
 

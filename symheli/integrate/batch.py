@@ -73,9 +73,7 @@ class Batch:
 
     @property
     def lost(self) -> Array:
-        """Which flights (N,) left the range of numbers: their states are NaN or infinite from there
-        on.
-        """
+        """Mask (N,) of the flights whose states became NaN or infinite."""
         return np.logical_not(np.isfinite(self.final).all(axis=1))
 
 

@@ -1,4 +1,6 @@
-"""What is to be flown, checked once, whatever the method and the number of flights."""
+"""Simulation problem: the inputs of a simulation, checked once for all methods and numbers of
+flights.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +16,8 @@ from symheli.physics.attitude import flight_state
 from symheli.steady.equilibrium import TrimPoint
 from symheli.values.arrays import Array, frozen
 
-MOST = 1_000_000
-"""Steps a sample."""
+MAX_STEPS_PER_SAMPLE = 1_000_000
+"""Largest number of integration steps a sample."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,11 +47,11 @@ class Problem:
         """Number and size (s) of the equal steps, none longer than `longest`, that make one
         sample.
         """
-        count = max(math.ceil(min(self.dt / longest, 2.0 * MOST) - 1e-9), 1)
-        if count > MOST:
+        count = max(math.ceil(min(self.dt / longest, 2.0 * MAX_STEPS_PER_SAMPLE) - 1e-9), 1)
+        if count > MAX_STEPS_PER_SAMPLE:
             raise InputError(
-                f"dt of {self.dt:g} s takes more than {MOST} steps of {longest:g} s a sample; is it"
-                " in seconds?"
+                f"dt of {self.dt:g} s takes more than {MAX_STEPS_PER_SAMPLE} steps of"
+                f" {longest:g} s a sample; is it in seconds?"
             )
         return count, self.dt / count
 

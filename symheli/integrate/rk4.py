@@ -55,7 +55,7 @@ class RungeKutta4:
 
     @property
     def tableau(self) -> Tableau:
-        """Its coefficients."""
+        """Coefficients of the method."""
         return CLASSICAL
 
 

@@ -22,7 +22,9 @@ Result = TypeVar("Result")
 
 
 def workers_of(asked: int | None) -> int:
-    """The number of threads asked for, or the cores this process may use; `InputError` below 1."""
+    """Return the requested number of threads, or of the cores this process may use; `InputError`
+    below 1.
+    """
     if asked is None:
         usable = getattr(os, "sched_getaffinity", None)
         return len(usable(0)) if usable else os.cpu_count() or 1
@@ -34,8 +36,8 @@ def workers_of(asked: int | None) -> int:
 def as_done(
     executor: Executor, run: Callable[[Chunk], Result], chunks: Iterable[Chunk], ahead: int
 ) -> Generator[tuple[Chunk, Future[Result]], None, None]:
-    """Each chunk with the finished future of `run(chunk)`, as they are done, at most `ahead` handed
-    to the executor at a time. Where the reader gives up, those not begun are cancelled.
+    """Yield each chunk with the finished future of `run(chunk)`, as they are done, at most `ahead`
+    handed to the executor at a time. If the reader stops, those not begun are cancelled.
     """
     waiting = iter(chunks)
     running: dict[Future[Result], Chunk] = {}

@@ -92,8 +92,8 @@ class Trajectory:
         return self.states[-1]
 
     def to_record(self) -> FlightRecord:
-        """As a flight record: velocities, rates, phi, theta, rotor states and position, and the
-        inputs (the last one again at the end).
+        """Return a flight record: velocities, rates, phi, theta, rotor states and position, and the
+        inputs (the last one repeated at the end).
         """
         euler, own = euler_state(self.states), self.signals[13:]
         columns = {str(name): euler[:, i] for i, name in enumerate((*EULER, *own))}

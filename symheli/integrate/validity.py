@@ -15,8 +15,8 @@ AT_ONCE = 65_536
 
 
 def warn_of_flights(heli: Helicopter, problem: Problem, states: Array, every: int = 1) -> None:
-    """One `ValidityWarning` where flights leave what the equations are known to hold for, judged at
-    the states that are kept (N, kept, nx), every `every`-th of the problem up to its last.
+    """Give one `ValidityWarning` where flights leave the validity range of the equations, judged at
+    the stored states (N, kept, nx), every `every`-th of the problem up to its last.
     """
     own = len(problem.p) == 1 and np.array_equal(problem.p[0], heli.parameters.array)
     validity = Validity.of(heli) if own else Validity(heli, problem.p)

@@ -10,19 +10,19 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.values.units import to_si
 
-SILENCE = 5.0
-"""A column that pauses for more than this many of its median steps is missing (NaN) in between."""
+MAX_PAUSE = 5.0
+"""A pause of a column longer than this many of its median steps is filled with NaN."""
 
 A_TURN = 0.9
 """Part of a turn that no angle moves by from one sample to the next."""
 
-FINER = 1e4
-"""A step that makes this many times as many samples as the column with most is refused."""
+MAX_UPSAMPLING = 1e4
+"""Largest number of samples, relative to the column with most, that a step may produce."""
 
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """Samples (n,) of one column of a log and their instants in s (n,), as they stand there.
+    """Samples (n,) of one column of a log and their instants in s (n,), as logged.
 
     `time` None where the log has no clock; `unit` None where the log declares none, else one that
     `symheli.values.units.to_si` knows.
@@ -34,7 +34,9 @@ class Column:
 
 
 def forward(time: np.ndarray) -> np.ndarray:
-    """Mask of the samples whose instant is later than all before: repeats and steps back go."""
+    """Return the mask of the samples whose instant is later than all before: repeats and steps back
+    are dropped.
+    """
     return np.concatenate([[True], np.diff(np.maximum.accumulate(time)) > 0])
 
 
@@ -54,8 +56,8 @@ def continuous(column: Column, unit: str) -> Column:
 def on_one_axis(
     columns: Mapping[str, Column], dt: float, path: object
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Columns of different rates at steps of `dt` (s), interpolated linearly between neighbours,
-    from the first instant that all have seen to the last; time counts from there.
+    """Return columns of different rates at steps of `dt` (s), interpolated linearly between
+    neighbours, over the interval common to all; time counts from its start.
 
     Nothing is filtered: what is faster than half of 1 / dt folds back. Within a silence (more than
     5 median steps of that column) samples are missing. Raises `InputError` where no instant is
@@ -78,7 +80,7 @@ def on_one_axis(
             f" {first!r} ends at {stop:.3f} s; leave one of them out"
         )
     samples, logged = (stop - start) / dt, max(len(time) for time, _ in series.values())
-    if samples > FINER * logged:
+    if samples > MAX_UPSAMPLING * logged:
         raise InputError(
             f"{path}: {samples:.1e} steps of {dt:g} s for {logged} samples; dt is in seconds, or a"
             f" clock of the log is damaged (it runs from {start:.6g} to {stop:.6g} s)"
@@ -95,5 +97,5 @@ def _interpolate(grid: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.n
         exact = np.isclose(grid, time[after], rtol=0, atol=1e-9) | np.isclose(
             grid, time[after - 1], rtol=0, atol=1e-9
         )
-        out[(step > SILENCE * np.median(np.diff(time))) & ~exact] = np.nan
+        out[(step > MAX_PAUSE * np.median(np.diff(time))) & ~exact] = np.nan
     return out

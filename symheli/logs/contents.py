@@ -1,4 +1,4 @@
-"""What a log holds, before anybody says what its columns mean."""
+"""Content of a log, before its columns are assigned to signals."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Contents:
 
 
 def contents_of(path: str | os.PathLike[str], format: Format | None = None) -> Contents:
-    """All that a log of this format (default: what it is by its content) holds.
+    """Return the content of a log of this format (default: recognised by its first bytes).
 
     Raises `InputError` for a file that is no such log.
     """

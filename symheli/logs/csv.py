@@ -26,9 +26,9 @@ def read_csv(
     dt: float | None = None,
     time_unit: str | None = None,
 ) -> Table:
-    """The columns named in `units`, as they stand, and the time in s; without `units` all columns
-    whose unit the header gives. What `units` says of a column counts before its header; where it
-    says None, the header counts, and "1" where that says nothing either.
+    """Read the columns named in `units`, unconverted, and the time in s; without `units` all
+    columns whose unit the header gives. An entry of `units` takes precedence over the header; for
+    None the unit of the header counts, and "1" where it gives none.
 
     `time` names the time column (in `time_unit`; default that of its header, or s); None where the
     file has none: its rows are then `dt` (s) apart. Empty cells are missing samples (NaN). Raises
@@ -79,8 +79,8 @@ def csv_columns(path: str | os.PathLike[str]) -> dict[str, Column]:
 
 
 def with_units(time: Array, columns: Sequence[tuple[Signal, Array]]) -> str:
-    """A table that `read_csv` reads without being told anything: "t [s],q [rad/s]", numbers to the
-    last bit, empty cells for NaN.
+    """Write a table that `read_csv` reads without options: "t [s],q [rad/s]", numbers to the last
+    bit, empty cells for NaN.
     """
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")

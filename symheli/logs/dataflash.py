@@ -22,7 +22,7 @@ import numpy as np
 from symheli.errors import InputError, UnknownNameError
 from symheli.extras import extra
 from symheli.logs.column import Column, continuous, on_one_axis
-from symheli.logs.files import Table, existing, positive, quiet, said_by, warn_of_damage
+from symheli.logs.files import Table, error_text, existing, positive, quiet, warn_of_damage
 from symheli.values.units import to_si
 
 LABELS = {
@@ -125,7 +125,7 @@ _Found = dict[str, dict[str, dict[str, Column]]]
 
 
 def _read(path: str | os.PathLike[str], wanted: Iterable[str] | None) -> _Found:
-    """These messages, or all; raises `UnknownNameError` where the log has none of one."""
+    """Return these messages, or all; raise `UnknownNameError` for one that the log lacks."""
     with extra("logs", "reading an ArduPilot log"):
         from pymavlink.DFReader import (  # type: ignore[import-not-found]
             DFReader_binary,
@@ -159,7 +159,7 @@ def _read(path: str | os.PathLike[str], wanted: Iterable[str] | None) -> _Found:
     except Exception as error:
         raise InputError(
             f"{file}: not an ArduPilot log, or one that was damaged"
-            f" ({said_by(error)}); download it once more"
+            f" ({error_text(error)}); download it once more"
         ) from error
     if not present:
         raise InputError(
@@ -199,18 +199,16 @@ def _messages(log: Any, names: Iterable[str]) -> Iterator[Any]:
             yield message
 
 
-class _Said(NamedTuple):
-    """Of a field: the letter of its unit, its label there, and what one count is (None: not
-    known).
-    """
+class _FieldUnit(NamedTuple):
+    """Unit of a field: its letter, its label here, and the value of one count (None: not known)."""
 
     unit: str
     label: str
     factor: float | None
 
 
-def _declared(log: Any) -> dict[int, dict[str, _Said]]:
-    """What the log says of its fields, by type of message and name."""
+def _declared(log: Any) -> dict[int, dict[str, _FieldUnit]]:
+    """Return the units that the log declares for its fields, by type of message and name."""
     labels: dict[str, str] = {}
     factors: dict[str, float] = {}
     fields: dict[int, tuple[str, str]] = {}
@@ -225,7 +223,7 @@ def _declared(log: Any) -> dict[int, dict[str, _Said]]:
     forms = {form.type: form for form in log.formats.values()}
     return {
         number: {
-            name: _Said(
+            name: _FieldUnit(
                 unit,
                 labels.get(unit, ""),
                 None if mult == NOT_WORKED_OUT else 1.0 if own else factors.get(mult, 1.0),
@@ -246,7 +244,7 @@ class _Row(NamedTuple):
     now: float | None
 
 
-def _columns(rows: list[_Row], known: Mapping[str, _Said]) -> dict[str, Column]:
+def _columns(rows: list[_Row], known: Mapping[str, _FieldUnit]) -> dict[str, Column]:
     """The fields of numbers of messages of one kind."""
     form = rows[0].message.fmt
     clock = next((name for name in CLOCKS if name in form.columns), None)

@@ -19,7 +19,7 @@ Table = tuple[np.ndarray, dict[str, np.ndarray], dict[str, str]]
 
 
 def existing(path: str | os.PathLike[str]) -> Path:
-    """The path of a file that exists and is not empty; raises `InputError` otherwise."""
+    """Return the path of a file that exists and is not empty; raise `InputError` otherwise."""
     file = Path(path)
     if not file.is_file():
         raise InputError(f"{file}: there is no such file")
@@ -44,19 +44,19 @@ def text(path: str | os.PathLike[str]) -> str:
 
 @contextlib.contextmanager
 def quiet() -> Iterator[io.StringIO]:
-    """Around a reader of others that prints what it thinks of the file: what it said."""
+    """Capture what a third-party reader prints."""
     said = io.StringIO()
     with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
         yield said
 
 
-def said_by(error: Exception) -> str:
-    """What an error says, or its name where it says nothing."""
+def error_text(error: Exception) -> str:
+    """Return the text of an error, or its name where it has none."""
     return str(error) or type(error).__name__
 
 
 def warn_of_damage(path: object) -> None:
-    """Warn (`DataWarning`) that what could be read is not the whole log."""
+    """Warn (`DataWarning`) that parts of the log could not be read."""
     warnings.warn(
         f"{path}: parts of the log are damaged and were left out; look for gaps before believing a"
         " fit, or copy it from the aircraft once more",

@@ -1,4 +1,4 @@
-"""Which kind of log a file is: by its first bytes, not by its name."""
+"""Recognition of the format of a log by its first bytes, not by its name."""
 
 from __future__ import annotations
 

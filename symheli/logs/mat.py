@@ -12,7 +12,7 @@ import numpy as np
 from symheli.errors import InputError, UnknownNameError
 from symheli.extras import extra
 from symheli.logs.column import Column
-from symheli.logs.files import Table, existing, said_by, seconds_in
+from symheli.logs.files import Table, error_text, existing, seconds_in
 from symheli.logs.format import is_hdf5
 from symheli.logs.mat5 import check_mat5
 
@@ -54,7 +54,7 @@ def mat_columns(path: str | os.PathLike[str]) -> dict[str, Column]:
 
 
 def _content(file: Path) -> Mapping[str, Any]:
-    """Variables and nested structs by name; arrays, or whatever else MATLAB may save."""
+    """Return variables and nested structs by name; arrays, or any other MATLAB value."""
     from scipy.io import loadmat
 
     if is_hdf5(file):
@@ -64,7 +64,8 @@ def _content(file: Path) -> Mapping[str, Any]:
         content = loadmat(file, simplify_cells=True)
     except Exception as error:
         raise InputError(
-            f"{file}: not a MATLAB file, or one that was cut ({said_by(error)}); save it once more"
+            f"{file}: not a MATLAB file, or one that was cut ({error_text(error)});"
+            " save it once more"
         ) from error
     return {name: value for name, value in content.items() if not name.startswith("__")}
 
@@ -95,7 +96,7 @@ def _hdf5(file: Path) -> Mapping[str, Any]:
             return read(opened)
     except Exception as error:
         raise InputError(
-            f"{file}: a MATLAB 7.3 file that was cut or damaged ({said_by(error)});"
+            f"{file}: a MATLAB 7.3 file that was cut or damaged ({error_text(error)});"
             " save it once more"
         ) from error
 
@@ -109,7 +110,7 @@ def _leaves(content: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, 
 
 
 def _as_vector(value: Any) -> np.ndarray | None:
-    """None where it is none of numbers."""
+    """Return the vector, None where the value is not a vector of numbers."""
     try:
         array = np.atleast_1d(np.squeeze(np.asarray(value, dtype=float)))
     except (TypeError, ValueError):

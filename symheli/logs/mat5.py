@@ -15,7 +15,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-SIZES = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8, 16: 1, 17: 2, 18: 4}
+ELEMENT_BYTES = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8, 16: 1, 17: 2, 18: 4}
 """Bytes of a value by type of element: miINT8 to miUTF32."""
 NAME, INT32, UINT32, MATRIX, COMPRESSED = (1, 16), (5, 6), 6, 14, 15
 """SciPy takes a name in UTF-8 and sizes that are said to have no sign."""
@@ -23,10 +23,12 @@ CELL, STRUCT, OBJECT, CHAR, SPARSE, FUNCTION, OPAQUE = 1, 2, 3, 4, 5, 16, 17
 NUMERIC = range(6, 16)
 COMPLEX = 0x800
 HEADER = 128
-DEEPEST = 50
-"""Structs and cells within each other; SciPy recurses."""
-EMPTY = 1_000_000
-"""Structs without a field and texts of spaces take no bytes of the file, but memory."""
+MAX_DEPTH = 50
+"""Largest nesting depth of structs and cells; SciPy is recursive."""
+MAX_EMPTY = 1_000_000
+"""Largest number of structs without fields, or of spaces of a text, which take memory but no bytes
+of the file.
+"""
 
 
 class _Element(NamedTuple):
@@ -36,8 +38,8 @@ class _Element(NamedTuple):
 
 
 def check_mat5(file: Path) -> None:
-    """Raises `ValueError` for a file of version 5 whose elements do not fit; says nothing of one
-    of another version.
+    """Raise `ValueError` for a file of version 5 whose elements do not fit; files of other versions
+    are not checked.
     """
     data = memoryview(file.read_bytes())
     if len(data) < 4 or 0 in data[:4]:  # version 4 has no header
@@ -62,7 +64,7 @@ class _Reader:
                 kind, content, _ = self.element(memoryview(zlib.decompress(content)), 0, False)
             if kind != MATRIX:
                 raise ValueError(f"expected a variable, found an element of type {kind}")
-            self.matrix(content, DEEPEST)
+            self.matrix(content, MAX_DEPTH)
 
     def element(self, data: memoryview, at: int, padded: bool = True) -> _Element:
         """The one that begins at `at`, the next of them at its `end`."""
@@ -78,7 +80,7 @@ class _Reader:
             end = start + size + (-size % 8 if padded else 0)
         if start + size > len(data):
             raise ValueError("an element is longer than what it is in")
-        if kind not in (MATRIX, COMPRESSED, *SIZES):
+        if kind not in (MATRIX, COMPRESSED, *ELEMENT_BYTES):
             raise ValueError(f"an element of type {kind} with {size} bytes")
         return _Element(kind, data[start : start + size], end)
 
@@ -96,7 +98,7 @@ class _Reader:
         if not len(data):
             return  # an empty array within a cell or struct
         if not deeper:
-            raise ValueError(f"more than {DEEPEST} structs or cells within each other")
+            raise ValueError(f"more than {MAX_DEPTH} structs or cells within each other")
         _, flags, at = self.of_type(data, 0, UINT32)
         if len(flags) != 8:
             raise ValueError("array flags are two numbers")
@@ -117,8 +119,8 @@ class _Reader:
         if kind in NUMERIC:
             self.numbers(data, at, [count] * parts)
         elif kind == CHAR:
-            found = self.of_type(data, at, *SIZES)
-            if count > (len(found.content) or EMPTY):  # spaces where there are none
+            found = self.of_type(data, at, *ELEMENT_BYTES)
+            if count > (len(found.content) or MAX_EMPTY):  # spaces where there are none
                 raise ValueError(f"{count} characters in {len(found.content)} bytes")
         elif kind == SPARSE:
             self.sparse(data, at, shape, parts)
@@ -133,9 +135,11 @@ class _Reader:
 
     def numbers(self, data: memoryview, at: int, counts: list[int]) -> None:
         for count in counts:
-            kind, content, at = self.of_type(data, at, *SIZES)
-            if len(content) != count * SIZES[kind]:
-                raise ValueError(f"{len(content) // SIZES[kind]} numbers in an array of {count}")
+            kind, content, at = self.of_type(data, at, *ELEMENT_BYTES)
+            if len(content) != count * ELEMENT_BYTES[kind]:
+                raise ValueError(
+                    f"{len(content) // ELEMENT_BYTES[kind]} numbers in an array of {count}"
+                )
 
     def sparse(self, data: memoryview, at: int, shape: list[int], parts: int) -> None:
         _, rows, at = self.of_type(data, at, *INT32)
@@ -148,7 +152,7 @@ class _Reader:
         if len(used) < starts[-1] or not all(0 <= row < shape[0] for row in used):
             raise ValueError("the rows of a sparse array do not fit")
         for _ in range(parts):
-            _kind, content, at = self.of_type(data, at, *SIZES)
+            _kind, content, at = self.of_type(data, at, *ELEMENT_BYTES)
             if len(content) < starts[-1]:  # of logical values a byte each, whatever their type
                 raise ValueError("a sparse array lacks numbers")
 
@@ -161,7 +165,7 @@ class _Reader:
         if len(length) != 1 or length[0] < 1 or len(names) % length[0]:
             raise ValueError("the names of the fields of a struct are cut")
         fields = len(names) // length[0]
-        if not fields and count > EMPTY:
+        if not fields and count > MAX_EMPTY:
             raise ValueError(f"{count} structs without a field")
         self.matrices(data, at, count * fields, deeper)
 

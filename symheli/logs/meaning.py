@@ -1,5 +1,5 @@
-"""What a column of a log probably is, by its name and its size: a suggestion for somebody to
-confirm, never used without being asked.
+"""Probable meaning of a column of a log, by its name and its size: a suggestion for the user to
+confirm, never used automatically.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from symheli.values.signal import UNITS
 
 @dataclass(frozen=True)
 class Guess:
-    """A column that may be `signal`, in `unit`; `why` says what both rest on."""
+    """A column that may be `signal`, in `unit`; `why` is the reason for both."""
 
     signal: str
     column: str
@@ -197,7 +197,7 @@ def _unit(signal: str, values: np.ndarray) -> tuple[str | None, str]:
     known = np.abs(values[np.isfinite(values)])
     size = float(known.max()) if len(known) else 0.0
     if signal in RATES:
-        return ("deg/s", "name and size") if size > FASTEST else ("rad/s", "name")
+        return ("deg/s", "name and size") if size > MAX_RATE else ("rad/s", "name")
     if signal in ANGLES:
         most = np.pi / 2 if signal == "theta" else 2 * np.pi
         return ("deg", "name and size") if size > 1.05 * most else ("rad", "name")
@@ -210,8 +210,8 @@ def _unit(signal: str, values: np.ndarray) -> tuple[str | None, str]:
     return ("%", "name and size") if size == 100.0 else (None, "")
 
 
-FASTEST = 12.0
-"""rad/s: no helicopter turns faster; larger numbers are degrees a second."""
+MAX_RATE = 12.0
+"""Largest angular rate of a helicopter, rad/s; larger numbers are in deg/s."""
 
 PULSES = (1000.0, 2500.0)
-"""Longest pulse of a radio channel, us."""
+"""Range of pulse lengths of a radio channel, us."""

@@ -1,6 +1,4 @@
-"""Text tables as they come: which character separates, which is the decimal sign, where the names
-stand.
-"""
+"""Text tables: recognition of the separator, the decimal sign and the line of names."""
 
 from __future__ import annotations
 
@@ -18,13 +16,15 @@ from symheli.logs.files import text
 from symheli.values.units import to_si
 
 SEPARATORS = {"\t": "tab", "|": "bar", ";": "semicolon", ",": "comma", " ": "blanks"}
-"""Tried in this order: what stands in names and numbers too comes last."""
+"""Separators in the order in which they are tried: those that also occur in names and numbers come
+last.
+"""
 
 LOOKED_AT = 20
 """Rows that decide on the separator."""
 
 MISSING = {"", "na", "n/a", "nan", "-nan", "null", "none", "#n/a"}
-"""Cells (lower case) that say that a sample is missing."""
+"""Cells (lower case) of a missing sample."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,8 +43,8 @@ class SeparatedTable:
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> SeparatedTable:
-        """Raises `InputError` that says what is no table about the file: no header, no rows, or the
-        row that does not fit.
+        """Read the table; raise `InputError` with the reason where the file is no table: no header,
+        no rows, or the row that does not fit.
         """
         lines = [line for line in text(path).splitlines() if line.strip()]
         first = next(
@@ -95,7 +95,7 @@ class SeparatedTable:
 
     @cached_property
     def _declared(self) -> dict[str, tuple[str, str]]:
-        """Whole name and unit of the columns that have theirs in the header, by bare name."""
+        """The whole name and the unit of columns with a unit in the header, by bare name."""
         found = [(whole, declared) for whole in self.header if (declared := _with_unit(whole))]
         bare = [name for _, (name, _) in found]
         return {
@@ -116,8 +116,8 @@ class SeparatedTable:
         return tuple(bare.get(whole, whole) for whole in self.header)
 
     def columns(self, names: Iterable[str]) -> dict[str, np.ndarray]:
-        """The named columns as numbers (n,), NaN where a cell is empty; "q" is found as "q [rad/s]"
-        too.
+        """Return the named columns as numbers (n,), NaN where a cell is empty; "q" finds "q
+        [rad/s]" too.
 
         A comma in numbers is the decimal sign where it does not separate. Raises `UnknownNameError`
         for a name the header lacks, `InputError` for one that stands there twice and for the first
@@ -158,8 +158,8 @@ class SeparatedTable:
 
 
 def _with_unit(name: str) -> tuple[str, str] | None:
-    """Name and unit of "q [rad/s]" or "q (rad/s)"; None where what stands in brackets is no unit,
-    or an index (xyz[1]; "n [1]" is a unit).
+    """Return name and unit of "q [rad/s]" or "q (rad/s)"; None where the brackets hold no unit, or
+    an index (xyz[1]; "n [1]" is a unit).
     """
     match = re.fullmatch(r"(.*\S)(\s*)(?:\[([^][]+)\]|\(([^()]+)\))", name)
     if match is None:

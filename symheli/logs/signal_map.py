@@ -40,7 +40,7 @@ ENTRY = ("column", "unit", "scale", "offset")
 
 @dataclass(frozen=True)
 class Source:
-    """Where one signal comes from: `column`, its `unit` (None: that of the log), scale * column +
+    """Source of one signal: `column`, its `unit` (None: that of the log), scale * column +
     offset.
     """
 
@@ -62,7 +62,7 @@ class SignalMap:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> SignalMap:
-        """From a TOML file; raises `InputError` naming the file and the entry that is wrong."""
+        """Load a map from a TOML file; raise `InputError` with the file and the invalid entry."""
         try:
             table = tomllib.loads(text(path))
         except tomllib.TOMLDecodeError as error:

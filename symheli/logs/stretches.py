@@ -1,6 +1,4 @@
-"""Parts of a log: on the ground and in the air, one mode after the other, and what is behind a
-crash.
-"""
+"""Segments of a log: on the ground and in the air, one mode after the other, and after a crash."""
 
 from __future__ import annotations
 
@@ -12,18 +10,18 @@ from typing import NamedTuple
 import numpy as np
 
 from symheli.logs.column import Column, forward
-from symheli.logs.meaning import FASTEST, RATES, Guess
+from symheli.logs.meaning import MAX_RATE, RATES, Guess
 from symheli.values.arrays import Array
 from symheli.values.units import to_si
 
-REST = 0.005
-"""rad/s: rates that vary by less than this over `WINDOW` are those of a vehicle at rest."""
+REST_RATE = 0.005
+"""Variation of the angular rates over `WINDOW`, rad/s, below which the vehicle is at rest."""
 
 WINDOW = 2.0
-"""s."""
+"""Length of the window, s."""
 
-SHORTEST = 5.0
-"""s: what is flown for less is not worth identifying from."""
+MIN_DURATION = 5.0
+"""Least duration, s, of a flight that is worth identifying from."""
 
 EVENTS = {"armed": ({10.0, 15.0}, {11.0}), "airborne": ({28.0}, {18.0})}
 """Numbers of ArduPilot's EV messages that begin and end a state."""
@@ -34,8 +32,8 @@ CRASH_CHECK = 12.0
 
 @dataclass(frozen=True)
 class Stretch:
-    """From `start` to `stop`, s on the log's clock: what the log says it is, such as "armed, mode
-    4", and whether it is flight.
+    """Segment from `start` to `stop`, s on the log's clock: its state by the log, such as "armed,
+    mode 4", and whether it is flight.
     """
 
     start: float
@@ -45,7 +43,7 @@ class Stretch:
 
 
 class _State(NamedTuple):
-    """What is true from each instant (n,) on, NaN where nobody knows."""
+    """State from each instant (n,) on, NaN where it is unknown."""
 
     time: Array
     values: Array
@@ -73,7 +71,7 @@ def stretches(columns: Mapping[str, Column], guesses: Mapping[str, Guess]) -> tu
     if not spans:
         return ()
     first, last = min(a for a, _ in spans), max(b for _, b in spans)
-    states = {**_said(columns), **_seen(rates)}
+    states = {**_from_messages(columns), **_from_rates(rates)}
     edges = {first, last}
     for state in states.values():
         edges |= {float(t) for t in state.time if first < t < last}
@@ -89,12 +87,12 @@ def stretches(columns: Mapping[str, Column], guesses: Mapping[str, Guess]) -> tu
 
 def longest(found: Sequence[Stretch]) -> Stretch | None:
     """The longest stretch of flight; None where the whole log is one, or none is long enough."""
-    flown = [s for s in found if s.flown and s.stop - s.start >= SHORTEST]
+    flown = [s for s in found if s.flown and s.stop - s.start >= MIN_DURATION]
     return max(flown, key=lambda s: s.stop - s.start) if flown and len(found) > 1 else None
 
 
 def _words(now: Mapping[str, float]) -> tuple[str, bool]:
-    """What is known of an instant, and whether it is flight."""
+    """Return the state at an instant in words, and whether it is flight."""
     parts, flown = [], True
     for name, other in (("armed", "disarmed"), ("airborne", "on the ground")):
         value = now.get(name, np.nan)
@@ -110,8 +108,8 @@ def _words(now: Mapping[str, float]) -> tuple[str, bool]:
     return ", ".join(parts) or "in motion", flown
 
 
-def _said(columns: Mapping[str, Column]) -> dict[str, _State]:
-    """By the messages of ArduPilot, of PX4, or of PX4's older logs."""
+def _from_messages(columns: Mapping[str, Column]) -> dict[str, _State]:
+    """Return states from the messages of ArduPilot, of PX4, or of PX4's older logs."""
     out: dict[str, _State] = {}
 
     def take(name: str, column: str, of: Callable[[Array], Array]) -> None:
@@ -140,8 +138,8 @@ def _said(columns: Mapping[str, Column]) -> dict[str, _State]:
     return out
 
 
-def _seen(rates: Sequence[Column]) -> dict[str, _State]:
-    """At rest, and crashed, by how fast it turns."""
+def _from_rates(rates: Sequence[Column]) -> dict[str, _State]:
+    """Return the states "at rest" and "crashed" from the angular rates."""
     out: dict[str, _State] = {}
     if not rates:
         return out
@@ -152,14 +150,14 @@ def _seen(rates: Sequence[Column]) -> dict[str, _State]:
         time, values = rate.time[keep], rate.values[keep]
         if len(time) < 3:
             continue
-        fast = np.abs(values) > FASTEST
+        fast = np.abs(values) > MAX_RATE
         wild = min(wild, float(time[fast.argmax()]) if fast.any() else np.inf)
         starts = np.arange(time[0], time[-1], WINDOW)
         part = np.searchsorted(starts, time, side="right") - 1
         count = np.bincount(part, minlength=len(starts))
         mean = np.bincount(part, values, len(starts)) / np.maximum(count, 1)
         spread = np.bincount(part, (values - mean[part]) ** 2, len(starts)) / np.maximum(count, 1)
-        moving.append(_State(starts, 1.0 * (np.sqrt(spread) > REST)))
+        moving.append(_State(starts, 1.0 * (np.sqrt(spread) > REST_RATE)))
     if moving:
         starts = moving[0].time
         still = [all(m.at(t + 0.5 * WINDOW) == 0.0 for m in moving) for t in starts]
@@ -170,6 +168,6 @@ def _seen(rates: Sequence[Column]) -> dict[str, _State]:
 
 
 def _changes(time: Array, values: Array) -> _State:
-    """Only where something changes."""
+    """Return the state at its changes only."""
     keep = np.concatenate([[True], np.diff(values) != 0])
     return _State(time[keep], values[keep])

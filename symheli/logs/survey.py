@@ -1,4 +1,4 @@
-"""What a log holds: for somebody who has only the file."""
+"""Survey of a log of which only the file is known."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ class Clock:
 
 @dataclass(frozen=True)
 class Motion:
-    """How much a column moves: samples and those missing, range, mean and standard deviation in the
-    unit it is guessed or declared to have, its own median step and first instant (s).
+    """Motion of a column: samples and those missing, range, mean and standard deviation in its
+    guessed or declared unit, its own median step and first instant (s).
     """
 
     samples: int
@@ -82,7 +82,7 @@ class Survey:
 
     @property
     def moving(self) -> dict[str, Guess]:
-        """The guessed signals that move."""
+        """Guessed signals that move."""
         return {s: g for s, g in self.guesses.items() if self.motions[g.column].moves}
 
 
@@ -94,8 +94,8 @@ def survey(
     time_unit: str = "s",
     dt: float | None = None,
 ) -> Survey:
-    """Look at every column of `contents`; `time` (in `time_unit`) and `dt` (s) as somebody has said
-    already.
+    """Examine every column of `contents`; `time` (in `time_unit`) and `dt` (s) as the user gives
+    them.
     """
     clock, name = None, time
     held = dict(contents.columns)
@@ -129,8 +129,8 @@ def survey(
 
 
 def _time_of(held: Mapping[str, Column]) -> tuple[str | None, str]:
-    """The column that probably is the time and its unit: by name, and steps that fit; (None, "s")
-    where none does.
+    """Return the column that probably is the time, and its unit: by name, and steps that fit;
+    (None, "s") where none does.
     """
     for name, column in sorted(held.items(), key=lambda item: item[0] not in ("t", "time")):
         plain, _ = plain_name(name)
@@ -182,7 +182,9 @@ def _motion(column: Column) -> Motion:
 
 
 def _step_of(held: Mapping[str, Column], guessed: Mapping[str, Guess]) -> float | None:
-    """The sample period (s) by which an angle follows its rate; None where they do not say."""
+    """Return the sample period (s) by which an angle follows its rate; None where they do not
+    determine it.
+    """
     for rate, angle in (("q", "theta"), ("p", "phi")):
         if rate in guessed and angle in guessed:
             w, a = (

@@ -17,14 +17,14 @@ import numpy as np
 from symheli.errors import InputError, UnknownNameError
 from symheli.extras import extra
 from symheli.logs.column import Column, continuous, on_one_axis
-from symheli.logs.files import Table, existing, positive, quiet, said_by, warn_of_damage
+from symheli.logs.files import Table, error_text, existing, positive, quiet, warn_of_damage
 
 QUATERNION = tuple(f"q[{i}]" for i in range(4))
 ANGLES = ("phi", "theta", "psi")
 
 
 class _Instance(NamedTuple):
-    """Of a topic: the number it was logged by, and its fields."""
+    """Instance of a topic: its number in the log, and its fields."""
 
     number: int
     data: Mapping[str, np.ndarray]
@@ -84,8 +84,8 @@ def split_column(column: str) -> tuple[str, str]:
 
 
 def unit_of(field: str) -> str:
-    """The unit of a field where nobody says one: a ULog declares none; phi, theta and psi are
-    computed in rad.
+    """Return the unit of a field that the user gave none for: a ULog declares none; phi, theta and
+    psi are computed in rad.
     """
     return "rad" if field in ANGLES else "1"
 
@@ -101,7 +101,7 @@ def _topics(path: str | os.PathLike[str]) -> dict[str, list[_Instance]]:
     except Exception as error:
         raise InputError(
             f"{file}: not a ULog file, or one that was cut or damaged"
-            f" ({said_by(error)}); copy it from the aircraft once more"
+            f" ({error_text(error)}); copy it from the aircraft once more"
         ) from error
     if log.file_corruption:
         warn_of_damage(file)

@@ -1,5 +1,5 @@
-"""Fewer states: truncation balanced over the whole range of the scheduling, for stable and unstable
-models alike.
+"""Model reduction: truncation balanced over the whole range of the scheduling, for stable and
+unstable models.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from symheli.values.summary import summarized
 Model = TypeVar("Model", LPVStateSpace, LinearModel)
 
 NEGLIGIBLE = 1e-7
-"""A state with a singular value below this fraction of the largest is not there: the roots of what
-Riccati solutions lose to rounding.
+"""A state with a singular value below this fraction of the largest counts as absent: the square
+root of the rounding of Riccati solutions.
 """
 
 
@@ -175,8 +175,8 @@ def _projected(model: Model, left: Array, right: Array) -> Model:
 
 
 def _comparable(full: LinearModel, small: LinearModel) -> tuple[LinearModel, LinearModel]:
-    """Both discrete: continuous models by one bilinear transformation, which keeps gains and the
-    nu-gap.
+    """Return both as discrete models: continuous ones by the same bilinear transformation, which
+    preserves gains and the nu-gap.
     """
     if full.dt is not None:
         return full, small

@@ -36,7 +36,7 @@ class Stacked(Protocol):
 
 
 class Names(Protocol):
-    """What the rows and columns are called."""
+    """Names of the rows and columns."""
 
     @property
     def states(self) -> tuple[Signal, ...]:

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
     from symheli.lpv.linear_family import LinearFamily
 
-PALEST = 0.15
-"""Strength of the first of many curves."""
+MIN_ALPHA = 0.15
+"""Opacity of the first of many curves."""
 
 
 def plot_entries(
@@ -31,21 +31,22 @@ def plot_entries(
     wanted: Sequence[str] | None,
     marker: str,
 ) -> Axes:
-    """The `wanted` entries (default: the diagonal of A, what damps each state by itself) against
-    `values` (K,) of `over`, each by its largest magnitude, which the legend gives with its unit.
+    """Plot the `wanted` entries (default: the diagonal of A, the damping of each state by itself)
+    against `values` (K,) of `over`, each divided by its largest magnitude, which the legend gives
+    with its unit.
     """
-    return draw_scaled(axes_of(ax), over, values, _wanted(names, matrices, wanted), marker)
+    return draw_scaled(axes_of(ax), over, values, _selected(names, matrices, wanted), marker)
 
 
 def plot_family(ax: Axes | None, family: LinearFamily, wanted: Sequence[str] | None) -> Axes:
-    """The `wanted` entries of a family as `plot_entries` has them, over airspeed where that is an
+    """Plot the `wanted` entries of a family like `plot_entries`, over airspeed where that is an
     axis; a curve for each combination of the other axes' values, the last one the strongest.
     """
     along = family.axes.index(AIRSPEED) if AIRSPEED in family.axes else 0
     values = family.values[along]
     drawn = [
         Entry(e.name, np.moveaxis(e.values, along, 0).reshape(len(values), -1))
-        for e in _wanted(family, family, wanted)
+        for e in _selected(family, family, wanted)
     ]
     ax = draw_scaled(axes_of(ax), family.axes[along], values, drawn)
     others = [
@@ -58,7 +59,7 @@ def plot_family(ax: Axes | None, family: LinearFamily, wanted: Sequence[str] | N
     return ax
 
 
-def _wanted(names: Names, matrices: Stacked, wanted: Sequence[str] | None) -> list[Entry]:
+def _selected(names: Names, matrices: Stacked, wanted: Sequence[str] | None) -> list[Entry]:
     every = list(entries(names, matrices))
     return chosen(every, [f"A[{s}, {s}]" for s in names.states] if wanted is None else wanted)
 
@@ -74,7 +75,9 @@ def draw_scaled(
         largest = float(np.abs(along).max())
         unit = "" if name.unit == "1" else f" {name.unit}"
         curves = along.reshape(len(values), -1).T / (largest or 1.0)
-        for curve, alpha in zip(curves, np.linspace(PALEST, 1.0, len(curves) + 1)[1:], strict=True):
+        for curve, alpha in zip(
+            curves, np.linspace(MIN_ALPHA, 1.0, len(curves) + 1)[1:], strict=True
+        ):
             last = alpha == 1.0
             ax.plot(
                 values,

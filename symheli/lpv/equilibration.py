@@ -1,6 +1,4 @@
-"""What is zero and what is singular, whatever the units: matrices judged after their rows and
-columns are scaled.
-"""
+"""Zero and singular matrices in any units: decided after rows and columns are scaled."""
 
 from __future__ import annotations
 
@@ -13,15 +11,15 @@ SINGULAR = 1e12
 """An equilibrated matrix with a larger condition number counts as singular."""
 
 
-NOISE = 1e-12
+NEGLIGIBLE_ENTRY = 1e-12
 """An entry smaller than this fraction of the largest of its row or column, after equilibration, is
 treated as zero when the units are chosen.
 """
 
 
 def equilibrate(size: Array) -> tuple[Array, Array]:
-    """Row and column factors that bring the largest entry of each to about one (zero rows and
-    columns keep 1).
+    """Return row and column factors that bring the largest entry of each to about one (zero rows
+    and columns keep 1).
 
     They start from the least-squares fit of log size by -log row - log column, so that row * size *
     column is the same whatever the units of rows and columns. Source: Curtis and Reid, J. Inst.
@@ -64,7 +62,7 @@ def _logarithmic(size: Array) -> tuple[Array, Array]:
         scaled = row[:, None] * size * column
         noise = counted & (
             scaled
-            < NOISE
+            < NEGLIGIBLE_ENTRY
             * np.maximum(scaled.max(axis=1, keepdims=True), scaled.max(axis=0, keepdims=True))
         )
         if not np.any(noise):

@@ -214,7 +214,7 @@ def _named(
 
 
 def _sympy() -> Any:
-    """SymPy, loaded when it is used; its types say less than `Any`."""
+    """Import SymPy on use; its types are less precise than `Any`."""
     import sympy
 
     return sympy

@@ -212,7 +212,7 @@ def _content(given: dict[str, Any]) -> LinearFamily:
 
 
 def _airspeeds(axes: tuple[Signal, ...], values: tuple[Array, ...]) -> list[float] | list[None]:
-    """Of every trim, m/s, from the axis; None where there is none."""
+    """Return the airspeed of every trim, m/s, from the axis; None where there is none."""
     size = next((ratio(s.unit, AIRSPEED.unit) for s in axes if s == AIRSPEED), None)
     if size is None:
         return [None] * math.prod(map(len, values))

@@ -1,5 +1,5 @@
-"""Pictures and tables of a model over its scheduling parameter: Bode, singular values, Nyquist,
-poles, damping, step responses.
+"""Plots and tables of a model over its scheduling parameter: Bode, singular values, Nyquist, poles,
+damping, step responses.
 
 Each takes an LPVStateSpace, an LFT, a LinearFamily or a LinearModel. `p` are the values at which
 the parameter is frozen, with several parameters rows of them; by default seven over the range of
@@ -34,13 +34,13 @@ Model = Any
 """An LPVStateSpace, an LFT, a LinearFamily or a LinearModel."""
 
 VALUES = 7
-"""Values of the parameter where none are named."""
+"""Default number of values of the parameter."""
 FREQUENCIES = 400
-"""Frequencies where none are named: from a tenth of the slowest pole to ten times the fastest, or
-to the Nyquist frequency.
+"""Default number of frequencies, from a tenth of the slowest pole to ten times the fastest, or to
+the Nyquist frequency.
 """
-PALEST = 0.25
-"""Strength of the first curve."""
+MIN_ALPHA = 0.25
+"""Opacity of the first curve."""
 
 
 @dataclass(frozen=True)
@@ -438,7 +438,7 @@ def _settled(models: Sequence[FrozenModel]) -> float:
 
 
 def _paler(models: Sequence[FrozenModel]) -> list[tuple[FrozenModel, float]]:
-    strengths = np.linspace(PALEST, 1.0, len(models)) if len(models) > 1 else [1.0]
+    strengths = np.linspace(MIN_ALPHA, 1.0, len(models)) if len(models) > 1 else [1.0]
     return [(one, float(s)) for one, s in zip(models, strengths, strict=True)]
 
 

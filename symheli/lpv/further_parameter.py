@@ -1,4 +1,4 @@
-"""The same model over other parameters besides its own, on which nothing depends."""
+"""The same model over additional parameters on which it does not depend."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from symheli.lpv.scheduling import Scheduling, parameters
 
 
 def with_parameter(lpv: LPVStateSpace, scheduling: Scheduling) -> LPVStateSpace:
-    """The same matrices and trim over (parameters of `lpv`, `scheduling`): f_j(p) 1.
+    """Return the same matrices and trim over (parameters of `lpv`, `scheduling`): f_j(p) 1.
 
     Raises `InputError` for a name that repeats, and a basis that cannot be a factor of a product.
     """
@@ -24,8 +24,8 @@ def with_parameter(lpv: LPVStateSpace, scheduling: Scheduling) -> LPVStateSpace:
 
 
 def over(lpv: LPVStateSpace, given: Sequence[Scheduling]) -> LPVStateSpace:
-    """The same matrices and trim over the parameters `given`: those of `lpv`, by name and in any
-    order, and others.
+    """Return the same matrices and trim over the parameters `given`: those of `lpv`, by name and in
+    any order, and others.
     """
     given = parameters(given)
     if [s.name for s in given] == [s.name for s in lpv.parameters]:
@@ -67,7 +67,7 @@ def _over(
 def _everywhere(
     residuals: Residuals, own: Sequence[Scheduling], given: Sequence[Scheduling]
 ) -> Residuals:
-    """The same misfit at both ends of every new range."""
+    """Return the same misfit at both ends of every new range."""
     nodes = residuals.nodes.reshape(len(residuals.nodes), -1)
     known = {s.name: column for s, column in zip(own, nodes.T, strict=True)}
     new = [s for s in given if s.name not in known]

@@ -17,7 +17,7 @@ Part = LinearModel | LPVStateSpace
 """One input, one output; continuous, or of the model's sample period."""
 
 AHEAD, BEHIND = "ahead of ", "behind "
-"""With the name of a signal: what a part is driven by, and what it drives, while it is
+"""Prefixes of temporary signal names: the input and the output of a system in series while it is
 connected.
 """
 

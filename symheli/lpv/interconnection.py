@@ -313,9 +313,9 @@ NAMES = ("states", "inputs", "outputs")
 
 @dataclass(frozen=True)
 class _Together:
-    """Systems side by side as one `model` of their common `kind`, and the inputs and outputs of
-    each: `into` and `out` are their places in the model, which has the channels of an uncertain
-    system's block besides.
+    """Systems side by side as one `model` of their common `kind`, and the positions `into` and
+    `out` of the inputs and outputs of each in that model, which has the channels of an uncertain
+    system first.
     """
 
     model: LPVStateSpace | LFT

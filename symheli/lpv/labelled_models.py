@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from symheli.lpv.lpv_state_space import LPVStateSpace
 
 VALUES = 21
-"""Of a scheduling parameter where none are named."""
+"""Default number of values of a scheduling parameter."""
 
 MATRICES = {
     "A": ("equation", "state"),
@@ -82,8 +82,8 @@ def models_dataset(
 
 
 def coefficient_dataset(names: Names, matrices: Stacked, functions: str) -> xarray.Dataset:
-    """The coefficients of an LPV model: A over "function" (j of f_j), "equation" and "state", and
-    so on; `functions` says what they are.
+    """Return the coefficients of an LPV model: A over "function" (j of f_j), "equation" and
+    "state", and so on; `functions` describes them.
     """
     order = np.arange(len(matrices.A))
     variables: dict[str, Any] = {

@@ -1,4 +1,4 @@
-"""A parameter seen through a lag: how fast that moves is known, and nothing is differentiated."""
+"""Scheduling by a lag of the parameter: its rate is known without differentiation."""
 
 from __future__ import annotations
 

@@ -268,7 +268,7 @@ class LinearFamily:
         return replace(self, models=self.models.each(lambda model: model.residualize(states)))
 
     def discretize(self, dt: float) -> LinearFamily:
-        """Zero-order-hold equivalent of each model at sample period `dt` (s)."""
+        """Return the zero-order-hold equivalent of each model at sample period `dt` (s)."""
         return replace(self, models=self.models.each(lambda model: model.discretize(dt)))
 
     def interpolate(

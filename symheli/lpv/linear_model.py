@@ -260,8 +260,8 @@ class LinearModel:
         inputs: Sequence[str] | None = None,
         outputs: Sequence[str] | None = None,
     ) -> LinearModel:
-        """From a python-control `StateSpace` (a `TransferFunction` is realised first); nothing is
-        converted.
+        """Return the model of a python-control `StateSpace` (a `TransferFunction` is realised
+        first); nothing is converted.
 
         Its labels become the names where `states`, `inputs` or `outputs` give none. `units` {name:
         unit} says what the signals are in; for the others the unit of a well-known name, "1" else.

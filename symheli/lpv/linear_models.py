@@ -67,7 +67,7 @@ class LinearModels(Sequence[LinearModel]):
 
     @classmethod
     def of(cls, models: Sequence[LinearModel]) -> LinearModels:
-        """These models; all with their operating point, or none."""
+        """Return these models as one stack; all with their operating point, or none."""
         if isinstance(models, LinearModels):
             return models
         if not len(models):
@@ -124,7 +124,7 @@ class LinearModels(Sequence[LinearModel]):
         inputs: Sequence[str] | None = None,
         outputs: Sequence[str] | None = None,
     ) -> LinearModels:
-        """As `LinearModel.select`."""
+        """Select states, inputs and outputs as `LinearModel.select`."""
         return selected(self, states, inputs, outputs)
 
     def each(self, change: Callable[[LinearModel], LinearModel]) -> LinearModels:

@@ -23,7 +23,7 @@ from symheli.values.signal import Signal, distinct, indices
 from symheli.values.units import per_second, to_si
 
 PREFIX = "controller_"
-"""Before the name of a controller's state that the plant has too."""
+"""Prefix of a controller's state whose name the plant has too."""
 
 
 class Positions(NamedTuple):
@@ -36,7 +36,7 @@ class Positions(NamedTuple):
 
 
 class ControllerMatrices(NamedTuple):
-    """Of dx/dt = A x + B y, u = C x + D y, as functions of p."""
+    """Matrices of dx/dt = A x + B y, u = C x + D y, as functions of p."""
 
     A: MatrixFunction
     B: MatrixFunction
@@ -198,7 +198,9 @@ def close_static(lpv: LPVStateSpace, K: Array) -> LPVStateSpace:
 
 
 def append_lpv(first: LPVStateSpace, second: LPVStateSpace) -> LPVStateSpace:
-    """Both side by side, over the parameters of both; their names are made distinct."""
+    """Return both models side by side, over the parameters of both; their names are made
+    distinct.
+    """
     first, second = _over_the_same(first, second)
     pairs = list(zip(functions_of(first), functions_of(second), strict=True))
     basis, (A, B, C, D) = in_one_basis([_diagonal(*pair) for pair in pairs], first.basis.ranges)
@@ -279,7 +281,8 @@ class Partition(NamedTuple):
 
 
 def _interconnected(P: Partition, K: Any, N: Any) -> tuple[tuple[tuple[Any, ...], ...], ...]:
-    """Blocks of A, B, C, D of the loop, N = (I - D_K D22)^-1: stacks of matrices or functions.
+    """Return the blocks of A, B, C, D of the loop, N = (I - D_K D22)^-1: stacks of matrices or
+    functions.
 
     With y = y0 + D22 u and y0 = C2 x + D21 w, u = N D_K y0 + N C_K x_K.
     """
@@ -368,15 +371,15 @@ def _same_quantity(s: Scheduling, known: Sequence[Scheduling]) -> Scheduling | N
 
 
 def _renamed(s: Scheduling) -> str:
-    """What brings another model to the name and unit of a parameter."""
+    """Return advice how to give another model the name and unit of a parameter."""
     return f".with_scheduling(Scheduling({s.name!r}, {s.unit!r}, low, high))"
 
 
 def _made_for_another_rate(
     s: Scheduling, known: Scheduling, plant: Mapping[str, Scheduling]
 ) -> str | None:
-    """What to say where a parameter moves otherwise in the plant, which is taken, than it was made
-    to in what is connected; None where that allows as much, or the plant gives no limit.
+    """Return a warning where the rate limit of the plant, which is used, exceeds the one that the
+    connected system was made for; None where it does not, or the plant has no limit.
     """
     if s.rate == known.rate or known.rate == np.inf:
         return None
@@ -391,15 +394,15 @@ def _made_for_another_rate(
     else:
         return None
     return (
-        f"in what is connected {made}, in the plant at up to {most:g} {unit}: the loop is taken"
-        " with the plant's rate; where that is too fast, .with_rate(...) of the plant says so"
+        f"in the connected system {made}, in the plant at up to {most:g} {unit}: the loop has the"
+        " plant's rate; if that is too fast, limit it with .with_rate(...) of the plant"
     )
 
 
 def _over_the_same(
     plant: LPVStateSpace, controller: LPVStateSpace
 ) -> tuple[LPVStateSpace, LPVStateSpace]:
-    """Both over the parameters of the plant and those that only the controller has."""
+    """Return both over the parameters of the plant and those that only the controller has."""
     plant, controller = (
         LPVStateSpace.constant(one.at(UNSCHEDULED.middle), other.parameters)
         if _is_unscheduled(one)

@@ -78,7 +78,7 @@ def load(path: str | os.PathLike[str], basis: FunctionSpace | None) -> LPVStateS
 
 
 def _written(array: Array) -> dict[str, Any]:
-    """With its shape, which an empty list would lose."""
+    """Return the array with its shape, which an empty list would lose."""
     return {"shape": list(array.shape), "values": array.ravel().tolist()}
 
 

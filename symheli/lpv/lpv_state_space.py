@@ -55,8 +55,8 @@ class Matrices(NamedTuple):
 
 
 class Residuals(NamedTuple):
-    """Fit minus what it was fitted to at `nodes` (K,), (K, d) with d parameters: A (K, nx, nx),
-    B (K, nx, nu), C (K, ny, nx), D (K, ny, nu).
+    """Fit minus exact data at `nodes` (K,), (K, d) with d parameters: A (K, nx, nx), B (K, nx, nu),
+    C (K, ny, nx), D (K, ny, nu).
     """
 
     nodes: Array
@@ -67,11 +67,11 @@ class Residuals(NamedTuple):
 
     @property
     def matrices(self) -> Matrices:
-        """Without the nodes."""
+        """The four arrays without the nodes."""
         return Matrices(*self[1:])
 
     def within(self, box: Sequence[Scheduling]) -> Residuals | None:
-        """Those at the nodes in these ranges; None where there are none."""
+        """Return the residuals at the nodes in these ranges; None where there are none."""
         columns = self.nodes.reshape(len(self.nodes), -1).T
         inside = np.all(
             [(s.low <= at) & (at <= s.high) for s, at in zip(box, columns, strict=False)], axis=0
@@ -177,7 +177,7 @@ class LPVStateSpace:
         inputs: Sequence[str] | None = None,
         outputs: Sequence[str] | None = None,
     ) -> LPVStateSpace:
-        """From monomial coefficients, p in physical units.
+        """Return a model from monomial coefficients, p in physical units.
 
         One parameter: lists, A(p) = A[0] + p A[1] + p^2 A[2] + ..., which may differ in length.
         Several (or one): {exponents: matrix}, A={(0, 0): A0, (1, 0): A1, (0, 2): A2} is A0 + p1 A1
@@ -219,7 +219,7 @@ class LPVStateSpace:
         inputs: Sequence[str] | None = None,
         outputs: Sequence[str] | None = None,
     ) -> LPVStateSpace:
-        """From matrices of SymPy expressions in the symbols of the parameters
+        """Return a model from matrices of SymPy expressions in the symbols of the parameters
         (`Scheduling.symbol`, in their units), and numbers; exact.
 
         Polynomials in any number of parameters get a polynomial basis; other functions, such as
@@ -297,8 +297,8 @@ class LPVStateSpace:
         return LinearModel(*frozen_at, self.states, self.inputs, self.outputs, dt=self.dt)
 
     def with_scheduling(self, scheduling: Scheduling | Sequence[Scheduling]) -> LPVStateSpace:
-        """The same model over narrower ranges, with the residuals there, with other rate limits, or
-        with its parameters, in order, under other names or in other units.
+        """Return the same model over narrower ranges, with the residuals there, with other rate
+        limits, or with its parameters, in order, under other names or in other units.
 
         Another unit of the same quantity is converted to: in "km/h" a model over "m/s" takes p in
         km/h, and is the same. A parameter without a unit ("1") is given one as it is. Raises
@@ -325,13 +325,13 @@ class LPVStateSpace:
         )
 
     def with_rate(self, rate: Rates) -> LPVStateSpace:
-        """The same model with |dp/dt| <= rate: one for all parameters, one each or by name; the
-        name of a parameter says that it is the rate.
+        """Return the same model with |dp/dt| <= rate: one for all parameters, one each or by name;
+        the name of a parameter states that it is the rate.
         """
         return replace(self, parameters=with_rates(self.parameters, rate))
 
     def with_parameter(self, scheduling: Scheduling) -> LPVStateSpace:
-        """The same model over one more parameter, the last, on which nothing depends.
+        """Return the same model over one more parameter, the last, on which it does not depend.
 
         With it a parameter may get a rate that is bounded in its own rate:
         `with_parameter(Scheduling("acceleration", "m/s^2", -3, 3, rate=5)).with_rate({"airspeed":
@@ -435,8 +435,8 @@ class LPVStateSpace:
     def scaled(
         self, inputs: Mapping[str, float] | None = None, outputs: Mapping[str, float] | None = None
     ) -> LPVStateSpace:
-        """The model with inputs and outputs {name: size} measured in that size (> 0): what was
-        `size` in its unit is 1. The others stay; the trim is left out.
+        """Return the model with inputs and outputs {name: size} measured in that size (> 0): a
+        value of `size` in its unit becomes 1. The others stay; the trim is left out.
         """
         sizes = [
             _sizes(given or {}, names, kind)
@@ -486,7 +486,8 @@ class LPVStateSpace:
     def discretize(
         self, dt: float, *, degree: int | Sequence[int] | None = None, nodes: int | None = None
     ) -> LPVStateSpace:
-        """Zero-order-hold equivalent at frozen p, fitted element-wise by polynomials of `degree`.
+        """Return the zero-order-hold equivalent at frozen p, fitted element-wise by polynomials of
+        `degree`.
 
         `nodes` values of each parameter (None: 41 of one, 13 each of several). `degree`, one for
         all parameters or one each, defaults to that of the basis (needed where the basis is no
@@ -516,9 +517,7 @@ class LPVStateSpace:
 
     @property
     def fitted_to(self) -> Residuals | None:
-        """What the model was fitted to, at its nodes: fit minus residuals; None where it was given
-        as it is.
-        """
+        """Data of the fit at its nodes: fit minus residuals; None for a model that is not a fit."""
         if self.residuals is None:
             return None
         exact = (
@@ -530,7 +529,7 @@ class LPVStateSpace:
         return Residuals(self.residuals.nodes, *exact)
 
     def with_residuals(self, nodes: Array, exact: Matrices) -> LPVStateSpace:
-        """The same model as a fit of `exact` (K, ...) at `nodes` (K,), or (K, d)."""
+        """Return the same model as a fit of `exact` (K, ...) at `nodes` (K,), or (K, d)."""
         off = (M - E for M, E in zip(self.matrices(nodes), exact, strict=True))
         return replace(self, residuals=Residuals(nodes, *off))
 
@@ -596,7 +595,7 @@ class LPVStateSpace:
         dt: float | None = None,
         rate: object | None = None,
     ) -> Prediction:
-        """What the model says of a flight: any number of samples ahead, or in free run; see
+        """Predict a flight: any number of samples ahead, or in free run; see
         `symheli.lpv.predict`.
         """
         from symheli.lpv.prediction import predict
@@ -639,9 +638,9 @@ class LPVStateSpace:
         return values_frame(self, p)
 
     def to_xarray(self) -> xarray.Dataset:
-        """The coefficients of A, B, C, D over "function" (j of f_j), "equation", "state", "input"
-        and "output"; the attribute `basis` says what the functions are. Raises `InputError` without
-        xarray.
+        """Return the coefficients of A, B, C, D over "function" (j of f_j), "equation", "state",
+        "input" and "output"; the attribute `basis` describes the functions. Raises `InputError`
+        without xarray.
         """
         from symheli.lpv.labelled_models import coefficient_dataset
 

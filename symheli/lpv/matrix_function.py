@@ -1,4 +1,4 @@
-"""Matrices that depend on the scheduling parameters: sums and products of them, exactly."""
+"""Matrices that depend on the scheduling parameters, with exact sums and products."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class MatrixFunction:
 
     @cached_property
     def varies(self) -> Array:
-        """Which entries (rows, columns) depend on p, each judged by its own size alone."""
+        """Mask of the entries (rows, columns) that depend on p, each relative to its own size."""
         if self.basis is None:
             return np.zeros(self.shape, dtype=bool)
         values = np.tensordot(_samples(self.basis, self.box), self.coefficients, axes=1)
@@ -158,7 +158,9 @@ def in_one_basis(
 
 @lru_cache(maxsize=8)
 def _samples(basis: FunctionSpace, box: Box) -> Array:
-    """Values (K, n) of the functions where those that differ in the box can be told apart."""
+    """Return values (K, n) of the functions at points where those that differ in the box are
+    distinguished.
+    """
     return basis(basis.samples(box))
 
 

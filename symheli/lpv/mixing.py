@@ -16,7 +16,7 @@ from symheli.values.signal import Signal, indices
 Sum = Mapping[Any, float]
 """{signal: gain}."""
 ERROR = "_error"
-"""Ends the name of a signal that is reference minus measured."""
+"""Suffix of the name of a signal that is reference minus measured."""
 
 
 def mixed(

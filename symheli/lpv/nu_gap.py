@@ -15,19 +15,19 @@ ON_THE_CIRCLE = 1e3 * np.finfo(float).eps
 matrix by.
 """
 
-REFINEMENTS = 30
-"""How often an interval of frequency is halved, at most, until the determinant turns little in
-it.
+MAX_REFINEMENTS = 30
+"""Largest number of bisections of a frequency interval until the phase of the determinant changes
+little in it.
 """
 
-SIZES = 1e-60, 1e60
+SCALE_LIMITS = 1e-60, 1e60
 """Permitted channel scales; their squares neither overflow nor underflow."""
 
 AT_ONCE = 2_000_000
 """Entries of the pencils zI - A that are solved together."""
 
-CLOSER = 12
-"""Frequencies between the neighbours of the largest distance of each model."""
+REFINED_FREQUENCIES = 12
+"""Number of frequencies between the neighbours of the largest distance of each model."""
 
 
 def nu_gap(
@@ -99,7 +99,7 @@ def nu_gap(
         return one, two
 
     P1, P2 = responses(angle)
-    for _ in range(REFINEMENTS):
+    for _ in range(MAX_REFINEMENTS):
         coarse = np.flatnonzero(np.abs(_turns(P1, P2)) > np.pi / 4)
         if not len(coarse):
             break
@@ -116,13 +116,16 @@ def nu_gap(
 
 
 def channel_scales(given: object, name: str, channels: int) -> Array:
-    """One for each channel; raises `InputError` unless they are positive and within `SIZES`."""
+    """Return one scale for each channel; raise `InputError` unless they are positive and within
+    `SCALE_LIMITS`.
+    """
     scales = frozen(given, name)
     if scales.shape not in ((), (1,), (channels,)):
         raise InputError(f"{name}: expected a number or {channels} of them, got {scales.shape}")
-    if not np.all((scales >= SIZES[0]) & (scales <= SIZES[1])):
+    if not np.all((scales >= SCALE_LIMITS[0]) & (scales <= SCALE_LIMITS[1])):
         raise InputError(
-            f"{name}: expected numbers from {SIZES[0]:.0e} to {SIZES[1]:.0e}, got {given!r:.60}"
+            f"{name}: expected numbers from {SCALE_LIMITS[0]:.0e} to {SCALE_LIMITS[1]:.0e},"
+            f" got {given!r:.60}"
         )
     return np.broadcast_to(scales, (channels,))
 
@@ -271,7 +274,7 @@ def nu_gaps(
         distance = _chordal(P1, P2)
         peak = distance.argmax(axis=1)
         low, high = angle[np.maximum(peak - 1, 0)], angle[np.minimum(peak + 1, len(angle) - 1)]
-        near = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, CLOSER)
+        near = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, REFINED_FREQUENCIES)
         closer = _chordal(
             _responses(one.take(np.zeros(len(rows), int)), near, su, sy),
             _responses(part, near, su, sy),

@@ -1,4 +1,6 @@
-"""What an LPV model of the whole state says of a flight: so many samples ahead, or running free."""
+"""Prediction of a flight by an LPV model of the whole state: a number of samples ahead, or in free
+run.
+"""
 
 from __future__ import annotations
 
@@ -42,7 +44,9 @@ class Prediction(NamedTuple):
         return out
 
     def free_run(self, start: int = 0) -> Array:
-        """States (n, nx) in free run from the measured one at sample `start`; NaN up to it."""
+        """Return states (n, nx) in free run from the measured one at sample `start`; NaN up
+        to it.
+        """
         out = np.full(self.x.shape, np.nan)
         z = (self.x - self.x0)[start]
         for k in range(start, len(self.x) - 1):

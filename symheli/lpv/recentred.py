@@ -19,7 +19,7 @@ Centre = tuple[Fraction, Fraction]
 
 
 def centre(low: float, high: float) -> Centre:
-    """Of a parameter in [low, high], exactly."""
+    """Return the centre of a parameter in [low, high], exactly."""
     return (Fraction(low) + Fraction(high)) / 2, (Fraction(high) - Fraction(low)) / 2
 
 

@@ -102,11 +102,13 @@ class Scheduling:
         return sympy.Symbol(self.name, real=True)
 
     def normalised(self, p: Array) -> Array:
-        """p as a number from -1 at `low` to 1 at `high`; no digit of p is lost far from zero."""
+        """Return p as a number from -1 at `low` to 1 at `high`; no digit of p is lost far from
+        zero.
+        """
         return ((p - self.low) - (self.high - p)) / (self.high - self.low)
 
     def with_rate(self, rate: Limit) -> Scheduling:
-        """The same parameter with another rate limit."""
+        """Return the same parameter with another rate limit."""
         return replace(self, rate=rate)
 
     def check(self, p: object) -> Array:
@@ -181,7 +183,7 @@ def with_rates(given: Sequence[Scheduling], rate: Rates) -> tuple[Scheduling, ..
 
 
 def unit_sizes(known: Sequence[Scheduling], given: Sequence[Scheduling]) -> list[float]:
-    """How many units of each of the known parameters one unit of that given in its place is.
+    """Return the size of one unit of each `given` parameter in units of the known one in its place.
 
     A parameter without a unit ("1") may be given any: it is named, not converted. Raises
     `InputError` for another number of parameters and for a unit of another quantity.

@@ -87,7 +87,9 @@ def simulate(
 
 
 def steps(lpv: LPVStateSpace, p: Array, dt: float | None) -> Steps:
-    """From each sample to the next, p held over `dt` (s) where the model is continuous."""
+    """Return the transition from each sample to the next, p held over `dt` (s) for a continuous
+    model.
+    """
     A, B, *_ = lpv.matrices(p)
     n, nx, nu = B.shape
     if lpv.dt is not None:

@@ -19,8 +19,8 @@ from symheli.values.signal import indices
 Feedback = Mapping[tuple[str, str], float] | LinearModel
 """u = K y as {(input, output): gain}, or a controller from outputs to inputs."""
 
-CLOSER = 12
-"""How often the frequencies around a peak are taken ten times closer together, at most."""
+MAX_REFINEMENTS = 12
+"""Largest number of times that the frequencies around a peak are refined by a factor of ten."""
 
 
 def stability_margin(
@@ -91,7 +91,7 @@ def stability_margin(
     angle = angles(np.concatenate([poles, [0.5]]), 400)
     values = gain(angle)
     largest = float(values.max())
-    for _ in range(CLOSER):
+    for _ in range(MAX_REFINEMENTS):
         peak, before = int(np.argmax(values)), largest
         angle = np.linspace(angle[max(peak - 1, 0)], angle[min(peak + 1, len(angle) - 1)], 21)
         values = gain(angle)

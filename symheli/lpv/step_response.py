@@ -1,4 +1,4 @@
-"""What a linear model answers to a step of each input."""
+"""Step response of a linear model to each input."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from symheli.values.signal import Signal
 from symheli.values.units import per_second
 
 PREFIX = "drift_"
-"""With the name of a parameter: the input that its motion is."""
+"""Prefix of the input that is the motion of a parameter."""
 
 
 def with_trim_drift(lpv: LPVStateSpace) -> LPVStateSpace:

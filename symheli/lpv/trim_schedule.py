@@ -43,7 +43,8 @@ class TrimSchedule:
         return self.basis(p, derivative) @ self.u
 
     def drift(self, p: object, rate: object) -> Array:
-        """What a moving trim adds to the rates of the deviations, xdot0(p) - dx0/dp dp/dt.
+        """Return the contribution of a moving trim to the rates of the deviations, xdot0(p) -
+        dx0/dp dp/dt.
 
         `rate` (per second) has the shape of p; the result p.shape + (nx,), the axis of several
         parameters left out.

@@ -18,10 +18,10 @@ from symheli.values.signal import Signal, indices, signals
 from symheli.values.summary import as_table, summarized
 
 SAFETY = 2.0
-"""A covering set contains this many times the largest difference measured."""
+"""Safety factor of a covering set on the largest measured difference."""
 
 ROUNDING = 1e-12
-"""A perturbation may exceed the bound by this fraction of it."""
+"""Relative excess of a perturbation over its bound that counts as rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +99,7 @@ class UncertainStateSpace:
             raise InputError("probability: expected a number in (0, 1], got 0")
         if not isinstance(self.source, str) or not self.source.strip():
             raise InputError(
-                f"source: expected a sentence on what the bound promises, got {self.source!r:.60}"
+                f"source: expected a sentence on the meaning of the bound, got {self.source!r:.60}"
             )
 
     @classmethod
@@ -174,7 +174,7 @@ class UncertainStateSpace:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Of Delta: (nd, nv)."""
+        """Shape of Delta: (nd, nv)."""
         return len(self.perturbation_inputs), len(self.perturbation_outputs)
 
     @property
@@ -262,24 +262,24 @@ class UncertainStateSpace:
     def scaled(
         self, inputs: Mapping[str, float] | None = None, outputs: Mapping[str, float] | None = None
     ) -> UncertainStateSpace:
-        """Inputs and outputs {name: size} measured in that size; see `LPVStateSpace.scaled`. Raises
-        `UnknownNameError` for the channels of the block.
+        """Return the set with inputs and outputs {name: size} measured in that size; see
+        `LPVStateSpace.scaled`. Raises `UnknownNameError` for the channels of the block.
         """
         indices(inputs or {}, self.inputs, "input")
         indices(outputs or {}, self.outputs, "output")
         return replace(self, model=self.model.scaled(inputs, outputs))
 
     def with_scheduling(self, scheduling: Scheduling | Sequence[Scheduling]) -> UncertainStateSpace:
-        """The same set over narrower ranges or with other rate limits."""
+        """Return the same set over narrower ranges or with other rate limits."""
         return replace(self, model=self.model.with_scheduling(scheduling))
 
     def with_rate(self, rate: Rates) -> UncertainStateSpace:
-        """The same set with |dp/dt| <= rate; see `LPVStateSpace.with_rate`."""
+        """Return the same set with |dp/dt| <= rate; see `LPVStateSpace.with_rate`."""
         return replace(self, model=self.model.with_rate(rate))
 
     def with_bound(self, bound: float) -> UncertainStateSpace:
-        """The same block with another bound; what the `source` says is then its reader's to
-        judge.
+        """Return the same block with another bound; the meaning of `source` is then up to
+        the user.
         """
         return replace(self, bound=bound)
 

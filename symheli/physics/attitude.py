@@ -1,4 +1,4 @@
-"""Between the Euler form of linear models and the quaternion form that flights integrate, for one
+"""Conversion between the Euler form of linear models and the quaternion form of flights, for one
 state or arrays of them.
 """
 

@@ -15,8 +15,8 @@ tests).
 RELAXATION, RELAXED_STEPS = 0.6, 40
 """Of the printed iteration; 0.4^40 is below rounding."""
 
-SETTLED = 1e-7
-"""A step of this size leaves an error of the order of its cube: the next one is not taken."""
+STEP_TOLERANCE = 1e-7
+"""Step of the inflow iteration at which it ends: the error is of the order of its cube."""
 
 # added under the root: its derivative stays finite without flow, its value moves by 1e-10
 _ROOT_GUARD = 1e-20
@@ -77,8 +77,8 @@ def solve(c0: Any, c1: Any, ct_max: Any, mu2: Any, mu_z: Any, efficiency: Any) -
     Thrust is limited or it is not: the momentum balance at the corner lam = (c0 - C_Tmax)/c1 says
     which, so that a smooth equation is left. Its start is an upper bound: the smaller of the
     axial-flow root (exact for mu = 0) and C_T/(2 eta_w mu). Halley's steps (order 3, one root and
-    one quotient each) stay between 0 and that bound until one is below `SETTLED`. Negative thrust
-    is the mirror image.
+    one quotient each) stay between 0 and that bound until one is below `STEP_TOLERANCE`. Negative
+    thrust is the mirror image.
     """
     drive, flow = absolute(c0), where(c0 >= 0, mu_z, -mu_z)
     mu2 = mu2 + _ROOT_GUARD
@@ -97,7 +97,7 @@ def solve(c0: Any, c1: Any, ct_max: Any, mu2: Any, mu_z: Any, efficiency: Any) -
     previous = top = minimum(axial, forward)
     lam = clip(_halley_step(top, line0, line1, mu2, flow, efficiency), 0.0, top)
     for _ in range(HALLEY_STEPS - 1):
-        settled = absolute(lam - previous) <= SETTLED
+        settled = absolute(lam - previous) <= STEP_TOLERANCE
         following = clip(_halley_step(lam, line0, line1, mu2, flow, efficiency), 0.0, top)
         previous, lam = lam, where(settled, lam, following)
     return where(c0 >= 0, lam, -lam)
@@ -148,8 +148,8 @@ def relaxed(c0: Any, c1: Any, ct_max: Any, mu2: Any, mu_z: Any, efficiency: Any)
 
 
 def vortex_ring(lam_hover: Any, mu2: Any, mu_z: Any) -> Any:
-    """Positive where momentum theory promises nothing: descending by more than half the hover
-    inflow at little forward speed.
+    """Return a function that is positive where momentum theory is invalid: descent at more than
+    half the hover inflow at little forward speed.
 
     `lam_hover` = sqrt(|C_T|/(2 eta_w)); covers every state with several inflow roots. Source:
     Leishman, Principles of Helicopter Aerodynamics (2006), section 2.13; the multiple-root bound mu

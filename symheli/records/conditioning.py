@@ -1,4 +1,4 @@
-"""What is done to a record before it is fitted; the caller's record stays as it is."""
+"""Preprocessing of a record before a fit; the original record is not changed."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def with_norm(record: FlightRecord, parts: Sequence[str], name: str = "speed") -
 
 
 def smooth(record: FlightRecord, name: str, seconds: float) -> FlightRecord:
-    """One signal after a causal first-order low-pass, started anew in each segment and behind
+    """Return one signal after a causal first-order low-pass, restarted in each segment and after
     missing samples.
 
     Parameters
@@ -179,8 +179,8 @@ def _filtered(sos: Array, x: Array, zero_phase: bool) -> Array:
 
 
 def decimate(record: FlightRecord, n: int) -> FlightRecord:
-    """Means of several samples in a row, all signals alike: a linear relation between them is kept,
-    noise and dt change.
+    """Return means of several samples in a row, all signals alike: a linear relation between them
+    is kept, noise and dt change.
 
     Within a mean the output has heard the input already: y(k) depends on u(k), whatever it did
     before. Identify with delay 0; the record remembers (`resampled`), and `fit` warns. No other

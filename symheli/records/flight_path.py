@@ -1,4 +1,6 @@
-"""Flight-path reconstruction: signals whose derivatives are known, fitted to what was measured."""
+"""Flight-path reconstruction: integrals of measured rates and accelerations, fitted to the measured
+states.
+"""
 
 from __future__ import annotations
 
@@ -18,20 +20,20 @@ the square root of it, while what a bias turns grows in proportion.
 LEAST_SAMPLES = 20
 """A window of slow samples is as long as this many."""
 
-MOST, PIECE = 120, 10
-"""Of a record with more windows, at most so many are compared, in unbroken pieces of so many: they
-tell biases to 0.01 deg/s.
+MAX_WINDOWS, WINDOWS_PER_PIECE = 120, 10
+"""Largest number of windows compared, and their number in an unbroken piece: they determine biases
+to 0.01 deg/s.
 """
 
-LATEST = 0.4
-"""Delays are sought up to this many seconds, either way."""
+MAX_DELAY = 0.4
+"""Largest delay that is searched for, s, either way."""
 
 ITERATIONS = 25
-SETTLED = 1e-6
-"""Seconds by which no delay changes any more."""
+DELAY_TOLERANCE = 1e-6
+"""Change of the delays at which the iteration ends, s."""
 
 SINGULAR = 1e-9
-"""Directions of the scaled normal equations below this are not determined."""
+"""Directions of the scaled normal equations with singular values below this are not determined."""
 
 ROUNDING, TINY = 1e-16, float(np.finfo(float).tiny)
 """No channel is known better than this part of its variation."""
@@ -98,15 +100,15 @@ class Windows:
     def of(cls, time: Array, stretches: Sequence[slice]) -> Windows:
         """As many windows as fit; of a long record pieces spread over it."""
         step = float(np.median(np.diff(time)))
-        length, rim = max(round(WINDOW / step), LEAST_SAMPLES), int(np.ceil(LATEST / step)) + 1
-        piece = PIECE * length + 2 * rim
-        if sum((part.stop - part.start) // length for part in stretches) > MOST:
+        length, rim = max(round(WINDOW / step), LEAST_SAMPLES), int(np.ceil(MAX_DELAY / step)) + 1
+        piece = WINDOWS_PER_PIECE * length + 2 * rim
+        if sum((part.stop - part.start) // length for part in stretches) > MAX_WINDOWS:
             stretches = [
                 slice(start, start + piece)
                 for part in stretches
                 for start in range(part.start, part.stop - piece + 1, piece)
             ] or stretches
-            stretches = stretches[:: -(-len(stretches) * PIECE // MOST)]
+            stretches = stretches[:: -(-len(stretches) * WINDOWS_PER_PIECE // MAX_WINDOWS)]
         rows: list[Array] = []
         home: list[int] = []
         for i, part in enumerate(stretches):
@@ -218,8 +220,8 @@ def reconstruct(
         moves = np.array([np.mean(windows.centred(c.measured) ** 2) for c in found])
         weights = 1 / np.maximum(np.mean(left**2, axis=(0, 1)), ROUNDING * moves + TINY)
         theta, step = np.split(solution, [len(theta)])
-        delays = np.clip(delays + step, -LATEST, LATEST)
-        if np.abs(step).max() < SETTLED:
+        delays = np.clip(delays + step, -MAX_DELAY, MAX_DELAY)
+        if np.abs(step).max() < DELAY_TOLERANCE:
             break
     covariance = _jackknife(np.asarray(normal), np.asarray(right), solution)
     covariance[lost, lost] = np.inf

@@ -1,4 +1,4 @@
-"""What was measured in a flight: one time axis, named signals with units, nothing guessed."""
+"""Record of a flight: one time axis, named signals with units."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ GAP = 1.5
 """Two samples further apart than this many median steps have a gap between them."""
 
 
-FINER = 1e4
-"""`resample` refuses a step that makes this many times as many samples."""
+MAX_UPSAMPLING = 1e4
+"""Largest number of samples `resample` may produce, relative to the record."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,8 +119,8 @@ class FlightRecord:
     def from_arrays(
         cls, time: object, units: Mapping[str, str], note: str = "", **columns: Any
     ) -> FlightRecord:
-        """From one array a signal, all as long as `time` (s); `units` declares the unit of each
-        signal.
+        """Return a record of one array a signal, all as long as `time` (s); `units` declares the
+        unit of each signal.
 
         Warns (`DataWarning`), as all readers do, where samples lie further apart than 1 s or closer
         than 0.1 ms. Raises `InputError` for a signal without a unit, units without a signal, and
@@ -165,8 +165,8 @@ class FlightRecord:
         time_unit: str = "s",
         note: str = "",
     ) -> FlightRecord:
-        """From a pandas DataFrame: `time` names the time column; the columns in `units` are taken
-        and converted to SI.
+        """Return a record of a pandas DataFrame: `time` names the time column; the columns in
+        `units` are taken and converted to SI.
 
         Raises `UnknownNameError` for a column that is not there, `InputError` for one of dates or
         words.
@@ -199,7 +199,7 @@ class FlightRecord:
         dt: float | None = None,
         time_unit: str | None = None,
     ) -> FlightRecord:
-        """From a table with a header line: commas, semicolons, tabs or blanks between cells,
+        """Read a table with a header line: commas, semicolons, tabs or blanks between cells,
         decimal points or commas, # comments.
 
         `time` names the time column, in `time_unit` (default that of its header "t [ms]", or s). A
@@ -210,7 +210,7 @@ class FlightRecord:
 
     @classmethod
     def from_xplane(cls, path: str | os.PathLike[str], dt: float | None = None) -> FlightRecord:
-        """From an X-Plane Data.txt: body velocities, rates and attitude in SI, sticks in -1..1; see
+        """Read an X-Plane Data.txt: body velocities, rates and attitude in SI, sticks in -1..1; see
         `symheli.logs.xplane`.
         """
         return cls._from_table(*read_xplane(path, dt), path)
@@ -236,8 +236,8 @@ class FlightRecord:
         dt: float,
         units: Mapping[str, str] | None = None,
     ) -> FlightRecord:
-        """From an ArduPilot log (.bin or .log): {signal: "message.field"}, such as "IMU.GyrY" or
-        "IMU[1].GyrY", resampled to `dt` (s) as `symheli.logs.column` says.
+        """Read an ArduPilot log (.bin or .log): {signal: "message.field"}, such as "IMU.GyrY" or
+        "IMU[1].GyrY", resampled to `dt` (s) as in `symheli.logs.column`.
 
         Units are those that the log declares; `units` gives those it does not. Needs pymavlink
         (extra "logs").
@@ -251,7 +251,7 @@ class FlightRecord:
     def from_mat(
         cls, path: str | os.PathLike[str], time: str, units: Mapping[str, str], time_unit: str = "s"
     ) -> FlightRecord:
-        """From a MATLAB file with one vector a signal, `time` in `time_unit`; one saved with -v7.3
+        """Read a MATLAB file with one vector a signal, `time` in `time_unit`; one saved with -v7.3
         needs h5py (extra "logs").
         """
         return cls._from_table(*read_mat(path, time, units, time_unit), path)
@@ -260,7 +260,7 @@ class FlightRecord:
     def from_map(
         cls, path: str | os.PathLike[str], signal_map: str | os.PathLike[str]
     ) -> FlightRecord:
-        """From any of these logs by a TOML file that says which column is which signal; see
+        """Read any of these logs by a TOML file that assigns columns to signals; see
         `symheli.logs.signal_map`.
         """
         found = SignalMap.load(signal_map)
@@ -270,8 +270,8 @@ class FlightRecord:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> FlightRecord:
-        """What `save` wrote, to the last bit; raises `InputError` for anything else. No pickle is
-        ever read.
+        """Load what `save` wrote, to the last bit; raise `InputError` for any other file. Pickles
+        are never read.
         """
         from symheli.records.record_file import read_record
 
@@ -329,7 +329,7 @@ class FlightRecord:
         return self.slope(self[name])
 
     def slope(self, values: Array) -> Array:
-        """The same of `values` (n, ...), one a sample; NaN in a segment of one sample."""
+        """Return the slope of `values` (n, ...), one a sample; NaN in a segment of one sample."""
         out = np.full(values.shape, np.nan)
         for part in self.segments():
             if part.stop - part.start > 1:
@@ -337,8 +337,9 @@ class FlightRecord:
         return out
 
     def check_kinematics(self) -> KinematicCheck:
-        """Whether attitude, rates, velocities and specific forces agree: bias, scale and delay of
-        each sensor, with standard errors and a verdict; see `symheli.records.check_kinematics`.
+        """Check whether attitude, rates, velocities and specific forces agree: bias, scale and
+        delay of each sensor, with standard errors and a verdict; see
+        `symheli.records.check_kinematics`.
         """
         from symheli.records.kinematic_check import check_kinematics
 
@@ -376,14 +377,14 @@ class FlightRecord:
         return replace(self, time=time, values=values)
 
     def select(self, names: Sequence[str]) -> FlightRecord:
-        """Only these signals."""
+        """Return a record of these signals only."""
         index = indices(names, self.signals, "signal")
         return replace(
             self, values=self.values[:, index], signals=tuple(self.signals[i] for i in index)
         )
 
     def with_signals(self, units: Mapping[str, str], **columns: Any) -> FlightRecord:
-        """With these signals added, or replaced where the name exists."""
+        """Return the record with these signals added, or replaced where the name exists."""
         other = FlightRecord._in_si(self.time, units, self.note, columns)
         kept = [i for i, s in enumerate(self.signals) if s not in other.signals]
         return replace(
@@ -406,7 +407,7 @@ class FlightRecord:
         samples = (
             sum(float(self.time[part.stop - 1] - self.time[part.start]) for part in parts) / dt
         )
-        if samples > FINER * len(self):
+        if samples > MAX_UPSAMPLING * len(self):
             raise InputError(
                 f"dt of {dt:g} s makes {samples:.1e} samples of {len(self)}; dt is in seconds"
             )
@@ -430,7 +431,7 @@ class FlightRecord:
     def low_pass(
         self, cutoff: float, order: int = 4, *, zero_phase: bool = False, leave: Sequence[str] = ()
     ) -> FlightRecord:
-        """All signals but those of `leave` through one Butterworth filter with its corner at
+        """Filter all signals but those of `leave` by one Butterworth filter with its corner at
         `cutoff` (Hz); see `symheli.records.low_pass`.
         """
         from symheli.records.conditioning import low_pass
@@ -446,8 +447,8 @@ class FlightRecord:
         return decimate(self, n)
 
     def split(self, fraction: float) -> tuple[FlightRecord, FlightRecord | None]:
-        """The first `fraction` of the time to fit, the rest to judge (None where nothing rests);
-        see `symheli.records.split`.
+        """Return the first `fraction` of the time for the fit, the rest for validation (None where
+        nothing is left); see `symheli.records.split`.
         """
         from symheli.records.conditioning import split
 

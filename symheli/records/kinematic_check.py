@@ -17,9 +17,9 @@ from symheli.records.flight_record import FlightRecord
 from symheli.records.kinematics import ANGLES, FORCES, RATES, VELOCITIES, comparable
 from symheli.records.sensor_faults import (
     DEGREES,
-    FEWEST,
-    FOLLOWS,
     FORCE_BIAS,
+    MIN_EXPLAINED,
+    MIN_WINDOWS,
     RATE_BIAS,
     SCALE,
     TILT,
@@ -30,26 +30,25 @@ from symheli.records.sensor_faults import (
 from symheli.values.kinematics import GRAVITY
 from symheli.values.signal import Signal
 
-CHANCE = 5e-4
-"""Probability that one number of a compatible record seems too large, and that it seems too
-small.
-"""
+TAIL_PROBABILITY = 5e-4
+"""Probability in each tail that a number of a compatible record appears significant."""
 
-MOVES = {"rad": pi / 180, "m/s": 0.1}
-"""Root mean square in a window from which on a signal moves, by its unit."""
+MIN_MOTION = {"rad": pi / 180, "m/s": 0.1}
+"""Root mean square in a window above which a signal counts as moving, by its unit."""
 
 DRIVER: dict[str, str] = dict(zip((*ANGLES, *VELOCITIES), (*RATES, *FORCES), strict=True))
 DRIVEN = {driver: driven for driven, driver in DRIVER.items()}
 UNITS = {"rad/s": ("deg/s", DEGREES), "rad": ("deg", DEGREES), "m/s^2": ("g", 1 / GRAVITY)}
-"""By unit: another that signals come in, and how many of it are one."""
+"""Other units in which signals are logged, by unit, with the conversion factor."""
 
-ALIKE = 1.05
-"""Factor within which a scale is taken for that of another unit."""
+SCALE_RATIO = 1.05
+"""Factor within which a scale is attributed to another unit."""
 
 
 @dataclass(frozen=True)
 class SensorCheck:
-    """What the others say of one signal: measured(t) = scale * true(t - delay) + bias.
+    """Sensor error of one signal, from the other signals: measured(t) = scale * true(t - delay) +
+    bias.
 
     Parameters
     ----------
@@ -184,7 +183,7 @@ def check_kinematics(record: FlightRecord) -> KinematicCheck:
     inconsistent: its scale is 57.3: it is in deg/s, declare that unit
     """
     found = sensor_faults(record)
-    limit = float(student.isf(CHANCE, max(found.windows - 1, 1)))
+    limit = float(student.isf(TAIL_PROBABILITY, max(found.windows - 1, 1)))
     step = float(np.median(np.diff(record.time)))
     rows = tuple(
         _row(record.signals[record.signals.index(name)], found, limit, step, record.signals)
@@ -215,7 +214,7 @@ def _row(
 
 def _follows(signal: Signal, found: Faults) -> list[str]:
     explained, driver = found.explained.get(signal, 1.0), DRIVER.get(signal, "")
-    if explained >= FOLLOWS or found.moves[signal] < MOVES[signal.unit]:
+    if explained >= MIN_EXPLAINED or found.moves[signal] < MIN_MOTION[signal.unit]:
         return []
     return [
         f"what is known of it, {driver} first, explains {max(100 * explained, 0):.0f} % of how it"
@@ -231,7 +230,7 @@ def _scale(signal: Signal, found: Faults, limit: float) -> list[str]:
     size, said = abs(scale.value), []
     if scale.value < 0:
         said.append(f"its sign is turned, or that of {_partner(signal, found)}: change it")
-    if 1 / ALIKE < size / many < ALIKE:
+    if 1 / SCALE_RATIO < size / many < SCALE_RATIO:
         twice = f" (or {DRIVER[signal]} was converted twice)" if signal in DRIVER else ""
         said.append(f"its scale is {size:.4g}: it is in {other}, declare that unit{twice}")
     elif abs(size - 1) > max(SCALE, limit * scale.standard_error):
@@ -240,7 +239,7 @@ def _scale(signal: Signal, found: Faults, limit: float) -> list[str]:
 
 
 def _partner(signal: str, found: Faults) -> str:
-    """What a signal is held against first."""
+    """Return the signal with which this one is compared first."""
     other = DRIVER.get(signal) or DRIVEN[signal]
     return other if other in (*found.scale, *found.delay) else "attitude"
 
@@ -268,8 +267,8 @@ def _delay(signal: Signal, delay: Estimate | None, limit: float, step: float) ->
 
 
 def _reason(signal: Signal, found: Faults, names: Sequence[str]) -> str:
-    if found.windows < FEWEST:
-        return f"{found.windows} windows of {WINDOW:g} s without a gap, {FEWEST} are needed"
+    if found.windows < MIN_WINDOWS:
+        return f"{found.windows} windows of {WINDOW:g} s without a gap, {MIN_WINDOWS} are needed"
     if signal in (*VELOCITIES, *FORCES) and signal not in (*found.delay, *found.scale):
         lacking = [name for name in (*VELOCITIES, *FORCES) if name not in names]
         return f"velocities are held against specific forces; there is no {', '.join(lacking)}"

@@ -31,19 +31,19 @@ UNIT = {
 
 
 def comparable(signals: Sequence[Signal]) -> list[str]:
-    """Which of the signals these kinematics tie together are there, in their unit."""
+    """Return the signals of these kinematics that are recorded, in their unit."""
     units = {str(signal): signal.unit for signal in signals}
     return [name for name in COMPARED if units.get(name) == UNIT[name]]
 
 
 def lacking(signals: Sequence[Signal]) -> list[str]:
-    """Which are not, of those without which nothing can be compared."""
+    """Return the missing signals without which nothing can be compared."""
     there = comparable(signals)
     return [name for name in (*RATES, *ANGLES[:2]) if name not in there]
 
 
 def attitude(windows: Windows, signals: Mapping[str, Array]) -> Kinematics:
-    """phi, theta, and psi where it is among the signals, driven by p q r: Euler's equations.
+    """Return phi, theta, and psi where it is among the signals, driven by p q r: Euler's equations.
 
     The parameters (8,) are those of p q r and the biases of phi and theta, to first order.
     Source: Klein and Morelli (2006), ch. 10.

@@ -18,11 +18,11 @@ from symheli.values.whole_files import write_bytes
 SCHEMA, VERSION = "symheli flight record", 1
 
 DESCRIBED = "described"
-"""Entry of `meta` under which the text of what a file cannot hold comes back."""
+"""Entry of `meta` with the text of items that a file cannot hold."""
 
 
 class Content(NamedTuple):
-    """What a record is made of."""
+    """Content of a record."""
 
     time: Array
     values: Array
@@ -33,7 +33,7 @@ class Content(NamedTuple):
 
 
 def write_record(path: str | os.PathLike[str], content: Content) -> os.PathLike[str]:
-    """Write all of it, compressed; a reader sees the old file or the new one, never half of it."""
+    """Write the record, compressed; a reader sees the old file or the new one, never half of it."""
     arrays: dict[str, Array] = {"time": content.time, "values": content.values}
     meta, described = {}, dict(content.meta.get(DESCRIBED, {}))
     for name, value in content.meta.items():
@@ -57,7 +57,7 @@ def write_record(path: str | os.PathLike[str], content: Content) -> os.PathLike[
 
 
 def read_record(path: str | os.PathLike[str]) -> Content:
-    """What `write_record` wrote; raises `InputError` for anything else, pickles among it."""
+    """Read what `write_record` wrote; raise `InputError` for any other file, pickles included."""
     try:
         with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
@@ -94,8 +94,8 @@ def _not_whole(path: object, error: Exception) -> InputError:
 
 
 def _tagged(value: Any, arrays: dict[str, Array]) -> Any:
-    """As JSON, with the kind of what JSON does not tell apart; arrays go to `arrays`. Raises
-    `TypeError` for what is no plain value.
+    """Return the value as JSON, with a tag for types that JSON does not distinguish; arrays go to
+    `arrays`. Raises `TypeError` for a value that is not plain.
     """
     if isinstance(value, np.generic):
         value = value.item()

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
     from symheli.records.flight_record import FlightRecord
 
-PANELS = 6
-"""More signals than this stand in two columns."""
+MAX_PANELS = 6
+"""Largest number of signals in one column."""
 
 
 def plot_record(record: FlightRecord, names: Sequence[str] | None = None) -> Array:
@@ -35,7 +35,7 @@ def plot_record(record: FlightRecord, names: Sequence[str] | None = None) -> Arr
     )
     if not shown.signals:
         raise InputError("name at least one signal to plot")
-    wide = 2 if len(shown.signals) > PANELS else 1
+    wide = 2 if len(shown.signals) > MAX_PANELS else 1
     tall = -(-len(shown.signals) // wide)
     figure = new_figure(7.5 * (1.5 if wide == 2 else 1), 0.6 + 1.3 * tall)
     axes = figure.subplots(tall, wide, sharex=True, squeeze=False).T.reshape(-1)

@@ -13,7 +13,7 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.records.conditioning import unbroken
 from symheli.records.flight_path import (
-    LATEST,
+    MAX_DELAY,
     ROUNDING,
     TINY,
     Kinematics,
@@ -45,17 +45,19 @@ OF_ATTITUDE = np.repeat([SCALE, RATE_BIAS, TILT], [3, 3, 2])
 WITHOUT_TILT = np.arange(8) < 6
 OF_MOTION = np.repeat([SCALE, FORCE_BIAS], 3)
 
-FEWEST = 8
-"""Windows that a comparison needs."""
+MIN_WINDOWS = 8
+"""Least number of windows of a comparison."""
 
-FOLLOWS = 0.5
-"""A signal of which the others explain less than this share is not theirs, or does not move."""
+MIN_EXPLAINED = 0.5
+"""Least explained fraction of a signal's variance for which the signal counts as following the
+others.
+"""
 
-STARTS = np.linspace(-0.75 * LATEST, 0.75 * LATEST, 7)
-"""Delays from which the search begins, s."""
+STARTS = np.linspace(-0.75 * MAX_DELAY, 0.75 * MAX_DELAY, 7)
+"""Initial delays of the search, s."""
 
-STEEP = 1.4
-"""Pitch (rad) beyond which Euler angles are not compared: they turn too fast there."""
+MAX_PITCH = 1.4
+"""Pitch (rad) above which Euler angles are not compared: they change too fast there."""
 
 DEGREES = degrees(1.0)
 NEAR = 1.5
@@ -74,7 +76,7 @@ class Estimate(NamedTuple):
 
 @dataclass(frozen=True)
 class Faults:
-    """What was found of each signal.
+    """Sensor errors of each signal.
 
     Parameters
     ----------
@@ -96,8 +98,8 @@ class Faults:
 
 
 def sensor_faults(record: FlightRecord) -> Faults:
-    """Of p q r phi theta, psi where recorded, and u v w ax ay az where all are; see
-    `check_kinematics`.
+    """Estimate the errors of p q r phi theta, psi where recorded, and u v w ax ay az where all are;
+    see `check_kinematics`.
     """
     missing = lacking(record.signals)
     if missing:
@@ -114,14 +116,14 @@ def sensor_faults(record: FlightRecord) -> Faults:
         for some in unbroken(whole[part])
     ]
     windows = Windows.of(record.time, stretches)
-    if len(windows) < FEWEST:
+    if len(windows) < MIN_WINDOWS:
         return Faults(len(windows))
     signals = dict(zip(names, table.T, strict=True))
     angles = tuple(name for name in ANGLES if name in signals)
     signals |= {name: continuous(signals[name], stretches) for name in angles}
     units, delays = _units_and_delays(windows, signals, angles)
-    windows = windows.where(np.abs(signals["theta"] / units["theta"][0]) < STEEP)
-    if len(windows) < FEWEST:
+    windows = windows.where(np.abs(signals["theta"] / units["theta"][0]) < MAX_PITCH)
+    if len(windows) < MIN_WINDOWS:
         return Faults(len(windows))
     fit, reads = _attitude_fit(windows, signals, units, delays)
     faults = Faults(len(windows))
@@ -143,15 +145,15 @@ def sensor_faults(record: FlightRecord) -> Faults:
 def _units_and_delays(
     windows: Windows, signals: Mapping[str, Array], angles: Sequence[str]
 ) -> tuple[dict[str, tuple[float, ...]], Array]:
-    """What each angle may have to be divided by to be in radians, and how late it is (s), from the
-    one rate that it follows while angles are small.
+    """Return the factor by which each angle may have to be divided to be in radians, and its delay
+    (s), from the one rate that it follows while angles are small.
     """
     units: dict[str, tuple[float, ...]] = {}
     delays = np.zeros(len(angles))
     steep = np.abs(signals["theta"][windows.index]).max() > 1.05 * pi / 2
     for i, (angle, rate) in enumerate(zip(angles, RATES, strict=False)):
         best = _best(windows, axis(signals, rate, angle), 1)
-        follows = best.explained[0] >= FOLLOWS
+        follows = best.explained[0] >= MIN_EXPLAINED
         ratio = 1 / abs(best.theta[0]) if follows else inf
         delays[i] = best.delays[0] if follows else 0.0
         if 1 / NEAR < ratio * DEGREES < NEAR:
@@ -164,7 +166,7 @@ def _units_and_delays(
 
 
 def _best(windows: Windows, kinematics: Kinematics, count: int) -> Reconstruction:
-    """Of the fits from several delays of `count` channels the one that explains most."""
+    """Return, of the fits from several delays of `count` channels, the one that explains most."""
     free = np.ones(len(kinematics.nominal), bool)
     fits = [reconstruct(windows, kinematics, free, np.full(count, start)) for start in STARTS]
     return max(fits, key=lambda fit: float(fit.explained.sum()))
@@ -172,8 +174,8 @@ def _best(windows: Windows, kinematics: Kinematics, count: int) -> Reconstructio
 
 @dataclass(frozen=True)
 class _Fit:
-    """A reconstruction whose drivers were read times `factors` (3,), and which of its parameters
-    are `free`; the others are not known.
+    """A reconstruction whose drivers were multiplied by `factors` (3,), and the mask of its `free`
+    parameters; the others are unknown.
     """
 
     found: Reconstruction
@@ -204,7 +206,7 @@ class _Fit:
         for i, name in enumerate(self.found.names):
             faults.explained[name] = float(self.found.explained[i])
             faults.moves[name] = float(np.sqrt(self.found.moves[i]))
-            error = errors[len(theta) + i] if faults.explained[name] >= FOLLOWS else inf
+            error = errors[len(theta) + i] if faults.explained[name] >= MIN_EXPLAINED else inf
             faults.delay[name] = Estimate(float(self.found.delays[i]), float(error))
 
 
@@ -215,13 +217,14 @@ def _fit(
     tolerance: Array,
     rough: Reconstruction,
 ) -> _Fit:
-    """All parameters, from a fit that has the drivers' scales roughly. Those that the record does
-    not tell within `tolerance` (m,) are held: tilts, then scales, then biases, the last to be lost.
+    """Fit all parameters, starting from a fit with approximate scales of the drivers. Those that
+    the record does not determine within `tolerance` (m,) are fixed: tilts first, then scales, then
+    biases.
     """
     plain, count = make(windows, signals), len(rough.delays)
     scale, errors = rough.theta[:3], rough.errors[:3]
     factors = np.where(errors < 0.25 * np.abs(scale), scale, 1.0)
-    factors[:count][rough.explained < FOLLOWS] = 1.0
+    factors[:count][rough.explained < MIN_EXPLAINED] = 1.0
     scaled = {name: f * signals[name] for name, f in zip(plain.drivers, factors, strict=True)}
     kinematics = make(windows, {**signals, **scaled})
     free, found = np.ones(len(tolerance), bool), rough
@@ -229,7 +232,7 @@ def _fit(
         found = reconstruct(windows, kinematics, free, found.delays)
         free[group] &= found.errors[: len(tolerance)][group] <= tolerance[group]
         if group.start is None:
-            free[:count] &= found.explained >= FOLLOWS
+            free[:count] &= found.explained >= MIN_EXPLAINED
     return _Fit(reconstruct(windows, kinematics, free, found.delays), plain.drivers, factors, free)
 
 
@@ -239,8 +242,8 @@ def _attitude_fit(
     units: Mapping[str, Sequence[float]],
     delays: Array,
 ) -> tuple[_Fit, dict[str, float]]:
-    """The fit of Euler's equations, and what the angles are to be divided by: with the fewest signs
-    turned of those that explain the record alike.
+    """Return the fit of Euler's equations, and the divisors of the angles: of equally good fits,
+    the one with the fewest signs changed.
 
     Turning phi, p, r and psi together changes nothing, nor theta, q, r and psi.
     """
@@ -266,7 +269,7 @@ def _attitude_fit(
 
 
 def _unexplained(found: Reconstruction) -> Array:
-    """What is left of each channel in each window (windows, c), over how it moves."""
+    """Return the residual of each channel in each window (windows, c), over its motion."""
     return found.left / (found.moves + TINY) + ROUNDING
 
 

@@ -93,8 +93,8 @@ def sweep(
 
 
 def design_family(heli: Helicopter, airspeeds: Sequence[float] | Array) -> LinearFamily:
-    """`sweep` of level flight for a controller: what the equations are not known to hold for is
-    said of the flight.
+    """Run `sweep` of level flight for a controller, without validity warnings, which the flight
+    gives.
     """
     flights = SteadyFlights.of(heli, FlightConditions(increasing(airspeeds)))
     return _family(flights, trimmed(flights, hover(flights), one_after_another(len(flights))))

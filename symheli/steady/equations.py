@@ -162,8 +162,8 @@ class SteadyEquations:
 
 
 def steady_equations(heli: Helicopter) -> SteadyEquations:
-    """Those of this helicopter's arrangement of parts, built once for all airframes that differ in
-    numbers alone.
+    """Return the equations of this helicopter's arrangement of parts, built once for all airframes
+    that differ only in numbers.
     """
     kept = vars(heli.dynamics)
     if "_steady" not in kept:

@@ -185,7 +185,7 @@ def warn_of_point(heli: Helicopter, point: TrimPoint) -> None:
 
 
 def _beyond(heli: Helicopter, point: TrimPoint) -> list[str]:
-    """What it asks too much of the equations."""
+    """Return the validity limits that the point exceeds."""
     velocity = point.x.array[:3] - point.wind.array
 
     def where(_: int) -> str:
@@ -206,7 +206,7 @@ def stops(inputs: Sequence[Signal], on: Array) -> tuple[str, ...]:
 
 
 def in_vortex_ring(switches: Array, names: Sequence[str]) -> Array:
-    """Whether a switching function (..., ns) says that a rotor is in one."""
+    """Whether a switching function (..., ns) shows that a rotor is in a vortex ring."""
     rings = [k for k, name in enumerate(names) if name.endswith("vortex ring")]
     return np.any(switches[..., rings] > 0, axis=-1)
 
@@ -218,7 +218,7 @@ def _stops(point: TrimPoint) -> str:
 
 
 def _throttle(heli: Helicopter, point: TrimPoint) -> list[str]:
-    """What the engine says at a point that is no trim."""
+    """Return the state of the engine at a point that is no trim, in words."""
     if "om_i" not in point.x:
         return []
     throttle = heli.vehicle.values("drivetrain")["governor_ki"] * point.x["om_i"]
@@ -255,7 +255,7 @@ class Equilibrium:
         return np.array([start.get(name, 0.0) for name in self.equations.unknowns])
 
     def other_guesses(self) -> list[Array]:
-        """Starts away from hover: nose and bank to either side, the rotor working hard or
+        """Return starting points away from hover: nose and bank to either side, the rotor loaded or
         windmilling.
         """
         guesses = []
@@ -272,7 +272,7 @@ class Equilibrium:
         return guesses
 
     def unknowns_of(self, point: OperatingPoint) -> Array:
-        """Those of a point of this helicopter."""
+        """Return the unknowns of a point of this helicopter."""
         return np.concatenate([point.x.array[self.equations.free], point.u.array])
 
     def search(self, start: Array, continuation: bool = True) -> Array:
@@ -289,8 +289,8 @@ class Equilibrium:
         return best
 
     def solve(self, start: Array) -> Array:
-        """Newton's method from `start`; MINPACK's hybrid method where it stops descending, then
-        Newton again.
+        """Solve by Newton's method from `start`; by MINPACK's hybrid method where it stops
+        descending, then Newton again.
         """
         z, miss = self.newton(start)
         if not miss < TOLERANCE:
@@ -311,7 +311,7 @@ class Equilibrium:
         return newton(self.system, self.equations.balanced, start)
 
     def point(self, z: Array) -> TrimPoint:
-        """All that is known at these unknowns."""
+        """Return all quantities at these unknowns."""
         heli, u = self.heli, z[len(self.equations.free) :]
         x, wind, xdot, residual, switches, _ = numeric(heli, "point")(z, self.demand)
         return TrimPoint(
@@ -328,7 +328,7 @@ class Equilibrium:
         )
 
     def failure(self, z: Array) -> TrimError:
-        """What the best point, at z, misses, equation by equation, the worst first."""
+        """Return the residuals of the best point, at z, equation by equation, the largest first."""
         best = self.point(z)
         misses = sorted(
             zip(best.residual.array, best.residual.signals, strict=True),

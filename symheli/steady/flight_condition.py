@@ -1,4 +1,4 @@
-"""What is asked of a trim: a steady flight."""
+"""The steady flight condition of a trim."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ class FlightCondition:
 
     @property
     def demand(self) -> np.ndarray:
-        """What the equations of steady flight are given (8,), by `DEMAND`."""
+        """Right-hand side of the equations of steady flight (8,), by `DEMAND`."""
         return np.array([*self.air_velocity, self.turn_rate, *self.wind, self.acceleration])
 
     def __str__(self) -> str:

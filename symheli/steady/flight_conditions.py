@@ -1,4 +1,4 @@
-"""What is asked of many trims: flight conditions as arrays."""
+"""The steady flight conditions of many trims, as arrays."""
 
 from __future__ import annotations
 
@@ -83,14 +83,14 @@ class FlightConditions(Sequence[FlightCondition]):
         )
 
     def at(self, which: Array) -> FlightConditions:
-        """Those of these positions."""
+        """Return the conditions at these positions."""
         chosen = {name: getattr(self, name)[which] for name in (*_NUMBERS, "wind")}
         altitude = None if self.altitude is None else np.asarray(self.altitude)[which]
         return FlightConditions(**chosen, altitude=altitude)
 
     @property
     def demand(self) -> Array:
-        """What the equations of steady flight are given (N, 8), by `DEMAND`."""
+        """Right-hand side of the equations of steady flight (N, 8), by `DEMAND`."""
         return np.column_stack(
             [
                 air_velocity(self.airspeed, self.climb_rate, self.sideslip),

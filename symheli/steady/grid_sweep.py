@@ -124,8 +124,8 @@ def sweep_grid(
 
 
 def _after_neighbours(shape: Sequence[int], speeds: int) -> Array:
-    """Which trim each of a grid is started from, airspeed running fastest: the first values of the
-    other axes one after another, the others from the neighbouring value.
+    """Return the trim from which each of a grid is started, airspeed running fastest: the first
+    values of the other axes one after another, the others from the neighbouring value.
     """
     after = [one_after_another(speeds)]
     for k, position in enumerate(np.ndindex(*shape)):

@@ -39,8 +39,8 @@ def kink_speeds(heli: Helicopter, trims: TrimBatch) -> Mapping[str, tuple[float,
 
 
 def _crossings(heli: Helicopter, trims: TrimBatch, names: list[str], between: Array) -> Array:
-    """Where each of the named functions changes sign after the trim `between`: every bracket is cut
-    at its quarters and about the root of its secant, all side by side, until it is short.
+    """Return where each of the named functions changes sign after the trim `between`: every bracket
+    is cut at its quarters and about the root of its secant, all side by side, until it is short.
     """
     at = np.stack([between, between + 1], axis=1)
     ends = trims.conditions.airspeed[at]
@@ -106,6 +106,6 @@ def _cuts(ends: Array, values: Array) -> Array:
 
 
 def _root(ends: Array, values: Array) -> Array:
-    """Of the straight line through the ends of each bracket."""
+    """Return the root of the straight line through the ends of each bracket."""
     low, high = ends.T
     return low - values[:, 0] * (high - low) / (values[:, 1] - values[:, 0])

@@ -1,4 +1,4 @@
-"""Many steady flights at once: solved, described and linearized in machine code, or one by one in
+"""Many steady flights at once: solved, evaluated and linearized in machine code, or one by one in
 CasADi's virtual machine where there is no compiler.
 """
 
@@ -27,8 +27,8 @@ ALONE = -1
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """What is known at N points: state and its derivative (N, nx), wind in body axes (N, 3),
-    residuals (N, nx), switching functions (N, ns) and the torque of the engine (N, 1), SI.
+    """Quantities at N points: state and its derivative (N, nx), wind in body axes (N, 3), residuals
+    (N, nx), switching functions (N, ns) and the torque of the engine (N, 1), SI.
     """
 
     x: Array
@@ -51,12 +51,12 @@ class SteadyFlights:
 
     @classmethod
     def of(cls, heli: Helicopter, conditions: FlightConditions) -> SteadyFlights:
-        """Those of one helicopter."""
+        """Return the flights of one helicopter."""
         return cls([heli], np.zeros(len(conditions), int), conditions)
 
     @cached_property
     def equations(self) -> SteadyEquations:
-        """Those they share."""
+        """Equations that they share."""
         return steady_equations(self.helis[0])
 
     @cached_property
@@ -65,7 +65,7 @@ class SteadyFlights:
 
     @cached_property
     def parameters(self) -> Array:
-        """Those of `Helicopter.parameters`, a row for each flight, or one for all."""
+        """Values of `Helicopter.parameters`, a row for each flight, or one for all."""
         rows = np.stack([heli.parameters.array for heli in self.helis])
         return rows if len(rows) == 1 else rows[self.which]
 
@@ -77,7 +77,7 @@ class SteadyFlights:
         return self.helis[self.which[k]]
 
     def at(self, which: Array) -> SteadyFlights:
-        """Those of these positions."""
+        """Return the flights at these positions."""
         return SteadyFlights(self.helis, self.which[which], self.conditions.at(which))
 
     def solved(self, starts: Array, after: Array | int) -> tuple[Array, Array]:
@@ -153,7 +153,7 @@ class SteadyFlights:
             yield slice(begin, min(begin + AT_ONCE, len(self)))
 
     def _shared(self, part: slice = slice(0, 0)) -> tuple[ctypes.c_void_p, ctypes.c_long]:
-        """Parameters from the first flight of a part on, and how far apart they are."""
+        """Return the parameters from the first flight of a part on, and their stride."""
         if len(self.parameters) == 1:
             return _at(self.parameters), ctypes.c_long(0)
         return _at(self.parameters[part.start :]), ctypes.c_long(self.parameters.shape[1])

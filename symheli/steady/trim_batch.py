@@ -238,8 +238,8 @@ def trim_batch(
 
 
 def warn_of_trims(flights: SteadyFlights, trims: TrimBatch, ring: bool = True) -> None:
-    """One `ValidityWarning` where the equations are not known to hold at all of these; `ring`:
-    also where a rotor is in a vortex ring.
+    """Give one `ValidityWarning` for trims outside the validity range of the equations; `ring`:
+    also for rotors in a vortex ring.
     """
     validity, velocity = Validity(flights.helis[0], flights.parameters), trims.x[:, :3] - trims.wind
 
@@ -251,8 +251,8 @@ def warn_of_trims(flights: SteadyFlights, trims: TrimBatch, ring: bool = True) -
 
 
 def one_after_another(count: int) -> Array:
-    """Which trim each is started from (count,): the last of those computed before, as many side by
-    side as there is room for.
+    """Return the trim from which each is started (count,): the last of those computed before, as
+    many side by side as there is room for.
     """
     lanes = SIDE_BY_SIDE.lanes
     k = np.arange(count)

@@ -1,4 +1,4 @@
-"""Trims over airspeed and climb rate, and where momentum theory promises nothing."""
+"""Trims over airspeed and climb rate, and the region where momentum theory is invalid."""
 
 from __future__ import annotations
 
@@ -84,7 +84,9 @@ class TrimMap:
 
     @property
     def vortex_ring(self) -> Array:
-        """Whether a rotor is where momentum theory promises no accuracy (n, m), bool."""
+        """Mask (n, m), bool, of the points at which a rotor is in the vortex-ring region, where
+        momentum theory is invalid.
+        """
         return self._flags("vortex_ring")
 
     @property
@@ -102,7 +104,7 @@ class TrimMap:
 
     @property
     def signals(self) -> tuple[Signal, ...]:
-        """What the map holds: states, inputs, power, with their units."""
+        """Signals of the map: states, inputs, power, with their units."""
         point = next(point for row in self.points for point in row if point is not None)
         return (*point.x.signals, *point.u.signals, POWER)
 
@@ -125,7 +127,7 @@ class TrimMap:
         return self.points[i][j]
 
     def csv(self) -> str:
-        """Every signal and flag, one line a grid point that is possible."""
+        """Return every signal and flag, one line for each possible grid point."""
         return comma_separated([*self._pairs(), *self._columns()])
 
     def plot(self, ax: Axes | None = None, quantity: str = "power") -> Axes:
@@ -236,8 +238,8 @@ def trim_map(
 
 
 def _after_inner(i: Array, j: Array, inner: int) -> Array:
-    """Which trim each is started from: those of the innermost climb rate one after another, the
-    others from the next climb rate inwards.
+    """Return the trim from which each is started: those of the innermost climb rate one after
+    another, the others from the next climb rate inwards.
     """
     at = {place: k for k, place in enumerate(zip(i.tolist(), j.tolist(), strict=True))}
     first = int(np.count_nonzero(j == inner))

@@ -1,6 +1,4 @@
-"""How far the equations of the helicopter are known to hold, and a word where they are asked for
-more.
-"""
+"""Validity range of the equations of the helicopter, and the warning outside it."""
 
 from __future__ import annotations
 
@@ -49,8 +47,8 @@ RING = (
 
 
 class Validity:
-    """What the equations of a helicopter, with parameters p (N or 1, n) as in
-    `Helicopter.parameters`, are known to hold for.
+    """Validity range of the equations of a helicopter, with parameters p (N or 1, n) as in
+    `Helicopter.parameters`.
     """
 
     def __init__(self, heli: Helicopter, p: Array):
@@ -60,7 +58,7 @@ class Validity:
 
     @classmethod
     def of(cls, heli: Helicopter) -> Validity:
-        """That of its own parameters, kept with it."""
+        """Return the validity range for the helicopter's own parameters, cached with it."""
         if "_validity" not in heli.__dict__:
             heli.__dict__["_validity"] = cls(heli, heli.parameters.array[None])
         return heli.__dict__["_validity"]
@@ -76,18 +74,18 @@ class Validity:
 
     @cached_property
     def density(self) -> Array:
-        """Of the air (N or 1,), kg/m^3."""
+        """Density of the air (N or 1,), kg/m^3."""
         return self._parameter(DENSITY)
 
     @cached_property
     def tip_speeds(self) -> Array:
-        """Of each main rotor (rotors, N or 1), m/s."""
+        """Tip speeds of each main rotor (rotors, N or 1), m/s."""
         speed = self.value("drivetrain", "nominal_speed")
         return np.stack([speed * self.value(rotor, "radius") for rotor in self.rotors])
 
     @cached_property
     def _tip_speeds(self) -> tuple[Array, Array]:
-        """Least and largest of the main rotors (N or 1,)."""
+        """Least and largest tip speeds of the main rotors (N or 1,), m/s."""
         return self.tip_speeds.min(axis=0), self.tip_speeds.max(axis=0)
 
     @cached_property
@@ -131,18 +129,20 @@ class Validity:
         )
 
     def beyond(self, where: Callable[[int], str], velocity: Array) -> list[str]:
-        """What N points at these velocities through the air (N, 3), body axes, m/s, ask too much
-        of, each with the worst of them, `where(k)`.
+        """Return a sentence for each limit that N points at these velocities through the air (N,
+        3), body axes, m/s, exceed, each with the worst of them, `where(k)`.
         """
         return [*self._wherever_it_flies, *self._as_fast(where, velocity)]
 
     def in_hover(self) -> list[str]:
-        """What is too much wherever it flies: it is too small, too large, or the air too thin."""
+        """Return the limits exceeded at any speed: the helicopter is too small, too large, or the
+        air too thin.
+        """
         return self.beyond(lambda _: "in hover", np.zeros((1, 3)))
 
     @cached_property
     def _wherever_it_flies(self) -> list[str]:
-        """What its size and its air ask too much of."""
+        """Limits exceeded by its size and its air."""
         found, (least, most) = [], DENSITIES
         outside = (self.density < least) | (self.density > most)
         if outside.any():
@@ -159,7 +159,7 @@ class Validity:
         return found
 
     def _as_fast(self, where: Callable[[int], str], velocity: Array) -> list[str]:
-        """What so much speed asks too much of."""
+        """Return the limits that these speeds exceed."""
         if not (self.rotors and len(velocity)):
             return []
         found, level = [], np.hypot(velocity[:, 0], velocity[:, 1])
@@ -183,8 +183,8 @@ class Validity:
 
 
 def in_a_ring(where: Callable[[int], str], ring: Array) -> list[str]:
-    """The first of N points in a vortex ring, `where(k)`, as `Validity.beyond` has it; `ring` (N,)
-    tells which are.
+    """Return a sentence on the first of N points in a vortex ring, `where(k)`, as in
+    `Validity.beyond`; `ring` (N,) marks them.
     """
     if not ring.any():
         return []
@@ -198,5 +198,5 @@ def warn(beyond: list[str]) -> None:
 
 
 def _many(beyond: Array) -> str:
-    """How many of the points, where there are several."""
+    """Return the number of points as text, where there are several."""
     return f" ({np.count_nonzero(beyond)} of {len(beyond)})" if len(beyond) > 1 else ""

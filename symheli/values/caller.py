@@ -1,4 +1,4 @@
-"""Where in somebody else's code a warning belongs."""
+"""Stack level of the user's code, to which a warning refers."""
 
 from __future__ import annotations
 

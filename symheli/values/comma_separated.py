@@ -1,4 +1,4 @@
-"""Columns with names and units as text any spreadsheet reads."""
+"""Columns with names and units as text for spreadsheets."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is asked of a controller in flight, and one flight of it."""
+"""Interfaces of a controller in flight."""
 
 from __future__ import annotations
 
@@ -98,8 +98,8 @@ class PureController(Protocol):
 
 
 def begun(controller: Any) -> Answer:
-    """What answers along one flight from its start: the state of a pure controller is kept here,
-    one that keeps it itself is reset.
+    """Return the function that computes commands along one flight: it keeps the state of a pure
+    controller, and resets one that keeps its own.
     """
     if hasattr(controller, "reset"):
         controller.reset()

@@ -1,4 +1,4 @@
-"""What the pictures of every room share: colours, axes, and how a quantity is labelled."""
+"""Common style of all plots: colours, axes, and labels of quantities."""
 
 from __future__ import annotations
 

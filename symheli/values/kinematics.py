@@ -21,8 +21,8 @@ RIGID_BODY: tuple[Signal, ...] = signals((*VELOCITIES, "phi", "theta"))
 
 
 def kinematic_rates(y: Array) -> Array:
-    """What a rigid body without aerodynamic forces and moments does: rates (..., 8) of
-    `RIGID_BODY`.
+    """Return the rates (..., 8) of `RIGID_BODY` of a rigid body without aerodynamic forces and
+    moments.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Where a linear model was taken."""
+"""Operating point of a linear model."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from symheli.values.summary import summarized
 @dataclass(frozen=True)
 class OperatingPoint:
     """States `x`, inputs `u` and state derivatives `xdot` (zero at an equilibrium) of a model; the
-    values of its scheduling parameters are the family's to say.
+    family holds the values of its scheduling parameters.
 
     `x`, `u` and `xdot` are named vectors with units; `airspeed` in m/s, None where the point is of
     nothing that flies or its airspeed is not known. Raises `InputError` for an airspeed that is not

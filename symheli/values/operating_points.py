@@ -1,4 +1,4 @@
-"""Where many linear models were taken."""
+"""Operating points of many linear models."""
 
 from __future__ import annotations
 

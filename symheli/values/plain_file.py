@@ -31,7 +31,7 @@ def write(path: str | os.PathLike[str], schema: str, content: dict[str, Any]) ->
 
 
 def read(path: str | os.PathLike[str], schema: str) -> dict[str, Any]:
-    """What `write` wrote; raises `InputError` unless the file is whole and of this schema."""
+    """Read what `write` wrote; raise `InputError` unless the file is whole and of this schema."""
     try:
         whole = json.loads(Path(path).read_text(encoding="utf-8"), parse_constant=_refused)
     except OSError as error:
@@ -57,7 +57,7 @@ def read(path: str | os.PathLike[str], schema: str) -> dict[str, Any]:
 
 
 def incomplete(path: str | os.PathLike[str], error: Exception) -> InputError:
-    """What to raise where a whole file lacks a part."""
+    """Return the error for a whole file that lacks a part."""
     return InputError(f"{path}: a part of the model is missing or of the wrong kind ({error})")
 
 

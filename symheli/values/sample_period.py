@@ -1,4 +1,4 @@
-"""Sample periods: what time stamps say of theirs, and when two of them are one."""
+"""Sample periods: estimated from time stamps, and compared with each other."""
 
 from __future__ import annotations
 
@@ -58,8 +58,8 @@ def period_of(steps: Array, last: float) -> float:
 
 
 def warn_of_odd_steps(time: Array) -> None:
-    """Warns (`DataWarning`) where the median step of `time` (s) is that of no flight record: the
-    unit is asked for.
+    """Warn (`DataWarning`) where the median step of `time` (s) is implausible for a flight record,
+    which suggests another unit.
     """
     step, (least, most) = float(np.median(np.diff(time))), USUAL
     if least <= step <= most:

@@ -1,4 +1,4 @@
-"""A signal is a name that knows its unit."""
+"""A signal: a name with a unit."""
 
 from __future__ import annotations
 

@@ -131,8 +131,8 @@ _ATOMS: dict[str, dict[str, int]] = {
 }
 
 Dimension = Mapping[str, int]
-"""Exponents of kg, m, rad, s, V; those that are zero are left out. The radian counts as a unit: it
-tells N m from N m/rad.
+"""Exponents of kg, m, rad, s, V; those that are zero are left out. The radian counts as a unit, to
+distinguish N m from N m/rad.
 """
 
 
@@ -210,8 +210,8 @@ def per_second(unit: str) -> str:
 
 
 def ratio(unit: str, other: str) -> float | None:
-    """How many of `other` one `unit` is: 3.6 for "m/s" and "km/h"; None where they are of another
-    dimension, or not known and not the same.
+    """Return how many of `other` one `unit` is: 3.6 for "m/s" and "km/h"; None for another
+    dimension, or for unknown and different units.
     """
     if unit == other:
         return 1.0

@@ -67,15 +67,15 @@ class ZarrArray:
 
 @dataclass(frozen=True)
 class ZarrFolder:
-    """The folder `path`; each file in it is whole or not there. `remade`: its owner says anew what
-    is in it whenever it writes to it, so that only chunks need to outlive a power failure.
+    """The folder `path`; each file in it is whole or absent. `remade`: the owner writes the
+    metadata anew with every change, so that only chunks need to survive a power failure.
     """
 
     path: Path
     remade: bool = False
 
     def describe(self, arrays: Mapping[str, ZarrArray]) -> None:
-        """Say which arrays there are; chunks that are there stay."""
+        """Write the metadata of the arrays; existing chunks stay."""
         metadata: dict[str, Any] = {".zgroup": {"zarr_format": FORMAT}}
         for name, array in arrays.items():
             fill = "NaN" if isinstance(array.fill, float) and np.isnan(array.fill) else array.fill
@@ -92,20 +92,20 @@ class ZarrFolder:
             labels = {"coordinates": " ".join(array.coordinates)} if array.coordinates else {}
             metadata[f"{name}/.zattrs"] = {"_ARRAY_DIMENSIONS": array.dimensions, **labels}
         for name, content in metadata.items():
-            self._say(name, content)
+            self._write_json(name, content)
         consolidated = {"zarr_consolidated_format": 1, "metadata": metadata}
-        self._say(".zmetadata", consolidated)
+        self._write_json(".zmetadata", consolidated)
 
-    def say(self, attributes: Mapping[str, Any]) -> None:
-        """The attributes of the whole."""
-        self._say(".zattrs", attributes)
+    def write_attributes(self, attributes: Mapping[str, Any]) -> None:
+        """Write the attributes of the folder."""
+        self._write_json(".zattrs", attributes)
 
     def keep(self, name: str, values: Array) -> None:
         """An array of one chunk."""
         write_bytes(self.path / name / "0", values.tobytes(), forced=not self.remade)
 
     def write(self, name: str, chunk: int, values: Array, array: ZarrArray | None = None) -> None:
-        """The chunk along the first dimension, filled up where `values` has fewer rows."""
+        """Write the chunk along the first dimension, filled up where `values` has fewer rows."""
         array = array or self.array(name)
         whole = array.filled(array.chunks)
         whole[: len(values)] = values
@@ -152,8 +152,8 @@ class ZarrFolder:
         return self._read(name, chunk, self.array(name))
 
     def whole(self, name: str, array: ZarrArray | None = None) -> Array:
-        """All of an array, with what it is filled with where chunks are not there; `InputError`
-        where one is damaged.
+        """Return all of an array, with its fill value where chunks are missing; `InputError` where
+        one is damaged.
         """
         array = array or self.array(name)
         out, step = array.filled(array.shape), array.chunks[0]
@@ -164,7 +164,7 @@ class ZarrFolder:
                 out[rows] = block[: len(out[rows])]
         return out
 
-    def _say(self, name: str, content: Any) -> None:
+    def _write_json(self, name: str, content: Any) -> None:
         write_bytes(self.path / name, json.dumps(content).encode(), forced=not self.remade)
 
     def _read(self, name: str, chunk: int, array: ZarrArray) -> Array | None:

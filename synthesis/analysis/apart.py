@@ -1,5 +1,5 @@
-"""Why the two bounds of a gain are apart: numbers, a fine sample period, a search that did not end,
-or the class of P.
+"""Causes of a gap between the two bounds of a gain: rounding, a small sample period, a search that
+did not converge, or the class of P.
 """
 
 from __future__ import annotations
@@ -12,33 +12,35 @@ from synthesis.program.cone_program import Answer
 
 Array = np.ndarray
 
-FAR = 1.05
-"""Bounds within this ratio need no cause."""
+MAX_UNEXPLAINED_RATIO = 1.05
+"""Largest ratio of upper to lower bound for which no cause of the gap is reported."""
 
-ROUNDED = 1e-2
-"""A frozen gain missed by more than this fraction says that numbers limit the bound."""
+FROZEN_GAIN_ERROR = 1e-2
+"""Relative error of a frozen gain above which rounding is reported to limit the bound."""
 
-FINE = 1e-3
-"""A least decay per sample, 1 - |pole|, below which margins of 1e-6 in a discrete LMI are felt in
+MIN_DECAY_PER_SAMPLE = 1e-3
+"""Least decay per sample, 1 - |pole|, below which margins of 1e-6 in a discrete-time LMI change
 the third digit of a gain.
 """
 
-WORTH_SAYING = 1.01
-"""Bounds that are this far apart may be so because of the sample period."""
+MIN_SAMPLING_RATIO = 1.01
+"""Ratio of upper to lower bound above which a small sample period is reported as a possible cause.
+"""
 
 
 def apart(gamma: float, lower: float, rounding: float, answer: Answer) -> tuple[str, ...]:
-    """A sentence where a proven gain is far above what no proof undercuts; else nothing.
+    """Return a sentence on the cause where a proven gain is far above its lower bound; else
+    nothing.
 
     `rounding` is the fraction by which the gain of a frozen model was missed in the same
-    coordinates (NaN: not asked), `answer` the solver's for the program of the proof.
+    coordinates (NaN: not computed), `answer` the solver's for the program of the proof.
     """
-    if not (math.isfinite(gamma) and gamma > FAR * lower) or math.isnan(rounding):
+    if not (math.isfinite(gamma) and gamma > MAX_UNEXPLAINED_RATIO * lower) or math.isnan(rounding):
         return ()
     if lower == 0.0:
-        return ()  # the lower bound tells nothing to compare with
+        return ()  # there is no lower bound to compare with
     head = f"the bounds are {100 * (gamma / lower - 1):.3g} % apart"
-    if not rounding <= ROUNDED:
+    if not rounding <= FROZEN_GAIN_ERROR:
         return (
             f"{head}, and of the model frozen at mid-range the same program does not find the gain"
             " either: rounding limits the bound; drop states that are far faster or slower than"
@@ -57,15 +59,15 @@ def apart(gamma: float, lower: float, rounding: float, answer: Answer) -> tuple[
 
 
 def fine_sampling(A: Array, dt: float | None, gamma: float, lower: float) -> tuple[str, ...]:
-    """A hypothesis where `gamma`, proven of a model sampled every `dt` seconds, may be loose
-    because of that period; else nothing.
+    """Return a hypothesis where `gamma`, proven of a model sampled every `dt` seconds, may be
+    conservative because of that period; else nothing.
 
     A (k, n, n): frozen models of the range. `lower` is the lower bound on the gain.
     """
-    if dt is None or not np.isfinite(gamma) or not gamma > WORTH_SAYING * lower:
+    if dt is None or not np.isfinite(gamma) or not gamma > MIN_SAMPLING_RATIO * lower:
         return ()
     decay = 1 - float(np.abs(np.linalg.eigvals(A)).max(initial=0.0))
-    if not decay < FINE:
+    if not decay < MIN_DECAY_PER_SAMPLE:
         return ()
     return (
         (

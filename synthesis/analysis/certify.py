@@ -17,7 +17,7 @@ from symheli.lpv import LFT, LPVStateSpace, Scheduling, UncertainStateSpace
 from synthesis.analysis.apart import apart, fine_sampling
 from synthesis.analysis.general_search import General
 from synthesis.analysis.hypotheses import VERIFIED, hypotheses
-from synthesis.analysis.ladder import CLOSE, Found, Ladder
+from synthesis.analysis.ladder import CLOSE_TO_LOWER, Found, Ladder
 from synthesis.analysis.one_parameter_search import OneParameter
 from synthesis.analysis.problem import Problem
 from synthesis.certificate import Certificate, Seconds, Status
@@ -31,14 +31,16 @@ from synthesis.worst.box import (
     worst_frozen,
     worst_moving,
 )
-from synthesis.worst.budget import said
+from synthesis.worst.budget import search_hypothesis
 from synthesis.worst.perturbation import worst_perturbation
 from synthesis.worst.trajectory import SchedulingTrajectory
 
 Array = np.ndarray
 
-ROUNDED = 1e-12
-"""What is looked for where the slowest frozen mode is stable or not to rounding, 1/s."""
+MARGINAL_DECAY = 1e-12
+"""Decay rate, 1/s, that the search must exceed where the slowest frozen mode is stable or unstable
+only to rounding.
+"""
 
 
 class Beaten(NamedTuple):
@@ -71,7 +73,7 @@ def certify(problem: Problem) -> Certificate:
             )
             return report.nothing(Status.UNSTABLE, beaten)
         # stable or not to rounding: nothing is known from below
-        frozen, search = Worst(0.0 if problem.gains else -ROUNDED, frozen.p), None
+        frozen, search = Worst(0.0 if problem.gains else -MARGINAL_DECAY, frozen.p), None
     stability = demand.kind == "stability"
     limit = frozen if stability else worst_moving(model.source, demand, frozen, search)
     beaten = Beaten(
@@ -92,11 +94,15 @@ def certify(problem: Problem) -> Certificate:
         if worst is not None:
             return report.nothing(Status.GROWING, beaten._replace(worst=worst), ladder)
     cert = report.found(best, beaten, ladder)
-    return cert if stability else cert.resting_on(said(search and search.seconds, beaten.seconds))
+    return (
+        cert
+        if stability
+        else cert.resting_on(search_hypothesis(search and search.seconds, beaten.seconds))
+    )
 
 
 class _Member(NamedTuple):
-    """The `model` whose trajectories give the lower bound, and the worst `frozen` one.
+    """The `model` whose trajectories give the lower bound, and its worst `frozen` model.
 
     Of a set the one with `perturbation`; where no basis holds it the nominal one, beside the frozen
     one with the perturbation, which is `unstable` at some p or nowhere (None).
@@ -124,13 +130,13 @@ def _worst_member(problem: Problem) -> _Member:
 
 
 def route(problem: Problem) -> Ladder:
-    """The search for a proof alone."""
+    """Return the search for a proof that suits the problem."""
     return (OneParameter if problem.one_parameter else General)(problem)
 
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """How a certificate is written down."""
+    """Writer of the certificate of a problem."""
 
     problem: Problem
 
@@ -141,15 +147,15 @@ class Report:
 
     @property
     def model(self) -> LPVStateSpace | UncertainStateSpace | LFT:
-        """The model as it was given."""
+        """The model as the user gave it."""
         return self.problem.uncertain or self.problem.model.source
 
     def nothing(self, status: Status, beaten: Beaten, ladder: Ladder | None = None) -> Certificate:
-        """Write that nothing is proven, for this known reason."""
+        """Write a certificate without a proof, for this known reason."""
         return self._made(Found(math.inf), beaten, ladder, status)
 
     def found(self, best: Found, beaten: Beaten, ladder: Ladder) -> Certificate:
-        """Write what the search brought."""
+        """Write the certificate of the best proof found."""
         if best.proof is None:
             status = Status.without_proof(best.answer)
         else:
@@ -192,12 +198,12 @@ class Report:
         )
 
     def method(self, ladder: Ladder | None) -> str:
-        """How the bound was looked for, in some words."""
+        """Name of the relaxation and of the form of P."""
         form, how = self.problem.form, ladder or self.problem.impose
         return f"{type(form).__name__}, {how.found_by}"
 
     def how(self, best: Found, status: Status, ladder: Ladder | None) -> tuple[str, ...]:
-        """On what the proof rests, in sentences."""
+        """Hypotheses of the proof, as sentences."""
         if status is Status.UNPROVEN and isinstance(self.problem.impose, Grid):
             return (
                 f"the inequalities hold at {self.problem.impose.points} values of each parameter in"
@@ -222,12 +228,12 @@ class Report:
     def distance(
         self, bounds: dict[str, float], best: Found, ladder: Ladder | None
     ) -> tuple[str, ...]:
-        """What keeps the bounds of a gain apart, where they are."""
+        """Sentences on the causes of a gap between the bounds of a gain."""
         if "gamma" not in bounds or ladder is None:
             return ()
         cause = apart(bounds["gamma"], bounds["lower"], ladder.rounding, best.answer)
         # numbers that suffice for the frozen model suffice for its sample period
-        return cause if ladder.rounding <= CLOSE else (*cause, *self._sampling(bounds))
+        return cause if ladder.rounding <= CLOSE_TO_LOWER else (*cause, *self._sampling(bounds))
 
     def _sampling(self, bounds: dict[str, float]) -> tuple[str, ...]:
         if "gamma" not in bounds:

@@ -1,6 +1,4 @@
-"""How much the rate of the parameter is worth: the gain of a loop at one permitted rate after the
-other.
-"""
+"""Gain of a loop as a function of the permitted rate of its parameter."""
 
 from __future__ import annotations
 
@@ -21,7 +19,7 @@ from synthesis.program.cone_program import Solver
 from synthesis.worst.lower_bound import THOROUGH, Search
 
 MOVING, CONSTANT = "P(p)", "constant P"
-"""How the Lyapunov function of a bounded rate, and that of a parameter that jumps, are called."""
+"""Names of the Lyapunov functions for a bounded rate, and for a parameter that jumps."""
 
 
 REDUCED = (
@@ -127,6 +125,6 @@ def _parameter(model: LPVStateSpace | UncertainStateSpace) -> Scheduling:
 
 
 def _units(names: Sequence[Signal]) -> str:
-    """The unit of a group of signals, or all of them where they differ."""
+    """Return the unit of a group of signals, or all of their units where they differ."""
     units = list(dict.fromkeys(s.unit for s in names))
     return units[0] if len(units) == 1 else f"({', '.join(units)})"

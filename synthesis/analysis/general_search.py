@@ -1,4 +1,4 @@
-"""The general route: any number of parameters, kind of bound and way to impose it."""
+"""The general search: any number of parameters, kind of bound and relaxation."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from functools import reduce
 import numpy as np
 
 from symheli.lpv import LinearModel, Matrices
-from synthesis.analysis.ladder import CLOSE, NOTHING, Found, Ladder
+from synthesis.analysis.ladder import CLOSE_TO_LOWER, NO_MARGIN, Found, Ladder
 from synthesis.analysis.problem import Problem
 from synthesis.assemble.box import Shape, affine_inequalities, assemble
 from synthesis.assemble.points import at_points, points_of
@@ -32,25 +32,27 @@ from synthesis.worst.frozen import norm
 
 Array = np.ndarray
 
-SAMPLES = {1: 17, 2: 7}
-"""Values of each parameter in a region at which the bound of a P is first computed (more
+SAMPLES_PER_REGION = {1: 17, 2: 7}
+"""Samples of each parameter in a region at which the bound that P admits is first computed (more
 parameters: 3).
 """
 
 
-LOOKED_AT, FIRST = {1: 81, 2: 25}, {1: 9, 2: 4}
-"""Values of each parameter in a region at which inequalities may join a program (more parameters:
-5), and at which they stand in the first one (more: 2).
+CANDIDATE_POINTS, INITIAL_POINTS = {1: 81, 2: 25}, {1: 9, 2: 4}
+"""Points of each parameter in a region at which inequalities may be added to a program (more
+parameters: 5), and those in the first program (more parameters: 2).
 """
-ROUNDS = 8
-"""Most rounds of adding violated ones."""
-ADDED = 24
-"""Most that join at a time from a region."""
-NEAR = 3e-3
-"""A bound proven within this fraction of the level of its program is as good as that."""
-COARSE = 2e-3
-"""Relative gap at which a program of points is left: its P is proven by other means, and one well
-inside holds between the points too.
+MAX_ROUNDS = 8
+"""Largest number of rounds in which violated inequalities are added."""
+MAX_ADDED = 24
+"""Largest number of inequalities added per region and round."""
+BOUND_TOLERANCE = 3e-3
+"""Relative difference of the proven bound from the level of its program below which no further
+points are added.
+"""
+MIN_POINT_TOLERANCE = 2e-3
+"""Least relative gap to which a program of points is solved: its P is proven by other means, and a
+P well inside the constraints holds between the points too.
 """
 
 
@@ -63,7 +65,7 @@ class General(Ladder):
         super().__init__(problem)
 
     def expect(self, bound: float) -> float:
-        """Set the units; the unit of gains."""
+        """Set the units for this expected gain; return the unit of gains."""
         model, kind = self.problem.model, self.problem.demand.kind
         frozen, scale = _scaling(model, kind, bound)
         self.choices = [scale]
@@ -74,8 +76,8 @@ class General(Ladder):
         return self._in_units(self.choices[-1])
 
     def settle(self) -> float:
-        """Programs are solved in the first units in which the gain of the model frozen at mid-range
-        is found, or nearly; the unit of gains.
+        """Choose the first units in which the gain of the model frozen at mid-range is found
+        accurately; return the unit of gains.
         """
         if self.problem.demand.kind != "l2 gain" or len(self.choices) == 1:
             return self.unit
@@ -84,7 +86,7 @@ class General(Ladder):
         for units in self.choices:
             self._in_units(units)
             found.append(self._frozen_gain() / gain - 1 if gain > 0 else 0.0)
-            if found[-1] <= CLOSE:
+            if found[-1] <= CLOSE_TO_LOWER:
                 break
         best = int(np.argmin(np.nan_to_num(found, nan=math.inf)))
         self.rounding = found[best]
@@ -98,7 +100,7 @@ class General(Ladder):
         return 1.0 / self.evidence.in_units(1.0)
 
     def _frozen_gain(self) -> float:
-        """What a program in these units finds of the gain of the model frozen at mid-range."""
+        """Return the gain of the model frozen at mid-range as a program in these units finds it."""
         whole, scaled = self.evidence, self.scaled
         box = tuple((s.low, s.high) for s in self.problem.model.parameters)
         still = {
@@ -118,13 +120,13 @@ class General(Ladder):
 
     @property
     def found_by(self) -> str:
-        """How the inequalities were imposed in the search."""
+        """Name of the relaxation used in the search."""
         if self.problem.by_points:
             return "LMIs at single p, added where they were violated"
         return super().found_by
 
     def constant(self) -> Shape:
-        """One matrix for the whole box."""
+        """The form of a constant P over the whole box."""
         parameters = self.problem.model.parameters
         ends = tuple(np.array([s.low, s.high]) for s in parameters)
         return Shape(ends, (0,) * len(parameters))
@@ -134,7 +136,7 @@ class General(Ladder):
         return any(shape.degrees)
 
     def shapes(self) -> list[Shape]:
-        """The P of the form that was asked for."""
+        """Forms of P that the user requested, in turn."""
         model, form, m = self.problem.model, self.problem.form, len(self.problem.model.parameters)
         motion = self.problem.demand.motion
         # a parameter whose rate is another is one of its own, graded towards its lower end
@@ -175,7 +177,7 @@ class General(Ladder):
         return out
 
     def attempt(self, shape: Shape, margin: float, alpha: float = 0.0) -> Found:
-        """One P and one margin, or one decay rate."""
+        """Solve and verify a program with one form of P and one margin, or one decay rate."""
         problem = self.problem
         demand = self.scaled_demand
         shift = self.evidence.in_units(alpha) if alpha else 0.0
@@ -193,7 +195,7 @@ class General(Ladder):
         return found
 
     def _solve(self, shape: Shape, margin: float) -> Candidate:
-        """A program of every inequality."""
+        """Solve the program of all inequalities."""
         problem, start = self.problem, time.perf_counter()
         if problem.by_points:
             every = self._inequalities(shape)
@@ -214,8 +216,8 @@ class General(Ladder):
         return candidate
 
     def _by_points(self, shape: Shape, margin: float) -> tuple[Found, str]:
-        """Programs of few inequalities, which those that came out violated join, until the bound
-        proven of the whole box is near their level; in a word what became of them.
+        """Solve programs of few inequalities, adding the violated ones, until the bound proven on
+        the whole box is near their level; return it with the outcome in words.
         """
         best, n, nu = Found(math.inf), *self.problem.model.sizes[:2]
         every, rounds = self._inequalities(shape), 0
@@ -224,17 +226,19 @@ class General(Ladder):
             rounds += 1
             candidate = self._of_points(every, active, margin)
             best = best.or_better(self._verified(candidate, shape), 1.0)
-            if candidate.x is None or rounds == ROUNDS:
+            if candidate.x is None or rounds == MAX_ROUNDS:
                 break
             g = candidate.x[-1]
-            if best.bound * self.evidence.in_units(1.0) <= (1 + NEAR) * math.sqrt(max(g, 0.0)):
+            if best.bound * self.evidence.in_units(1.0) <= (1 + BOUND_TOLERANCE) * math.sqrt(
+                max(g, 0.0)
+            ):
                 break
             P = smat(candidate.x[:-1].reshape(-1, length(n)), n)
             level, added = np.diag(np.r_[np.zeros(n), np.full(nu, g)]), 0
             for block, which in zip(every, active, strict=True):
                 excess = np.linalg.eigvalsh(block.linear(P) + block.constant - level)[:, -1]
                 excess[which] = 0.0
-                worst = np.argsort(excess)[-ADDED:]
+                worst = np.argsort(excess)[-MAX_ADDED:]
                 worst = worst[excess[worst] > 0]
                 which[worst] = True
                 added += len(worst)
@@ -243,9 +247,9 @@ class General(Ladder):
         return best, f"{candidate.message} ({rounds} round(s))"
 
     def _inequalities(self, shape: Shape) -> list[LyapunovBlocks]:
-        """Those that may join a program, one object a region."""
+        """Return the inequalities that may be added, one object a region."""
         start, demand = time.perf_counter(), self.scaled_demand
-        count = LOOKED_AT.get(len(shape.knots), 5)
+        count = CANDIDATE_POINTS.get(len(shape.knots), 5)
         moving = demand.moving(shape.degrees)
         every = [
             at_points(self.scaled, demand, shape, region, points_of(region, count), self.weight)
@@ -255,11 +259,13 @@ class General(Ladder):
         return every
 
     def _first(self, shape: Shape, block: LyapunovBlocks) -> Array:
-        """Which of a region stand in the first program: some points, with every motion."""
+        """Mark the inequalities of a region in the first program: some points, with every
+        motion.
+        """
         m = len(shape.knots)
-        count = LOOKED_AT.get(m, 5)
+        count = CANDIDATE_POINTS.get(m, 5)
         chosen = np.zeros(count, dtype=bool)
-        chosen[np.linspace(0, count - 1, FIRST.get(m, 2)).round().astype(int)] = True
+        chosen[np.linspace(0, count - 1, INITIAL_POINTS.get(m, 2)).round().astype(int)] = True
         grid = reduce(np.logical_and.outer, [chosen] * m)
         return np.resize(grid.ravel(), len(block.constant))
 
@@ -273,18 +279,18 @@ class General(Ladder):
             tuple(chosen), Sizes(n, nu, unknowns), margin, self.problem.impose.least
         )
         given = self.problem.solver
-        coarse = max(COARSE, given.options["tolerance"])
+        coarse = max(MIN_POINT_TOLERANCE, given.options["tolerance"])
         candidate = interior_point.minimise(program, replace(given, tolerance=coarse))
         self.spent[1] += candidate.seconds
         return candidate
 
     @property
     def weight(self) -> Array:
-        """Of the state blocks; see `Scaling`."""
+        """Weight of the state blocks; see `Scaling`."""
         return self.evidence.units.weight
 
     def _lyapunov(self, x: Array, shape: Shape) -> BoxLyapunov:
-        """P at the solver's point x, as it is stored: in physical units."""
+        """Return P at the solver's point x in physical units, as it is stored."""
         n, free = self.problem.model.sizes[0], shape.free
         values = smat(x[: free.shape[1] * length(n)].reshape(free.shape[1], -1), n)
         tensor = np.tensordot(free, values, axes=1).reshape(*shape.counts, n, n)
@@ -297,14 +303,14 @@ class General(Ladder):
         return found
 
     def _judged(self, candidate: Candidate, shape: Shape) -> Found:
-        """What P itself gives, whatever the solver said."""
+        """Compute the bound that P itself admits, whatever status the solver reported."""
         if candidate.x is None:
             return Found(math.inf, None, candidate.answer)
         n, free, gains = self.problem.model.sizes[0], shape.free, self.problem.gains
         # a margin of nothing is an answer; a larger one that cannot be verified, or a gain that
         # cannot, is the solver's trouble
         margin = 1.0 if gains else candidate.x[free.shape[1] * length(n)]
-        none = candidate.answer is Answer.SOLVED and margin <= NOTHING
+        none = candidate.answer is Answer.SOLVED and margin <= NO_MARGIN
         nothing = Found(math.inf, None, Answer.INFEASIBLE if none else Answer.FAILED)
         P = self._lyapunov(candidate.x, shape)
         if isinstance(self.problem.impose, Grid):
@@ -312,7 +318,7 @@ class General(Ladder):
             if math.isinf(bound):
                 return nothing
         else:
-            least = self.evidence.least(P, SAMPLES.get(len(shape.knots), 3))
+            least = self.evidence.least(P, SAMPLES_PER_REGION.get(len(shape.knots), 3))
             if least is None:
                 return nothing
             P, bound = least

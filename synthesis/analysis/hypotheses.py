@@ -1,5 +1,5 @@
-"""What every certificate rests on, in sentences: how far the model is from what it was fitted to,
-and which code is trusted.
+"""The hypotheses of a certificate, as sentences: the misfit of the model and the code that is
+trusted.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from synthesis.norm_bounded import open_block
 
 Array = np.ndarray
 
-NOTHING = 1e-12
-"""Entries below this fraction of both their row's and their column's largest are rounding, and so
-is their misfit.
+NEGLIGIBLE_ENTRY = 1e-12
+"""Entries below this fraction of both their row's and their column's largest entry are rounding,
+and so is their misfit.
 """
 
 VERIFIED = (
@@ -49,8 +49,8 @@ def hypotheses(
     model: object,
     found: Sequence[str],
 ) -> tuple[str, ...]:
-    """How p may move, how far the model is from what it was made of, how the proof was `found`, and
-    what the bound means.
+    """Return sentences on how p may move, the misfit of the model, how the proof was `found`, and
+    the meaning of the bound.
     """
     moving = tuple(motion(s, rate) for s, rate in zip(parameters, rates, strict=True))
     meaning = (MEANING[kind],) if kind in MEANING else ()
@@ -58,7 +58,9 @@ def hypotheses(
 
 
 def perturbed(model: object) -> tuple[str, ...]:
-    """For which perturbations a statement on a set of models holds, and what its bound promises."""
+    """Return for which perturbations a statement on a set of models holds, and what its bound
+    means.
+    """
     if not isinstance(model, UncertainStateSpace):
         return ()
     _, block = open_block(model, channels=False)
@@ -89,7 +91,7 @@ def motion(s: Scheduling, rate: float) -> str:
 
 
 def drifting(model: object) -> tuple[str, ...]:
-    """What is left out where the model is one about a moving trim."""
+    """Return the neglected terms of a model about a moving trim, as a sentence."""
     model = model.model if isinstance(model, UncertainStateSpace) else model
     if not isinstance(model, LPVStateSpace):
         return ()
@@ -103,8 +105,8 @@ def drifting(model: object) -> tuple[str, ...]:
 
 
 def fitted(model: object) -> tuple[str, ...]:
-    """The misfit of an interpolated or sampled model, which is among the hypotheses; nothing for a
-    model that was given as it is.
+    """Return the misfit of an interpolated or sampled model as a hypothesis; nothing for a model
+    without one.
     """
     model = model.model if isinstance(model, UncertainStateSpace) else model
     if not isinstance(model, LPVStateSpace) or model.residuals is None:
@@ -118,7 +120,7 @@ def fitted(model: object) -> tuple[str, ...]:
             continue
         size, off = np.abs(own).max(axis=0), np.abs(residual).max(axis=0)
         size = np.maximum(size, off)
-        real = size > NOTHING * np.minimum(
+        real = size > NEGLIGIBLE_ENTRY * np.minimum(
             size.max(axis=0, keepdims=True), size.max(axis=1, keepdims=True)
         )
         ratio = np.where(real & (size > 0), off / np.where(size > 0, size, 1.0), 0.0)

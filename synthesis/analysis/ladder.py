@@ -1,7 +1,7 @@
-"""The search for a proof, whatever the route: finer and finer P, margins in turn, a constant P at
-last.
+"""The search for a proof, common to all relaxations: finer and finer P, margins in turn, a constant
+P last.
 
-A route says how to set its units, which P to try and how to try one; the ladder is one for all.
+A relaxation defines its units, the forms of P and one attempt; the sequence of attempts is common.
 """
 
 from __future__ import annotations
@@ -19,26 +19,26 @@ from synthesis.program.cone_program import Answer
 from synthesis.program.scaling import in_its_own_scale
 
 INFLATION = 1e-6
-"""gamma^2 is raised by this fraction above what P admits in floating point, so that an exact proof
-has room.
+"""gamma^2 is raised by this fraction above the value that P admits in floating point, to leave a
+margin for the exact proof.
 """
-SMALLEST = 1e-6
-"""Least gain in scaled units: a model without response is given a small gain rather than none,
-which no strict inequality proves.
+MIN_GAIN = 1e-6
+"""Least gain in scaled units: no strict inequality proves a gain of zero, so a model without
+response is given this one.
 """
-NOTHING = 1e-6
-"""A largest margin of stability below this (P <= I, scaled) counts as none: the solver is no more
-accurate than that.
+NO_MARGIN = 1e-6
+"""A largest margin of stability (P <= I, scaled) up to this value counts as none: the solver is no
+more accurate.
 """
-CLOSE = 1e-3
+CLOSE_TO_LOWER = 1e-3
 """A bound within this fraction of the lower bound is not improved further by a constant P."""
 DECAY_TOLERANCE = 2e-3
-"""The decay rate is found to this fraction of the frozen one."""
+"""Tolerance of a decay rate, relative to the frozen one."""
 
 
 class Found(NamedTuple):
-    """The best proof verified (None: none was), the bound it gives (NaN for stability), and what
-    the solver said.
+    """The best verified proof (None without one), its bound (NaN for stability), and the solver's
+    answer.
     """
 
     bound: float
@@ -47,7 +47,7 @@ class Found(NamedTuple):
     conditioning: float = math.inf
 
     def or_better(self, other: Found, sign: float) -> Found:
-        """The better of the two; `sign` 1: a smaller bound is better, -1: a larger one."""
+        """Return the better of the two; `sign` 1: a smaller bound is better, -1: a larger one."""
         if other.proof is not None:
             better = self.proof is None or sign * other.bound < sign * self.bound
             return other if better else self
@@ -57,8 +57,8 @@ class Found(NamedTuple):
 
 
 class Ladder(ABC):
-    """The rungs of one route: what was tried on them (`attempts`), and the seconds it took to
-    build, solve and verify (`spent`).
+    """A sequence of relaxations, with the programs tried (`attempts`) and the seconds to build,
+    solve and verify them (`spent`).
     """
 
     def __init__(self, problem: Problem):
@@ -73,12 +73,12 @@ class Ladder(ABC):
 
     @property
     def found_by(self) -> str:
-        """How the inequalities were imposed in the search."""
+        """Name of the relaxation used in the search."""
         return self.problem.impose.found_by
 
     @abstractmethod
     def expect(self, bound: float) -> float:
-        """Set the units in which numbers are of order one where the bound is near this one; the
+        """Set the units in which numbers are of order one if the bound is near this one; return the
         unit of gains.
         """
 
@@ -88,20 +88,20 @@ class Ladder(ABC):
         return self.problem.impose.tried if self.problem.gains else (0.0,)
 
     def proposed(self) -> Found:
-        """What is proven of a gain without a program."""
+        """Return a bound on the gain proven without a program."""
         return Found(math.inf)
 
     def settle(self) -> float:
-        """Choose the units of the programs where there is a choice; the unit of gains."""
+        """Choose the units of the programs where several are possible; return the unit of gains."""
         return self.unit
 
     @abstractmethod
     def shapes(self) -> list[Any]:
-        """The P to try in turn, finer and finer."""
+        """Forms of P to try in turn, finer and finer."""
 
     @abstractmethod
     def constant(self) -> Any:
-        """A constant P, which proves for every rate what it proves for jumps."""
+        """The form of a constant P, which proves the same for every rate and for jumps."""
 
     @abstractmethod
     def varies(self, shape: Any) -> bool:
@@ -109,11 +109,11 @@ class Ladder(ABC):
 
     @abstractmethod
     def attempt(self, shape: Any, margin: float, alpha: float = 0.0) -> Found:
-        """Assemble, solve, verify; `alpha` is the decay rate asked for, 1/s."""
+        """Assemble, solve and verify a program; `alpha` is the requested decay rate, 1/s."""
 
     def search(self, limit: float) -> Found:
-        """The best bound found. `limit`, the worst frozen one, alone sets the first scale and says
-        what is good enough.
+        """Return the best bound found. `limit`, the worst frozen value, sets the first scale and
+        the level at which the search may stop.
 
         What trajectories show plays no part: a longer search for them must not change what is
         proven.
@@ -138,8 +138,8 @@ class Ladder(ABC):
         return best
 
     def _whether_any(self, answer: Answer) -> Answer:
-        """Whether there is a P at all is a question with a bounded answer, which solvers handle
-        better than an infinite gain.
+        """Decide whether any P exists. Solvers handle this bounded problem better than an infinite
+        gain.
         """
         problem = self.problem
         other = type(self)(problem._replace(demand=problem.demand._replace(kind="stability")))
@@ -151,14 +151,14 @@ class Ladder(ABC):
     def _least(self, limit: float) -> Found:
         gains = self.problem.gains
         best = self.proposed() if gains else Found(math.nan)
-        if best.proof is not None and best.bound <= (1 + CLOSE) * limit:
+        if best.proof is not None and best.bound <= (1 + CLOSE_TO_LOWER) * limit:
             return best
         self.unit = self.settle() if gains else self.unit
         shapes, near, still = self.shapes(), self.problem.form.near, None
         if gains and any(map(self.varies, shapes)):
             # cheapest, and enough where p changes little
             still = self._margins(self.constant(), Found(math.inf))
-            if still.proof is not None and still.bound <= (1 + CLOSE) * limit:
+            if still.proof is not None and still.bound <= (1 + CLOSE_TO_LOWER) * limit:
                 return still
         for shape in shapes:
             best = self._margins(shape, best)
@@ -186,8 +186,8 @@ class Ladder(ABC):
         return found
 
     def _decay(self, limit: float) -> Found:
-        """The largest decay rate, between 0 and `limit` (1/s); each P counts for all that it
-        proves.
+        """Return the largest decay rate found, between 0 and `limit` (1/s); each P counts for the
+        rate that it proves.
         """
         best, shape = Found(-math.inf), None
         tolerance = DECAY_TOLERANCE * limit
@@ -196,7 +196,7 @@ class Ladder(ABC):
             if best.proof is not None and best.bound * self.problem.form.near >= limit:
                 break
         if shape is not None and self.varies(shape) and best.bound < limit - 2 * tolerance:
-            # asked first whether a constant P proves more
+            # a constant P is tried first
             trial = limit - tolerance if best.proof is None else best.bound + tolerance
             answer, best = best.answer, self._bisected(self.constant(), best, trial, limit)
             best = best if best.proof is not None else best._replace(answer=answer)
@@ -211,8 +211,7 @@ class Ladder(ABC):
                 best = best.or_better(found, -1.0)
             if found.answer is Answer.UNTRIED:
                 return best
-            # a P that proves less than was asked for: the half below is left, whatever it would
-            # have allowed
+            # P proves less than requested: the lower half is skipped
             low = max(low, found.bound if found.proof is not None else 0.0)
             high = high if low >= trial else trial
             if high - low <= tolerance:
@@ -221,7 +220,7 @@ class Ladder(ABC):
 
 
 def inflated(least: float, channel: float) -> float:
-    """The gain to be verified where a proof admits `least` in floating point, `channel` the unit of
-    gains; NaN stays.
+    """Return the gain to be verified where a proof admits `least` in floating point, `channel` the
+    unit of gains; NaN stays NaN.
     """
-    return least if math.isnan(least) else max(least, SMALLEST * channel) * math.sqrt(1 + INFLATION)
+    return least if math.isnan(least) else max(least, MIN_GAIN * channel) * math.sqrt(1 + INFLATION)

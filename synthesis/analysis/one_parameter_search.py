@@ -1,4 +1,6 @@
-"""The route of one parameter: the fast assembly, and blocks that join as they are violated."""
+"""The search for models of one parameter: a fast assembly, and blocks that are added as they are
+violated.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from synthesis.analysis.ladder import CLOSE, NOTHING, Found, Ladder, inflated
+from synthesis.analysis.ladder import CLOSE_TO_LOWER, NO_MARGIN, Found, Ladder, inflated
 from synthesis.assemble.bounded_real import assemble
 from synthesis.assemble.unknowns import (
     Quadratic,
@@ -29,15 +31,15 @@ from synthesis.worst.frozen import norm
 
 Array = np.ndarray
 
-VIOLATED = 1e-8
-"""A block left out of the program joins it when its largest eigenvalue (scaled) exceeds this."""
-ABOVE = (1e-6, 1e-5, 1e-4, 5e-4, 2e-3, 1e-2)
-"""Fractions above the expected gain at which a storage function of a frozen model is tried."""
-TOWARDS = (1e-3, 1e-2, 0.1, 0.5)
-"""Shares of the way to P = I."""
-ROUNDS = 12
-"""Most rounds of adding violated blocks; what then remains violated only makes the recomputed gain
-larger.
+MAX_VIOLATION = 1e-8
+"""Largest eigenvalue (scaled) of a block outside the program above which the block is added."""
+GAIN_MARGINS = (1e-6, 1e-5, 1e-4, 5e-4, 2e-3, 1e-2)
+"""Fractions above the expected gain at which a storage function of a frozen model is computed."""
+SHIFTS_TO_IDENTITY = (1e-3, 1e-2, 0.1, 0.5)
+"""Weights of I in the convex combinations of P and I that are tried."""
+MAX_ROUNDS = 12
+"""Largest number of rounds in which violated blocks are added; blocks violated after the last one
+only raise the recomputed gain.
 """
 
 
@@ -47,7 +49,7 @@ class OneParameter(Ladder):
     """
 
     def expect(self, bound: float) -> float:
-        """Set the units; the unit of gains."""
+        """Set the units for this expected gain; return the unit of gains."""
         model, (rate,) = (
             self.problem.uncertain or self.problem.model.source,
             self.problem.demand.rates,
@@ -62,7 +64,7 @@ class OneParameter(Ladder):
         return units.channel
 
     def shapes(self) -> list[Unknown]:
-        """Those of the form, each number of knots once."""
+        """Forms of V that the user requested, each number of knots once."""
         return list(
             {
                 len(u.knots): u for u in reversed([*unknowns(self.scaled, self.problem.form)])
@@ -70,7 +72,7 @@ class OneParameter(Ladder):
         )[::-1]
 
     def constant(self) -> Unknown:
-        """A constant P of that form."""
+        """A constant P of the requested form of V."""
         return constant(self.scaled, self.problem.form)
 
     def varies(self, shape: Unknown) -> bool:
@@ -79,12 +81,12 @@ class OneParameter(Ladder):
 
     @property
     def elevation(self) -> int:
-        """How far the degree of the Bernstein forms is raised."""
+        """Increase of the degree of the Bernstein forms."""
         assert isinstance(self.problem.impose, Bernstein)  # noqa: S101 - see `Problem`
         return self.problem.impose.elevation
 
     def attempt(self, shape: Unknown, margin: float, alpha: float = 0.0) -> Found:
-        """One P and one margin."""
+        """Solve and verify a program with one form of P and one margin."""
         start = time.perf_counter()
         candidate = self._solve(shape, margin)
         solved = time.perf_counter()
@@ -116,8 +118,8 @@ class OneParameter(Ladder):
         return interior_point.minimise(program, self.problem.solver)
 
     def _solve_by_rounds(self, form: Unknown, margin: float) -> Candidate:
-        """Solve with the blocks likely to bind, add those that came out violated, and so on: far
-        fewer blocks in all.
+        """Solve with the blocks likely to be active, add the violated ones, and repeat: this needs
+        far fewer blocks.
         """
         blocks = form.weighed(self.scaled, self.elevation)
         sizes = self.scaled.sizes(form)
@@ -135,7 +137,7 @@ class OneParameter(Ladder):
                 self.problem.solver,
             )
             seconds += candidate.seconds
-            if candidate.x is None or rounds == ROUNDS or all(which.all() for which in active):
+            if candidate.x is None or rounds == MAX_ROUNDS or all(which.all() for which in active):
                 break
             P, multiplier = form.coefficients(candidate.x), form.multiplier(candidate.x)
             level = candidate.x[-1]
@@ -150,7 +152,7 @@ class OneParameter(Ladder):
                     continue
                 excess = block.values(P, sizes.rows, multiplier)
                 excess = excess - block.weight[:, None, None] * target
-                new = ~which & (np.linalg.eigvalsh(excess)[:, -1] > VIOLATED)
+                new = ~which & (np.linalg.eigvalsh(excess)[:, -1] > MAX_VIOLATION)
                 which |= new
                 added += int(new.sum())
             if not added:
@@ -159,11 +161,11 @@ class OneParameter(Ladder):
         return replace(candidate, seconds=seconds, message=message)
 
     def proposed(self) -> Found:
-        """What a constant P proves, a storage function of the model at mid-range."""
+        """Return the gain proven by a constant P, a storage function of the model at mid-range."""
         start, scaled, best = time.perf_counter(), self.dissipating, Found(math.inf)
         if scaled is not None:
             knots, middle = self.constant().knots, scaled.lpv.at(scaled.lpv.scheduling.middle)
-            for above in ABOVE:
+            for above in GAIN_MARGINS:
                 P = scaled.units.storage(middle, above)
                 if P is None:
                     continue
@@ -178,8 +180,8 @@ class OneParameter(Ladder):
         return best
 
     def settle(self) -> float:
-        """Programs are solved in the first units in which the gain of the model frozen at mid-range
-        is found, or nearly: whether numbers limit a bound is told by that.
+        """Choose the first units in which the gain of the model frozen at mid-range is found
+        accurately: this shows whether rounding limits a bound.
         """
         start, shape, p = time.perf_counter(), self.constant(), self.scaled.lpv.scheduling.middle
         if self.dissipating is not None and isinstance(shape, Quadratic):
@@ -188,13 +190,13 @@ class OneParameter(Ladder):
                 excess = self._frozen_gain(scaled, shape, p) / gain - 1 if gain > 0 else 0.0
                 if not excess >= self.rounding:
                     self.scaled, self.rounding = scaled, excess
-                if excess <= CLOSE:
+                if excess <= CLOSE_TO_LOWER:
                     break
         self.spent[1] += time.perf_counter() - start
         return self.scaled.units.channel
 
     def _frozen_gain(self, scaled: ScaledProblem, shape: Quadratic, p: float) -> float:
-        """What is proven of the model frozen at p by a program in these units."""
+        """Return the gain of the model frozen at p that a program in these units proves."""
         whole, self.scaled = self.scaled, scaled.frozen(p)
         margin = self.problem.impose.tried[0]
         solve = (
@@ -207,18 +209,18 @@ class OneParameter(Ladder):
         return found.bound
 
     def _judged(self, candidate: Candidate, shape: Unknown) -> Found:
-        """The gain that P itself admits, whatever the solver said."""
+        """Compute the gain that P itself admits, whatever status the solver reported."""
         answer = candidate.answer
         if candidate.x is None:
             return Found(math.inf, None, answer)
-        # a largest margin of nothing, for fewer blocks or for all of them: there is no P
-        if not self.problem.gains and candidate.x[-1] <= NOTHING and answer is Answer.SOLVED:
+        # the largest margin is zero, for some blocks or for all of them: there is no P
+        if not self.problem.gains and candidate.x[-1] <= NO_MARGIN and answer is Answer.SOLVED:
             answer = Answer.INFEASIBLE
         P = shape.lyapunov(candidate.x)
         found = self._proven(self.scaled, P, answer)
         if self.scaled is self.dissipating:
-            # nearer to P = I, which has margins of one, where rounding leaves this one none
-            for share in TOWARDS:
+            # P = I has margins of one: a convex combination regains what rounding took
+            for share in SHIFTS_TO_IDENTITY:
                 if found.proof is not None:
                     break
                 inner = (1 - share) * P.coefficients + share * np.eye(P.coefficients.shape[-1])
@@ -226,7 +228,7 @@ class OneParameter(Ladder):
         return found
 
     def _proven(self, scaled: ScaledProblem, P: Lyapunov, answer: Answer) -> Found:
-        """What P in scaled units proves, judged as it is stored: in physical units."""
+        """Verify P, given in scaled units, in physical units as it is stored."""
         units, evidence = scaled.units, scaled.evidence(self.elevation)
         P = P.in_units(units.left, units.channel**2, 1.0 / units.time, units.multiplier)
         least, conditioning = evidence.least_gain(P)

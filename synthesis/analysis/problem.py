@@ -1,4 +1,4 @@
-"""The analysis problem: a model, the kind of bound, and the means, checked against one another."""
+"""The analysis problem: a model, the kind of bound and the options, checked for consistency."""
 
 from __future__ import annotations
 
@@ -13,18 +13,17 @@ from synthesis.impose import Bernstein, Grid, Imposed, SumOfSquares, Vertices
 from synthesis.polynomial.motion import Motion
 from synthesis.polynomial.pieces import Pieces, pieces
 from synthesis.program.cone_program import LYAPUNOV, Solver, general_solver
-from synthesis.program.lyapunov_program import GENERAL
+from synthesis.program.lyapunov_program import MAX_STATES_GENERAL
 from synthesis.proof.inequalities import Demand
 from synthesis.worst.lower_bound import Search
-from synthesis.worst.rates import Rate
-from synthesis.worst.rates import asked as limits
+from synthesis.worst.rates import Rate, limits
 
 Model = LPVStateSpace | LFT | UncertainStateSpace
 
 
 class Problem(NamedTuple):
-    """A model in polynomial pieces, the kind of bound and the means to certify it; `uncertain`: the
-    set of models for which it must hold, of which `model` then is the nominal one.
+    """A model in polynomial pieces, the kind of bound and the options; `uncertain`: the set of
+    models for which the bound must hold, with `model` as its nominal one.
     """
 
     model: Pieces
@@ -37,8 +36,8 @@ class Problem(NamedTuple):
 
     @property
     def one_parameter(self) -> bool:
-        """Whether the fast route for one parameter answers it: gain and stability by plain
-        Bernstein coefficients.
+        """Whether the fast search for one parameter applies: gain and stability by plain Bernstein
+        coefficients.
         """
         return (
             len(self.model.parameters) == 1
@@ -50,14 +49,14 @@ class Problem(NamedTuple):
 
     @property
     def by_points(self) -> bool:
-        """Whether a gain of several parameters is sought by inequalities at single p, as products
-        with P.
+        """Whether a gain over several parameters is computed from inequalities at single p, as
+        products with P.
         """
         return self.points_serve and self.solver.name == LYAPUNOV
 
     @property
     def points_serve(self) -> bool:
-        """Whether that could be."""
+        """Whether such a program is possible."""
         return (
             len(self.model.parameters) > 1
             and self.demand.kind == "l2 gain"
@@ -70,7 +69,7 @@ class Problem(NamedTuple):
 
     @property
     def gains(self) -> bool:
-        """Whether the bound is one of a gain."""
+        """Whether the bound is a gain."""
         return self.demand.kind.endswith("gain")
 
 
@@ -83,7 +82,7 @@ def pose(
     solver: Solver | str | None,
     search: Search | None,
 ) -> Problem:
-    """State the problem, its options checked against one another and against the model.
+    """Check the options against one another and against the model, and return the problem.
 
     Raises `InputError` for an option that has no meaning for the problem.
     """
@@ -120,7 +119,9 @@ def _solver(problem: Problem, solver: Solver | str | None) -> Solver:
         problem.one_parameter and isinstance(problem.form, Spline)
     ) or problem.points_serve
     if solver is None:
-        return Solver(LYAPUNOV if by_products and problem.model.sizes[0] > GENERAL else "CLARABEL")
+        return Solver(
+            LYAPUNOV if by_products and problem.model.sizes[0] > MAX_STATES_GENERAL else "CLARABEL"
+        )
     if by_products:
         return solver if isinstance(solver, Solver) else Solver(solver)
     return general_solver(solver)

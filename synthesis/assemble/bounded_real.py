@@ -45,7 +45,7 @@ class Blocks(NamedTuple):
     """LMI blocks F = sum_j linear[., j] P_columns[j] + constant - weight g diag(0, I), svec'd along
     the last axis.
 
-    `columns` (k,) says which coefficients of P are involved; `linear` (m, k, n (n + 1)/2, L),
+    `columns` (k,) are the coefficients of P that are involved; `linear` (m, k, n (n + 1)/2, L),
     `constant` (m, L), of matrices (N, N) with L = N (N + 1)/2; `weight` (m,) > 0. `likely`:
     expected to be among the binding ones. `supply`: what a block adds, None without one.
     """
@@ -74,7 +74,7 @@ class Blocks(NamedTuple):
         return self._replace(linear=self.linear @ K, constant=self.constant @ K, supply=supply)
 
     def keep(self, which: Array) -> Blocks:
-        """Only these of the m blocks."""
+        """Return only these of the m blocks."""
         supply = self.supply and self.supply._replace(linear=self.supply.linear[which])
         return self._replace(
             linear=self.linear[which],
@@ -85,8 +85,8 @@ class Blocks(NamedTuple):
 
 
 class Supply(NamedTuple):
-    """sum_j linear[., j] multipliers[columns[j]], what a norm-bounded block adds to F: `linear` (m,
-    k, L).
+    """Supply rate of a norm-bounded block, sum_j linear[., j] multipliers[columns[j]], added to F:
+    `linear` (m, k, L).
     """
 
     columns: Array
@@ -133,7 +133,7 @@ def discrete_blocks(
     extra: int,
     multiplier: Multiplier | None = None,
 ) -> Iterator[Blocks]:
-    """The blocks of every strip."""
+    """Yield the blocks of every strip."""
     for form in over_strips(strips, knots, degree, extra, multiplier):
         M = np.concatenate([form.A, form.B], axis=2)
         E = basis(form.A.shape[1])
@@ -233,7 +233,7 @@ def assemble(
 
 
 class OverCell(NamedTuple):
-    """What the blocks of one cell are made of, in continuous time.
+    """Weights from which the blocks of one cell are assembled, in continuous time.
 
     `columns` (k,) of P; A, B of the same degree; the block q has A_i and B_i by P_j with the weight
     `flow` (q, i, j), P_j in dP/dp with `slope` (q, j), and `output` r with `up` (q, r); `supply` of
@@ -253,7 +253,7 @@ class OverCell(NamedTuple):
 def over_cell(
     cell: Cell, knots: Array, degree: int, extra: int, multiplier: Multiplier | None = None
 ) -> OverCell:
-    """The weights of one cell; `extra` raises the degree of the Bernstein form."""
+    """Compute the weights of one cell; `extra` raises the degree of the Bernstein form."""
     A, B, dM = common_degree(cell.piece.A, cell.piece.B, cell)
     output, own = output_terms(cell, multiplier), supply_terms(cell, multiplier)
     d = max(degree + dM, len(output) - 1, own.degree) + extra
@@ -269,7 +269,7 @@ def over_cell(
 
 
 class OverStrip(NamedTuple):
-    """What the blocks of one strip are made of, in discrete time.
+    """Weights from which the blocks of one strip are assembled, in discrete time.
 
     `columns` (k,) of P, those of p from `own` on and those of p(k+1) from `next` on; A, B of the
     same degree. P(p) has the weights `here` (q, j); P(p(k+1)) those of `after` (x, s, j), its
@@ -298,8 +298,8 @@ def over_strips(
     extra: int,
     multiplier: Multiplier | None = None,
 ) -> Iterator[OverStrip]:
-    """The weights of every strip. Likely to bind: the border lines of the widest cell of each
-    segment and piece.
+    """Compute the weights of every strip. Likely to be active: the border lines of the widest cell
+    of each segment and piece.
     """
     widest: dict[tuple[int, float], float] = {}
     for cell in (strip.cell for strip in strips):
@@ -333,7 +333,7 @@ def over_strips(
 
 
 def common_degree(A: Array, B: Array, cell: Cell) -> tuple[Array, Array, int]:
-    """A and B over the cell with coefficients of the same degree, and that degree."""
+    """Return A and B over the cell with coefficients of the same degree, and that degree."""
     A, B = (_restrict(M, cell) for M in (A, B))
     d = max(len(A), len(B)) - 1
     return _raise(A, d), _raise(B, d), d
@@ -350,7 +350,7 @@ def _restrict(M: Array, cell: Cell) -> Array:
 
 
 def local_coordinates(cell: Cell, knots: Array) -> tuple[float, float, float]:
-    """The cell's ends as fractions of its segment, and the segment's width."""
+    """Return the cell's ends as fractions of its segment, and the segment's width."""
     low, high = float(knots[cell.segment]), float(knots[cell.segment + 1])
     return (cell.low - low) / (high - low), (cell.high - low) / (high - low), high - low
 
@@ -361,7 +361,7 @@ def slope_over(degree: int, here: Array, width: float) -> Array:
 
 
 def bordered(top: Array, side: Array) -> Array:
-    """[top side; side' 0]."""
+    """Return [top side; side' 0]."""
     corner = np.zeros((*side.shape[:-2], side.shape[-1], side.shape[-1]))
     return np.concatenate(
         [
@@ -390,11 +390,11 @@ class SupplyTerms(NamedTuple):
 
     @property
     def degree(self) -> int:
-        """Of the supply with lambda; -1 without a block."""
+        """Degree of the supply rate with lambda; -1 without a block."""
         return len(self.squares) - 1 + self.degree_in_p
 
     def over(self, cell: Cell, knots: Array, degree: int) -> Supply | None:
-        """What the block adds to each of the degree + 1 coefficients."""
+        """Return the supply rate as added to each of the degree + 1 coefficients."""
         if not len(self.squares):
             return None
         e, (a, b, _) = self.degree_in_p, local_coordinates(cell, knots)

@@ -1,4 +1,4 @@
-"""The inequalities of a problem over a box as a cone program, imposed as was chosen.
+"""The inequalities of a problem over a box as a cone program, by the chosen relaxation.
 
 The general assembly: any number of parameters, any way to impose. It shares its inequalities with
 the proof; `pointwise` does not.
@@ -50,7 +50,7 @@ class Shape(NamedTuple):
 
     @property
     def free(self) -> Array:
-        """Matrix (coefficients, free ones): the identity, or orthonormal polynomials of limited
+        """Matrix (coefficients, unknowns): the identity, or orthonormal polynomials of limited
         total degree.
         """
         if self.total is None:
@@ -140,8 +140,8 @@ def assemble(
     *,
     maximise: bool,
 ) -> ConeProgram:
-    """minimise g (or maximise it) subject to all of them; the unknowns are P's free coefficients,
-    g, Gram matrices.
+    """Minimise g, or maximise it, subject to all inequalities; the unknowns are P's free
+    coefficients, g and Gram matrices.
     """
     nv = length(states)
     free = shape.free
@@ -228,8 +228,8 @@ def _raised(F: Affine, elevation: int, tensor: int) -> tuple[Affine, sparse.csr_
 def _affine(
     F: PolynomialMatrix, columns: Array, level: Array, back_off: Array, fixed: Array
 ) -> Affine:
-    """From the polynomial of a stack of unit P and, last in the stack, P = 0; `fixed` is a constant
-    to add.
+    """Return the affine map of the polynomials of a stack of unit P and, last in the stack, P = 0;
+    `fixed` is a constant to add.
     """
     m, N = len(F.box), F.shape[0]
     c = svec(F.coefficients).reshape(-1, F.coefficients.shape[m], length(N))
@@ -239,7 +239,9 @@ def _affine(
 
 
 def coefficients_of(shape: Shape, index: Sequence[int]) -> Array:
-    """Numbers of the coefficients of P on one segment of each parameter, an axis a parameter."""
+    """Return the indices of the coefficients of P on one segment of each parameter, an axis a
+    parameter.
+    """
     return np.arange(prod(shape.counts)).reshape(shape.counts)[segment_slices(shape.degrees, index)]
 
 
@@ -253,8 +255,8 @@ def _pair(shape: Shape, region: Region, states: int) -> tuple[Array, Pair]:
 def _unknown(
     shape: Shape, index: Sequence[int], involved: Array, states: int
 ) -> tuple[Array, PolynomialMatrix]:
-    """Columns (V,) of the `involved` coefficients, and P on a segment for a unit of each; then for
-    none.
+    """Return columns (V,) of the `involved` coefficients, and P on a segment for a unit of each;
+    then for P = 0.
     """
     ids, E = coefficients_of(shape, index), basis(states)
     nv = len(E)

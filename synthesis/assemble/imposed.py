@@ -1,5 +1,5 @@
-"""How "F(p) < 0 for every p in the box" becomes finitely many conditions on Bernstein coefficients:
-the relaxations.
+"""Relaxations that turn "F(p) < 0 for every p in the box" into finitely many conditions on
+Bernstein coefficients.
 
     bernstein   every coefficient negative (after raising the degree or subdividing): sufficient,
                 exact in the limit
@@ -44,8 +44,8 @@ class Conditions(NamedTuple):
 
 
 def coefficient_conditions(degrees: Sequence[int], elevation: int, subdivision: int) -> Conditions:
-    """Bernstein: every coefficient over each of 2^subdivision parts a parameter, of degrees raised
-    by `elevation`.
+    """Bernstein relaxation: every coefficient over each of 2^subdivision parts a parameter, of
+    degrees raised by `elevation`.
     """
     up = [elevation_matrix(d, d + elevation) if d else np.ones((1, 1)) for d in degrees]
     parts = 2**subdivision
@@ -61,8 +61,8 @@ def coefficient_conditions(degrees: Sequence[int], elevation: int, subdivision: 
 
 
 def vertex_conditions(degrees: Sequence[int]) -> Conditions:
-    """The corners, and the Bernstein coefficients of the second derivative along each axis of
-    degree 2 or more.
+    """Vertex relaxation: the corners, and the Bernstein coefficients of the second derivative along
+    each axis of degree 2 or more.
     """
     ends = [np.eye(d + 1)[[0, d] if d else [0]] for d in degrees]
     curved = []
@@ -79,7 +79,7 @@ def vertex_conditions(degrees: Sequence[int]) -> Conditions:
 
 
 def grid_conditions(degrees: Sequence[int], points: int) -> Conditions:
-    """The values at `points` equidistant points of each parameter F depends on."""
+    """Grid relaxation: the values at `points` equidistant points of each parameter F depends on."""
     local = np.linspace(0.0, 1.0, points)
     values = [
         np.array([blossom([t] * d) for t in local]) if d else np.ones((1, 1)) for d in degrees

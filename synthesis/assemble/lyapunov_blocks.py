@@ -46,7 +46,9 @@ def continuous_products(
 
 
 def _supplied(supply: Supply | None, size: int, order: Array) -> Supplied | None:
-    """What a norm-bounded block adds as matrices, for the coefficients in this order."""
+    """Return the supply rate of a norm-bounded block as matrices, for the coefficients in this
+    order.
+    """
     if supply is None:
         return None
     return Supplied(supply.columns, smat(supply.linear, size)[order])
@@ -94,5 +96,5 @@ def discrete_products(
 
 
 def of_state(A: Array, B: Array) -> Array:
-    """[I 0], which takes the state out of state and input."""
+    """Return [I 0], which selects the state from state and input."""
     return np.eye(A.shape[1], A.shape[1] + B.shape[2])

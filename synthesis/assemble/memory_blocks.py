@@ -1,5 +1,5 @@
-"""The bounded real lemma with a Lyapunov function that remembers: blocks in p and in the lead over
-a lag of p.
+"""The bounded real lemma with a Lyapunov function of p and its lag: blocks in p and in the lag
+error.
 
 With e = p - q, time dq/dt = p - q, the rate of e is known where that of p is: de/dt = dp/dt -
 e/time. So V = x' P(p, e) x has dV/dt of the ordinary form, over the region of (p, e) that can be
@@ -46,8 +46,8 @@ def memory_blocks(
     rate: float,
     extra: int,
 ) -> Iterator[Blocks]:
-    """The blocks of every patch for both signs of the rate (units of p per unit of time, that of
-    the region's `time`).
+    """Yield the blocks of every patch for both signs of the rate (units of p per unit of time,
+    that of the region's `time`).
     """
     across = (len(lead_knots) - 1) * lead_degree + 1
     same = np.eye(lead_degree + 1)

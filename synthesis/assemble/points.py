@@ -1,5 +1,6 @@
 """The bounded real lemma of several parameters and many states at single p, in continuous time:
-fewer blocks than Bernstein coefficients, as products with P. What is found so is a proposal.
+fewer blocks than Bernstein coefficients, as products with P. The resulting P is only a candidate
+for a proof.
 """
 
 from __future__ import annotations
@@ -22,15 +23,17 @@ Array = np.ndarray
 
 
 def points_of(region: Region, count: int) -> Array:
-    """So many values of each parameter in a region, (K, m), ends included, dense towards them."""
+    """Return this number of values of each parameter in a region, (K, m), ends included, dense
+    towards them.
+    """
     return lobatto_points(count, region.box).reshape(-1, len(region.box))
 
 
 def at_points(
     model: Pieces, demand: Demand, shape: Shape, region: Region, points: Array, weight: Array
 ) -> LyapunovBlocks:
-    """The inequalities of a region at `points` (K, m), one block each and extreme motion of p; of
-    scaled data, the state blocks in coordinates changed by `weight`.
+    """Return the inequalities of a region at `points` (K, m), one block for each and extreme motion
+    of p; for scaled data, the state blocks in coordinates changed by `weight`.
     """
     A, B, C, D = (M(points) for M in model_on(model, region, float))
     flow, state = np.concatenate([A, B], axis=2), of_state(A, B)

@@ -1,4 +1,4 @@
-"""What is unknown in each form of V for one parameter, its LMI blocks, and the V they lead to.
+"""The unknowns of each form of V for one parameter, its LMI blocks, and V at a solution.
 
 This is the fast assembly: arrays, and blocks that join the program as they are violated. The
 general one for boxes (`box`) is built on polynomials that know their box, several times slower.
@@ -31,7 +31,7 @@ from synthesis.polynomial.cells import Strip, cells, strips
 from synthesis.polynomial.pieces import ModelPiece, model_pieces, rounded
 from synthesis.polynomial.symmetric import extended, length, smat, svec
 from synthesis.polynomial.symmetric_power import generator, monomials, null_matrix, null_size
-from synthesis.program.lyapunov_program import MANY, LyapunovBlocks, Sizes
+from synthesis.program.lyapunov_program import MANY_STATES, LyapunovBlocks, Sizes
 from synthesis.program.scaling import Scaling, block_scaling, scaling
 from synthesis.proof.one_parameter import Evidence
 
@@ -39,8 +39,8 @@ Array = np.ndarray
 
 
 class ScaledProblem(NamedTuple):
-    """What every attempt shares: the model in physical units for the proof, in scaled ones for the
-    search.
+    """The data common to all attempts: the model in physical units for the proof, in scaled ones
+    for the search.
     """
 
     lpv: LPVStateSpace
@@ -57,20 +57,20 @@ class ScaledProblem(NamedTuple):
         return self.rate * self.units.time
 
     def evidence(self, elevation: int) -> Evidence:
-        """What verifies a P for this problem."""
+        """The checks that verify a P for this problem."""
         return Evidence(self.lpv, self.pieces, self.units, self.rate, elevation, self.block)
 
     def sizes(self, form: Unknown) -> Sizes:
-        """Of the program of a V of this form."""
+        """Return the sizes of the program for a V of this form."""
         d = 0 if self.block is None else self.block.inputs
         return Sizes(form.size, len(self.lpv.inputs) - d, form.unknowns, d, form.multipliers)
 
     def in_units(self, units: Scaling) -> ScaledProblem:
-        """The same in other units."""
+        """Return the same problem in other units."""
         return self._replace(units=units, scaled=units.of_pieces(self.pieces, self.block))
 
     def frozen(self, p: float) -> ScaledProblem:
-        """That of the model frozen at p, without a block, in the same units."""
+        """Return the problem frozen at p, without a block, in the same units."""
         lpv = LPVStateSpace.constant(self.lpv.at(p), self.lpv.scheduling)
         return self._replace(lpv=lpv, rate=0.0, pieces=model_pieces(lpv)).in_units(self.units)
 
@@ -83,7 +83,7 @@ class ScaledProblem(NamedTuple):
 def scaled_problem(
     model: LPVStateSpace | UncertainStateSpace, rate: float, gain: float, *, with_gain: bool
 ) -> ScaledProblem:
-    """The model scaled for an expected `gain`; without channels where only stability is asked."""
+    """Scale the model for an expected `gain`; without channels if the problem is stability."""
     if isinstance(model, UncertainStateSpace):
         lpv, block = open_block(model, channels=with_gain)
         units = block_scaling(lpv, block, gain)
@@ -104,7 +104,7 @@ class Unknown(ABC):
     degree: int
     size: int
     null: Array | None = None
-    """What may be added to each block, (s, L) as vectors."""
+    """Basis of the matrices that may be added to each block, (s, L) as vectors."""
     multipliers: int = 0
     """Number of coefficients of the multiplier of a block."""
 
@@ -122,7 +122,7 @@ class Unknown(ABC):
         """V at the solver's point x, in scaled units."""
 
     def weighed(self, problem: ScaledProblem, extra: int) -> list[Blocks]:
-        """The same in coordinates in which slow and fast states count alike."""
+        """Return the same with states of different rates equally weighted."""
         W = extended(problem.units.weight, len(problem.lpv.inputs))
         return [block.congruent(W) for block in self.blocks(problem, extra)]
 
@@ -131,8 +131,8 @@ class Unknown(ABC):
         return x[: self.unknowns * length(self.size)].reshape(self.unknowns, -1)
 
     def multiplier(self, x: Array) -> Array:
-        """Coefficients of the multiplier (multipliers,), none below 0: what a solver leaves there
-        is its tolerance.
+        """Return the coefficients of the multiplier (multipliers,), clipped at 0: negative values
+        are within the solver's tolerance.
         """
         return np.maximum(x[len(x) - 1 - self.multipliers : -1], 0.0)
 
@@ -173,8 +173,8 @@ class Quadratic(Unknown):
         return None if e is None or block is None else Multiplier(block, e)
 
     def products(self, problem: ScaledProblem, extra: int) -> tuple[LyapunovBlocks, ...]:
-        """The same blocks as products with P, in coordinates in which slow and fast states count
-        alike.
+        """Return the same blocks as products with P, with states of different rates equally
+        weighted.
         """
         own = self._multiplier(problem)
         if problem.lpv.dt is None:
@@ -215,7 +215,7 @@ class OfMonomials(Quadratic):
             object.__setattr__(self, name, value)
 
     def blocks(self, problem: ScaledProblem, extra: int) -> list[Blocks]:
-        """As for a quadratic V, of the linear system that the monomials follow."""
+        """Return the blocks of a quadratic V for the linear system of the monomials."""
         N = self.size
         lifted = tuple(
             q._replace(
@@ -229,7 +229,7 @@ class OfMonomials(Quadratic):
         return super().blocks(problem._replace(scaled=lifted), extra)
 
     def weighed(self, problem: ScaledProblem, extra: int) -> list[Blocks]:
-        """The blocks as they are: what is added to them is in the coordinates of P."""
+        """Return the blocks unchanged: the added matrices are in the coordinates of P."""
         return self.blocks(problem, extra)
 
     def lyapunov(self, x: Array) -> SplineLyapunov:
@@ -288,9 +288,9 @@ class Remembering(Unknown):
 
 
 def unknowns(problem: ScaledProblem, form: LyapunovForm) -> Iterator[Unknown]:
-    """The finer and finer P to try in turn."""
+    """Yield the forms of V to try in turn, finer and finer."""
     n, sampled = len(problem.lpv.states), problem.lpv.dt is not None
-    many = isinstance(form, Spline) and n > MANY
+    many = isinstance(form, Spline) and n > MANY_STATES
     higher = isinstance(form, HigherOrder)
     remembers = isinstance(form, Memory) and 0 < problem.rate < math.inf
     (own,) = form.degrees(1)
@@ -317,14 +317,14 @@ def unknowns(problem: ScaledProblem, form: LyapunovForm) -> Iterator[Unknown]:
 
 
 def _multiplier_degree(problem: ScaledProblem, degree: int) -> int | None:
-    """That of P, which then alone says of which degree the LMIs are, at least 1: a constant P says
-    nothing of where the block weighs most.
+    """Return the degree of the multiplier: that of P, which sets the degree of the LMIs, and at
+    least 1, because a constant P does not show where the block matters most.
     """
     return None if problem.block is None else max(degree, 1)
 
 
 def constant(problem: ScaledProblem, form: LyapunovForm) -> Unknown:
-    """A constant P, which proves for every rate what it proves for jumps."""
+    """Return the form of a constant P, which proves the same for every rate and for jumps."""
     n, knots = len(problem.lpv.states), _knots(problem, form, 8, 0)
     if isinstance(form, HigherOrder):
         return OfMonomials(knots, 0, n, form.order)

@@ -1,1 +1,1 @@
-"""The classical LFT tests: parameters as fast as they like, one constant P and a multiplier."""
+"""The classical LFT tests: arbitrarily fast parameters, one constant P and a multiplier."""

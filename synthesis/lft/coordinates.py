@@ -41,7 +41,7 @@ class Coordinates(NamedTuple):
 
 
 def split(lft: LFT) -> Loop:
-    """The nine matrices of the LFT as it is."""
+    """Return the nine matrices of the LFT, unscaled."""
     x = len(lft.states)
     return Loop(
         lft.M22[:x, :x],
@@ -57,8 +57,8 @@ def split(lft: LFT) -> Loop:
 
 
 def scaled(lft: LFT, coordinates: Coordinates) -> Loop:
-    """The LFT in these coordinates: outputs divided by the channel, time in its unit, energies keep
-    their ratios.
+    """Return the LFT in these coordinates: outputs divided by the channel, time in its unit; ratios
+    of energies are unchanged.
     """
     (left, right, channel, time, *_), L, R = coordinates.units, coordinates.left, coordinates.right
     loop, root = split(lft), np.sqrt(time)
@@ -76,9 +76,9 @@ def scaled(lft: LFT, coordinates: Coordinates) -> Loop:
 
 
 def coordinates(lft: LFT, gain: float, *, one: bool = False) -> Coordinates:
-    """From the model at the middle of the box and an expected `gain`: states by a Lyapunov
-    solution, the copies of a parameter by balancing what state noise and inputs make of z against
-    what w makes of state and outputs (`one`: by one number).
+    """Compute coordinates from the model at the middle of the box and an expected `gain`: states by
+    a Lyapunov solution, the copies of a parameter by balancing the responses of z to state noise
+    and inputs against those of state and outputs to w (`one`: by one number).
     """
     middle = lft.at(*(s.middle for s in lft.parameters))
     every = [
@@ -114,8 +114,8 @@ def coordinates(lft: LFT, gain: float, *, one: bool = False) -> Coordinates:
 
 
 def _frequencies(A: Array, continuous: bool) -> Array:
-    """Points where the loop is looked at, just outside the stability region so that a pole on its
-    border does no harm.
+    """Return the points at which the loop is evaluated, just outside the stability region so that a
+    pole on its border does no harm.
     """
     if not continuous:
         return 1.005 * np.exp(1j * np.concatenate([[0.0], np.geomspace(1e-3, np.pi, 40)]))
@@ -128,16 +128,16 @@ def _frequencies(A: Array, continuous: bool) -> Array:
 
 
 def _spread(direct: Array, around: Array) -> Array:
-    """Sum over frequencies of H H*, H the direct response and what of it comes around the loop
-    once.
+    """Return the sum over frequencies of H H*, with H the direct response and the response once
+    around the loop.
     """
     once = direct @ _adjoint(direct)
     return np.real(once + around @ once @ _adjoint(around)).sum(axis=0)
 
 
 def _balancing(reach: Array, seen: Array) -> Array:
-    """T with T^-1 reach T^-T = T' seen T, diagonal; directions that hardly matter are treated as if
-    they did.
+    """Return the diagonal T with T^-1 reach T^-T = T' seen T; directions that hardly matter are
+    bounded from below.
     """
     if not len(reach):
         return reach

@@ -12,7 +12,7 @@ from symheli.errors import InputError
 from symheli.lpv import LFT, Scheduling
 from synthesis.analysis.certify import Beaten, Report
 from synthesis.analysis.hypotheses import VERIFIED
-from synthesis.analysis.ladder import NOTHING, Found, Ladder, inflated
+from synthesis.analysis.ladder import NO_MARGIN, Found, Ladder, inflated
 from synthesis.certificate import Attempt, Certificate, Kind, Proof, Status
 from synthesis.forms import Spline
 from synthesis.impose import Bernstein
@@ -29,7 +29,7 @@ from synthesis.lft.proof import Evidence, Quadratic
 from synthesis.polynomial.motion import Motion
 from synthesis.program.cone_program import Answer, Solver, general_solver, solve
 from synthesis.proof.inequalities import Demand
-from synthesis.worst.budget import said
+from synthesis.worst.budget import search_hypothesis
 from synthesis.worst.lft import BoxGain, box_growing_trajectory, box_lower_bound, frozen_box_gain
 from synthesis.worst.lower_bound import THOROUGH, Search
 from synthesis.worst.spectrum import surely_unstable
@@ -159,7 +159,7 @@ class LFTProblem(NamedTuple):
 
     @property
     def gains(self) -> bool:
-        """Whether the bound is one of a gain."""
+        """Whether the bound is a gain."""
         return self.demand.kind == "l2 gain"
 
 
@@ -209,7 +209,7 @@ def _certified(problem: LFTProblem) -> Certificate:
             return report.nothing(Status.GROWING, beaten, ladder)
         return report.found(best, beaten, ladder)
     if math.isinf(frozen.gain):
-        # stable or not to rounding: nothing is known from below
+        # stability is decided by rounding: there is no lower bound
         frozen, search = BoxGain(0.0, frozen.p, math.nan), None
     below = box_lower_bound(lft, frozen, search)
     seconds = time.perf_counter() - start
@@ -221,7 +221,7 @@ def _certified(problem: LFTProblem) -> Certificate:
         if growing
         else report.found(best, beaten, ladder)
     )
-    return cert.resting_on(said(search and search.seconds, seconds))
+    return cert.resting_on(search_hypothesis(search and search.seconds, seconds))
 
 
 class MultiplierSearch(Ladder):
@@ -231,7 +231,7 @@ class MultiplierSearch(Ladder):
     margins = MARGINS  # type: ignore[assignment]
 
     def expect(self, bound: float) -> float:
-        """Set the coordinates; the unit of gains."""
+        """Set the coordinates for this expected gain; return the unit of gains."""
         lft, scaling, *_ = self.problem
         # a small gain means one thing only in the coordinates the LFT has, up to a number
         self.evidence = Evidence(lft, coordinates(lft, bound, one=scaling == "small gain"))
@@ -245,19 +245,19 @@ class MultiplierSearch(Ladder):
         return units.channel
 
     def shapes(self) -> list[str]:
-        """The class of multipliers."""
+        """The class of multipliers, the only form to try."""
         return [self.problem.scaling]
 
     def constant(self) -> str:
-        """The same: P is constant."""
+        """The same class: P is constant."""
         return self.problem.scaling
 
     def varies(self, shape: str) -> bool:
-        """Whether P depends on p: it does not."""
+        """Whether P depends on p; always False."""
         return False
 
     def _margins(self, shape: str, best: Found) -> Found:
-        """The least gain; where no answer can be verified, the largest margin of stability."""
+        """Search the least gain; where none can be verified, the largest margin of stability."""
         best = super()._margins(shape, best)
         return best if best.proof is not None else best.or_better(self._tried(shape, 0.0), 1.0)
 
@@ -265,7 +265,9 @@ class MultiplierSearch(Ladder):
         return answer
 
     def attempt(self, shape: str, margin: float, alpha: float = 0.0) -> Found:
-        """One margin; 0: the largest, of which many multiples may prove a gain."""
+        """Solve and verify with one margin; 0: the largest margin, from which multiples of P may
+        prove a gain.
+        """
         start, x = time.perf_counter(), len(self.problem.lft.states)
         program = (
             gain_program(self.linear, self.multipliers, x, self.inputs, margin)
@@ -278,8 +280,8 @@ class MultiplierSearch(Ladder):
         solved, answer = time.perf_counter(), candidate.answer
         if not margin:
             margin = math.nan if candidate.x is None else float(candidate.x[-1])
-            none = Answer.INFEASIBLE if margin <= NOTHING else Answer.FAILED
-            # what is not solved leaves the answer as it was
+            none = Answer.INFEASIBLE if margin <= NO_MARGIN else Answer.FAILED
+            # a program that is not solved does not change the answer
             answer = none if answer is Answer.SOLVED else Answer.UNTRIED
         found = Found(math.inf, None, answer)
         for weight in weights:
@@ -294,7 +296,7 @@ class MultiplierSearch(Ladder):
         return found
 
     def _proven(self, x: Array, answer: Answer) -> Found:
-        """What P and the multiplier at the solver's point prove, in physical units."""
+        """Verify P and the multiplier at the solver's point, in physical units."""
         lft, (units, left, _) = self.problem.lft, self.evidence.coordinates
         P, Q, S, R = unpack(x, self.multipliers, len(lft.states))
         multiplier = Multiplier(self.problem.scaling, lft.sizes, Q, S, R)
@@ -307,7 +309,7 @@ class MultiplierSearch(Ladder):
 
 
 class LFTReport(Report):
-    """How the certificate of an LFT is written down."""
+    """Writer of the certificate of an LFT."""
 
     problem: LFTProblem  # type: ignore[assignment]
 
@@ -322,11 +324,11 @@ class LFTReport(Report):
         return self.problem.lft
 
     def method(self, ladder: Ladder | None) -> str:
-        """The class of multipliers."""
+        """Name of the class of multipliers."""
         return f"LFT test with {self.problem.scaling}, p arbitrarily fast"
 
     def how(self, best: Found, status: Status, ladder: Ladder | None) -> tuple[str, ...]:
-        """On what the proof rests, in sentences."""
+        """Hypotheses of the proof, as sentences."""
         own = ("a limit on the rate is not used", f"constant P; {_CLASS[self.problem.scaling]}")
         what, shared = "finitely many matrices", "only the matrices of the LFT"
         verified = () if best.proof is None else (VERIFIED.format(what=what, shared=shared),)
@@ -335,7 +337,7 @@ class LFTReport(Report):
     def distance(
         self, bounds: dict[str, float], best: Found, ladder: Ladder | None
     ) -> tuple[str, ...]:
-        """Nothing is known of what keeps the bounds apart."""
+        """No sentences: the causes of a gap are not analysed for an LFT."""
         return ()
 
 

@@ -1,7 +1,7 @@
-"""Multipliers for w = Delta z, Delta = diag(delta_i I), |delta_i| <= 1: what is known of (w, z) at
-every instant.
+"""Multipliers for w = Delta z, Delta = diag(delta_i I), |delta_i| <= 1: quadratic constraints on
+(w, z) at every instant.
 
-A multiplier [Q S; S' R] claims [w; z]'[Q S; S' R][w; z] >= 0 for every Delta of the box. Four
+A multiplier [Q S; S' R] states [w; z]'[Q S; S' R][w; z] >= 0 for every Delta of the box. Four
 nested classes:
 
 small gain   t (|z|^2 - |w|^2) with one number t > 0, in the coordinates the LFT has D            R
@@ -38,7 +38,7 @@ SCALINGS = ("small gain", "D", "DG", "full block")
 """The classes, from the most to the least conservative."""
 
 MOST_CORNERS = 64
-"""More corners than this are refused: full block multipliers are for few parameters."""
+"""Largest number of corners: full block multipliers are for few parameters."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +67,7 @@ class Multiplier:
 
     @property
     def fault(self) -> str | None:
-        """What is wrong with the form, None where nothing is."""
+        """Reason why the form is invalid, None where it is valid."""
         if not isinstance(self.scaling, str) or self.scaling not in SCALINGS:
             return f"expected one of the scalings {', '.join(SCALINGS)}, got {self.scaling!r:.60}"
         n = sum(self.sizes)
@@ -125,7 +125,9 @@ class Class(NamedTuple):
 
 
 def check_scaling(scaling: str, sizes: Sequence[int]) -> str:
-    """The name, or an error that lists the classes; refuses more corners than `MOST_CORNERS`."""
+    """Return the name; raise an error that lists the classes for another one, or for more corners
+    than `MOST_CORNERS`.
+    """
     if scaling not in SCALINGS:
         raise UnknownNameError("scaling", scaling, SCALINGS)
     if scaling == "full block" and 2 ** len(sizes) > MOST_CORNERS:
@@ -137,7 +139,7 @@ def check_scaling(scaling: str, sizes: Sequence[int]) -> str:
 
 
 def multiplier_class(scaling: str, sizes: Sequence[int]) -> Class:
-    """The class as a linear space with conditions."""
+    """Return the class as a linear space with conditions."""
     n = sum(sizes)
     blocks = [part for part in parts(sizes) if part.stop > part.start]
     if n == 0:

@@ -5,7 +5,7 @@ Continuous time, with w = Delta z and a multiplier [Q S; S' R]: for all (x, w, u
     2 x'P (A x + Bw w + Bu u) + [w; z]'[Q S; S' R][w; z] + y'y - gamma^2 u'u < 0,   P > 0,
 
 so that V = x'P x falls by more than y'y - gamma^2 u'u along every trajectory; discrete time:
-x(k+1)'P x(k+1) - x'P x. For w alone it says that the parameter loop is well posed.
+x(k+1)'P x(k+1) - x'P x. For w alone it states that the parameter loop is well posed.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from synthesis.program.cone_program import ConeProgram
 Array = np.ndarray
 
 FLOOR = 0.1
-"""P and the conditions of the multiplier are held above this part of the margin (scaled
+"""P and the conditions of the multiplier are held above this fraction of the margin (scaled
 coordinates), so that they are strict.
 """
 
@@ -63,8 +63,8 @@ def inequality(loop: Loop, multipliers: Class, continuous: bool) -> Linear:
 
 
 def with_state_channels(loop: Loop) -> Loop:
-    """Noise on every state as the input, the state as the output: a gain from one to the other
-    exists where the loop is stable.
+    """Add noise on every state as the input and the state as the output: the gain between them
+    exists if the loop is stable.
     """
     x, w = len(loop.A), loop.Bw.shape[1]
     return loop._replace(
@@ -103,7 +103,7 @@ def margin_program(linear: Linear, multipliers: Class, states: int, inputs: int)
 
 
 def unpack(x: Array, multipliers: Class, states: int) -> tuple[Array, Array, Array, Array]:
-    """P, Q, S, R (scaled coordinates) from the unknowns."""
+    """Return P, Q, S, R (scaled coordinates) at the unknowns."""
     first = states * (states + 1) // 2
     P = smat(x[:first], states)
     Q, S, R = (
@@ -113,7 +113,7 @@ def unpack(x: Array, multipliers: Class, states: int) -> tuple[Array, Array, Arr
 
 
 def _positive(linear: Linear, multipliers: Class, states: int, extra: int) -> list[Array]:
-    """What must be positive: P and the multiplier's conditions, as matrices an unknown."""
+    """Return the matrices that must be positive, per unknown: P and the multiplier's conditions."""
     count = len(linear.matrices) + extra
     P = np.zeros((count, states, states))
     P[: linear.first] = basis(states)

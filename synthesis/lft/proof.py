@@ -1,4 +1,4 @@
-"""Is this P and multiplier a proof? Recomputed from the LFT alone, in floating point or in exact
+"""Check of P and a multiplier as a proof, from the LFT alone, in floating point or in exact
 rational arithmetic.
 
 Nothing here is shared with the assembly of the cone program: an error there cannot pass here.
@@ -24,8 +24,10 @@ from synthesis.proof import pointwise
 
 Array = np.ndarray
 
-CORNERS = 6
-"""Most parameters at all of whose corners a proof is checked once more."""
+MAX_PARAMETERS_AT_CORNERS = 6
+"""Largest number of parameters for which a proof is checked independently at all corners of the
+box.
+"""
 
 
 class Quadratic(NamedTuple):
@@ -54,15 +56,15 @@ class Evidence(NamedTuple):
         return self.lft.parameters
 
     def fault(self, proof: Quadratic, kind: str, rates: tuple[float, ...]) -> str | None:
-        """What keeps the proof from being about this LFT and this claim, before any inequality;
-        None where nothing does.
+        """Return why the proof does not belong to this LFT and statement, before any inequality is
+        checked; None where it does.
         """
         if not isinstance(proof, Quadratic) or not isinstance(proof.multiplier, Multiplier):
             return "expected P and a Multiplier"
         if kind != ("l2 gain" if self.lft.inputs else "stability"):
             return f"the LFT of the proof is not one of the kind {kind!r}"
         if rates != (math.inf,) * len(self.lft.parameters):
-            return f"the proof is for parameters that jump, the claim for rates {rates}"
+            return f"the proof is for parameters that jump, the certificate for rates {rates}"
         x, M = len(self.lft.states), proof.multiplier
         units, left, right = self.coordinates
         return structure.first(
@@ -78,8 +80,8 @@ class Evidence(NamedTuple):
         )
 
     def least_gain(self, proof: Quadratic) -> tuple[float, float]:
-        """(gain that the proof admits, condition number of P); inf where it proves nothing, NaN
-        without channels.
+        """Return (gain that the proof admits, condition number of P); inf where it proves nothing,
+        NaN without channels.
         """
         lft, (units, _, right) = self.lft, self.coordinates
         E = np.zeros((lft.order + len(lft.states) + len(lft.inputs),) * 2)
@@ -101,13 +103,13 @@ class Evidence(NamedTuple):
         return units.channel * math.sqrt(g), float(values[-1] / values[0])
 
     def floating(self, proof: Quadratic, gamma: float) -> bool:
-        """Eigenvalues, with a margin for rounding."""
+        """Check by eigenvalues, with a margin for rounding."""
         least = self.least_gain(proof)[0]
         return math.isnan(least) if math.isnan(gamma) else least < gamma
 
     def exact(self, proof: Quadratic, gamma: float) -> bool:
-        """LDL' in rationals; the doubles of the LFT, of the proof and of gamma are taken as the
-        rationals they are.
+        """Check by LDL' in rationals; the doubles of the LFT, of the proof and of gamma are taken
+        as exact rationals.
         """
         number, n, x = rational(), self.lft.order, len(self.lft.states)
         if not _structure_holds(proof.multiplier, self.lft):
@@ -122,15 +124,15 @@ class Evidence(NamedTuple):
             positive_definite(M)
             for M in (exact(proof.P, number), *_conditions(proof.multiplier, number), F)
         )
-        return exactly and self.witnessed(proof, gamma, number)
+        return exactly and self.checked_independently(proof, gamma, number)
 
-    def witnessed(self, proof: Quadratic, gamma: float, number: Number) -> bool:
-        """V = x'Px does at the corners of the box and inside it what is claimed, through the closed
-        model's own matrices.
+    def checked_independently(self, proof: Quadratic, gamma: float, number: Number) -> bool:
+        """Check the inequality of V = x'Px at the corners of the box and inside it, through the
+        closed model's own matrices.
         """
         g = None if math.isnan(gamma) else number(gamma) * number(gamma)
         P, m = exact(proof.P, number), len(self.lft.parameters)
-        corners = product((-1.0, 1.0), repeat=m) if m <= CORNERS else ()
+        corners = product((-1.0, 1.0), repeat=m) if m <= MAX_PARAMETERS_AT_CORNERS else ()
         diagonals = (np.where(np.arange(m) % 2, -t, t) for t in np.linspace(-0.9, 0.9, 7))
         for delta in (*corners, *diagonals):
             model = self.lft.at(
@@ -185,8 +187,8 @@ def _left_side(lft: LFT, proof: Quadratic, number: Number) -> Array:
 
 
 def _structure_holds(multiplier: Multiplier, lft: LFT) -> bool:
-    """Exactly: the blocks are those of the LFT, and the multiplier has the form its class
-    promises.
+    """Check exactly that the blocks are those of the LFT, and that the multiplier has the form of
+    its class.
     """
     Q, S, R = multiplier.Q, multiplier.S, multiplier.R
     if multiplier.sizes != lft.sizes or np.any(Q != Q.T) or np.any(R != R.T):
@@ -211,7 +213,9 @@ def _structure_holds(multiplier: Multiplier, lft: LFT) -> bool:
 
 
 def _conditions(multiplier: Multiplier, number: Number) -> Iterator[Array]:
-    """What must be positive for the multiplier to hold on the whole box, given its structure."""
+    """Yield the matrices that must be positive for the multiplier to hold on the whole box, given
+    its structure.
+    """
     Q, S, R = (exact(M, number) for M in (multiplier.Q, multiplier.S, multiplier.R))
     for part in parts(multiplier.sizes):
         yield -Q[part, part]
@@ -224,7 +228,7 @@ def _conditions(multiplier: Multiplier, number: Number) -> Iterator[Array]:
 
 
 def _negative(M: Array) -> bool:
-    """Negative definite by more than rounding can hide."""
+    """Whether F is negative definite by more than rounding can hide."""
     if not len(M):
         return True
     values = np.linalg.eigvalsh(0.5 * (M + M.T))

@@ -1,1 +1,3 @@
-"""A controller and its loop: margins, and what is left of a proof once it is implemented."""
+"""A controller and its loop: margins, reduction, sampling, and the guarantee of the controller as
+implemented.
+"""

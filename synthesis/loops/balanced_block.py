@@ -1,4 +1,5 @@
-"""Coordinates in which repeated scalar blocks b_i I cost least as one block of bounded norm.
+"""Coordinates in which repeated scalar blocks b_i I are least conservative as one norm-bounded
+block.
 
 T^-1 (b I) T = b I for every invertible T: a block diag(b_1 I, b_2 I, ...) may be seen in
 coordinates T = diag(T_1, T_2, ...) where the largest singular value of T^-1 H(p, jw) T is least. T
@@ -12,13 +13,13 @@ import numpy as np
 
 Array = np.ndarray
 
-ROUNDS, SHARPNESS = 60, 6.0
-"""Rounds of balancing; how much more the worst responses count."""
+ITERATIONS, WEIGHT_EXPONENT = 60, 6.0
+"""Number of balancing iterations, and the exponent with which larger responses are weighted."""
 
 
 def balanced(responses: Array, size: int, count: int = 1) -> tuple[Array, Array, float]:
-    """T for the `count` blocks of `size`, alpha for the block of all other channels, and the
-    largest norm that is left; of `responses` H (K, rows, columns).
+    """Return T for the `count` blocks of `size`, alpha for the block of all other channels, and the
+    largest remaining norm, for `responses` H (K, rows, columns).
 
     Returns
     -------
@@ -35,7 +36,7 @@ def balanced(responses: Array, size: int, count: int = 1) -> tuple[Array, Array,
     own, alpha = size * count, 1.0
     T = np.eye(own)
     best, least = (T, alpha), np.inf
-    for _ in range(ROUNDS):
+    for _ in range(ITERATIONS):
         left, right = _whole(T, alpha, rows), _whole(T, alpha, columns)
         seen = np.linalg.solve(left, responses @ right)
         norms = np.linalg.norm(seen, 2, axis=(1, 2))
@@ -44,7 +45,7 @@ def balanced(responses: Array, size: int, count: int = 1) -> tuple[Array, Array,
             least, best = worst, (T, alpha)
         if not np.isfinite(worst) or worst == 0:
             break
-        weights = (norms / worst) ** SHARPNESS
+        weights = (norms / worst) ** WEIGHT_EXPONENT
         adjoint = np.conj(np.swapaxes(seen, 1, 2))
         out = _regular(np.real(np.tensordot(weights, seen @ adjoint, axes=1)))
         into = _regular(np.real(np.tensordot(weights, adjoint @ seen, axes=1)))
@@ -74,6 +75,6 @@ def _power(M: Array, exponent: float) -> Array:
 
 
 def _mean(P: Array, Q: Array) -> Array:
-    """The geometric mean X of two positive definite matrices: X P^-1 X = Q."""
+    """Return the geometric mean X of two positive definite matrices: X P^-1 X = Q."""
     root, inverse = _power(P, 0.5), _power(P, -0.5)
     return root @ _power(inverse @ Q @ inverse, 0.5) @ root

@@ -18,7 +18,7 @@ from synthesis.impose import Bernstein
 from synthesis.plant.diagnosis import decided
 from synthesis.plant.refusals import conditions
 from synthesis.program.cone_program import LYAPUNOV, Solver
-from synthesis.worst.rates import asked as limits
+from synthesis.worst.rates import limits
 
 if TYPE_CHECKING:
     from symheli.flight import ScheduledController
@@ -33,28 +33,28 @@ ADJOINT = (
 
 SAMPLED = (
     "proven of the sampled loop: the plant with its inputs, disturbances too, held over each"
-    " {dt:g} s; nothing is said of what happens between the samples"
+    " {dt:g} s; the statement does not include the time between the samples"
 )
 
 
-NEAR = 1.05
-"""A gain proven within this factor of what no proof undercuts is not tried to improve upon, where
-none was promised.
+GAIN_TOLERANCE = 1.05
+"""Ratio of a proven gain to its lower bound up to which no richer P is tried, where the synthesis
+promised no gain.
 """
 ADJOINT_USUAL = {"form": Spline(degree=2, segments=(1, 4)), "solver": LYAPUNOV}
 
-RICHER = {
+RICHER_SEARCH = {
     "form": Spline(degree=4, segments=4, grading=1.0),
     "impose": Bernstein(floor=1e-2),
     "solver": Solver(LYAPUNOV, tolerance=1e-3),
 }
-"""Where the usual P proves far more than was promised. Solved coarsely and held off zero, such a P
-keeps digits enough for its verification.
+"""Search used where the usual P proves far more than was promised. A coarse tolerance and a larger
+margin leave such a P enough digits for its verification.
 """
 
 
 def _proven(found: Certificate) -> float:
-    """Its gain; infinity without a proof."""
+    """Return the proven gain; infinity without a proof."""
     return found.gamma if found.verified else math.inf
 
 
@@ -80,9 +80,9 @@ class Controller:
     attempts : tuple of Attempt
         Every program that was solved.
     by_adjoint : bool
-        Whether `certify` looks at the adjoint of the loop.
+        Whether `certify` uses the adjoint of the loop.
     notes : tuple of str
-        What kept the synthesis from a lower gamma, or the controller from a limit that was asked.
+        Reasons why the synthesis reached no lower gamma, or the controller no requested limit.
 
     Examples
     --------
@@ -112,7 +112,7 @@ class Controller:
     _repr_html_ = as_table
 
     def at(self, *p: float) -> LinearModel:
-        """The controller frozen at p, one value a parameter."""
+        """Return the controller frozen at p, one value a parameter."""
         return self.model.at(*p)
 
     @property
@@ -127,7 +127,7 @@ class Controller:
 
     @cached_property
     def loop_plant(self) -> Plant:
-        """The plant that `closed` closes: that of the design, around a controller that was sampled
+        """The plant that `closed` closes: the design plant; for a sampled controller, the plant
         with its inputs held between the samples, see `synthesis.plant.sampling.held`.
 
         Raises `InputError` for an uncertain plant that is not sampled as the controller is.
@@ -139,14 +139,14 @@ class Controller:
         return held(self.plant, self.dt)
 
     def closed(self) -> Any:
-        """The plant under this controller, from disturbances to performance; sampled where the
+        """Return the plant under this controller, from disturbances to performance; sampled if the
         controller is.
         """
         return self.loop_plant.close(self.model)
 
     def certify(self, rate: Any = None, **options: Any) -> Certificate:
-        """Its proven gain: `synthesis.l2_gain` of the closed loop, or of the adjoint of that, which
-        knows nothing of how the controller was made.
+        """Certify the gain with `synthesis.l2_gain` of the closed loop, or of its adjoint; the
+        certificate does not use how the controller was made.
 
         Where Y(p) moved in the synthesis the inverse of P(p) is a polynomial as simple as Y, and
         not P: then the adjoint, which has the same gain, is analysed first. Where one of the two
@@ -169,7 +169,7 @@ class Controller:
         def proof(adjoint: bool, richer: bool = False) -> Certificate:
             usually: dict[str, Any] = {}
             if richer or (adjoint and usual and len(moving) == 1):
-                usually = RICHER if richer else ADJOINT_USUAL
+                usually = RICHER_SEARCH if richer else ADJOINT_USUAL
             if not adjoint:
                 return l2_gain(loop, rate, **usually | options).resting_on(rests)
             proven = l2_gain(loop.adjoint(), rate, **usually | options)
@@ -178,20 +178,20 @@ class Controller:
         if tied or isinstance(loop, UncertainStateSpace):
             return proof(False)
         found = proof(self.by_adjoint)
-        enough = NEAR * found.lower if math.isnan(self.promised) else self.promised
+        enough = GAIN_TOLERANCE * found.lower if math.isnan(self.promised) else self.promised
         others = [lambda: proof(not self.by_adjoint)] if usual and moving else []
         if usual and len(moving) == 1 and loop.dt is None:
             # at once where the usual P proves nothing
             others.insert(found.verified, lambda: proof(self.by_adjoint, richer=True))
         for k, other in enumerate(others):
-            if found.gamma <= (NEAR if k else 1.0) * enough:
+            if found.gamma <= (GAIN_TOLERANCE if k else 1.0) * enough:
                 break
             found = min(found, other(), key=_proven)
         return found
 
     def discretize(self, dt: float) -> Controller:
-        """Sampled by Tustin's rule at every frozen p, functions of the same degree fitted to that;
-        `closed` and `certify` then hold the inputs of the plant between the samples.
+        """Sample the controller by Tustin's rule at every frozen p and fit functions of the same
+        degree; `closed` and `certify` then hold the inputs of the plant between the samples.
 
         Raises `InputError` for a controller that is sampled, or a period that is not positive.
         """
@@ -201,8 +201,8 @@ class Controller:
         return replace(self, model=model)
 
     def reduce(self, order: int | None = None, *, loss: float | None = None) -> Controller:
-        """At most `order` states, or the fewest with which the largest gain of the frozen loops is
-        at most the fraction `loss` above that of all states; give one of the two.
+        """Reduce to at most `order` states, or to the fewest with which the largest gain of the
+        frozen loops is at most the fraction `loss` above that of all states; give one of the two.
 
         One projection keeps what the closed loop sees of the controller; see
         `synthesis.loops.reduction`. What was promised of all states is not promised of fewer:
@@ -227,8 +227,8 @@ class Controller:
 
     @cached_property
     def reasons(self) -> tuple[str, ...]:
-        """The `notes`, and why `optimum` says little of the controller: what no controller can
-        lower, at some frozen p, is all of it. Empty where it earns its gamma.
+        """The `notes`, and why `optimum` limits gamma: at some frozen p, a part of the gain that no
+        controller can lower. Empty if gamma depends on the controller.
         """
         if self.optimum is None:
             return self.notes
@@ -245,7 +245,8 @@ class Controller:
 
     @cached_property
     def scheduled_controller(self) -> ScheduledController:
-        """What `symheli.fly` flies, where measurements and controls are signals of the helicopter.
+        """The controller for `symheli.fly`, where measurements and controls are signals of
+        the helicopter.
 
         Raises `InputError` for a continuous controller and for other signals and parameters.
         """
@@ -254,13 +255,13 @@ class Controller:
         return ScheduledController(self.model)
 
     def init(self) -> Array:
-        """The states (n,) before a flight: zero."""
+        """Return the states (n,) before a flight: zero."""
         return self.scheduled_controller.init()
 
     def step(
         self, state: Array, measured: NamedVector, reference: NamedVector, p: NamedVector
     ) -> tuple[Array, Array]:
-        """Commands (4,), rad, at one sample and the states (n,) of the next; see
+        """Return the commands (4,), rad, at one sample and the states (n,) at the next; see
         `symheli.PureController`.
         """
         return self.scheduled_controller.step(state, measured, reference, p)

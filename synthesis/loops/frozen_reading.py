@@ -1,4 +1,6 @@
-"""A controller whose reading of the parameter stands still: how far the true one may go."""
+"""A controller with a constant scheduling input: the range of the true parameter with a stability
+proof.
+"""
 
 from __future__ import annotations
 
@@ -13,16 +15,17 @@ from symheli.threads import with_one_thread
 from synthesis.analysis.questions import stability
 from synthesis.plant.as_controller import as_controller
 from synthesis.plant.plant import Plant, require_plant
-from synthesis.worst.rates import Rate
-from synthesis.worst.rates import asked as limits
+from synthesis.worst.rates import Rate, limits
 
-FINEST = 1e-6
-"""The smallest tolerance: twenty bisections, each of them a proof; solvers decide no closer."""
+MIN_TOLERANCE = 1e-6
+"""Smallest permitted tolerance: twenty bisections, each with a proof; solvers are no more
+accurate.
+"""
 
 
 class Largest(NamedTuple):
-    """`proven`: the largest value with a proof, 0 where even the least that was tried had none;
-    `failed`: the least without one, inf where all had one.
+    """Result of a bisection: `proven`, the largest value with a proof, 0 where even the least tried
+    had none; `failed`, the least without one, inf where all had one.
     """
 
     proven: float
@@ -32,7 +35,8 @@ class Largest(NamedTuple):
 def largest(
     proves: Callable[[float], bool], most: float, tolerance: float = 0.05, *, least: float = 1e-3
 ) -> Largest:
-    """The largest value up to `most` for which `proves` says yes, to `tolerance` of `most`.
+    """Search the largest value up to `most` for which `proves` returns True, to `tolerance` of
+    `most`.
 
     What is proven for a value is taken to hold for all below it; each returned number was tried.
 
@@ -110,7 +114,7 @@ def proven_around(
     Raises
     ------
     InputError
-        Several parameters, an `at` out of range, a tolerance below `FINEST` or not below 1.
+        Several parameters, an `at` out of range, a tolerance below `MIN_TOLERANCE` or not below 1.
 
     Examples
     --------
@@ -127,8 +131,8 @@ def proven_around(
     0.0 0.719
     """
     require_plant(plant)
-    if not FINEST <= tolerance < 1:
-        raise InputError(f"tolerance: expected from {FINEST:g} to below 1, got {tolerance}")
+    if not MIN_TOLERANCE <= tolerance < 1:
+        raise InputError(f"tolerance: expected from {MIN_TOLERANCE:g} to below 1, got {tolerance}")
     (s,) = _one(plant, rate)
     if not s.low <= at <= s.high:
         raise InputError(f"at: expected {s.name} within [{s.low:g}, {s.high:g}] {s.unit}, got {at}")

@@ -1,6 +1,4 @@
-"""How much gain, phase, delay, or both at once, a feedback loop stands before it becomes
-unstable.
-"""
+"""Margins of a feedback loop: the gain, phase and delay, or both at once, that make it unstable."""
 
 from __future__ import annotations
 
@@ -41,14 +39,14 @@ class Margins:
 
     @property
     def disk_gain(self) -> tuple[float, float]:
-        """Gain factors inside the disk."""
+        """Gain factors inside the disk margin."""
         return max((2 - self.disk) / (2 + self.disk), 0.0), (
             (2 + self.disk) / (2 - self.disk) if self.disk < 2 else math.inf
         )
 
     @property
     def disk_phase(self) -> float:
-        """Phase (rad) inside the disk."""
+        """Phase (rad) inside the disk margin."""
         return 2 * math.atan(self.disk / 2)
 
 
@@ -246,14 +244,16 @@ def disk_margin(loop: LinearModel) -> float:
 
 
 def _closed(loop: LinearModel) -> LinearModel:
-    """S = (I + L)^-1."""
+    """Return S = (I + L)^-1."""
     inverse = np.linalg.inv(np.eye(len(loop.inputs)) + loop.D)
     B = loop.B @ inverse
     return replace(loop, A=loop.A - B @ loop.C, B=B, C=-inverse @ loop.C, D=inverse)
 
 
 def _real_axis(A: Array, B: Array, C: Array) -> Array:
-    """Frequencies >= 0 (rad/s) at which a scalar L is real: imaginary zeros of L(s) - L(-s)."""
+    """Return frequencies >= 0 (rad/s) at which a scalar L is real: imaginary zeros of L(s)
+    - L(-s).
+    """
     n = len(A)
     pencil = np.zeros((2 * n + 1, 2 * n + 1))
     pencil[:n, :n], pencil[n : 2 * n, n : 2 * n] = A, -A

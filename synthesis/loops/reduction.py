@@ -1,10 +1,10 @@
-"""Fewer states of a controller, by what the loop sees of them.
+"""Reduction of a controller by its reachability and observability within the loop.
 
 The Gramians are those of the closed loop, the block of the controller's states: what disturbances
 do to them, and what they do to the performance, averaged over frozen p. One constant projection
 for all p keeps the dependence on p what it was (truncation with the closed loop as the weight:
 Enns 1984; Anderson and Liu, IEEE Trans. Automatic Control 34 (1989); one projection over p: Wood,
-Goddard and Glover, CDC 1996). Whether it was too much the analysis of the loop says.
+Goddard and Glover, CDC 1996). The analysis of the loop shows whether it was too much.
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ from synthesis.worst.frozen import norm, stable
 Array = np.ndarray
 
 NOT_STABLE = (
-    "the closed loop is not stable at every frozen p, so that nothing says which states of the"
-    " controller matter"
+    "the closed loop is not stable at every frozen p: it has no Gramians by which the states of"
+    " the controller could be reduced"
 )
 
 NODES = {1: 14, 2: 6}
-"""Values of each parameter at which the loop is looked at (more parameters: 4)."""
+"""Values of each parameter at which the loop is evaluated (more parameters: 4)."""
 
 
 def reduced(controller: Controller, order: int) -> Controller:
-    """The controller with at most `order` states, of which nothing is promised: its `gamma` is NaN,
-    and a note tells the frozen gains of its loop and of that of all states.
+    """Return the controller with at most `order` states. It has no promised gain, and a note gives
+    the frozen gains of its loop and of the full one.
 
     Raises `InputError` for an order below 0, `SynthesisError` where the loop is not stable at some
     frozen p, before or after.
@@ -47,8 +47,8 @@ def reduced(controller: Controller, order: int) -> Controller:
 
 
 def within(controller: Controller, loss: float) -> Controller:
-    """The controller of least order whose loop has a frozen gain at most the fraction `loss` above
-    that of all states.
+    """Return the controller of least order whose loop has a frozen gain at most the fraction `loss`
+    above the full one.
 
     Raises `InputError` for a loss that is no number >= 0, `SynthesisError` where the loop is not
     stable at some frozen p.
@@ -69,8 +69,8 @@ def fewest(
     limit: float,
     orders: Iterable[int] | None = None,
 ) -> Controller:
-    """The reduced controller of the first of the `orders` (None: every one, from 0 on) with gain at
-    most `limit`; the controller itself where there is none.
+    """Return the reduced controller of the first of the `orders` (None: every one, from 0 on) with
+    gain at most `limit`; the controller itself where there is none.
     """
     whole = _Whole(controller)
     for order in range(controller.order) if orders is None else orders:
@@ -84,15 +84,15 @@ def fewest(
 
 
 class _Whole:
-    """A controller of all states, whose Gramians and gain serve every order."""
+    """The controller of full order, with the Gramians and gain that all reductions use."""
 
     def __init__(self, controller: Controller) -> None:
         self.controller = controller
 
     @cached_property
     def directions(self) -> tuple[Array, Array]:
-        """(left (n, n), right (n, n)) of the states in falling order of what the loop sees of them;
-        the first rows and columns project on fewer.
+        """(left (n, n), right (n, n)) of the states, in falling order of their Hankel
+        singular values in the loop; the first rows and columns project on a reduced order.
         """
         P, Q = gramians(self.controller)
         L, R = _root(P), _root(Q)
@@ -102,11 +102,13 @@ class _Whole:
 
     @cached_property
     def gain(self) -> float:
-        """Frozen gain of its loop."""
+        """Frozen gain of the full loop."""
         return frozen_gain(self.controller)
 
     def kept(self, order: int) -> Controller:
-        """With `order` states; raises `SynthesisError` where the loop is not stable."""
+        """Return the controller of `order` states; raises `SynthesisError` where the loop is not
+        stable.
+        """
         controller, n = self.controller, self.controller.order
         left, right = self.directions[0][:order], self.directions[1][:, :order]
         model = controller.model
@@ -140,15 +142,15 @@ class _Whole:
 
 
 def frozen_gain(controller: Controller) -> float:
-    """Largest H-infinity norm of the loop at some frozen p, inf where one is not stable."""
+    """Return the largest H-infinity norm of the frozen loops, inf where one is not stable."""
     loop: LPVStateSpace = controller.closed()
     every = zip(*loop.matrices(_conditions(loop)), strict=True)
     return max(norm(*each, loop.dt)[0] for each in every)
 
 
 def gramians(controller: Controller) -> tuple[Array, Array]:
-    """Reachability and observability (n, n) of the controller's states in the loop, the mean over
-    frozen p of each in units of its own size.
+    """Return the reachability and observability Gramians (n, n) of the controller's states in the
+    loop: means over frozen p, each in units of its own size.
     """
     closed: LPVStateSpace = controller.closed()
     n = controller.order

@@ -1,4 +1,4 @@
-"""The certificate of a sampled loop: the controller's own numbers around the sampled plant.
+"""Certificate of a sampled loop: the controller as implemented around the sampled plant.
 
 How a controller was made plays no part in it: synthesis may be as rough as it likes, and what
 sampling, tabulating, rounding and delay take is the distance between two gains.
@@ -23,8 +23,8 @@ from synthesis.plant.plant import Plant, require_plant
 from synthesis.worst.rates import Rate
 
 ROUNDING = 256 * np.finfo(float).eps
-"""A misfit of an entry of the performance below this fraction of the terms that the entry is the
-sum of, at the same p, is one of their rounding: of its own terms, whatever the units.
+"""A misfit of an entry of the performance below this fraction of its own terms, at the same p, is
+rounding, whatever the units.
 """
 
 
@@ -68,13 +68,13 @@ class SampledLoop:
 
     @property
     def gamma(self) -> float:
-        """The proven gain, inf where nothing is proven."""
+        """Proven gain, inf without a proof."""
         return self.certificate.gamma
 
     @property
     def loss(self) -> float:
-        """Proven gain over the promised one, minus 1: from all that stands between design and
-        flight; inf where nothing is proven, NaN where nothing was promised.
+        """Proven gain over the promised one, minus 1: the total effect of sampling, fit and
+        implementation; inf without a proof, NaN where nothing was promised.
         """
         return self.gamma / self.promised - 1.0
 
@@ -165,7 +165,7 @@ def certify_sampled(
 
 
 def _covered(loop: LPVStateSpace) -> tuple[LPVStateSpace | UncertainStateSpace, float]:
-    """The set of models around a fit, and the largest entry of [A B] that is missed."""
+    """Return the set of models around a fit, and the largest misfit of an entry of [A B]."""
     assert loop.residuals is not None  # noqa: S101
     nodes, A, B, C, D = loop.residuals
     functions = np.abs(loop.basis(nodes))

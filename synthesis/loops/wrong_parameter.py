@@ -1,4 +1,4 @@
-"""A controller that reads a wrong parameter: its loop for every error within a bound.
+"""A controller with an error in its measured parameter: the loop for every error within a bound.
 
 It is at K(p + b) where the plant is at p, and K(p + b) = K(p) + b K[p, p + b] with the divided
 difference K[p, q], the mean of the slopes of K between p and q. On a short interval of p that mean
@@ -31,7 +31,7 @@ from symheli.lpv.matrix_function import MatrixFunction, block, functions_of, in_
 from symheli.values.sample_period import same_period
 from symheli.values.signal import signals
 from synthesis.loops.balanced_block import balanced
-from synthesis.lpv.existence import FINEST
+from synthesis.lpv.existence import MAX_DIVISIONS
 from synthesis.plant.as_controller import as_controller
 from synthesis.plant.plant import Plant, require_plant
 from synthesis.polynomial.bernstein import restriction
@@ -40,11 +40,13 @@ from synthesis.polynomial.pieces import function_pieces
 Array = np.ndarray
 
 ROUNDING = 64 * np.finfo(float).eps
-"""What an entry may be off by, as a fraction of the terms that it is the sum of: of its own, so
-that the units of controls and measurements play no part.
+"""Relative rounding error of an entry, as a fraction of the sum of its own terms, so that the
+units of controls and measurements play no part.
 """
-LOST = 0.1
-"""Coordinates whose inverse is not known to this fraction are not used."""
+MAX_INVERSE_ERROR = 0.1
+"""Largest relative error of the inverse of a change of coordinates; with a larger error the change
+is not used.
+"""
 
 
 def with_wrong_parameter(
@@ -102,8 +104,10 @@ def with_wrong_parameter(
     if not (np.isfinite(error) and error >= 0):
         raise InputError(f"error: expected a number >= 0 in the unit of p, got {error!r}")
     whole = isinstance(divisions, int) and not isinstance(divisions, bool)
-    if not whole or not 1 <= divisions <= FINEST:
-        raise InputError(f"divisions: expected an integer from 1 to {FINEST}, got {divisions!r}")
+    if not whole or not 1 <= divisions <= MAX_DIVISIONS:
+        raise InputError(
+            f"divisions: expected an integer from 1 to {MAX_DIVISIONS}, got {divisions!r}"
+        )
     if len(plant.parameters) != 1:
         raise InputError(
             "a wrong reading needs a plant of one parameter, this one has"
@@ -112,7 +116,7 @@ def with_wrong_parameter(
     K = _scheduled(as_controller(controller, plant.controls, plant.measurements), plant)
     loop = _Opened.of(plant, K)
     s = plant.parameters[0]
-    reach = min(error, s.high - s.low)  # of a reading that ends where the range does
+    reach = min(error, s.high - s.low)  # the measured p ends with its range
     S = _slopes(K, s, reach, divisions)
     U, rows_kept = _reached([each.coefficients for each in S])
     seen = [each[rows_kept, :] for each in S]
@@ -132,7 +136,7 @@ def with_wrong_parameter(
 
 
 class _Opened:
-    """The loop under K(p), to whose [x_K(k+1); u] d is added, and that shows y~ = (x_K, y).
+    """The loop under K(p) with inputs d added to [x_K(k+1); u] and outputs y~ = (x_K, y).
 
     A .. D of it as functions of p, with the inputs (w, d) and the outputs (z, y~); w and z hold the
     channels of the plant's own block, if it has one.
@@ -192,8 +196,8 @@ class _Opened:
         return cls(plant, K, parts)
 
     def closed(self, enter: Array, leave: MatrixFunction) -> LPVStateSpace:
-        """With d = enter d_1 and v_1 = leave(p) y~, the inputs (w, d_1, own d), the outputs (z,
-        v_1, own v); the bound of the plant's own block is in its d.
+        """Return the loop with d = enter d_1 and v_1 = leave(p) y~, the inputs (w, d_1, own d) and
+        the outputs (z, v_1, own v); the bound of the plant's own block is in its d.
         """
         f, plant, own = self.parts, self.plant, self.plant.model
         w, z = len(plant.disturbances), len(plant.performance)
@@ -236,8 +240,8 @@ class _Opened:
 def _in_balanced_units(
     model: LPVStateSpace, ends: tuple[int, int], p: Array, size: int, count: int
 ) -> LPVStateSpace:
-    """The channels of the block, those after `ends`, in coordinates in which it costs little: by
-    the responses at p and some frequencies.
+    """Return coordinates of the block's channels, those after `ends`, in which it is least
+    conservative, from the responses at p and some frequencies.
     """
     w, z = ends
     A, B, C, D = model.matrices(p)
@@ -257,15 +261,15 @@ def _in_balanced_units(
 
 
 def _inverse(left: Array, right: Array, own: int) -> tuple[Array, Array]:
-    """(left^-1, right) with the `own` first columns of `right` enlarged by what rounding takes from
-    the inverse: b T^-1 (T^-1)^-1 is then within the error for every b. No change of coordinates
-    where that is too much.
+    """Return (left^-1, right) with the `own` first columns of `right` enlarged by the rounding of
+    the inverse: b T^-1 (T^-1)^-1 is then within the error for every b. The coordinates stay
+    unchanged if that is too large.
     """
     inverse, T = np.linalg.inv(left), left[:own, :own]
     L = inverse[:own, :own]
     computed = np.abs(L @ T - np.eye(own))
     missed = np.linalg.norm(computed + own * np.finfo(float).eps * np.abs(L) @ np.abs(T))
-    if not missed < LOST:
+    if not missed < MAX_INVERSE_ERROR:
         return np.eye(len(left)), np.eye(len(right))
     grown = right * (1.0 + 4 * np.finfo(float).eps)
     grown[:, :own] /= 1.0 - missed
@@ -277,14 +281,14 @@ def _constant(M: Array, like: MatrixFunction) -> MatrixFunction:
 
 
 def _corner(M: MatrixFunction, rows: int, columns: int, *, first: bool = False) -> MatrixFunction:
-    """M with so many rows and columns of zeros more, after it or (rows) before it."""
+    """Return M with this many rows and columns of zeros added, after it or (rows) before it."""
     before, after = (rows, 0) if first else (0, rows)
     padded = np.pad(M.coefficients, ((0, 0), (before, after), (0, columns)))
     return MatrixFunction(M.basis, padded, M.box)
 
 
 def _scheduled(given: LinearModel | LPVStateSpace, plant: Plant) -> LPVStateSpace:
-    """K over the parameter of the plant, in its sample period."""
+    """Return K over the parameter of the plant, in its sample period."""
     if isinstance(given, LinearModel):
         given = LPVStateSpace.constant(given, plant.parameters)
     mine, own = given.parameters, plant.parameters[0]
@@ -305,7 +309,7 @@ def _scheduled(given: LinearModel | LPVStateSpace, plant: Plant) -> LPVStateSpac
 
 
 def _slopes(K: LPVStateSpace, s: Scheduling, error: float, divisions: int) -> list[MatrixFunction]:
-    """S_0, S_1 .. , each constant on the same intervals."""
+    """Return S_0, S_1 .., each constant on the same intervals."""
     M = np.block([[K.A, K.B], [K.C, K.D]])
     cuts, slopes = _derivative(K, M, s)
     least = 1e-6 * (s.high - s.low)
@@ -334,9 +338,9 @@ def _slopes(K: LPVStateSpace, s: Scheduling, error: float, divisions: int) -> li
 
 
 def _box(hull: Array) -> list[Array]:
-    """S_0, S_1 .. of which S_0 + sum_i m_i S_i, |m_i| <= 1, holds all of the hull: its principal
-    directions where each entry is measured by its own spread, each as long as the hull reaches that
-    way. As many as leave nothing of any entry but rounding.
+    """Return S_0, S_1 .. such that S_0 + sum_i m_i S_i, |m_i| <= 1, contains the convex hull: the
+    principal directions of the hull with each entry scaled by its spread, each as long as the hull
+    reaches in it. Directions are added until only rounding is left of any entry.
     """
     centre = 0.5 * (hull.min(axis=0) + hull.max(axis=0))
     flat = (hull - centre).reshape(len(hull), -1)
@@ -357,7 +361,8 @@ def _box(hull: Array) -> list[Array]:
 
 
 def _derivative(K: LPVStateSpace, M: Array, s: Scheduling) -> tuple[list[float], list[Array]]:
-    """Ends of the pieces of K, and the Bernstein coefficients (degree, ..) of its slope on each.
+    """Return the ends of the pieces of K, and the Bernstein coefficients (degree, ..) of its slope
+    on each.
 
     A jump is one of an entry beside its own terms, whatever stands in the others.
     """
@@ -382,8 +387,8 @@ def _derivative(K: LPVStateSpace, M: Array, s: Scheduling) -> tuple[list[float],
 
 
 def _slope(piece: Piece, M: Array, one: Array) -> Array:
-    """Bernstein coefficients (degree, ..) of the slope on a piece; exactly zero for an entry that
-    is one number there.
+    """Return the Bernstein coefficients (degree, ..) of the slope on a piece; exactly zero for a
+    constant entry.
     """
     degree, width = piece.bernstein.shape[1] - 1, piece.high - piece.low
     if degree == 0:
@@ -395,7 +400,7 @@ def _slope(piece: Piece, M: Array, one: Array) -> Array:
 
 
 def _hull(cuts: list[float], slopes: list[Array], low: float, high: float) -> Array:
-    """Matrices (N, ..) in whose convex hull the slope is for p from `low` to `high`."""
+    """Return matrices (N, ..) whose convex hull contains the slope for p from `low` to `high`."""
     found = []
     for (a, b), slope in zip(pairwise(cuts), slopes, strict=True):
         start, stop = max(a, low), min(b, high)
@@ -406,7 +411,7 @@ def _hull(cuts: list[float], slopes: list[Array], low: float, high: float) -> Ar
 
 
 def _reached(S: list[Array]) -> tuple[Array, list[int]]:
-    """U (rows, r) and r rows with S = U S[those rows] for every slope, r >= 1.
+    """Return U (rows, r) and r rows with S = U S[those rows] for every slope, r >= 1.
 
     A row is left out where the others give all its entries, each to its own rounding.
     """

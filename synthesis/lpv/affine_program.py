@@ -29,7 +29,7 @@ from synthesis.program.cone_program import Candidate, ConeProgram, Solver, solve
 Array = np.ndarray
 
 MARGIN = 1e-8
-"""Every inequality is kept above this multiple of the identity."""
+"""Every inequality is imposed as >= this multiple of the identity."""
 
 
 class BernsteinCell(NamedTuple):
@@ -42,7 +42,9 @@ class BernsteinCell(NamedTuple):
 
 
 def cells(breaks: Sequence[Sequence[float]], degrees: Sequence[int]) -> list[BernsteinCell]:
-    """One cell between every two breaks of each parameter, for polynomials of these degrees."""
+    """Return one cell between every two breaks of each parameter, for polynomials of these
+    degrees.
+    """
     units = [interpolation_points([d], [(0.0, 1.0)]) for d in degrees]
     maps = [
         np.linalg.inv([blossom([t] * d) for t in unit])
@@ -73,11 +75,11 @@ class Variable:
     along: slice
 
     def coefficients(self, x: Array) -> Array:
-        """Coefficients (k, a, b) of the functions at the solver's point x."""
+        """Return the coefficients (k, a, b) of the functions at the solver's point x."""
         return np.tensordot(x[self.columns], self.entries, axes=1)
 
     def at(self, x: Array, p: Array) -> Array:
-        """Values (K, a, b) at p (K, m)."""
+        """Return the values (K, a, b) at p (K, m)."""
         return self.unknown.at(self.coefficients(x), p)
 
 
@@ -94,7 +96,7 @@ class AffineProgram:
         self._sizes: list[int] = []
 
     def variable(self, entries: Array, basis: FunctionSpace) -> Variable:
-        """A matrix that is a sum of `entries` (e, a, b), each times functions of this basis."""
+        """Add a matrix that is a sum of `entries` (e, a, b), each times functions of this basis."""
         e = len(entries)
         columns = self.count + np.arange(basis.size * e).reshape(basis.size, e)
         here = slice(self.values, self.values + e)
@@ -105,26 +107,26 @@ class AffineProgram:
         return made
 
     def symmetric(self, n: int, basis: FunctionSpace) -> Variable:
-        """A symmetric matrix (n, n)."""
+        """Add a symmetric matrix (n, n)."""
         return self.variable(symmetric_basis(n), basis)
 
     def full(self, rows: int, columns: int, basis: FunctionSpace) -> Variable:
-        """A matrix (rows, columns) without structure."""
+        """Add a matrix (rows, columns) without structure."""
         return self.variable(np.eye(rows * columns).reshape(-1, rows, columns), basis)
 
     def known(self, M: Array) -> Array:
-        """A known matrix (..., a, b) as such an array."""
+        """Return a given matrix (..., a, b) in the format of the variables' values."""
         M = M if M.ndim > 2 else M[None]
         out = np.zeros((self.values, *M.shape))
         out[0] = M
         return out
 
     def value(self, variable: Variable) -> Array:
-        """The variable at p."""
+        """Return the variable at p."""
         return self._placed(variable.entries, variable.here)
 
     def slope(self, variable: Variable) -> Array:
-        """Its derivative along the motion of p that the inequality is imposed for."""
+        """Return its derivative along the motion of p for which the inequality is imposed."""
         moving = variable.along.stop - variable.along.start
         return self._placed(variable.entries[:moving], variable.along)
 
@@ -134,8 +136,8 @@ class AffineProgram:
         return out
 
     def positive(self, cell: BernsteinCell, F: Array, motion: Array | None = None) -> None:
-        """F(p) >= `MARGIN` on the cell, by its Bernstein coefficients, for the motion dp/dt (K, m)
-        at its nodes.
+        """Impose F(p) >= `MARGIN` on the cell, by its Bernstein coefficients, for the motion dp/dt
+        (K, m) at its nodes.
         """
         v = svec(symmetrized(np.broadcast_to(F, (len(F), len(cell.nodes), *F.shape[-2:]))))
         v[0] -= MARGIN * svec(np.eye(F.shape[-1]))
@@ -144,7 +146,7 @@ class AffineProgram:
             self._sizes.append(F.shape[-1])
 
     def zero(self, cell: BernsteinCell, F: Array) -> None:
-        """F(p) = 0 at the nodes of the cell."""
+        """Impose F(p) = 0 at the nodes of the cell."""
         v = np.broadcast_to(F, (len(F), len(cell.nodes), *F.shape[-2:]))
         v = v.reshape(*v.shape[:2], -1)
         for weights in np.eye(len(cell.nodes)):
@@ -153,7 +155,7 @@ class AffineProgram:
             self._zero.append((A[there], b[there]))
 
     def nonnegative(self, cell: BernsteinCell, F: Array) -> None:
-        """The number F >= 0, which is the same all over the cell."""
+        """Impose F >= 0 for a number F, which is the same all over the cell."""
         v = np.broadcast_to(F[..., 0], (len(F), len(cell.nodes), 1))
         self._positive.append(self._row(cell.to_bernstein[0], v, cell, None))
         self._sizes.append(1)
@@ -161,8 +163,8 @@ class AffineProgram:
     def _row(
         self, weights: Array, v: Array, cell: BernsteinCell, motion: Array | None
     ) -> tuple[sparse.csr_matrix, Array]:
-        """The sum of the values v (1 + e, K, L) at the nodes with these weights (K,): factors
-        (L, count) of x and the constant (L,).
+        """Return the sum of the values v (1 + e, K, L) at the nodes with these weights (K,):
+        factors (L, count) of x and the constant (L,).
         """
         out = np.zeros((v.shape[-1], self.count))
         for each in self.variables:
@@ -176,7 +178,7 @@ class AffineProgram:
         return sparse.csr_matrix(out), weights @ v[0]
 
     def minimise(self, cost: Array, solver: Solver) -> Candidate:
-        """The solver's candidate for the least cost' x."""
+        """Return the solver's candidate for the least cost' x."""
         rows = [*self._zero, *self._positive]
         A = sparse.csc_matrix(sparse.vstack([-A for A, _ in rows]))
         b = np.concatenate([b for _, b in rows])
@@ -185,7 +187,7 @@ class AffineProgram:
 
 
 def from_lower(rows: Sequence[Sequence[Array | None]]) -> Array:
-    """A symmetric block matrix of its lower triangle, None for a block of zeros."""
+    """Return the symmetric block matrix of its lower triangle, None for a block of zeros."""
     ends = np.cumsum([0, *(row[-1].shape[-1] for row in rows)])  # type: ignore[union-attr]
     at = [slice(a, b) for a, b in pairwise(ends)]
     there = [(i, j, M) for i, row in enumerate(rows) for j, M in enumerate(row) if M is not None]

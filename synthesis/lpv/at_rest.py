@@ -1,5 +1,5 @@
-"""Output feedback for parameters that stand still: the central H-infinity controllers of the frozen
-models as functions of p, where the inequalities of X and Y find nothing.
+"""Output feedback for constant parameters: the central H-infinity controllers of the frozen models
+as functions of p, for plants whose LMIs in X and Y have no solution.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from synthesis.certificate import Attempt
 from synthesis.lpv.fitted import Fitted
 from synthesis.lpv.recovery import Gains
 from synthesis.lpv.scaled_plant import ScaledPlant, scaled_plant_of
-from synthesis.lpv.search import closed, judged, simplest, with_knots
+from synthesis.lpv.search import check_points, closed, simplest, with_knots
 from synthesis.lpv.worst_optimum import FrozenOptimum
 from synthesis.lti.hinf import central_gains
 from synthesis.plant.generalized import Generalized
@@ -27,7 +27,7 @@ Array = np.ndarray
 
 
 class AtRest(NamedTuple):
-    """Gains as functions of p that keep `gamma` at every p at rest."""
+    """Gains as functions of p that keep `gamma` at every constant p."""
 
     scaled: ScaledPlant
     fit: Fitted
@@ -37,9 +37,9 @@ class AtRest(NamedTuple):
 def at_rest(
     plant: Plant, worst: FrozenOptimum, factors: Sequence[float], attempts: list[Attempt]
 ) -> Iterator[AtRest]:
-    """Of these multiples of the `worst` frozen optimum."""
+    """Yield such gains for these multiples of the `worst` frozen optimum."""
     scaled = scaled_plant_of(plant, worst.level)
-    points = judged(plant.parameters, worst.p)
+    points = check_points(plant.parameters, worst.p)
     for factor in tracked("central controllers of frozen models", factors):
         gains = partial(_central, scaled, factor)
         fit, outcome = None, "no functions of p keep it"
@@ -57,8 +57,8 @@ def at_rest(
 
 
 def _central(scaled: ScaledPlant, level: float, p: Array) -> Array:
-    """[A B; C D] (K, ..) of the models frozen at p (K, m); raises `LinAlgError` where one has none
-    of this level.
+    """Return [A B; C D] (K, ..) of the central controllers of the models frozen at p (K, m); raises
+    `LinAlgError` where one has none of this level.
     """
     out = []
     for each in zip(*scaled.at(p), strict=True):

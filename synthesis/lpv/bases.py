@@ -1,4 +1,4 @@
-"""The functions of p that X and Y are made of: what was asked for, or what may move with what."""
+"""The functions of p in X and Y: those that the user requested, or those that the rates permit."""
 
 from __future__ import annotations
 
@@ -11,18 +11,20 @@ from symheli.lpv import FunctionSpace, Scheduling
 from symheli.lpv.bases.polynomials import factors_of, polynomials
 
 Dependence = int | tuple[int, ...] | FunctionSpace
-"""Of X or Y on the parameters: a degree for all, one each, or the functions themselves."""
+"""Dependence of X or Y on the parameters: a degree for all, one each, or the functions themselves.
+"""
 DEGREES = {1: (2, 4, 6, 8), 2: (2, 4)}
-"""Of the one that moves, tried in turn while gamma falls (more parameters: 2)."""
+"""Degrees of the function that depends on p, tried in turn while gamma falls (more parameters: 2).
+"""
 
 
 def moves(parameters: Sequence[Scheduling]) -> bool:
-    """Whether any of them may change."""
+    """Whether any of the parameters may change."""
     return any(isinstance(s.rate, str) or s.rate > 0 for s in parameters)
 
 
 def used(basis: FunctionSpace) -> list[bool]:
-    """Which parameters the functions depend on."""
+    """Return for each parameter whether the functions depend on it."""
     return [factor.size > 1 for factor in factors_of(basis)]
 
 
@@ -44,33 +46,33 @@ class Bases:
         moving = [basis is not None and basis.size > 1 for basis in (self.X, self.Y)]
         return moving == [False, True]
 
-    def untold(self, parameters: Sequence[Scheduling]) -> list[str]:
-        """Parameters of a rate that is a number > 0 with which X and Y both move: a controller
-        would have to be told dp/dt.
+    def unmeasured_rates(self, parameters: Sequence[Scheduling]) -> list[str]:
+        """Names of the parameters with a finite rate > 0 on which X and Y both depend: the
+        controller would need dp/dt.
         """
         if self.X is None or self.Y is None:
             return []
         both = zip(parameters, used(self.X), used(self.Y), strict=True)
-        return [s.name for s, x, y in both if x and y and not _known(s)]
+        return [s.name for s, x, y in both if x and y and not _rate_known(s)]
 
     def __str__(self) -> str:
         said = [
-            f"{name} {_said(basis)}"
+            f"{name} {_described(basis)}"
             for name, basis in (("X", self.X), ("Y", self.Y))
             if basis is not None
         ]
         return ", ".join(said)
 
 
-def _said(basis: FunctionSpace) -> str:
+def _described(basis: FunctionSpace) -> str:
     if basis.size == 1:
         return "constant"
     return f"of degree {'x'.join(map(str, basis.degrees))}" if basis.degrees else f"in {basis.size}"
 
 
 def functions(given: Dependence, parameters: Sequence[Scheduling], name: str) -> FunctionSpace:
-    """The basis that was asked for; `InputError` for a degree below zero, a wrong number of them,
-    or functions of another range.
+    """Return the requested basis; `InputError` for a degree below zero, a wrong number of them, or
+    functions of another range.
     """
     box = [(s.low, s.high) for s in parameters]
     if isinstance(given, FunctionSpace):
@@ -88,7 +90,7 @@ def functions(given: Dependence, parameters: Sequence[Scheduling], name: str) ->
 
 
 def limited(basis: FunctionSpace, parameters: Sequence[Scheduling], name: str) -> FunctionSpace:
-    """The basis, checked: what may jump must not be in it."""
+    """Return the basis; raise `InputError` if it depends on a parameter that may jump."""
     for s, moves in zip(parameters, used(basis), strict=True):
         if moves and not isinstance(s.rate, str) and math.isinf(s.rate):
             raise InputError(
@@ -105,15 +107,15 @@ def candidates(
     matters: Sequence[bool],
     degree: int = DEGREES[1][0],
 ) -> list[Bases]:
-    """The pairs that are tried: what was asked for, else one of the two moving, of this degree,
-    then the other, with the parameters that the plant depends on.
+    """Return the pairs of bases to try: the requested ones, else first one of X and Y with this
+    degree in the parameters that the plant depends on, then the other.
 
-    Both may move with a parameter that stands still, and with one whose rate is another parameter:
-    then the controller knows how they move. Where both were asked for they may move with others too
-    (`Bases.untold`), of which dp/dt is then neglected. Raises `InputError` where that has no proof:
-    in discrete time, and beside a rate that is another parameter.
+    Both may depend on a constant parameter, and on one whose rate is another parameter: then the
+    controller knows dp/dt. If the user requests both they may also depend on others
+    (`Bases.unmeasured_rates`), whose dp/dt is then neglected. Raises `InputError` where that has no
+    proof: in discrete time, and beside a rate that is another parameter.
     """
-    free = [_known(s) for s in parameters]
+    free = [_rate_known(s) for s in parameters]
     jumps = [not isinstance(s.rate, str) and math.isinf(s.rate) for s in parameters]
     both = tuple(degree if f and m else 0 for f, m in zip(free, matters, strict=True))
     one = tuple(degree if m and not j else 0 for j, m in zip(jumps, matters, strict=True))
@@ -138,28 +140,28 @@ def candidates(
                     " next value; let Y depend on it"
                 )
         shape = Bases(*bases)
-        untold = shape.untold(parameters)
-        if untold and any(isinstance(s.rate, str) for s in parameters):
+        names = shape.unmeasured_rates(parameters)
+        if names and any(isinstance(s.rate, str) for s in parameters):
             raise InputError(
-                f"X and Y both depend on {', '.join(untold)}: the controller would need its rate,"
+                f"X and Y both depend on {', '.join(names)}: the controller would need its rate,"
                 " which can be neglected only where no rate is another parameter; let one of X and"
-                f" Y be of degree 0 in {', '.join(untold)}, or give numbers as rates,"
+                f" Y be of degree 0 in {', '.join(names)}, or give numbers as rates,"
                 " .with_rate(...)"
             )
         out.append(shape)
     return out
 
 
-def _known(s: Scheduling) -> bool:
-    """Whether a controller knows dp/dt."""
+def _rate_known(s: Scheduling) -> bool:
+    """Whether dp/dt is known to the controller."""
     return isinstance(s.rate, str) or s.rate == 0
 
 
 def both_moving(
     parameters: Sequence[Scheduling], matters: Sequence[bool], degree: int
 ) -> list[Bases]:
-    """X and Y of this degree in every parameter of a limited rate; nothing where none moves, or
-    one whose rate is another.
+    """Return X and Y of this degree in every parameter with a finite rate; nothing where no
+    parameter moves, or one is the rate of another.
     """
     rates = [s.rate for s in parameters if not isinstance(s.rate, str)]
     if len(rates) < len(parameters) or not any(0 < rate < math.inf for rate in rates):
@@ -179,8 +181,8 @@ def dependence(
     *,
     still: bool = False,
 ) -> FunctionSpace:
-    """Functions of X or Y where there is only one of them: by default of this degree in what the
-    plant depends on and may not jump; `still`: nor move.
+    """Return the functions of X or Y where there is only one of them: by default of this degree in
+    the parameters that the plant depends on and that may not jump; `still`: in constant ones only.
     """
     degrees = tuple(
         degree if m and (s.rate == 0 if still else s.rate != math.inf) else 0

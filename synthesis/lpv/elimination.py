@@ -37,7 +37,7 @@ class Half(NamedTuple):
 
 
 def observed(plant: Generalized) -> Half:
-    """That of X: no controller changes what no measurement tells."""
+    """Return the half of X: no controller can influence directions that no measurement shows."""
     A, B1, _, C1, C2, D11, _, D21, _ = plant
     K, n, nz = len(A), A.shape[-1], C1.shape[-2]
     inverse = _right_inverse(D21)
@@ -53,7 +53,7 @@ def observed(plant: Generalized) -> Half:
 
 
 def controlled(plant: Generalized) -> Half:
-    """That of Y: what no control changes; the same of the dual plant."""
+    """Return the half of Y: directions that no control reaches; the same of the dual plant."""
     return observed(plant.dual)
 
 
@@ -62,7 +62,9 @@ def _right_inverse(D: Array) -> Array:
 
 
 def _blind(D: Array, inverse: Array) -> Array:
-    """Disturbances (K, nw, nw - ny) that no measurement shows, as smooth in p as D is."""
+    """Return the disturbances (K, nw, nw - ny) that no measurement shows, as smooth in p as
+    D is.
+    """
     ny, nw = D.shape[-2:]
     middle = D[len(D) // 2]
     start = np.linalg.svd(middle)[2][ny:].T

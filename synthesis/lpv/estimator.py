@@ -25,8 +25,7 @@ from synthesis.lpv.scaled_plant import ScaledPlant, depends
 from synthesis.lpv.search import BACK_OFF, Gains, best, settled
 from synthesis.plant.plant import Plant, require_plant
 from synthesis.plant.refusals import failed, least_ranks, levels_above
-from synthesis.worst.rates import Rate
-from synthesis.worst.rates import asked as limits
+from synthesis.worst.rates import Rate, limits
 
 Array = np.ndarray
 
@@ -65,7 +64,7 @@ class Estimator:
     _repr_html_ = as_table
 
     def certify(self, rate: Any = None, **options: Any) -> Certificate:
-        """The proven gain of the error: `synthesis.l2_gain`."""
+        """Certify the gain of the error with `synthesis.l2_gain`."""
         from synthesis.analysis.questions import l2_gain
 
         return l2_gain(self.error, rate, **options)
@@ -165,13 +164,13 @@ def _recover(scaled: ScaledPlant, existence: Existence, found: Solution) -> Gain
 
 
 def _error(scaled: ScaledPlant, gains: Gains, p: Array) -> tuple[Array, ...]:
-    """Of the estimate."""
+    """Return the system from disturbances to the error of the estimate."""
     at, L = scaled.at(p), gains(p)
     return at.A - L @ at.C2, at.B1 - L @ at.D21, at.C1, at.D11
 
 
 def _observer(plant: Plant, c: ScaledPlant, fit: Fitted) -> tuple[LPVStateSpace, LPVStateSpace]:
-    """The observer and its error."""
+    """Return the observer and its error system."""
     rows, columns = c.right / math.sqrt(c.time), c.measurements
     basis, coefficients = fit.basis, rows @ fit.coefficients * columns
     at: Any = plant.functions()

@@ -1,10 +1,10 @@
-"""Whether there is a controller: the two halves of `elimination` and what couples them, as a
-program whose blocks are imposed at points of the range of p.
+"""Existence of a controller: the two inequalities of `elimination` and their coupling, as a program
+whose blocks are imposed at points of the range of p.
 
-The points are few at first; between them the blocks are looked at on a finer grid, and where one is
-violated a point is added. Nothing is proven by that, and nothing need be: the certificate of the
-closed loop proves. Blocks between points cost nothing in gamma, as the hull of their Bernstein
-coefficients would where an entry of B2 or C2 passes through zero.
+The points are few at first; between them the blocks are checked on a finer grid, and where one is
+violated a point is added. This proves nothing, and need not: the proof is the certificate of the
+closed loop. Points do not raise gamma, as the hull of Bernstein coefficients would where an entry
+of B2 or C2 passes through zero.
 """
 
 from __future__ import annotations
@@ -32,41 +32,46 @@ from synthesis.program.lyapunov_program import LyapunovBlocks, Sizes
 
 Array = np.ndarray
 
-LARGEST = (1e8, 1e10)
-"""X and Y are kept below this multiple of the identity, in scaled coordinates; the second where the
-first decides.
+MATRIX_BOUNDS = (1e8, 1e10)
+"""X and Y are kept below this multiple of the identity, in scaled coordinates; the second bound is
+used where the first is active.
 """
-NEAR = 0.1
-"""A bound decides where X or Y comes to more than this part of it."""
-WIDE = (1e2, 1e3, 1e4, 1e6, 1e8)
-"""The bounds once g is settled, tried in turn."""
-GROWS = 1.03
-"""A larger bound that separates X Y from I by less than this factor more is not worth it."""
-COARSE, FINE = 1e-3, 1e-5
-"""Tolerances of g while points are added and at the end, where p moves: points leave VIOLATED."""
-CENTRAL = 0.1
-"""Tolerance to which X and Y are separated once g is settled: near the middle of what is feasible,
-where gains change slowly with p; at the end of the search they turn steeply at the ends of a range.
+ACTIVE_FRACTION = 0.1
+"""A bound counts as active where the largest eigenvalue of X or Y exceeds this fraction of it."""
+SETTLED_BOUNDS = (1e2, 1e3, 1e4, 1e6, 1e8)
+"""Bounds on X and Y once gamma is fixed, tried in turn."""
+MIN_GROWTH = 1.03
+"""Least factor by which a larger bound must increase the separation of X Y from I to be preferred.
+"""
+COARSE_TOLERANCE, FINE_TOLERANCE = 1e-3, 1e-5
+"""Tolerances of g while points are added, and of the last program where p moves (points are
+checked to `MAX_VIOLATION`).
+"""
+SEPARATION_TOLERANCE = 0.1
+"""Tolerance to which X and Y are separated once g is fixed. Near the centre of the feasible set
+gains change slowly with p; near its boundary they change steeply at the ends of a range.
 """
 MARGIN = 1e-8
 """Blocks are kept below minus this multiple of the identity."""
-SETTLED = (1e-3, 1e-5, 1e-8)
-"""The same once g is settled, tried in turn: at a block that is singular gains have no bound."""
+SETTLED_MARGINS = (1e-3, 1e-5, 1e-8)
+"""The same once g is fixed, tried in turn: where a block is singular the gains are unbounded."""
 
-FINEST = 1000
-"""Parts that an interval of p may be divided into."""
-LEAST_POINTS = {1: 13, 2: 5}
-"""Of each parameter, at least (more parameters: 3)."""
-FINER = {1: 8, 2: 3}
-"""Points in which blocks are looked at for each at which they are imposed (more parameters: 2)."""
-ROUNDS = 8
-"""Most additions of points."""
-ADDED = 8
-"""Most points that are added at a time."""
-VIOLATED = 1e-4
-"""Excess of g, relative, with which a block between the points must be negative."""
+MAX_DIVISIONS = 1000
+"""Largest number of parts into which the range of a parameter may be divided."""
+MIN_POINTS = {1: 13, 2: 5}
+"""Least number of points of each parameter (more parameters: 3)."""
+CHECK_RATIO = {1: 8, 2: 3}
+"""Number of points at which blocks are checked for each point at which they are imposed (more
+parameters: 2).
+"""
+MAX_ROUNDS = 8
+"""Largest number of times that points are added."""
+MAX_ADDED = 8
+"""Largest number of points added at a time."""
+MAX_VIOLATION = 1e-4
+"""Relative increase of g with which a block must be negative between the points."""
 ROUNDING = 1e-8
-"""An eigenvalue up to this size is zero there, in scaled coordinates."""
+"""Eigenvalue up to which a block counts as negative there, in scaled coordinates."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,8 +87,8 @@ class ExistenceProgram:
 
 
 class Solution(NamedTuple):
-    """Coefficients of X, Y (and of the bound of Y at the next sample) with the g they admit, what
-    the solver said, whether it `reached` its tolerance, and where it may start again.
+    """Coefficients of X, Y (and of the bound of Y at the next sample) with the g they admit, the
+    solver's answer, whether it `reached` its tolerance, and a point to start again from.
     """
 
     gamma: float
@@ -104,7 +109,7 @@ class Existence:
         X: FunctionSpace | None,
         Y: FunctionSpace | None,
         divisions: int = 1,
-        largest: float = LARGEST[0],
+        largest: float = MATRIX_BOUNDS[0],
         p: Array | None = None,
     ):
         self.plant, self.largest = plant, largest
@@ -121,9 +126,9 @@ class Existence:
         self.points = first if p is None else np.unique(np.vstack([first, p]), axis=0)
 
     def _first(self, divisions: int) -> Array:
-        """Points (K, m) at which blocks are imposed at first."""
-        if not 1 <= whole(divisions, "divisions", 1) <= FINEST:
-            raise InputError(f"divisions: expected 1 to {FINEST}, got {divisions}")
+        """Return the points (K, m) at which blocks are imposed at first."""
+        if not 1 <= whole(divisions, "divisions", 1) <= MAX_DIVISIONS:
+            raise InputError(f"divisions: expected 1 to {MAX_DIVISIONS}, got {divisions}")
         breaks = [set(b) for b in self.plant.breaks]
         m = len(breaks)
         most = np.zeros(m, int)
@@ -139,22 +144,22 @@ class Existence:
                 a + (b - a) * np.arange(divisions) / divisions for a, b in pairwise(sorted(ends))
             ]
             knots = [*np.concatenate(parts), max(ends)]
-            least = LEAST_POINTS.get(m, 3)
+            least = MIN_POINTS.get(m, 3)
             count = max(-(-(least - 1) // (len(knots) - 1)), 2 * int(degree) + (m == 1))
             axes.append(piecewise_lobatto(knots, count))
         return tensor_grid(axes)
 
     def least_gamma(self, solver: Solver) -> Solution:
-        """Minimise g, with points added where a block is violated between them."""
+        """Minimise g, adding points where a block is violated between them."""
         if len(self.points) == 1:
             return self._least(solver)
         start = None
-        for _ in range(ROUNDS):
-            found = self._least(replace(solver, tolerance=COARSE), start)
+        for _ in range(MAX_ROUNDS):
+            found = self._least(replace(solver, tolerance=COARSE_TOLERANCE), start)
             start = found.early
             if not np.isfinite(found.gamma) or not self._added(found, found.gamma):
                 break
-        return self._least(replace(solver, tolerance=FINE), start)
+        return self._least(replace(solver, tolerance=FINE_TOLERANCE), start)
 
     def _least(self, solver: Solver, start: interior_point.Early | None = None) -> Solution:
         return self._least_within(self.largest, solver, start)
@@ -166,30 +171,33 @@ class Existence:
         return self._solved(blocks, 1.0, solver, start)
 
     def least_share(self, found: Solution, largest: float, solver: Solver) -> float:
-        """Below this part of the g that was found there is none within a larger bound on X and Y;
-        0 where the program does not tell. At the present points alone: more of them raise g.
+        """Return the fraction of the g found below which none exists within a larger bound on X and
+        Y; 0 where the program does not decide. It holds for the present points: more of them raise
+        g.
         """
-        within = self._least_within(largest, replace(solver, tolerance=COARSE), found.early)
-        return (1 - COARSE) * within.gamma / found.gamma if within.reached else 0.0
+        within = self._least_within(
+            largest, replace(solver, tolerance=COARSE_TOLERANCE), found.early
+        )
+        return (1 - COARSE_TOLERANCE) * within.gamma / found.gamma if within.reached else 0.0
 
     def bounded(self, found: Solution) -> bool:
-        """Whether the bound on X and Y decides."""
+        """Whether the bound on X and Y is active."""
         each = (u.at(found.coefficients, self.points) for u in (self.X, self.Y) if u is not None)
-        return any(np.linalg.eigvalsh(M).max() > NEAR * self.largest for M in each)
+        return any(np.linalg.eigvalsh(M).max() > ACTIVE_FRACTION * self.largest for M in each)
 
     def _added(self, found: Solution, gamma: float) -> bool:
-        """Whether a block is violated between the points at this g: then there are more of them,
-        where it is most, one in each cell of the present ones.
+        """Whether a block is violated between the points at this g: then points are added where it
+        is violated most, one in each cell of the present ones.
         """
         axes = [np.unique(x) for x in self.points.T]
-        finer = FINER.get(len(axes), 2)
+        finer = CHECK_RATIO.get(len(axes), 2)
         between = tensor_grid([piecewise_lobatto(x.tolist(), finer) for x in axes])
-        gamma = (1 + VIOLATED) * gamma
+        gamma = (1 + MAX_VIOLATION) * gamma
         worst = self._excess(between, found, gamma)
         allowed = max(ROUNDING, 2 * float(self._excess(self.points, found, gamma).max()))
         chosen: dict[tuple[int, ...], Array] = {}
         for k in np.argsort(-worst):
-            if worst[k] <= allowed or len(chosen) == ADDED:
+            if worst[k] <= allowed or len(chosen) == MAX_ADDED:
                 break
             cell = tuple(int(np.searchsorted(x, q)) for x, q in zip(axes, between[k], strict=True))
             chosen.setdefault(cell, between[k])
@@ -197,7 +205,7 @@ class Existence:
         return bool(chosen)
 
     def _excess(self, points: Array, found: Solution, gamma: float) -> Array:
-        """The largest eigenvalue (K,) of any half at each point."""
+        """Return the largest eigenvalue (K,) of any half at each point."""
         values = [
             np.linalg.eigvalsh(b.linear(found.coefficients) + b.constant)[:, -1]
             for b in self._halves_at(points, gamma, 0.0)
@@ -205,24 +213,26 @@ class Existence:
         return np.concatenate([v.reshape(-1, len(points)) for v in values]).max(axis=0)
 
     def widest(self, gamma: float, solver: Solver) -> Iterator[Solution]:
-        """For this g the X and Y whose product is farthest from one: first within the least bound
-        beyond which that hardly grows, then within larger ones.
+        """Return, for this g, the X and Y whose product is farthest from the identity: within the
+        least bound beyond which that hardly grows, then within larger ones.
         """
-        for margin in SETTLED:
+        for margin in SETTLED_MARGINS:
             before: Solution | None = None
-            for largest in WIDE:
-                found = self._widest(gamma, margin, largest, replace(solver, tolerance=CENTRAL))
+            for largest in SETTLED_BOUNDS:
+                found = self._widest(
+                    gamma, margin, largest, replace(solver, tolerance=SEPARATION_TOLERANCE)
+                )
                 if not np.any(found.coefficients):
                     continue
-                if before is not None and found.gamma < GROWS * before.gamma:
+                if before is not None and found.gamma < MIN_GROWTH * before.gamma:
                     yield before._replace(gamma=gamma)
                 before = found
             if before is not None:
                 yield before._replace(gamma=gamma)
 
     def _widest(self, gamma: float, margin: float, largest: float, solver: Solver) -> Solution:
-        """The same within this bound, with points added as for the least g."""
-        for _ in range(ROUNDS):
+        """Solve this within one bound, adding points as for the least g."""
+        for _ in range(MAX_ROUNDS):
             blocks = [*self._halves(gamma, margin), *self._coupling(True, largest)]
             found = self._solved(blocks, -1.0, solver)
             if not np.any(found.coefficients) or len(self.points) == 1:
@@ -254,7 +264,7 @@ class Existence:
         )
 
     def _halves(self, gamma: float | None, margin: float) -> list[LyapunovBlocks]:
-        """Those of every point, for this g or for one that is sought."""
+        """Return the halves at every point, for this g or for an unknown one."""
         return self._halves_at(self.points, gamma, margin)
 
     def _halves_at(self, p: Array, gamma: float | None, margin: float) -> list[LyapunovBlocks]:
@@ -299,13 +309,13 @@ class Existence:
         return [blocks.finished(constant + margin * np.eye(N), level)]
 
     def _motions(self, unknown: UnknownFunction, p: Array) -> list[Array]:
-        """Every extreme dp/dt (K, m) at these points, per scaled time."""
+        """Return every extreme dp/dt (K, m) at these points, per scaled time."""
         if not unknown.moves:
             return [np.zeros(p.shape)]
         return self.plant.motions(p, used(unknown.basis))
 
     def _next(self, p: Array, margin: float) -> list[LyapunovBlocks]:
-        """S(p) <= Y(p(k+1)) to first order in the step, at its ends."""
+        """Impose S(p) <= Y(p(k+1)) to first order in the step, at its ends."""
         assert self.S is not None  # noqa: S101 - see `_halves_at`
         assert self.Y is not None  # noqa: S101
         out, one = [], np.eye(self.states)
@@ -319,7 +329,8 @@ class Existence:
         return out
 
     def _coupling(self, apart: bool, largest: float) -> list[LyapunovBlocks]:
-        """[X I; I Y] > 0, with g in place of I where they are to be `apart`; both below a bound.
+        """Impose [X I; I Y] > 0, with g in place of I if they are to be `apart`, and an upper bound
+        on both.
 
         Without one of the two the other is positive, or apart from zero by g.
         """
@@ -347,5 +358,5 @@ class Existence:
 
 
 def _below(M: Array, n: int) -> Array:
-    """[0 0; 0 M] with n rows of nothing first."""
+    """Return [0 0; 0 M] with n rows of zeros first."""
     return np.pad(M, [(0, 0)] * (M.ndim - 2) + [(n, 0), (n, 0)])

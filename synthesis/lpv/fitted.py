@@ -1,4 +1,4 @@
-"""Gains known at some p as functions of p, and as a controller in the units of its plant."""
+"""Gains computed at some p as functions of p, and as a controller in the units of its plant."""
 
 from __future__ import annotations
 
@@ -19,18 +19,20 @@ if TYPE_CHECKING:
 Array = np.ndarray
 
 DEGREES = {1: (0, 1, 2, 3, 4, 5, 6, 8, 10), 2: (0, 1, 2, 3, 4, 5, 6, 8)}
-"""Of the polynomials that are tried in turn (more parameters: up to 4)."""
+"""Degrees of the polynomials tried in turn (more parameters: up to 4)."""
 SEGMENTS = (4, 8, 16, 32)
-"""Of the cubic splines of one parameter that are tried after them."""
-NEGLIGIBLE = 0.01
-"""Of the geometric mean of the largest entries of its row and column an entry matters from here."""
+"""Numbers of segments of the cubic splines of one parameter, tried after the polynomials."""
+NEGLIGIBLE_ENTRY = 0.01
+"""The misfit of an entry is relative to its size, but at least to this fraction of the geometric
+mean of the largest entries of its row and column.
+"""
 NODES = {1: 129, 2: 17}
 """Values of each parameter at which the gains are computed (more parameters: 7)."""
-MOST, SHORTEST = 256, 1e-6
-"""Segments of a spline that are not cut further; nor is one of this part of the range."""
-IN_EACH, AT_LAST = 9, 33
-"""Values of p in each of them at which it must serve, at every other one the gains are computed;
-and once it serves at these.
+MAX_SEGMENTS, MIN_SEGMENT = 256, 1e-6
+"""Largest number of segments of a spline, and its shortest segment as a fraction of the range."""
+CHECKS_PER_SEGMENT, FINAL_CHECKS = 9, 33
+"""Values of p in each segment at which a fit is checked (gains are computed at every other one),
+and once it passes there.
 """
 
 
@@ -38,7 +40,7 @@ class Fitted(NamedTuple):
     """Gains (r, c) as functions of p: sum_j f_j(p) coefficients[j].
 
     `misfit` is the largest error of an entry relative to that entry, one that is small in its row
-    and column relative to `NEGLIGIBLE` of those.
+    and column relative to `NEGLIGIBLE_ENTRY` of those.
     """
 
     basis: FunctionSpace
@@ -52,7 +54,7 @@ class Fitted(NamedTuple):
 
 
 def fits(gains: Callable[[Array], Array], parameters: Sequence[Scheduling]) -> Iterator[Fitted]:
-    """`gains` (K, r, c) at p (K, m) as polynomials of rising degree, then as splines."""
+    """Yield `gains` (K, r, c) at p (K, m) as polynomials of rising degree, then as splines."""
     m = len(parameters)
     box = [(s.low, s.high) for s in parameters]
     p = lobatto_points(NODES.get(m, 7), box)
@@ -66,14 +68,15 @@ def cut_to_serve(
     parameter: Scheduling,
     serves: Callable[[Fitted, Array], Array],
 ) -> Fitted | None:
-    """`gains` of one parameter as a cubic spline whose segments are halved where it does not serve
-    ((K,) at p (K, 1)); None where that takes more than `MOST` or ones too short.
+    """Return `gains` of one parameter as a cubic spline whose segments are halved where the check
+    `serves` fails ((K,) at p (K, 1)); None where that takes more than `MAX_SEGMENTS` or segments
+    too short.
     """
     known: dict[float, Array] = {}
     knots = np.linspace(parameter.low, parameter.high, SEGMENTS[0] + 1)
-    shortest = SHORTEST * (parameter.high - parameter.low)
-    while len(knots) <= MOST and np.diff(knots).min() > shortest:
-        p = np.unique(piecewise_lobatto(knots.tolist(), IN_EACH))
+    shortest = MIN_SEGMENT * (parameter.high - parameter.low)
+    while len(knots) <= MAX_SEGMENTS and np.diff(knots).min() > shortest:
+        p = np.unique(piecewise_lobatto(knots.tolist(), CHECKS_PER_SEGMENT))
         nodes = p[::2]
         new = np.array([q for q in nodes if q not in known])
         if len(new):
@@ -81,7 +84,7 @@ def cut_to_serve(
         fit = _fit(BSpline(3, tuple(knots)), nodes, np.array([known[q] for q in nodes]))
         bad = p[~serves(fit, p[:, None])]
         if not len(bad):
-            p = np.unique(piecewise_lobatto(knots.tolist(), AT_LAST))
+            p = np.unique(piecewise_lobatto(knots.tolist(), FINAL_CHECKS))
             bad = p[~serves(fit, p[:, None])]
         if not len(bad):
             return fit
@@ -91,10 +94,10 @@ def cut_to_serve(
 
 
 def _fit(basis: FunctionSpace, p: Array, values: Array) -> Fitted:
-    """To these values (K, r, c)."""
+    """Return the functions of this basis nearest to these values (K, r, c)."""
     size = np.abs(values).max(axis=0)
     rows, columns = (size.max(axis=k, keepdims=True, initial=0.0) for k in (1, 0))
-    size = np.maximum(size, NEGLIGIBLE * np.sqrt(rows * columns))
+    size = np.maximum(size, NEGLIGIBLE_ENTRY * np.sqrt(rows * columns))
     size[size == 0] = 1.0
     coefficients = basis.fit(p, values)
     off = np.abs(np.tensordot(basis(p), coefficients, axes=1) - values)
@@ -113,7 +116,7 @@ def _bases(box: Sequence[tuple[float, float]]) -> Iterator[FunctionSpace]:
 def fitted(
     gains: Callable[[Array], Array], parameters: Sequence[Scheduling], accuracy: float
 ) -> Fitted:
-    """The first of the `fits` that is within `accuracy` of every gain, or the nearest of all."""
+    """Return the first of the `fits` within `accuracy` of every gain, or the nearest of all."""
     best: Fitted | None = None
     for fit in fits(gains, parameters):
         best = fit if best is None or fit.misfit < best.misfit else best
@@ -126,7 +129,9 @@ def fitted(
 def in_plant_units(
     plant: Plant, c: ScaledPlant, fit: Fitted, gamma: float, method: str
 ) -> Controller:
-    """The controller in the units of the plant, of gains in the scaled ones as functions of p."""
+    """Return the controller in the units of the plant, for gains in scaled ones as
+    functions of p.
+    """
     basis, M, misfit = fit
     ny = len(plant.measurements)
     n = M.shape[-1] - ny

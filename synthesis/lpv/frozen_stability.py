@@ -1,4 +1,4 @@
-"""Whether a loop is stable frozen at every p of its range, between points of a grid as well."""
+"""Stability of a loop frozen at every p of its range, between points of a grid as well."""
 
 from __future__ import annotations
 
@@ -14,17 +14,19 @@ from synthesis.polynomial.pieces import pieces
 
 Array = np.ndarray
 
-CELLS = 500
-"""Most Lyapunov equations that are solved; then stability between points is not shown."""
-HALVED = 16
-"""Most boxes for which one solution serves."""
-PART = 0.5
-"""Of the decay rate of the slowest mode that P keeps."""
+MAX_CELLS = 500
+"""Largest number of Lyapunov equations that are solved; beyond it stability between points is left
+undecided.
+"""
+MAX_BOXES = 16
+"""Largest number of boxes on which one Lyapunov matrix is checked."""
+DECAY_FRACTION = 0.5
+"""Fraction of the decay rate of the slowest mode for which the Lyapunov equation is solved."""
 
 
 class FrozenStability(NamedTuple):
-    """Whether a loop is `stable` frozen at every p, None where neither was shown; `p` (m,) is then,
-    or where it is not, the place.
+    """Whether a loop is `stable` frozen at every p, None if undecided; `p` (m,) is then, or for an
+    unstable loop, the place.
     """
 
     stable: bool | None
@@ -32,14 +34,14 @@ class FrozenStability(NamedTuple):
 
 
 def frozen_stability(loop: LPVStateSpace) -> FrozenStability:
-    """Stability of the loop frozen at each p of its range.
+    """Decide stability of the loop frozen at each p of its range.
 
     For every cell P solves a Lyapunov equation of its middle; where P does not serve the whole
     cell, by the Bernstein coefficients of A'P + PA, the cell is halved. With p at rest P may differ
     from cell to cell.
     """
     waiting = [models[0] for models in pieces(loop).models.values()]
-    for _ in range(CELLS):
+    for _ in range(MAX_CELLS):
         if not waiting:
             return FrozenStability(True)
         A = waiting.pop()
@@ -47,14 +49,14 @@ def frozen_stability(loop: LPVStateSpace) -> FrozenStability:
         root = _lyapunov(A(middle), loop.dt)
         if root is None:
             return FrozenStability(False, middle)
-        if not negative_definite(_decrease(A, root, loop.dt), cells=HALVED):
+        if not negative_definite(_decrease(A, root, loop.dt), cells=MAX_BOXES):
             waiting += A.split(int(np.argmax(_variation(A))))
     return FrozenStability(None, middle)
 
 
 def _lyapunov(A: Array, dt: float | None) -> Array | None:
-    """The square root of P > 0, for which all states decay at a part of the rate of the slowest
-    mode; None where A is not stable.
+    """Return the square root of a P > 0 for which all states decay at a fraction of the rate of the
+    slowest mode; None where A is not stable.
     """
     with np.errstate(invalid="ignore"):  # of the permutation, which is not used
         _, (units, _) = linalg.matrix_balance(A, permute=False, separate=True)
@@ -65,12 +67,12 @@ def _lyapunov(A: Array, dt: float | None) -> Array | None:
         slowest = -float(poles.real.max(initial=-1.0))
         if slowest <= 0:
             return None
-        P = linalg.solve_continuous_lyapunov((balanced + PART * slowest * one).T, -one)
+        P = linalg.solve_continuous_lyapunov((balanced + DECAY_FRACTION * slowest * one).T, -one)
     else:
         largest = float(np.abs(poles).max(initial=0.0))
         if largest >= 1:
             return None
-        P = linalg.solve_discrete_lyapunov((balanced / max(largest, 0.01) ** PART).T, one)
+        P = linalg.solve_discrete_lyapunov((balanced / max(largest, 0.01) ** DECAY_FRACTION).T, one)
     try:
         return np.linalg.cholesky(0.5 * (P + P.T)).T / units
     except np.linalg.LinAlgError:
@@ -78,7 +80,7 @@ def _lyapunov(A: Array, dt: float | None) -> Array | None:
 
 
 def _decrease(A: PolynomialMatrix, root: Array, dt: float | None) -> PolynomialMatrix:
-    """A'P + PA, or [-P A'P; PA -P], in the coordinates in which P is the identity."""
+    """Return A'P + PA, or [-P A'P; PA -P], in the coordinates in which P is the identity."""
     own = root @ A.coefficients @ np.linalg.inv(root)
     turned = np.swapaxes(own, -1, -2)
     if dt is None:
@@ -88,7 +90,7 @@ def _decrease(A: PolynomialMatrix, root: Array, dt: float | None) -> PolynomialM
 
 
 def _variation(A: PolynomialMatrix) -> list[float]:
-    """Of the coefficients along each axis."""
+    """Return the variation of the coefficients along each axis."""
     return [
         float(np.abs(np.diff(A.coefficients, axis=i)).max(initial=0.0)) for i in range(len(A.box))
     ]

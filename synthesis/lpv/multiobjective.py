@@ -30,20 +30,21 @@ from synthesis.plant.generalized import Generalized, blocks
 from synthesis.plant.plant import Plant, require_plant
 from synthesis.plant.refusals import failed, levels_above, require_channels
 from synthesis.program.cone_program import Answer, Solver, general_solver
-from synthesis.worst.rates import Rate
-from synthesis.worst.rates import asked as limits
+from synthesis.worst.rates import Rate, limits
 
 Array = np.ndarray
 
 BACK_OFF = 1.02
-"""Every bound is loosened by this factor before X and Y are settled."""
-NEAR = 3.0
-"""Gains so many times larger or smaller than the units of the program ask for other units."""
-ROUNDS = 3
-"""Most changes of units."""
-LARGEST, WIDE = 1e5, 1e3
-"""X and Y are kept below this multiple of the identity, in scaled coordinates; the second once the
-gains are settled.
+"""Factor by which every bound is relaxed before X and Y are fixed."""
+UNIT_RATIO = 3.0
+"""Ratio of a gain to its unit in the program beyond which the program is solved again in other
+units.
+"""
+MAX_UNIT_CHANGES = 3
+"""Largest number of changes of units."""
+MATRIX_BOUND, SETTLED_BOUND = 1e5, 1e3
+"""X and Y are kept below this multiple of the identity, in scaled coordinates: while gains are
+minimised, and once they are fixed.
 """
 ONE = np.eye(1)
 
@@ -158,8 +159,8 @@ class _Loop(NamedTuple):
 
 
 class _Unknowns(NamedTuple):
-    """The variables: X, Y, those of the controller, and one for each gain squared or, where these
-    are given, for how far X Y is from I.
+    """The variables: X, Y, those of the controller, and each squared gain or, where gains are
+    given, the separation of X Y from I.
     """
 
     X: Variable
@@ -210,24 +211,28 @@ class _Problem:
 
     @property
     def units(self) -> list[float]:
-        """Of every gain of the plant: so much is 1 in the program."""
+        """Units of all gains of the plant in the program."""
         return [pace / size for pace, size in zip(self.pace, self.sizes, strict=True)]
 
     def best(self, solver: Solver, attempts: list[Attempt]) -> list[float] | None:
-        """`least`, again in units of the gains found while these are far from the first."""
+        """Minimise the gains, again in units of the gains found while these are far from
+        the first.
+        """
         values = self.least(solver, attempts)
-        for _ in range(ROUNDS):
+        for _ in range(MAX_UNIT_CHANGES):
             if values is None:
                 break
             sizes = [max(v * pace, 1e-9) for v, pace in zip(values, self.pace, strict=True)]
-            if all(1 / NEAR < a / b < NEAR for a, b in zip(sizes, self.sizes, strict=True)):
+            if all(
+                1 / UNIT_RATIO < a / b < UNIT_RATIO for a, b in zip(sizes, self.sizes, strict=True)
+            ):
                 break
             self.sizes = sizes
             values = self.least(solver, attempts) or values
         return values
 
     def least(self, solver: Solver, attempts: list[Attempt]) -> list[float] | None:
-        """Gains that minimise the sum; None where there are none."""
+        """Return the gains that minimise the sum; None where there are none."""
         program, unknowns = self._program(None)
         cost, cell = np.zeros(program.count), self.cells[0]
         squares = [int(v.columns.item()) for v in unknowns.scalars]
@@ -250,7 +255,9 @@ class _Problem:
     def settled(
         self, values: Sequence[float], solver: Solver, attempts: list[Attempt]
     ) -> Callable[[Array], Array] | None:
-        """For these gains the X and Y whose product stays farthest from one: their gains at p."""
+        """Return, for these gains, the X and Y whose product is farthest from the identity: their
+        controller gains at p.
+        """
         program, unknowns = self._program(
             [(v * unit) ** 2 for v, unit in zip(values, self.units, strict=True)]
         )
@@ -273,7 +280,9 @@ class _Problem:
         return gains
 
     def _program(self, squares: Sequence[float] | None) -> tuple[AffineProgram, _Unknowns]:
-        """The inequalities of unknown gains, or of these, squared and in units of the program."""
+        """Return the inequalities for unknown gains, or for these, squared and in units of the
+        program.
+        """
         program = AffineProgram()
         plant = self.scaled.at(self.cells[0].nodes)
         n, nu, ny = plant.A.shape[-1], plant.B2.shape[-1], plant.C2.shape[-2]
@@ -293,10 +302,10 @@ class _Problem:
         ]
         each = [program.value(v) for v in unknowns.scalars]
         if squares is None:
-            bounds, apart, widest = each, program.known(ONE), LARGEST
+            bounds, apart, widest = each, program.known(ONE), MATRIX_BOUND
         else:
             bounds = [program.known(s * ONE) for s in squares]
-            (apart,), widest = each, WIDE
+            (apart,), widest = each, SETTLED_BOUND
         X, Y = program.value(unknowns.X), program.value(unknowns.Y)
         one = np.eye(n)
         for cell in self.cells:
@@ -331,7 +340,7 @@ class _Problem:
         unknowns: _Unknowns,
         top: Array,
     ) -> None:
-        """Its inequalities: of the gain, or of the variance and of what is seen of it."""
+        """Impose the inequalities of an objective: of a gain, or of a variance and its outputs."""
         one = program.known(np.eye(loop.B.shape[-1]))
         sampled = self.scaled.dt is not None
         gain = isinstance(o, L2)
@@ -368,7 +377,7 @@ class _Problem:
 
 
 def _region(region: PoleRegion, loop: _Loop) -> Iterator[Array]:
-    """The inequalities of a region (Chilali and Gahinet 1996)."""
+    """Yield the inequalities of a pole region (Chilali and Gahinet 1996)."""
     A, P = loop.A, loop.P
     if region.decay > 0:
         yield A + _t(A) + 2 * region.decay * P

@@ -1,4 +1,4 @@
-"""What a closed loop is asked to be: gains of some of its channels, and where its poles lie."""
+"""Objectives of a closed loop: gains of some of its channels, and a region for its poles."""
 
 from __future__ import annotations
 

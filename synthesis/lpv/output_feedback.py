@@ -15,7 +15,7 @@ from synthesis.certificate import Attempt
 from synthesis.loops.controller import Controller
 from synthesis.lpv.at_rest import at_rest
 from synthesis.lpv.bases import DEGREES, Bases, Dependence, both_moving, candidates, used
-from synthesis.lpv.existence import LARGEST, Existence, Solution
+from synthesis.lpv.existence import MATRIX_BOUNDS, Existence, Solution
 from synthesis.lpv.fitted import in_plant_units
 from synthesis.lpv.frozen_stability import frozen_stability
 from synthesis.lpv.recovery import controller, sampled_controller, split
@@ -23,10 +23,10 @@ from synthesis.lpv.robust import robust_plant
 from synthesis.lpv.scaled_plant import ScaledPlant, depends
 from synthesis.lpv.search import (
     BACK_OFF,
-    CHECKED,
-    CLOSE,
+    CHECK_POINTS,
+    CLOSE_TO_OPTIMUM,
     FAR_ABOVE,
-    WORTH,
+    MIN_IMPROVEMENT,
     Design,
     Start,
     best,
@@ -37,8 +37,7 @@ from synthesis.lpv.worst_optimum import FrozenOptimum, worst_optimum
 from synthesis.plant.plant import Plant, require_plant
 from synthesis.plant.refusals import NOTHING_WRONG, failed, least_ranks, levels_above
 from synthesis.program.cone_program import LYAPUNOV, Solver
-from synthesis.worst.rates import Rate
-from synthesis.worst.rates import asked as limits
+from synthesis.worst.rates import Rate, limits
 
 Array = np.ndarray
 
@@ -65,14 +64,14 @@ def output_feedback(
     """Design a dynamic controller from the measurements, of the order of the plant, for every p(t)
     within its range and rates.
 
-    X(p) belongs to what the measurements tell, Y(p) to what the controls can do. While only one of
-    them moves with a parameter the controller needs no rate of it; both pairs are tried. Both may
-    move with a parameter whose rate is another one (`plant.lagged`), or that stands still. Where
-    one of them moving does not come near the worst frozen optimum both do, and the controller is
-    not told dp/dt: `gamma` is then what the storage function of X and Y proves of that, and is
-    taken where it is at most 1.05 times what a controller could have that is told. Where parameters
-    stand still and the inequalities find nothing near that optimum, the gains are those of the
-    central H-infinity controllers of the frozen models.
+    X(p) is the matrix of the estimation inequality, Y(p) that of the control inequality. If only
+    one of them depends on a parameter, the controller does not need its rate; both pairs are tried.
+    Both may depend on a parameter whose rate is another one (`plant.lagged`), or that is constant.
+    If one of them does not come near the worst frozen optimum, both depend on p and the controller
+    neglects dp/dt: `gamma` is then proven with the storage function of X and Y for that controller,
+    and is accepted if it is at most 1.05 times the gamma with dp/dt measured. If parameters are
+    constant and the inequalities find nothing near that optimum, the gains are those of the central
+    H-infinity controllers of the frozen models.
 
     Parameters
     ----------
@@ -85,7 +84,7 @@ def output_feedback(
         Degree in every parameter, one each, or functions; by default one of the two moves, with a
         degree that rises from 2 while that lowers gamma and gamma is above the worst optimum of the
         frozen models, which no controller can beat. Where both are given and move with a parameter
-        of a bounded rate, the controller is not told dp/dt, as above.
+        of a bounded rate, the controller neglects dp/dt, as above.
     back_off : float or sequence
         Multiples of the least gamma at which X and Y are settled, tried in turn until the gains are
         smooth functions of p: at the least itself a controller has poles without limit.
@@ -198,7 +197,7 @@ def _robust(
     divisions: int,
     attempts: list[Attempt],
 ) -> Controller:
-    """For all models of the set, by the one of the shapes that serves the nominal one best."""
+    """Design for all models of the set, with the shape that is best for the nominal one."""
     starts = [least(plant, shape, divisions, USUAL, attempts) for shape in every]
     start = min(starts, key=lambda each: each.gamma)
     found = robust_plant(
@@ -223,7 +222,9 @@ def _nominal(
     *,
     free: bool = False,
 ) -> Controller:
-    """For one model, by the best of the shapes; those are `free` where none was asked for."""
+    """Design for one model, with the best of the shapes; they are `free` where the user requested
+    none.
+    """
     worst = worst_optimum(plant)
     if worst.level == 0 and (refusal := failed(plant, attempts)).reasons != (NOTHING_WRONG,):
         raise refusal  # no frozen model has a controller, and it is known why
@@ -241,7 +242,7 @@ def _nominal(
         if _fastest(found) <= fastest:
             break
     if slowest is None:
-        raise failed(plant, attempts, _both_asked(start.shape.untold(plant.parameters)))
+        raise failed(plant, attempts, _advice(start.shape.unmeasured_rates(plant.parameters)))
     return replace(slowest, attempts=tuple(attempts))
 
 
@@ -256,9 +257,10 @@ def _controllers(
     *,
     free: bool,
 ) -> Iterator[tuple[Controller, tuple[str, ...]]]:
-    """Those of the inequalities with what kept them from a lower gamma; where every parameter
-    stands still and X and Y are `free`, the central ones of the frozen models before those that are
-    far from it. Where X or Y moving stays above what no controller can beat, both move first.
+    """Yield controllers from the inequalities, with the reasons against a lower gamma. If every
+    parameter is constant and X and Y are `free`, central controllers of the frozen models precede
+    those far from the least gamma; if X or Y alone stays above the bound for every controller, both
+    depend on p first.
     """
     floor = worst.level
     still = free and floor > 0 and all(s.rate == 0 for s in plant.parameters)
@@ -269,38 +271,40 @@ def _controllers(
             yield replace(made, optimum=floor), ()
 
     def other() -> Start | None:
-        if start.gamma <= CLOSE * floor or not both(DEGREES[1][0]):
+        if start.gamma <= CLOSE_TO_OPTIMUM * floor or not both(DEGREES[1][0]):
             return None
         found = best(plant, both, divisions, USUAL, attempts, worst)
-        return found if found.gamma < WORTH * start.gamma else None
+        return found if found.gamma < MIN_IMPROVEMENT * start.gamma else None
 
     for own, design in _designs(plant, start, other(), factors, attempts):
         if still and design.gamma > _far(min(factors)) * floor:
             yield from central()
             still = False
-        told = ", their rates neglected" if own.shape.untold(plant.parameters) else ""
+        told = ", their rates neglected" if own.shape.unmeasured_rates(plant.parameters) else ""
         method = f"output feedback, {own.shape}{told}"
         made = in_plant_units(plant, design.scaled, design.fit, design.gamma, method)
         made = replace(made, optimum=own.gamma, by_adjoint=own.shape.by_y)
-        decides = own.existence.bounded(own.found) and own.existence.largest >= LARGEST[-1]
+        decides = own.existence.bounded(own.found) and own.existence.largest >= MATRIX_BOUNDS[-1]
         yield made, (BOUND_DECIDES.format(own.existence.largest),) if decides else ()
     if still:
         yield from central()
 
 
 def _far(asked: float) -> float:
-    """A gamma so many times the least one is far from it, where the least back-off is `asked`."""
+    """Return the ratio to the least gamma above which a design counts as far from it, where the
+    least requested back-off is `asked`.
+    """
     return FAR_ABOVE * max(1.0, asked / BACK_OFF[0])
 
 
-def _both_asked(untold: Sequence[str]) -> tuple[str, ...]:
-    """What to write instead of X and Y that both move with these."""
-    if not untold:
+def _advice(names: Sequence[str]) -> tuple[str, ...]:
+    """Return the advice where X and Y both depend on these parameters."""
+    if not names:
         return ()
     return (
-        f"X and Y both depend on {', '.join(untold)}, and a controller that is not told its rate"
-        " keeps no gamma near theirs: let X or Y be of degree 0 in it, as X=0, or give the plant a"
-        " lagged parameter, plant.lagged(...)",
+        f"X and Y both depend on {', '.join(names)}, and a controller without a measurement of its"
+        " rate keeps no gamma near theirs: let X or Y be of degree 0 in it, as X=0, or give a"
+        " lagged parameter to the plant, plant.lagged(...)",
     )
 
 
@@ -311,16 +315,16 @@ def _designs(
     factors: Sequence[float],
     attempts: list[Attempt],
 ) -> Iterator[tuple[Start, Design]]:
-    """First of the `other`, where X and Y both move and the controller is not told how fast, which
-    serves where parameters move slowly; as far as it is backed off, its gamma is still lower.
+    """Yield designs of `other` first, where X and Y both depend on p and dp/dt is not measured,
+    which suits slow parameters; only with back-offs whose gamma is still lower.
     """
     first: list[float] = []
     if other is not None:
         first = [f for f in factors if f * other.gamma < min(factors) * start.gamma]
         for design in settled(other, first, _recover, USUAL, attempts, neglecting=True):
             yield other, design
-    untold = bool(start.shape.untold(plant.parameters))  # asked for by hand
-    for design in settled(start, factors, _recover, USUAL, attempts, neglecting=untold):
+    neglected = bool(start.shape.unmeasured_rates(plant.parameters))  # requested by the user
+    for design in settled(start, factors, _recover, USUAL, attempts, neglecting=neglected):
         yield start, design
     if other is not None:
         rest = [f for f in factors if f not in first]
@@ -329,7 +333,9 @@ def _designs(
 
 
 def _limited(made: Controller, asked: float, fastest: float) -> tuple[str, ...]:
-    """What may have kept the controller from a lower gamma, or from its limits, a sentence each."""
+    """Return what may have kept the controller from a lower gamma, or from its limits, a sentence
+    each.
+    """
     out = []
     if made.optimum and made.promised > _far(asked) * made.optimum:
         out.append(
@@ -375,10 +381,12 @@ def _recover(
 
 
 def _fastest(made: Controller) -> float:
-    """The largest modulus of a pole, rad/s, of a continuous controller; 0 of another."""
+    """Return the largest modulus of a pole, rad/s, of a continuous controller; 0 for a
+    sampled one.
+    """
     model = made.model
     if model.dt is not None:
         return 0.0
-    p = lobatto_points(CHECKED.get(len(model.parameters), 3), model.box)
+    p = lobatto_points(CHECK_POINTS.get(len(model.parameters), 3), model.box)
     A = model.matrices(p).A
     return float(np.abs(np.linalg.eigvals(A)).max(initial=0.0))

@@ -18,8 +18,8 @@ from synthesis.plant.plant import Plant
 def hinf_schedule(
     plant: Plant, points: Sequence[float] | Array, back_off: float = 1.01
 ) -> Controller:
-    """H-infinity designs at values of the one parameter of a plant, their entries interpolated
-    linearly in between, which is meaningful because the states of each design estimate those of the
+    """Design H-infinity controllers at values of the one parameter of a plant and interpolate their
+    entries linearly. This is meaningful because the states of each design estimate those of the
     plant in the same coordinates.
 
     `back_off` is the factor by which each design may exceed the least norm, as in `hinf`;

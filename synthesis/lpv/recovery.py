@@ -1,4 +1,4 @@
-"""The controller that X and Y promise, at given p.
+"""Recovery of the controller from X and Y, at given p.
 
 In the variables A~, B~, C~ of Scherer, Gahinet and Chilali (1997) the inequality of the closed loop
 splits into that of Y and that of X once its corner is made zero. C~ minimises the one and B~ the
@@ -10,14 +10,14 @@ other, whatever dY/dt or dX/dt is, so that the gains know p alone (Gahinet 1996;
 
 The state of the controller is an estimate of the plant's, in whose coordinates its matrices stay
 of the size of the plant's even where X or Y tend to infinity, as X does where the measurements
-tell the disturbance: N = -X with M' = Y - X^-1, or M' = Y with N = Y^-1 - X. The last two terms
-cancel in the first case if X is constant, in the second if Y is.
+determine the disturbance: N = -X with M' = Y - X^-1, or M' = Y with N = Y^-1 - X. The last two
+terms cancel in the first case if X is constant, in the second if Y is.
 
 In discrete time the state of the controller is an estimate of the plant's, too: in the coordinates
 (x - x_k, x_k) the storage function is that of X and of W^-1, W = Y - X^-1. Where these are
 identities, with S <= Y(p(k+1)) in place of Y after the step, and gains in units of gamma, the
-inequality of the closed loop says that [A B; C D] of the loop, which is known but for left K right,
-is a contraction.
+inequality of the closed loop states that [A B; C D] of the loop, known except for left K right, is
+a contraction.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from synthesis.plant.generalized import Generalized
 
 Array = np.ndarray
 ROUNDING = 1e-6
-"""By this part a level is kept above the least one, at which the formula has no digits."""
+"""Least relative margin of a level above the smallest one, at which the formula is singular."""
 
 
 class Gains(NamedTuple):
@@ -59,7 +59,7 @@ class Transformed(NamedTuple):
 
 
 def split(plant: Generalized, X: Array, Y: Array, gamma: float) -> Transformed:
-    """Of the inequality in continuous time."""
+    """Return the transformed controller that solves the inequality in continuous time."""
     A, B1, B2, C1, C2, D11, D12, D21, _ = plant
     D = direct(D11, D12, D21, gamma)
     Dcl = D11 + D12 @ D @ D21
@@ -74,7 +74,7 @@ def split(plant: Generalized, X: Array, Y: Array, gamma: float) -> Transformed:
 
 
 def control_gain(plant: Generalized, Y: Array, D: Array, gamma: float) -> Array:
-    """C~ (K, nu, n) that makes the inequality of Y as negative as it can be."""
+    """Return C~ (K, nu, n) that makes the inequality of Y as negative as possible."""
     _, B1, B2, C1, _, D11, D12, D21, _ = plant
     Dcl = D11 + D12 @ D @ D21
     nu, nz, nw = B2.shape[-1], C1.shape[-2], B1.shape[-1]
@@ -92,7 +92,7 @@ def control_gain(plant: Generalized, Y: Array, D: Array, gamma: float) -> Array:
 
 
 def direct(D11: Array, D12: Array, D21: Array, gamma: float) -> Array:
-    """D (K, nu, ny) with |D11 + D12 D D21| < gamma; zero where that is enough."""
+    """Return D (K, nu, ny) with |D11 + D12 D D21| < gamma; zero where that suffices."""
     nothing = np.zeros((len(D11), D12.shape[-1], D21.shape[-2]))
     if float(np.linalg.norm(D11, 2, axis=(1, 2)).max()) < 0.9 * gamma:
         return nothing
@@ -108,7 +108,8 @@ def controller(
     constant_x: bool,
     moving_x: Array | None = None,
 ) -> Gains:
-    """Its matrices, by N = -X where X is `constant_x`, else by M' = Y; with D22 in the loop.
+    """Return the controller's matrices, by N = -X where X is `constant_x`, else by M' = Y; with D22
+    in the loop.
 
     With the first X may also move, if `moving_x` (K, n, n), dX/dt, is known.
     """
@@ -128,7 +129,7 @@ def controller(
 
 
 def sampled_controller(plant: Generalized, X: Array, Y: Array, S: Array, gamma: float) -> Gains:
-    """The controller of the whole inequality, in discrete time."""
+    """Return the controller from the complete inequality, in discrete time."""
     A, B1, B2, C1, C2, D11, D12, D21, D22 = plant
     K, n = len(A), A.shape[-1]
     inverse = np.linalg.inv(X)
@@ -153,7 +154,7 @@ def sampled_controller(plant: Generalized, X: Array, Y: Array, S: Array, gamma: 
 
 
 def state_gain(plant: Generalized, Y: Array, S: Array, gamma: float) -> Array:
-    """F (K, nu, n) of u = F x, in discrete time."""
+    """Return F (K, nu, n) of u = F x, in discrete time."""
     A, B1, B2, C1, _, D11, D12, *_ = plant
     now, ahead = np.linalg.cholesky(Y), np.linalg.inv(np.linalg.cholesky(S))
     blind = np.zeros((len(A), A.shape[-1], B1.shape[-1]))
@@ -171,8 +172,8 @@ def _central(
     right_w: Array,
     gamma: float,
 ) -> Array:
-    """K of the loop A + left K right, B + left K right_w, C + left_z K right, D + left_z K right_w,
-    the storage before and after the step the identity.
+    """Return K for the loop A + left K right, B + left K right_w, C + left_z K right, D + left_z K
+    right_w, with the identity as storage before and after the step.
     """
     root = np.sqrt(gamma)
     return contraction(
@@ -184,8 +185,8 @@ def _central(
 
 
 def contraction(M: Array, left: Array, right: Array, level: float) -> Array:
-    """K (N, k, l) with |M + left K right| <= level, or nearly the least that can be, if that is
-    more; `left` (N, r, k) of full column, `right` (N, l, c) of full row rank.
+    """Return K (N, k, l) with |M + left K right| <= level, or nearly the least possible norm, if
+    that is larger; `left` (N, r, k) of full column rank, `right` (N, l, c) of full row rank.
 
     References
     ----------

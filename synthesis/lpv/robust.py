@@ -14,15 +14,15 @@ from symheli.lpv import UncertainStateSpace
 if TYPE_CHECKING:
     from synthesis.plant.plant import Plant
 
-DECADES = (0.0, -1.0, 1.0, -2.0, 2.0)
-"""Scales of the block's channels that are tried, powers of ten of one that makes it as large as the
-performance; then around the best.
+SCALE_DECADES = (0.0, -1.0, 1.0, -2.0, 2.0)
+"""Scales of the block's channels that are tried, as decimal exponents relative to the scale that
+makes the block as large as the performance; then those around the best.
 """
-AROUND = (-0.5, 0.5, -0.25, 0.25)
-ROUNDS = 8
-"""Most corrections of gamma for one scale."""
-SETTLED = 2e-3
-"""Changes of gamma, relative, that end them."""
+REFINED_DECADES = (-0.5, 0.5, -0.25, 0.25)
+MAX_CORRECTIONS = 8
+"""Largest number of corrections of gamma for one scale."""
+GAMMA_TOLERANCE = 2e-3
+"""Relative change of gamma below which the corrections end."""
 
 
 def robust_plant(plant: Plant, start: float, least: Callable[[Plant], float]) -> Plant | None:
@@ -42,7 +42,7 @@ def robust_plant(plant: Plant, start: float, least: Callable[[Plant], float]) ->
         return None
     unit = _even(plant)
     best: tuple[float, float] | None = None
-    for exponents in (DECADES, AROUND):
+    for exponents in (SCALE_DECADES, REFINED_DECADES):
         centre = unit if best is None else best[1]
         for e in exponents:
             s = centre * 10**e
@@ -56,22 +56,24 @@ def robust_plant(plant: Plant, start: float, least: Callable[[Plant], float]) ->
 
 
 def _consistent(plant: Plant, s: float, start: float, least: Callable[[Plant], float]) -> float:
-    """gamma with least(opened at gamma) = gamma, from below; inf where it grows without end."""
+    """Solve gamma = least(opened at gamma) by iteration from below; inf where it grows
+    without end.
+    """
     model = plant.model
     assert isinstance(model, UncertainStateSpace)  # noqa: S101
     gamma = start
-    for _ in range(ROUNDS):
+    for _ in range(MAX_CORRECTIONS):
         found = least(opened(plant, s, gamma * model.bound / s))
         if not math.isfinite(found):
             return math.inf
-        if found <= gamma * (1 + SETTLED):
+        if found <= gamma * (1 + GAMMA_TOLERANCE):
             return max(found, gamma)
         gamma = found * (found / gamma) ** 0.5  # farther than the step: it converges slowly
     return math.inf
 
 
 def opened(plant: Plant, out: float, into: float) -> Plant:
-    """The plant with the block's channels among its own: v times `out`, d times `into`."""
+    """Return the plant with the block's channels among its own: v times `out`, d times `into`."""
     model = plant.model
     assert isinstance(model, UncertainStateSpace)  # noqa: S101
     d, v = model.perturbation_inputs, model.perturbation_outputs
@@ -88,7 +90,9 @@ def opened(plant: Plant, out: float, into: float) -> Plant:
 
 
 def _even(plant: Plant) -> float:
-    """s that makes v as large as the performance, by their rows in the middle of the range."""
+    """Return s that makes v as large as the performance, by their rows in the middle of the
+    range.
+    """
     model = plant.model
     assert isinstance(model, UncertainStateSpace)  # noqa: S101
     middle = model.model.at(*(s.middle for s in model.parameters))

@@ -1,4 +1,4 @@
-"""A plant in coordinates in which its synthesis is a matter of numbers of order one."""
+"""A plant in coordinates in which its synthesis has numbers of order one."""
 
 from __future__ import annotations
 
@@ -26,17 +26,18 @@ Array = np.ndarray
 MatricesAt = Callable[[Array], Generalized]
 
 POINTS = 9
-"""Values of p, on the diagonal of its box, from which coordinates are made."""
-LEAST = 1e-6
-"""Part of the mean eigenvalue that is added to a solution of a Riccati equation: states without a
-cost, or known exactly, have a scale too.
+"""Number of values of p, on the diagonal of its box, from which coordinates are computed."""
+REGULARIZATION = 1e-6
+"""Fraction of the mean eigenvalue added to a solution of a Riccati equation, so that states
+without cost, or known exactly, have a scale too.
 """
-MOST = 10
-"""Highest degree in a parameter by which data on a cell are followed; what lies beyond is left to
+MAX_DEGREE = 10
+"""Highest degree in a parameter to which data on a cell are represented; the remainder is left to
 the analysis of the closed loop.
 """
-SMALL = 1e-10
-"""A Chebyshev coefficient below this fraction of the largest entry of its own is rounding."""
+NEGLIGIBLE_COEFFICIENT = 1e-10
+"""A Chebyshev coefficient below this fraction of the largest coefficient of its entry is rounding.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,13 +105,13 @@ class ScaledPlant:
         return own._in(_balancing(own.at(line), dt))
 
     def _in(self, T: Array | None) -> ScaledPlant:
-        """With T z for z."""
+        """Return the plant with T z for z."""
         if T is None:
             return self
         return replace(self, left=np.linalg.solve(T, self.left), right=self.right @ T)
 
     def at(self, p: Array) -> Generalized:
-        """Matrices (K, ..) at p (K, m)."""
+        """Return the matrices (K, ..) at p (K, m)."""
         A, B1, B2, C1, C2, D11, D12, D21, D22 = self.matrices(p)
         root, L, R = np.sqrt(self.time), self.left, self.right
         u, y = self.controls, self.measurements[:, None]
@@ -127,8 +128,8 @@ class ScaledPlant:
         )
 
     def motions(self, p: Array, matters: Sequence[bool]) -> list[Array]:
-        """Every extreme dp/dt (K, m) at p (K, m) per unit of time: of a parameter whose rate is
-        another the value of that, of the others both signs of their limit; zero of those that do
+        """Return every extreme dp/dt (K, m) at p (K, m) per unit of time: the value of another
+        parameter where that is the rate, else both signs of the limit; zero for parameters that do
         not matter.
         """
         names = [s.name for s in self.parameters]
@@ -145,7 +146,7 @@ class ScaledPlant:
 
     @property
     def breaks(self) -> list[list[float]]:
-        """Where the plant is not one polynomial, ends included, of each parameter."""
+        """Breaks of the piecewise polynomials of each parameter, ends included."""
         out = []
         for s, factor in zip(self.parameters, factors_of(self.basis), strict=True):
             try:
@@ -157,13 +158,13 @@ class ScaledPlant:
 
 
 def _sizes(D: Array, axis: int) -> Array:
-    """Of each channel over all p; 1 where there is nothing."""
+    """Return the size of each channel over all p; 1 for a zero channel."""
     size = np.sqrt(np.square(D).sum(axis=axis).mean(axis=0))
     return np.where(size > 0, size, 1.0)
 
 
 def _balancing(plants: Generalized, dt: float | None) -> Array | None:
-    """T (n, n) with T'XT = T^-1 Y T^-T diagonal, X and Y the mean solutions of the Riccati
+    """Return T (n, n) with T'XT = T^-1 Y T^-T diagonal, X and Y the mean solutions of the Riccati
     equations of control and of estimation; with one of them alone T'XT = I, or T^-1 Y T^-T = I.
     """
     X, Y = _mean_cost(plants, dt), _mean_cost(plants.dual, dt)
@@ -179,8 +180,9 @@ def _balancing(plants: Generalized, dt: float | None) -> Array | None:
 
 
 def _mean_cost(plants: Generalized, dt: float | None) -> Array | None:
-    """Of a state under the best control that knows it: the mean of these matrices as parts of their
-    traces, times the geometric mean of the traces; None where there is no such control.
+    """Return the mean cost of a state under optimal full-information control: the mean of these
+    matrices divided by their traces, times the geometric mean of the traces; None where there is no
+    such control.
     """
     n = plants.A.shape[-1]
     every = (Generalized(*each) for each in zip(*plants, strict=True))
@@ -189,17 +191,17 @@ def _mean_cost(plants: Generalized, dt: float | None) -> Array | None:
     if not costs:
         return None
     traces = np.array([np.trace(X) for X in costs])
-    mean = np.mean(costs / traces[:, None, None], axis=0) + LEAST / n * np.eye(n)
+    mean = np.mean(costs / traces[:, None, None], axis=0) + REGULARIZATION / n * np.eye(n)
     return float(np.exp(np.log(traces).mean())) * mean
 
 
 def _priced(D: Array) -> bool:
-    """Whether every control costs."""
+    """Whether every control has a cost."""
     return D.shape[1] == 0 or np.linalg.matrix_rank(D) == D.shape[1]
 
 
 def scaled_plant_of(plant: Plant, channel: float) -> ScaledPlant:
-    """ScaledPlant of the plant with performance in units of `channel`."""
+    """Return the scaled plant with performance in units of `channel`."""
     one = len(plant.parameters) == 1
     return ScaledPlant.of(
         lambda p: plant.matrices(p[:, 0] if one else p),
@@ -211,7 +213,7 @@ def scaled_plant_of(plant: Plant, channel: float) -> ScaledPlant:
 
 
 def depends(plant: Plant) -> list[bool]:
-    """On which parameters."""
+    """Return for each parameter whether the data depend on it."""
     c = scaled_plant_of(plant, 1.0)
     return [d > 0 for d in degrees_of(lambda p: list(c.at(p)), c.breaks)]
 
@@ -219,12 +221,12 @@ def depends(plant: Plant) -> list[bool]:
 def degrees_of(
     data: Callable[[Array], Sequence[Array]], breaks: Sequence[Sequence[float]]
 ) -> tuple[int, ...]:
-    """The degree in each parameter that `data` (arrays (K, ...) at p (K, m)) have on the widest
-    cells, at most `MOST`.
+    """Return the degree in each parameter of `data` (arrays (K, ...) at p (K, m)) on the widest
+    cells, at most `MAX_DEGREE`.
     """
     sides = [max(pairwise(b), key=lambda side: side[1] - side[0]) for b in breaks]
-    unit = interpolation_points([MOST], [(-1.0, 1.0)])
-    to_chebyshev = np.linalg.inv(chebyshev.chebvander(unit, MOST))
+    unit = interpolation_points([MAX_DEGREE], [(-1.0, 1.0)])
+    to_chebyshev = np.linalg.inv(chebyshev.chebvander(unit, MAX_DEGREE))
     found = []
     for i in range(len(sides)):
         axes = [
@@ -234,7 +236,9 @@ def degrees_of(
         degree = 0
         for values in data(tensor_grid(axes)):
             c = np.abs(to_chebyshev @ values.reshape(len(unit), -1))
-            above = np.flatnonzero((c > SMALL * max(float(c.max(initial=0.0)), 1e-300)).any(axis=1))
+            above = np.flatnonzero(
+                (c > NEGLIGIBLE_COEFFICIENT * max(float(c.max(initial=0.0)), 1e-300)).any(axis=1)
+            )
             degree = max(degree, int(above.max(initial=0)))
         found.append(degree)
     return tuple(found)

@@ -1,8 +1,8 @@
-"""From a plant to X(p), Y(p) and the gains they promise: which of them moves and of what degree,
-how far from the least gamma, in a stated order.
+"""The search for X(p), Y(p) and gains: which of them depends on p and of what degree, and the
+distance from the least gamma, in a fixed order.
 
-Where X and Y both move with p the controller is not told dp/dt. With N = -X its state estimates
-that of the plant, and
+If X and Y both depend on p the controller neglects dp/dt. With N = -X its state estimates that of
+the plant, and
 
     V = e' X e + x_k' (Y - X^-1)^-1 x_k,  e = x - x_k,
 
@@ -25,7 +25,7 @@ from symheli.lpv.bases.function_space import tensor_grid
 from symheli.progress import tracked
 from synthesis.certificate import Attempt
 from synthesis.lpv.bases import DEGREES, Bases, used
-from synthesis.lpv.existence import LARGEST, Existence, Solution
+from synthesis.lpv.existence import MATRIX_BOUNDS, Existence, Solution
 from synthesis.lpv.fitted import Fitted, cut_to_serve, fits
 from synthesis.lpv.scaled_plant import ScaledPlant, scaled_plant_of
 from synthesis.lpv.worst_optimum import FrozenOptimum
@@ -39,42 +39,43 @@ Array = np.ndarray
 
 
 BACK_OFF = (1.02, 1.04, 1.01, 1.1, 1.2, 1.5)
-"""Multiples of the least gamma at which X and Y are settled, tried in turn."""
-SLACK = 1e-6
-"""By which the frozen gain of a controller may exceed what was promised: rounding."""
+"""Multiples of the least gamma at which X and Y are fixed, tried in turn."""
+LEVEL_TOLERANCE = 1e-6
+"""Relative excess of a frozen gain over the promised one that counts as rounding."""
 UNKEPT = "frozen loops do not keep it"
-UNTOLD = "p moves too fast for gains that are not told dp/dt"
+RATE_UNMEASURED = "p moves too fast for gains without a measurement of dp/dt"
 SHARP = "frozen loops keep it, no functions of p do"
 FAR_ABOVE = 1.05
-"""A gamma this many times the least one is said to be, one of a larger back-off that was asked for
-in proportion; before it gains that turn sharply become splines with as many knots as that takes.
+"""Ratio to the least gamma above which a note reports it, in proportion for a larger requested
+back-off; before it, gains that change steeply become splines with as many knots as needed.
 """
-FURTHER = 1.05
-"""Of the gamma of a controller that is told dp/dt, where it is not told."""
-TOO_FAST = 1.1
-"""The same at which no other X and Y of this gamma are tried: all move about as much."""
-ROUGH = 0.3
-"""Functions of p farther from the gains than this are not looked at."""
+MAX_RATE_LOSS = 1.05
+"""Largest factor by which neglecting dp/dt in the gains may raise gamma."""
+HOPELESS_RATE_LOSS = 1.1
+"""Factor above which no other X and Y of this gamma are tried: they all vary about as fast with p.
+"""
+MAX_MISFIT = 0.3
+"""Relative misfit above which functions of p are not considered."""
 ACCURACY = 3e-3
-"""Of functions of p fitted to the gains, relative, entry by entry."""
-NEAR = 2e-2
-"""Polynomials as accurate as this are preferred to splines."""
-CHECKED = {1: 97, 2: 7}
-"""Values of each parameter at which frozen loops are judged, beside those where the inequalities
-were imposed (more parameters: 3).
+"""Accuracy of the functions of p fitted to the gains, relative, entry by entry."""
+POLYNOMIAL_MISFIT = 2e-2
+"""Relative misfit up to which polynomials are preferred to splines."""
+CHECK_POINTS = {1: 97, 2: 7}
+"""Values of each parameter at which frozen loops are checked, in addition to those at which the
+inequalities were imposed (more parameters: 3).
 """
-CLOSE = 1.01
-"""A gamma within this factor of what no controller can beat is not worth another program."""
+CLOSE_TO_OPTIMUM = 1.01
+"""Ratio of gamma to a lower bound for every controller up to which no further program is solved."""
 NOTHING_KNOWN = FrozenOptimum()
-WORTH = 0.995
-"""Part of gamma to which a richer program must lower it to be worth another."""
-FAR = 30.0
-"""A gamma this many times larger or smaller than the unit of performance asks for another unit."""
+MIN_IMPROVEMENT = 0.995
+"""Factor by which a richer program must lower gamma to be preferred."""
+MAX_UNIT_RATIO = 30.0
+"""Ratio of gamma to the unit of performance beyond which the unit is changed."""
 
 
 Gains = Callable[[Array], Array]
 Loop = Callable[[ScaledPlant, Gains, Array], tuple[Array, ...]]
-"""A, B, C, D (K, ..) of what is judged, at p (K, m)."""
+"""A, B, C, D (K, ..) of the loop to check, at p (K, m)."""
 
 
 class Start(NamedTuple):
@@ -87,7 +88,7 @@ class Start(NamedTuple):
 
     @property
     def gamma(self) -> float:
-        """In the units of the plant; inf where none was found."""
+        """Gamma in the units of the plant; inf where none was found."""
         return self.scaled.channel * self.found.gamma
 
 
@@ -104,7 +105,7 @@ class Design:
 
     @property
     def gamma(self) -> float:
-        """In the units of the plant."""
+        """Gamma in the units of the plant."""
         return self.found.gamma * self.scaled.channel
 
 
@@ -119,8 +120,8 @@ def best(
     attempts: list[Attempt],
     worst: FrozenOptimum = NOTHING_KNOWN,
 ) -> Start:
-    """The shape of the least gamma: of those of the lowest degree the best, then of higher degrees
-    while that lowers it, then with a larger bound on X and Y where that decides. No controller has
+    """Return the shape of the least gamma: of the lowest degree first, then of higher degrees while
+    that lowers it, then with a larger bound on X and Y where the bound is active. No controller has
     a gamma below the `worst` frozen optimum.
     """
     floor = worst.level
@@ -129,27 +130,27 @@ def best(
     starts: list[Start] = []
     for shape in every(degrees[0]):
         starts.append(least(plant, shape, divisions, solver, attempts, channel, worst.p))
-        if starts[-1].gamma <= CLOSE * floor:
+        if starts[-1].gamma <= CLOSE_TO_OPTIMUM * floor:
             break
     chosen = min(range(len(starts)), key=lambda k: starts[k].gamma)
     start = starts[chosen]
 
     def worth(other: Start) -> bool:
-        return other.gamma < WORTH * start.gamma
+        return other.gamma < MIN_IMPROVEMENT * start.gamma
 
     for degree in degrees[1:]:
         shape = every(degree)[chosen]
-        if start.gamma <= CLOSE * floor or shape.size == start.shape.size:
+        if start.gamma <= CLOSE_TO_OPTIMUM * floor or shape.size == start.shape.size:
             break
         richer = least(plant, shape, divisions, solver, attempts, channel, worst.p)
         more = worth(richer)
         start = richer if richer.gamma < start.gamma else start
         if not more and math.isfinite(start.gamma):
             break
-    for largest in LARGEST[1:]:
-        if start.gamma <= CLOSE * floor or not start.existence.bounded(start.found):
+    for largest in MATRIX_BOUNDS[1:]:
+        if start.gamma <= CLOSE_TO_OPTIMUM * floor or not start.existence.bounded(start.found):
             break
-        if start.existence.least_share(start.found, largest, solver) >= WORTH:
+        if start.existence.least_share(start.found, largest, solver) >= MIN_IMPROVEMENT:
             break
         unit = start.gamma
         wider = least(
@@ -170,10 +171,10 @@ def least(
     channel: float = 1.0,
     p: Array | None = None,
     *,
-    largest: float = LARGEST[0],
+    largest: float = MATRIX_BOUNDS[0],
 ) -> Start:
-    """The least gamma of a shape, in a unit of performance that suits it, at first `channel`; with
-    the inequalities at this p (m,), too.
+    """Return the least gamma of a shape, in a suitable unit of performance, at first `channel`; the
+    inequalities are imposed at this p (m,), too.
     """
     for _ in tracked(f"least gamma, {shape}", range(3)):
         own = scaled_plant_of(plant, channel)
@@ -181,7 +182,7 @@ def least(
         found = existence.least_gamma(solver)
         gamma = channel * found.gamma
         attempts.append(Attempt(f"least gamma, {shape}", 0.0, found.message, gamma))
-        if not math.isfinite(found.gamma) or 1 / FAR < found.gamma < FAR:
+        if not math.isfinite(found.gamma) or 1 / MAX_UNIT_RATIO < found.gamma < MAX_UNIT_RATIO:
             break
         channel = gamma
     return Start(own, existence, found, shape)
@@ -196,13 +197,14 @@ def settled(
     loop: Loop | None = None,
     neglecting: bool = False,
 ) -> Iterator[Design]:
-    """Designs at these multiples of the least gamma, whose frozen `loop` keeps it with the gains
-    as functions of p; `neglecting`: at most `FURTHER` above, where the gains are not told dp/dt.
+    """Yield designs at these multiples of the least gamma, whose frozen `loop` keeps the level with
+    the gains as functions of p; `neglecting`: the gains do not depend on dp/dt, which may raise
+    gamma by `MAX_RATE_LOSS` at most.
     """
     scaled, existence, lowest, _ = start
     if not math.isfinite(lowest.gamma):
         return
-    judged = loop or closed
+    of_loop = loop or closed
     sharp: dict[float, tuple[Solution, Gains]] = {}
 
     def noted(factor: float, message: str, outcome: str) -> None:
@@ -213,7 +215,7 @@ def settled(
         while sharp:
             factor = max(sharp)
             found, gains = sharp.pop(factor)
-            design, outcome = _tried(start, found, gains, judged, neglecting, with_knots)
+            design, outcome = _tried(start, found, gains, of_loop, neglecting, with_knots)
             noted(factor, "knots added", outcome)
             if design is not None:
                 yield design
@@ -228,13 +230,13 @@ def settled(
             with contextlib.suppress(np.linalg.LinAlgError):
                 if np.any(found.coefficients):
                     gains = recover(scaled, existence, found)
-                    design, outcome = _tried(start, found, gains, judged, neglecting, simplest)
+                    design, outcome = _tried(start, found, gains, of_loop, neglecting, simplest)
                     if outcome == SHARP:
                         sharp.setdefault(factor, (found, gains))
             noted(factor, found.message, outcome)
             if design is not None:
                 yield design
-            if design is not None or outcome.startswith(UNTOLD):
+            if design is not None or outcome.startswith(RATE_UNMEASURED):
                 break
     yield from by_splines()
 
@@ -247,18 +249,20 @@ def _tried(
     neglecting: bool,
     fit_of: Callable[[ScaledPlant, Gains, Loop, Array, float], Fitted | None],
 ) -> tuple[Design | None, str]:
-    """The design of these gains, None where their loop does not keep gamma; and what came of it."""
+    """Return the design of these gains, None where their loop does not keep gamma; and the outcome
+    in words.
+    """
     scaled, existence, *_ = start
     reached = found.gamma
-    points = judged(existence.plant.parameters, existence.points)
+    points = check_points(existence.plant.parameters, existence.points)
     if neglecting:
         looped = closed(scaled, gains, points)
         reached = max(reached, level_kept(scaled, existence, found, looped, points))
     further = reached / found.gamma
-    if further > FURTHER:
-        said = UNTOLD if further > TOO_FAST else "as dp/dt is not known"
+    if further > MAX_RATE_LOSS:
+        said = RATE_UNMEASURED if further > HOPELESS_RATE_LOSS else "as dp/dt is not known"
         return None, f"{said}, {further:.3g} times as much"
-    if not all(kept(scaled, gains, loop, points, reached * (1 + SLACK))):
+    if not all(kept(scaled, gains, loop, points, reached * (1 + LEVEL_TOLERANCE))):
         return None, UNKEPT
     fit = fit_of(scaled, gains, loop, points, reached)
     if fit is None:
@@ -270,16 +274,16 @@ def _tried(
 def simplest(
     scaled: ScaledPlant, gains: Gains, loop: Loop, points: Array, gamma: float
 ) -> Fitted | None:
-    """The simplest functions that are accurate and keep gamma, else the most accurate of those that
-    keep it, splines only where polynomials are far off; None where none does.
+    """Return the simplest functions that are accurate and keep gamma, else the most accurate that
+    keep it, splines only where polynomials are far off; None without any.
     """
     every = list(fits(gains, scaled.parameters))
     polynomials = [fit for fit in every if fit.basis.degrees]
-    near = any(fit.misfit <= NEAR for fit in polynomials)
+    near = any(fit.misfit <= POLYNOMIAL_MISFIT for fit in polynomials)
     accurate = [fit for fit in every if fit.misfit <= ACCURACY]
-    rest = [fit for fit in (polynomials if near else every) if ACCURACY < fit.misfit <= ROUGH]
+    rest = [fit for fit in (polynomials if near else every) if ACCURACY < fit.misfit <= MAX_MISFIT]
     for fit in (*accurate, *sorted(rest, key=lambda fit: fit.misfit)):
-        if all(kept(scaled, fit, loop, points, gamma * (1 + SLACK))):
+        if all(kept(scaled, fit, loop, points, gamma * (1 + LEVEL_TOLERANCE))):
             return fit
     return None
 
@@ -287,12 +291,12 @@ def simplest(
 def with_knots(
     scaled: ScaledPlant, gains: Gains, loop: Loop, points: Array, gamma: float
 ) -> Fitted | None:
-    """Splines of one parameter with knots where gamma would not be kept without; None where they
-    do not come to an end.
+    """Return splines of one parameter, with knots added where gamma would not be kept without; None
+    where the refinement does not end.
     """
     if len(scaled.parameters) != 1:
         return None
-    limit = gamma * (1 + SLACK)
+    limit = gamma * (1 + LEVEL_TOLERANCE)
 
     def serves(fit: Fitted, p: Array) -> Array:
         return np.fromiter(kept(scaled, fit, loop, p, limit), bool, len(p))
@@ -301,11 +305,11 @@ def with_knots(
     return fit if fit is not None and serves(fit, points).all() else None
 
 
-def judged(parameters: Sequence[Scheduling], more: Array | None = None) -> Array:
-    """Points (K, m) at which frozen loops are judged, with `more`; a parameter that is the rate of
-    another is zero there.
+def check_points(parameters: Sequence[Scheduling], more: Array | None = None) -> Array:
+    """Return the points (K, m) at which frozen loops are checked, with `more`; a parameter that is
+    the rate of another is zero there.
     """
-    count = CHECKED.get(len(parameters), 3)
+    count = CHECK_POINTS.get(len(parameters), 3)
     p = tensor_grid([np.linspace(s.low, s.high, count) for s in parameters])
     p = p if more is None else np.vstack([p, more])
     rates = [s.name in {other.rate for other in parameters} for s in parameters]
@@ -315,13 +319,15 @@ def judged(parameters: Sequence[Scheduling], more: Array | None = None) -> Array
 
 
 def kept(scaled: ScaledPlant, gains: Gains, loop: Loop, p: Array, gamma: float) -> Iterator[bool]:
-    """Whether the loop frozen at each p (K, m), scaled, is stable and its gain below gamma."""
+    """Yield for each p (K, m), scaled, whether the frozen loop is stable and its gain below
+    gamma.
+    """
     for A, B, C, D in zip(*loop(scaled, gains, p), strict=True):
         yield below(A, B, C, D, gamma, scaled.dt)
 
 
 def closed(scaled: ScaledPlant, gains: Gains, p: Array) -> tuple[Array, ...]:
-    """The plant under [A B; C D]."""
+    """Return the plant under [A B; C D]."""
     plants, K = scaled.at(p), gains(p)
     k = K.shape[-1] - plants.C2.shape[-2]
     return plants.closed(K[:, :k, :k], K[:, :k, k:], K[:, k:, :k], K[:, k:, k:])
@@ -334,8 +340,8 @@ def level_kept(
     loop: tuple[Array, ...],
     p: Array,
 ) -> float:
-    """The least gamma, scaled, for which V proves the loop A, B, C, D (K, ..) at every p (K, m) and
-    extreme dp/dt; inf where there is none.
+    """Return the least gamma, scaled, for which V proves the loop A, B, C, D (K, ..) at every p (K,
+    m) and extreme dp/dt; inf where there is none.
     """
     X, Y = existence.X, existence.Y
     assert X is not None  # noqa: S101 - both move
@@ -353,14 +359,16 @@ def level_kept(
 
 
 def _joined(x: Array, w: Array) -> Array:
-    """[x -x; -x x + w] (K, 2n, 2n)."""
+    """Return [x -x; -x x + w] (K, 2n, 2n)."""
     return np.concatenate(
         [np.concatenate([x, -x], axis=2), np.concatenate([-x, x + w], axis=2)], axis=1
     )
 
 
 def _least_level(loop: tuple[Array, ...], P: Array, moving: Array) -> float:
-    """Of [A'P + PA + dP/dt, PB, C'; B'P, -g, D'; C, D, -g] <= 0, in coordinates where P is one."""
+    """Return the least g of [A'P + PA + dP/dt, PB, C'; B'P, -g, D'; C, D, -g] <= 0, in coordinates
+    where P is the identity.
+    """
     A, B, C, D = loop
     try:
         R = np.linalg.inv(np.linalg.cholesky(P))

@@ -21,13 +21,12 @@ from synthesis.lpv.scaled_plant import ScaledPlant, depends
 from synthesis.lpv.search import BACK_OFF, best, settled
 from synthesis.plant.plant import Plant, require_plant
 from synthesis.plant.refusals import conditions, failed, least_ranks, levels_above
-from synthesis.worst.rates import Rate
-from synthesis.worst.rates import asked as limits
+from synthesis.worst.rates import Rate, limits
 
 Array = np.ndarray
 
-WORST = 1e12
-"""So many times weaker than what C2 shows best, anywhere, is a state that it does not show."""
+MAX_CONDITION = 1e12
+"""Largest condition number of C2 at which all states count as measured."""
 
 
 @with_one_thread
@@ -106,7 +105,7 @@ def _check_measured(plant: Plant) -> None:
     n, ny = len(plant.states), len(plant.measurements)
     at = plant.matrices(conditions(plant)[0])
     shown = np.linalg.svd(at.C2, compute_uv=False)
-    if n != ny or np.any(at.D21) or np.any(at.D22) or shown.min() * WORST < shown.max():
+    if n != ny or np.any(at.D21) or np.any(at.D22) or shown.min() * MAX_CONDITION < shown.max():
         raise InputError(
             f"state feedback needs all {n} states among the measurements at every p, undisturbed,"
             f" and nothing else ({', '.join(plant.states)}); measured are"

@@ -24,7 +24,7 @@ class UnknownFunction:
 
     @property
     def columns(self) -> Array:
-        """Numbers (k,) of its coefficients."""
+        """Indices (k,) of its coefficients."""
         return self.first + np.arange(self.basis.size)
 
     @property
@@ -33,25 +33,25 @@ class UnknownFunction:
         return self.basis.size > 1
 
     def values(self, p: Array) -> Array:
-        """The functions (K, k) at p (K, m)."""
+        """Return the functions (K, k) at p (K, m)."""
         return self.basis(_own(p))
 
     def gradient(self, p: Array) -> Array:
-        """Their derivatives (K, k, m) by each parameter."""
+        """Return their derivatives (K, k, m) by each parameter."""
         if not self.moves:
             return np.zeros((len(p), 1, p.shape[1]))
         return np.swapaxes(self.basis.gradient(_own(p)), 1, 2)
 
     def slopes(self, p: Array, rates: Array) -> Array:
-        """Their derivatives (K, k) along the motion dp/dt = `rates` (m,) or (K, m)."""
+        """Return their derivatives (K, k) along the motion dp/dt = `rates` (m,) or (K, m)."""
         return np.einsum("kjm,km->kj", self.gradient(p), np.broadcast_to(rates, p.shape))
 
     def at(self, coefficients: Array, p: Array) -> Array:
-        """X (K, n, n) at p (K, m) from all coefficients of the program."""
+        """Return X (K, n, n) at p (K, m) from all coefficients of the program."""
         return np.tensordot(self.values(p), coefficients[self.columns], axes=1)
 
     def moving(self, coefficients: Array, p: Array, rates: Array) -> Array:
-        """dX/dt (K, n, n)."""
+        """Return dX/dt (K, n, n)."""
         return np.tensordot(self.slopes(p, rates), coefficients[self.columns], axes=1)
 
 
@@ -67,14 +67,14 @@ class BlockTerms:
     def add(
         self, unknown: UnknownFunction, weights: Array, left: Array, right: Array
     ) -> BlockTerms:
-        """left (n, N)' X right with `weights` (K, k) of the functions of X; right (n, N), (K, n, N)
-        or (motions, K, n, N).
+        """Add left (n, N)' X right with `weights` (K, k) of the functions of X; right (n, N), (K,
+        n, N) or (motions, K, n, N).
         """
         self.terms.append((unknown.columns, weights, left, right))
         return self
 
     def finished(self, constant: Array | float, level: Array | float) -> LyapunovBlocks:
-        """With what is known: (K, N, N) or (N, N)."""
+        """Return the blocks with the given constant and level: (K, N, N) or (N, N)."""
         motions, count, size, _ = self.shape
         lefts: list[Array] = []
         where = [_place(lefts, left) for _, _, left, _ in self.terms]
@@ -109,13 +109,13 @@ def _own(p: Array) -> Array:
 
 
 def selector(rows: int, start: int, size: int) -> Array:
-    """[0 I 0] (rows, size) that takes `rows` entries from `start` on."""
+    """Return [0 I 0] (rows, size) that takes `rows` entries from `start` on."""
     out = np.zeros((rows, size))
     out[:, start : start + rows] = np.eye(rows)
     return out
 
 
 def unknowns(bases: Sequence[FunctionSpace]) -> list[UnknownFunction]:
-    """One after the other in a program."""
+    """Return the unknown functions, one after the other in a program."""
     firsts = np.cumsum([0, *(b.size for b in bases)])
     return [UnknownFunction(b, int(f)) for b, f in zip(bases, firsts, strict=False)]

@@ -1,4 +1,6 @@
-"""The worst optimum of the models frozen at each p, which no scheduled controller can beat."""
+"""The largest optimum over the models frozen at each p, a lower bound for every scheduled
+controller.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,7 @@ from scipy import optimize
 
 from symheli.lpv.bases.polynomials import lobatto_points
 from symheli.progress import tracked
-from synthesis.lti.hinf import ROUGH, optimum_above, slack
+from synthesis.lti.hinf import ROUGH_ACCURACY, optimum_above, slack
 from synthesis.plant.generalized import Generalized
 
 if TYPE_CHECKING:
@@ -19,16 +21,16 @@ if TYPE_CHECKING:
 Array = np.ndarray
 
 POINTS = {1: 65, 2: 5}
-"""Values of each parameter (more parameters: 3)."""
-PLACES, BESIDE, ROUNDS = 4, 16, 6
-"""Between them the worst is looked for at so many places, at so many values each, again while the
-level that is looked for rises.
+"""Number of values of each parameter (more parameters: 3)."""
+MAX_MINIMA, MAX_EVALUATIONS, MAX_ROUNDS = 4, 16, 6
+"""Between the points, the worst is searched near so many minima of the slack, with so many
+evaluations each, again while the level rises.
 """
 
 
 class FrozenOptimum(NamedTuple):
-    """A level that no scheduled controller beats, and the p (m,) of the model that decides it; 0
-    and None where nothing is known.
+    """Lower bound on the level of every scheduled controller, and the p (m,) of the model that
+    decides it; 0 and None where none was found.
     """
 
     level: float = 0.0
@@ -36,8 +38,8 @@ class FrozenOptimum(NamedTuple):
 
 
 def worst_optimum(plant: Plant) -> FrozenOptimum:
-    """The largest optimum of H-infinity output feedback over models of the range, to a part in a
-    thousand; of level 0 where the Riccati equations of none have a solution.
+    """Return the largest optimum of H-infinity output feedback over models of the range, to a part
+    in a thousand; of level 0 where the Riccati equations of none have a solution.
 
     Without the part of a plant that is uncertain, and of some p only; of one parameter also of
     those between them where the worst may be.
@@ -66,11 +68,13 @@ def worst_optimum(plant: Plant) -> FrozenOptimum:
     line = np.sort(p.ravel())
     found = np.pad([spare(q) for q in line], 1, constant_values=math.inf)
     low = np.flatnonzero((found[1:-1] <= found[:-2]) & (found[1:-1] <= found[2:]))
-    for k in low[np.argsort(found[1:-1][low])][:PLACES]:
+    for k in low[np.argsort(found[1:-1][low])][:MAX_MINIMA]:
         ends = line[max(k - 1, 0)], line[min(k + 1, len(line) - 1)]
-        for _ in range(ROUNDS):  # out of reach, a level is so by no measure: raised, by another
+        for _ in range(MAX_ROUNDS):  # out of reach, a level is so by no measure: raised, by another
             before = worst
-            worst = raised(np.array([optimize.fminbound(spare, *ends, maxfun=BESIDE, disp=0)]))
-            if worst.level <= before.level * (1 + ROUGH):
+            worst = raised(
+                np.array([optimize.fminbound(spare, *ends, maxfun=MAX_EVALUATIONS, disp=0)])
+            )
+            if worst.level <= before.level * (1 + ROUGH_ACCURACY):
                 break
     return worst

@@ -19,18 +19,19 @@ Array = np.ndarray
 
 
 class Obstacle(Enum):
-    """What keeps a level out of reach; the value says it."""
+    """Reason why a level cannot be reached; the value is the sentence to print."""
 
-    DIRECT = "the direct way from disturbances to performance is too strong at high frequency"
-    CONTROL = "not even a controller that knows every state and disturbance reaches it"
+    DIRECT = "the feedthrough from disturbances to performance is too large at high frequency"
+    CONTROL = "not even a controller that measures all states and disturbances reaches it"
     ESTIMATION = (
-        "not even one that moves every performance by itself: the measurements do not tell enough"
+        "not even a controller that acts on each performance signal directly reaches it: the"
+        " measurements do not suffice"
     )
-    COUPLING = "estimation and control each could reach it alone, together they cannot"
+    COUPLING = "control and estimation can each reach it alone, but not together"
 
 
 class Trial(NamedTuple):
-    """What the Riccati equations say at a level: `obstacle` is None where a controller exists.
+    """Result of the Riccati equations at a level: `obstacle` is None where a controller exists.
 
     `slack`: gamma^2 over the spectral radius of XY, less one, -1 where a solution does not exist.
     X, F and Y, L' are solutions and gains of control and estimation.
@@ -57,8 +58,8 @@ class Normalised(NamedTuple):
 
     @classmethod
     def of(cls, plant: Generalized) -> Normalised:
-        """Of a plant whose D12 has full column and D21 full row rank; rotates performance and
-        disturbances, scales controls and measurements, leaves the states alone.
+        """Normalise a plant whose D12 has full column and D21 full row rank: rotate performance and
+        disturbances, scale controls and measurements, keep the states.
         """
         nu, ny = plant.B2.shape[1], plant.C2.shape[0]
         Q, R = np.linalg.qr(plant.D12, mode="complete")
@@ -80,13 +81,13 @@ class Normalised(NamedTuple):
         return cls(normal, into, out, plant.D22)
 
     def least(self) -> float:
-        """No level below this can be reached: Parrott's bound of D11."""
+        """Lower bound on every level: Parrott's bound of D11."""
         D, nu, ny = self.plant.D11, len(self.into), len(self.out)
         parts = D[: len(D) - nu], D[:, : D.shape[1] - ny]
         return max((float(np.linalg.norm(part, 2)) for part in parts if part.size), default=0.0)
 
     def trial(self, gamma: float) -> Trial:
-        """Whether a controller with a norm below `gamma` exists."""
+        """Decide whether a controller with a norm below `gamma` exists."""
         if gamma <= self.least():
             return Trial(gamma, Obstacle.DIRECT, -1.0)
         X, F = _half(self.plant, gamma)
@@ -100,7 +101,7 @@ class Normalised(NamedTuple):
         return Trial(gamma, None if slack > 0 else Obstacle.COUPLING, slack, X, F, Y, L)
 
     def controller(self, trial: Trial) -> tuple[Array, Array, Array, Array]:
-        """The central controller u = K y of the plant that was normalised; its state estimates the
+        """Return the central controller u = K y of the original plant; its state estimates the
         plant's, in the same coordinates.
         """
         P, gamma = self.plant, trial.gamma
@@ -117,7 +118,7 @@ class Normalised(NamedTuple):
         F12, F2 = F[w1:w], F[w:]
         L12, L2 = L[z1 : z1 + nu].T, L[z1 + nu :].T
         Z = np.linalg.inv(np.eye(n) - Y @ X / gamma**2)
-        Cy = P.C2 + F12  # the measurement that is expected, with the worst disturbance
+        Cy = P.C2 + F12  # the predicted measurement, with the worst disturbance
         B = -Z @ L2 + Z @ (P.B2 + L12) @ D
         C = F2 - D @ Cy
         A = P.A + P.B1 @ F[:w] + P.B2 @ F2 - B @ Cy
@@ -125,8 +126,8 @@ class Normalised(NamedTuple):
 
 
 def _half(P: Generalized, gamma: float) -> tuple[Array | None, Array | None]:
-    """X and F of full-information control; of the dual plant Y and the transpose of the gain of
-    estimation.
+    """Return X and F of full-information control; for the dual plant, Y and the transpose of the
+    estimator gain.
 
     Zhou, Doyle, Glover (1996), section 17.1.
     """

@@ -24,15 +24,17 @@ from synthesis.plant.generalized import Channels, Generalized
 
 Array = np.ndarray
 
-DIRECT = 1e-9
-"""Direct gain from disturbances to performance below this part of its terms is none."""
+NEGLIGIBLE_FEEDTHROUGH = 1e-9
+"""Feedthrough from disturbances to performance below this fraction of its terms counts as zero."""
 
-AGREED = 1e-6
-"""To this fraction a mean square is known, or none is told."""
-CANCELLED = 1e-12
-"""Of the terms of a mean square: what is left of them is rounding, and small whatever it is."""
-REFINED = 3
-"""Steps by which the solution of a Lyapunov equation is refined."""
+MEAN_SQUARE_TOLERANCE = 1e-6
+"""Largest relative error of a mean square; with a larger error the norm is NaN."""
+CANCELLATION = 1e-12
+"""Fraction of the terms of a mean square below which the remainder after cancellation is rounding,
+and small.
+"""
+REFINEMENTS = 3
+"""Number of refinement steps of the solution of a Lyapunov equation."""
 
 DIRECT_NOISE = (
     "the performance feels the disturbances directly (D11), in continuous time white noise of"
@@ -121,14 +123,14 @@ def h2(
 
 
 def _cancelling(P: Generalized) -> Array | None:
-    """The static gain (nu, ny) that takes away D11, to rounding; None where there is none."""
+    """Return the static gain (nu, ny) that cancels D11, to rounding; None where there is none."""
     static = -np.linalg.pinv(P.D12) @ P.D11 @ np.linalg.pinv(P.D21)
     left = np.abs(P.D11 + P.D12 @ static @ P.D21).max(initial=0.0)
-    return static if left <= DIRECT * np.abs(P.D11).max(initial=0.0) else None
+    return static if left <= NEGLIGIBLE_FEEDTHROUGH * np.abs(P.D11).max(initial=0.0) else None
 
 
 def _around(P: Generalized, static: Array, dt: float | None) -> Matrices | None:
-    """The best controller beside a static gain, with it."""
+    """Return the best controller in parallel with a static gain, with that gain added."""
     into, out = P.B2 @ static, P.D12 @ static
     K = lqg(
         P._replace(
@@ -148,11 +150,11 @@ def _around(P: Generalized, static: Array, dt: float | None) -> Matrices | None:
 
 def h2_norm(model: LinearModel) -> float:
     """Root of the variance of the outputs with white noise of unit intensity at the inputs, in any
-    units of the states; inf where it is not stable, or continuous with a direct way.
+    units of the states; inf where the model is unstable, or continuous with feedthrough.
 
-    From what drives the states and from what shows them, each with what rounding leaves open. Of
-    what all but cancels in the outputs (`CANCELLED`) the most it may be; NaN where rounding decides
-    over more, or the two contradict each other.
+    Computed from the reachability and from the observability Gramian, each with a bound of its
+    rounding error. Where the terms nearly cancel in the outputs (`CANCELLATION`), the upper bound
+    is returned; NaN where rounding decides more than that, or the two results contradict.
     """
     if not model.is_stable() or (model.dt is None and np.any(model.D)):
         return math.inf
@@ -164,15 +166,15 @@ def h2_norm(model: LinearModel) -> float:
     every = [v for v in found if v is not None]
     least, most = min(v.value for v in every), max(v.value for v in every)
     unknown = most - least + max(v.doubt for v in every)
-    if unknown <= AGREED * (least + through):
+    if unknown <= MEAN_SQUARE_TOLERANCE * (least + through):
         return math.sqrt(through + 0.5 * (least + most))
-    cancelled = most + unknown <= CANCELLED * min(v.terms for v in every)
+    cancelled = most + unknown <= CANCELLATION * min(v.terms for v in every)
     return math.sqrt(through + most + unknown) if cancelled else math.nan
 
 
 def _in_units_of_one_size(A: Array, B: Array, C: Array) -> tuple[Array, Array, Array]:
-    """A, B and C with the states in units, powers of two, in which what drives and what shows each
-    is of the size of the rest: no digit is lost.
+    """Return A, B and C with the states in units, powers of two, in which inputs to and outputs
+    from each state are of similar size: no digit is lost.
     """
     n = len(A)
     whole = np.zeros((n + 1, n + 1))
@@ -184,7 +186,7 @@ def _in_units_of_one_size(A: Array, B: Array, C: Array) -> tuple[Array, Array, A
 
 
 class _Variance(NamedTuple):
-    """The `value` and by how much it may be off; `terms`: the sizes of what it is the sum of."""
+    """The `value`, its error bound, and `terms`, the sizes of the terms of the sum."""
 
     value: float
     doubt: float
@@ -195,7 +197,7 @@ def _variance(A: Array, B: Array, C: Array, dt: float | None) -> _Variance | Non
     """tr C W C' with A W + W A' + B B' = 0, sampled A W A' - W + B B' = 0; None where there is no
     W of a variance.
 
-    W is refined; what the steps still change, and the rounding of the sum, is what is not known.
+    W is refined; the last change, and the rounding of the sum, bound the error.
     """
 
     def solved(Q: Array) -> Array:
@@ -209,7 +211,7 @@ def _variance(A: Array, B: Array, C: Array, dt: float | None) -> _Variance | Non
     W, values = np.zeros(A.shape, dtype=np.longdouble), []
     driven = B.astype(np.longdouble) @ B.T
     try:
-        for _ in range(1 + REFINED):
+        for _ in range(1 + REFINEMENTS):
             left = (A @ W + W @ A.T if dt is None else A @ W @ A.T - W) + driven
             more = solved(np.asarray(left, dtype=float))
             W = W + 0.5 * (more + more.T)

@@ -31,32 +31,35 @@ from synthesis.worst.frozen import norm
 Array = np.ndarray
 
 ACCURACY = 1e-10
-"""Of the optimum, relative."""
+"""Relative accuracy of the optimum."""
 
-ROUGH = 1e-3
-"""The same where it is a number to compare with."""
+ROUGH_ACCURACY = 1e-3
+"""Relative accuracy of an optimum that only serves for comparison."""
 
-NOTHING = 1e-9
-"""A level below this part of that of the LQG controller counts as zero."""
+ZERO_LEVEL = 1e-9
+"""A level below this fraction of the H-infinity norm of the LQG loop counts as zero."""
 
 BACK_OFFS = 1.0, 1.02, 1.05, 1.2, 2.0, 10.0, 100.0, 1000.0
-"""Where a controller does not keep its level in the check, the level is raised by these in turn."""
+"""Factors by which the level is raised in turn where a controller does not keep it in the check."""
 
-KEPT = 1e-6
-"""A level is kept where the norm of the loop exceeds it by no more than this part."""
+LEVEL_TOLERANCE = 1e-6
+"""Relative excess of the norm of the loop over the level up to which the level counts as reached.
+"""
 
-DOUBLINGS = 40
-"""How often a level that was not reached, though a controller is known to, is doubled."""
+MAX_DOUBLINGS = 40
+"""Largest number of times that a level is doubled which was not reached although a controller
+exists.
+"""
 
 NOT_KEPT = "the loop of the central controller for gamma = {:.6g} does not keep that level"
-NO_LEVEL = "the Riccati equations have no solution at any level, though nothing speaks against one"
+NO_LEVEL = "the Riccati equations have no solution at any level, for no known reason"
 NO_LEAST = (
-    "gamma can be made as small as one likes: the controller is that of the least mean square, add"
-    " what limits it (noise, a price on the controls)"
+    "gamma can be made arbitrarily small: the controller is the H2-optimal one; add measurement"
+    " noise or control weights, which limit it"
 )
 
-LARGEST = 1e100
-"""Of a level, and of its inverse: its square is a number, too."""
+MAX_LEVEL = 1e100
+"""Largest level, and the inverse of the smallest: its square must neither over- nor underflow."""
 
 
 def hinf(
@@ -123,9 +126,9 @@ def hinf(
     0.6009252 0.607 True
     """
     model = as_model(model)
-    if gamma is not None and not 1 / LARGEST < gamma < LARGEST:
+    if gamma is not None and not 1 / MAX_LEVEL < gamma < MAX_LEVEL:
         raise InputError(
-            f"gamma: expected a number from {1 / LARGEST:g} to {LARGEST:g}, got {gamma}"
+            f"gamma: expected a number from {1 / MAX_LEVEL:g} to {MAX_LEVEL:g}, got {gamma}"
         )
     levels_above(back_off)
     names = Channels.of(model, controls, measurements, disturbances, performance)
@@ -139,7 +142,7 @@ def hinf(
 
 
 class _Levels(NamedTuple):
-    """The Riccati equations of a plant, to be asked at any level.
+    """The Riccati equations of a plant, solved at any level.
 
     `units` (nx,) of the states in which they are solved.
     """
@@ -157,29 +160,31 @@ class _Levels(NamedTuple):
         return cls(Normalised.of(P), units, dt)
 
     def controller(self, trial: Trial) -> Matrices | None:
-        """The central one for the plant as it was given; None where it would not be causal."""
+        """Return the central controller for the original plant; None where it would not be
+        causal.
+        """
         A, B, C, D = self.normal.controller(trial)
         A, B, C = A * self.units[:, None] / self.units, B * self.units[:, None], C / self.units
         return (A, B, C, D) if self.dt is None else sampled_controller(A, B, C, D)
 
 
 def optimum_above(plant: Generalized, level: float, dt: float | None) -> float:
-    """The smallest level of a plant to a part in a thousand, or `level` where that can be reached
-    or no level is found; without its controller.
+    """Return the smallest level of a plant to a part in a thousand, or `level` where that can be
+    reached or no level is found; without its controller.
     """
     try:
         normal = _Levels.of(plant, dt).normal
         if level > 0 and normal.trial(level).obstacle is None:
             return level
-        found = _smallest(normal, level or 1.0, ROUGH)
+        found = _smallest(normal, level or 1.0, ROUGH_ACCURACY)
     except (np.linalg.LinAlgError, InputError):
         return level
     return level if found is None else max(level, found[0])
 
 
 def slack(plant: Generalized, gamma: float, dt: float | None) -> float:
-    """By how much a level is above the smallest, gamma^2 over the spectral radius of XY less one;
-    not above 0 where it is out of reach, inf where the equations cannot be written.
+    """Return how far a level is above the smallest, as gamma^2 over the spectral radius of XY less
+    one; not above 0 where it cannot be reached, inf where the equations cannot be written.
     """
     try:
         return _Levels.of(plant, dt).normal.trial(gamma).slack
@@ -188,14 +193,16 @@ def slack(plant: Generalized, gamma: float, dt: float | None) -> float:
 
 
 def central_gains(plant: Generalized, gamma: float, dt: float | None) -> Matrices | None:
-    """A, B, C, D of the central controller of this level, None where it is out of reach."""
+    """Return A, B, C, D of the central controller of this level, None where it cannot be
+    reached.
+    """
     levels = _Levels.of(plant, dt)
     trial = levels.normal.trial(gamma)
     return None if trial.obstacle is not None else levels.controller(trial)
 
 
 def _at(levels: _Levels, plant: Generalized, names: Channels, gamma: float) -> PointDesign:
-    """The central controller of this level, or why it cannot be reached."""
+    """Return the central controller of this level, or why it cannot be reached."""
     obstacle = levels.normal.trial(gamma).obstacle
     if obstacle is not None:
         why = f"gamma = {gamma:.6g} is out of reach: {obstacle.value}"
@@ -208,10 +215,10 @@ def _at(levels: _Levels, plant: Generalized, names: Channels, gamma: float) -> P
 
 
 def _optimal(levels: _Levels, plant: Generalized, names: Channels, back_off: float) -> PointDesign:
-    """The central controller a little above the smallest level."""
+    """Return the central controller a little above the smallest level."""
     K = lqg(plant, levels.dt)
     simple = None if K is None else checked(plant, K, names, levels.dt)
-    if simple is not None and simple.hinf_norm <= NOTHING * _untouched(plant, simple):
+    if simple is not None and simple.hinf_norm <= ZERO_LEVEL * _untouched(plant, simple):
         return replace(simple, optimum=0.0, reasons=(NO_LEAST,))
     found = _smallest(levels.normal, 1.0 if simple is None else simple.hinf_norm)
     if found is None:
@@ -231,8 +238,8 @@ def _optimal(levels: _Levels, plant: Generalized, names: Channels, back_off: flo
 
 
 def _untouched(plant: Generalized, design: PointDesign) -> float:
-    """The gain of a loop were the controls not felt in the performance, beside which rounding is
-    nothing.
+    """Return the gain of the loop if the controls did not enter the performance, the scale of
+    rounding.
     """
     assert design.loop is not None  # noqa: S101
     A, B, C = design.loop.A, design.loop.B, np.zeros(design.loop.C.shape)
@@ -241,33 +248,35 @@ def _untouched(plant: Generalized, design: PointDesign) -> float:
 
 
 def _kept(levels: _Levels, plant: Generalized, names: Channels, gamma: float) -> PointDesign | None:
-    """The central controller of a level, if its loop keeps it."""
+    """Return the central controller of a level, if its loop keeps it."""
     trial = levels.normal.trial(gamma)
     K = None if trial.obstacle is not None else levels.controller(trial)
     if K is None:
         return None
     design = checked(plant, K, names, levels.dt)
-    return design if design is not None and design.hinf_norm <= gamma * (1 + KEPT) else None
+    return (
+        design if design is not None and design.hinf_norm <= gamma * (1 + LEVEL_TOLERANCE) else None
+    )
 
 
 def _smallest(
     normal: Normalised, start: float, accuracy: float = ACCURACY
 ) -> tuple[float, Obstacle | None] | None:
-    """The smallest level, and what stands against a lower one; 0 where none is too low, None where
-    none was found.
+    """Return the smallest level, and the obstacle to a lower one; 0 where none is too low, None
+    where none was found.
 
     `start`: a level that some controller reaches. The root of the slack of the coupling condition,
     or of what takes its place, the jump to where an equation has no solution.
     """
     least = normal.least()
     high = max(start * (1 + 1e-6), least * (1 + 1e-6), 1e-300)
-    for _ in range(DOUBLINGS):
+    for _ in range(MAX_DOUBLINGS):
         if normal.trial(high).obstacle is None:
             break
         high *= 2
     else:
         return None
-    low = max(least, NOTHING * high)
+    low = max(least, ZERO_LEVEL * high)
     below = normal.trial(low)
     if below.obstacle is None:
         return 0.0, None

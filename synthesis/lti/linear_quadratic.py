@@ -17,8 +17,8 @@ Matrices = tuple[Array, Array, Array, Array]
 
 
 class Regulator(NamedTuple):
-    """Of the control that minimises |z| with the states known: u = F x + F0 w, X the solution, R
-    the weight of u.
+    """The control that minimises |z| with the states known: u = F x + F0 w, X the solution of the
+    Riccati equation, R the weight of u.
 
     Of the dual plant: the transposed gains of the filter, its covariance, and that of what it
     cannot predict.
@@ -31,7 +31,7 @@ class Regulator(NamedTuple):
 
 
 def control_gains(P: Generalized, dt: float | None) -> Regulator | None:
-    """None where the equation has no stabilising solution."""
+    """Return the regulator, None where the equation has no stabilising solution."""
     return _continuous(P) if dt is None else _sampled(P)
 
 
@@ -63,8 +63,8 @@ def _sampled(P: Generalized) -> Regulator | None:
 
 
 def lqg(P: Generalized, dt: float | None) -> Matrices | None:
-    """The controller u = K y; its state is the filter's estimate, of a sampled plant from the
-    samples before.
+    """Return the controller u = K y; its state is the filter's estimate, for a sampled plant from
+    the samples before.
 
     D12 has full column and D21 full row rank; of a continuous plant D11 plays no part. None where
     an equation has no stabilising solution.
@@ -87,7 +87,9 @@ def lqg(P: Generalized, dt: float | None) -> Matrices | None:
 
 
 def given_direct_way(D22: Array, A: Array, B: Array, C: Array, D: Array) -> Matrices:
-    """The controller of a plant with D22 from that of the plant without: it works on y - D22 u."""
+    """Return the controller of a plant with D22 from that of the plant without: it acts on y - D22
+    u.
+    """
     N = np.linalg.inv(np.eye(D.shape[-2]) + D @ D22)
     NC, ND = N @ C, N @ D
     return A - B @ D22 @ NC, B - B @ D22 @ ND, NC, ND

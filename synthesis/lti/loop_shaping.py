@@ -1,6 +1,4 @@
-"""Loop shaping of McFarlane and Glover: weights give the loop its shape, the controller its
-robustness.
-"""
+"""Loop shaping of McFarlane and Glover: weights shape the loop, the controller makes it robust."""
 
 from __future__ import annotations
 
@@ -93,7 +91,9 @@ def ncf(
 
 
 def _four_block(G: LinearModel) -> tuple[Generalized, Channels]:
-    """From noise on y and a disturbance on u to (u, y): [K; I] (I - G K)^-1 [I, G]."""
+    """Return the system from noise on y and a disturbance on u to (u, y): [K; I] (I - G K)^-1 [I,
+    G].
+    """
     nx, nu, ny = len(G.states), len(G.inputs), len(G.outputs)
     plant = Generalized(
         A=G.A,
@@ -116,8 +116,8 @@ def _four_block(G: LinearModel) -> tuple[Generalized, Channels]:
 def _closed_form(
     G: LinearModel, back_off: float
 ) -> tuple[float, tuple[Array, Array, Array, Array]] | None:
-    """The smallest gamma, and the controller of `back_off` times that; its state estimates that of
-    the shaped plant.
+    """Return the smallest gamma, and the controller of `back_off` times that; its state estimates
+    that of the shaped plant.
     """
     A, B, C, D = (G.A, G.B, G.C, G.D) if G.dt is None else to_continuous(G.A, G.B, G.C, G.D)
     S, R = np.linalg.inv(np.eye(D.shape[1]) + D.T @ D), np.linalg.inv(np.eye(len(D)) + D @ D.T)

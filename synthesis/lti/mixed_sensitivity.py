@@ -1,4 +1,6 @@
-"""S/KS/T: how well the loop rejects, what it spends, and where it must stop, weighed together."""
+"""Mixed sensitivity S/KS/T: disturbance rejection, control effort and roll-off, weighted
+together.
+"""
 
 from __future__ import annotations
 
@@ -85,7 +87,7 @@ def mixed_sensitivity(
 
 
 def _weighted(G: LinearModel, *weights: LinearModel | None) -> LinearModel:
-    """From (w, u) to (S, KS, T, y)."""
+    """Return the system from (w, u) to (S, KS, T, y)."""
     nx, nu, ny = len(G.states), len(G.inputs), len(G.outputs)
     # what each weight is given, from (x, w, u)
     output = np.hstack([G.C, np.zeros((ny, ny)), G.D])

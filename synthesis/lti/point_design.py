@@ -1,4 +1,4 @@
-"""A controller for one frozen model, with the check of its loop; or why there is none."""
+"""A controller for one frozen model with the check of its loop, or the reason why there is none."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class PointDesign:
     hinf_norm : float
         Norm of that loop, recomputed from its matrices; inf where there is none.
     optimum : float
-        What no controller undercuts, to the accuracy asked for; NaN where it was not sought.
+        Lower bound for every controller, to the requested accuracy; NaN where it was not computed.
     reasons : tuple of str
         Sentences.
     limit : str
@@ -67,7 +67,7 @@ class PointDesign:
     def without(
         cls, status: DesignStatus, reasons: Sequence[str], optimum: float = float("nan")
     ) -> PointDesign:
-        """No controller, and why."""
+        """Return a design without a controller, with the reason."""
         return cls(status, None, None, float("inf"), optimum, tuple(reasons))
 
     def __str__(self) -> str:
@@ -78,7 +78,9 @@ class PointDesign:
 
 
 def as_model(system: object) -> LinearModel:
-    """A LinearModel as it is, a system of python-control as one; `InputError` for anything else."""
+    """Return a LinearModel itself, a system of python-control as one; `InputError` for anything
+    else.
+    """
     if isinstance(system, LinearModel):
         return system
     if is_control_system(system):
@@ -90,13 +92,15 @@ def as_model(system: object) -> LinearModel:
 
 
 def named_controller(K: Matrices, names: Channels, dt: float | None) -> LinearModel:
-    """K with the names of what it estimates, reads and commands."""
+    """Return K with the names of the states it estimates, the measurements it reads and its
+    commands.
+    """
     states = tuple(Signal(f"{s}_estimate", s.unit) for s in names.states[: len(K[0])])
     return LinearModel(*K, states, names.measurements, names.controls, dt)
 
 
 def named_loop(plant: Generalized, K: LinearModel, names: Channels) -> LinearModel:
-    """The loop of u = K y from disturbances to performance."""
+    """Return the loop of u = K y from disturbances to performance."""
     closed = plant.closed(K.A, K.B, K.C, K.D)
     return LinearModel(
         *closed, (*names.states, *K.states), names.disturbances, names.performance, K.dt
@@ -106,8 +110,8 @@ def named_loop(plant: Generalized, K: LinearModel, names: Channels) -> LinearMod
 def checked(
     plant: Generalized, K: Matrices, names: Channels, dt: float | None
 ) -> PointDesign | None:
-    """The controller with the H-infinity norm of its loop, recomputed; None where the loop is not
-    well posed or not stable.
+    """Return the controller with the H-infinity norm of its loop, recomputed; None where the loop
+    is not well posed or not stable.
     """
     if not all(np.all(np.isfinite(M)) for M in K):
         return None

@@ -1,6 +1,4 @@
-"""Stabilising solutions of algebraic Riccati equations, believed only after their properties were
-checked.
-"""
+"""Stabilising solutions of algebraic Riccati equations, accepted only if their properties hold."""
 
 from __future__ import annotations
 
@@ -9,31 +7,31 @@ from scipy import linalg
 
 Array = np.ndarray
 
-ISOTROPIC = 1e-6
-"""How far the stable subspace V, with orthonormal columns, may be from V'JV = 0: rounding leaves
-less, one that took an eigenvalue on the axis for a stable one far more.
+MAX_SUBSPACE_ERROR = 1e-6
+"""Largest entry of V'JV of the stable subspace V with orthonormal columns, exactly zero in theory:
+rounding leaves less, an eigenvalue on the axis taken for a stable one far more.
 """
 
 SEMIDEFINITE = 1e-8
-"""Negative eigenvalues below this part of the largest, or of one, are zero, in units in which the
-Hamiltonian matrix is balanced.
+"""Negative eigenvalues below this fraction of the largest, or of one, count as zero, in units in
+which the Hamiltonian matrix is balanced.
 """
 
 
 ROUNDING = 1e-13
-"""What is left of a difference below this part of its terms is none."""
+"""Entries of a difference below this fraction of its terms count as zero."""
 
 
 def without_rounding(value: Array, terms: Array) -> Array:
-    """A symmetric matrix that was computed from sums of this size: entries that are rounding are
-    zero. They would come out as solutions of either sign once balancing has raised them.
+    """Return a symmetric matrix, computed from sums of this size, with rounding errors set to zero.
+    Balancing would raise them to solutions of either sign.
     """
     symmetric = 0.5 * (value + value.T)
     return np.where(np.abs(symmetric) > ROUNDING * np.maximum(terms, terms.T), symmetric, 0.0)
 
 
 def stabilising(A: Array, R: Array, Q: Array) -> Array | None:
-    """X = X' >= 0 of A'X + XA + XRX + Q = 0 with A + RX stable, or None where there is none.
+    """Return X = X' >= 0 of A'X + XA + XRX + Q = 0 with A + RX stable, or None where there is none.
 
     From the stable invariant subspace of the Hamiltonian matrix [A R; -Q -A'], balanced by a
     symplectic scaling, so that the units of the states play no part. R and Q may be indefinite.
@@ -62,7 +60,7 @@ def stabilising(A: Array, R: Array, Q: Array) -> Array | None:
     if stable != n:
         return None
     X1, X2 = vectors[:n, :n], vectors[n:, :n]
-    if np.abs(X1.T @ X2 - X2.T @ X1).max() > ISOTROPIC:
+    if np.abs(X1.T @ X2 - X2.T @ X1).max() > MAX_SUBSPACE_ERROR:
         return None
     try:
         X = np.linalg.solve(X1.T, X2.T)

@@ -24,7 +24,7 @@ sequence of numbers and systems, one for each channel.
 def as_weight(
     weight: Weight, name: str, channels: Sequence[Signal], dt: float | None
 ) -> LinearModel:
-    """The weight on these channels, from and to signals of their names.
+    """Return the weight on these channels, from and to signals of their names.
 
     `InputError` where it has another number of channels or another sample period.
     """

@@ -47,7 +47,7 @@ class BoxLyapunov:
 
     @property
     def fault(self) -> str | None:
-        """What is wrong with the form, None where nothing is."""
+        """Reason why the form is invalid, None where it is valid."""
         if len(self.knots) != len(self.degrees):
             return f"expected a degree for each of {len(self.knots)} parameters, got {self.degrees}"
         found = structure.first(
@@ -61,7 +61,9 @@ class BoxLyapunov:
         return structure.symmetric(self.coefficients, (*counts, n, n))
 
     def fault_for(self, box: Sequence[tuple[float, float]], states: int) -> str | None:
-        """What keeps it from being a function of `states` states for every p in the box."""
+        """Return why it is not a function of `states` states for every p in the box; None where it
+        is.
+        """
         if self.fault:
             return self.fault
         if len(self.knots) != len(box):
@@ -117,5 +119,5 @@ class BoxLyapunov:
 
 
 def segment_slices(degrees: Sequence[int], index: Sequence[int]) -> tuple[slice, ...]:
-    """Which coefficients belong to one segment of each parameter."""
+    """Return the slices of the coefficients of one segment of each parameter."""
     return tuple(slice(j * d, (j + 1) * d + 1) for d, j in zip(degrees, index, strict=True))

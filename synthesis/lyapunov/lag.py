@@ -1,5 +1,5 @@
-"""A first-order lag of the scheduling parameter: a known second parameter that remembers where p
-came from.
+"""A first-order lag of the scheduling parameter: a known second parameter that depends on the
+history of p.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from synthesis.polynomial import structure
 
 Array = np.ndarray
 
-START = 2.0**-20
-"""The region begins this fraction of the range away from e = 0, so that rounded corners keep it
-invariant.
+CORNER_OFFSET = 2.0**-20
+"""The region begins this fraction of the range away from e = 0, so that it stays invariant with
+rounded corners.
 """
-ROOM = 1e-3
+INVARIANCE_MARGIN = 1e-3
 """Relative margin of the invariance condition at the corners, for the same reason."""
 
 
 @dataclass(frozen=True, eq=False)
 class LagRegion:
-    """Where the lead e = p - q can be while |dp/dt| <= rate, q the lag `time` dq/dt = p - q from
-    q(0) = p(0).
+    """The region that the lag error e = p - q cannot leave while |dp/dt| <= rate, q the lag `time`
+    dq/dt = p - q from q(0) = p(0).
 
     lower(p) <= e <= upper(p), straight lines between the `knots` (K + 1,) of p; e in units of p,
     `time` in s.
@@ -47,7 +47,7 @@ class LagRegion:
 
     @property
     def fault(self) -> str | None:
-        """What is wrong with the form, None where nothing is."""
+        """Reason why the form is invalid, None where it is valid."""
         found = structure.ascending(self.knots)
         if found:
             return found
@@ -63,15 +63,16 @@ class LagRegion:
 
     @classmethod
     def reached(cls, knots: Array, rate: float, time: float) -> LagRegion:
-        """A polygon around all (p, e) that p can reach: e grows no faster than by 1 - e/(rate time)
+        """Return a polygon around all reachable (p, e): e grows no faster than by 1 - e/(rate time)
         per unit of p.
         """
-        up = _polygon(np.diff(knots), rate * time, START * (knots[-1] - knots[0]))
-        down = _polygon(np.diff(knots)[::-1], rate * time, START * (knots[-1] - knots[0]))
+        up = _polygon(np.diff(knots), rate * time, CORNER_OFFSET * (knots[-1] - knots[0]))
+        down = _polygon(np.diff(knots)[::-1], rate * time, CORNER_OFFSET * (knots[-1] - knots[0]))
         return cls(knots, -down[::-1], up, time)
 
     def invariant(self, rate: float, number: Callable[[float], Any]) -> bool:
-        """Whether no trajectory can leave it, in the arithmetic of `number`; e = 0 lies inside.
+        """Whether no trajectory can leave the region, in the arithmetic of `number`; e = 0 lies
+        inside.
 
         With de/dt = dp/dt - e/time, D = e - upper(p) > 0 has dD/dt <= |1 - upper'| rate - e/time <=
         0 if
@@ -96,7 +97,7 @@ class LagRegion:
         return True
 
     def locate(self, p: Array) -> tuple[Array, Array, Array, Array]:
-        """lower(p), upper(p) - lower(p) and their slopes (right-hand ones at a knot)."""
+        """Return lower(p), upper(p) - lower(p) and their slopes (right-hand ones at a knot)."""
         k = np.clip(np.searchsorted(self.knots, p, side="right") - 1, 0, len(self.knots) - 2)
         height = self.upper - self.lower
         slopes = [np.diff(values) / np.diff(self.knots) for values in (self.lower, height)]
@@ -111,6 +112,6 @@ class LagRegion:
 def _polygon(widths: Array, reach: float, start: float) -> Array:
     out = [start]
     for width in widths:
-        out.append(out[-1] + width * max(0.0, 1.0 - (1.0 - ROOM) * out[-1] / reach))
+        out.append(out[-1] + width * max(0.0, 1.0 - (1.0 - INVARIANCE_MARGIN) * out[-1] / reach))
     assert all(a <= b for a, b in pairwise(out))  # noqa: S101 - never falls
     return np.array(out)

@@ -1,5 +1,5 @@
 """Parameter-dependent Lyapunov functions: V = x' P(p) x, of higher degree in x, or with a memory of
-where p came from.
+p.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class SplineLyapunov:
 
     @property
     def fault(self) -> str | None:
-        """What is wrong with the form, None where nothing is."""
+        """Reason why the form is invalid, None where it is valid."""
         found = structure.first(
             structure.ascending(self.knots),
             structure.whole(self.degree, 0, "degree"),
@@ -91,7 +91,9 @@ class SplineLyapunov:
         return None
 
     def fault_for(self, low: float, high: float, states: int) -> str | None:
-        """What keeps it from being a function of `states` states for every p in [low, high]."""
+        """Return why it is not a function of `states` states for every p in [low, high]; None where
+        it is.
+        """
         if self.fault:
             return self.fault
         size = len(monomials(states, self.order)) if self.order > 1 else states
@@ -129,8 +131,8 @@ class SplineLyapunov:
     def in_units(
         self, T: Array, factor: float = 1.0, time: float = 1.0, multiplier: float = 1.0
     ) -> SplineLyapunov:
-        """factor V as a function of the states z, x = T z, T (n, n), with time in units of `time`
-        and the multiplier times `multiplier`.
+        """Return factor V as a function of the states z, x = T z, T (n, n), with time in units of
+        `time` and the multiplier times `multiplier`.
         """
         lifted = power(T, self.order)
         slack = self.slack
@@ -227,7 +229,7 @@ class MemoryLyapunov:
 
     @property
     def fault(self) -> str | None:
-        """What is wrong with the form, None where nothing is."""
+        """Reason why the form is invalid, None where it is valid."""
         if not isinstance(self.region, LagRegion):
             return f"region must be a LagRegion, got {type(self.region).__name__}"
         found = structure.first(
@@ -251,7 +253,9 @@ class MemoryLyapunov:
         )
 
     def fault_for(self, low: float, high: float, states: int) -> str | None:
-        """What keeps it from being a function of `states` states for every p in [low, high]."""
+        """Return why it is not a function of `states` states for every p in [low, high]; None where
+        it is.
+        """
         if self.fault:
             return self.fault
         if self.coefficients.shape[-1] != states:
@@ -280,8 +284,8 @@ class MemoryLyapunov:
     def in_units(
         self, T: Array, factor: float = 1.0, time: float = 1.0, multiplier: float = 1.0
     ) -> MemoryLyapunov:
-        """factor V as a function of the states z, x = T z, T (n, n), with time in units of `time`;
-        of a `multiplier` it has none.
+        """Return factor V as a function of the states z, x = T z, T (n, n), with time in units of
+        `time`; there is no `multiplier`.
         """
         region = replace(self.region, time=self.region.time / time)
         return replace(self, region=region, coefficients=_congruent(self.coefficients, T, factor))
@@ -339,8 +343,8 @@ def graded_knots(
     breaks: Sequence[float] = (),
     shortest: float = 0.0,
 ) -> Array:
-    """Knots low + (high - low) (k/K)^grading, moved onto a `break` of the model that is near, none
-    closer than `shortest`.
+    """Return knots low + (high - low) (k/K)^grading, moved onto a `break` of the model that is
+    near, none closer than `shortest`.
 
     They are short binary fractions, so that exact arithmetic on them stays short.
     """

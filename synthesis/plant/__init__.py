@@ -1,1 +1,3 @@
-"""Design plants: their channels and weights, what closes them, and why one has no controller."""
+"""Design plants: channels and weights, closed loops, and the diagnosis of plants without a
+controller.
+"""

@@ -1,4 +1,4 @@
-"""What may be closed around a design plant, as a model with the names of its signals."""
+"""Controllers of all accepted kinds as models with the signal names of a design plant."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from symheli.values.signal import Signal, indices
 def as_controller(
     given: Any, controls: Sequence[Signal], measurements: Sequence[Signal]
 ) -> LinearModel | LPVStateSpace:
-    """The controller that is `given` in one of the ways of `Plant.close`; raises `InputError` for
-    anything else, `UnknownNameError` for signals that are not the plant's.
+    """Return the controller that is `given` in one of the ways of `Plant.close`; raise `InputError`
+    for anything else, `UnknownNameError` for signals that are not the plant's.
     """
     inner = getattr(given, "model", None)
     if isinstance(inner, LPVStateSpace) and not isinstance(given, UncertainStateSpace):
@@ -46,8 +46,8 @@ def as_controller(
 
 
 def _named(system: Any, controls: Sequence[str], measurements: Sequence[str]) -> Any:
-    """A copy of a python-control system whose signals have the names of the plant, in order, where
-    it has none of its own.
+    """Return a copy of a python-control system whose signals have the names of the plant, in order,
+    where it has none of its own.
     """
     import control
 

@@ -1,4 +1,6 @@
-"""Why no controller can be found, or none that is worth having, in sentences with names."""
+"""Diagnosis of a plant: why no controller exists, or why its gamma is not meaningful, in sentences
+with signal names.
+"""
 
 from __future__ import annotations
 
@@ -16,16 +18,23 @@ from synthesis.worst.frozen import norm
 Array = np.ndarray
 
 SINGULAR = 1e-9
-"""A direction with a smaller singular value, in units that bring the entries to one, is missing."""
+"""Singular values of a matrix with entries of order one up to this fraction of the largest count
+as zero.
+"""
 
-CLOSE = 0.01
-"""A gamma within this part of what no controller can lower is decided by it."""
+FLOOR_TOLERANCE = 0.01
+"""Relative difference up to which a gamma counts as decided by the part that no controller can
+lower.
+"""
 
-BELOW = 1e-6
-"""A gamma is below that by more than this part: what ill-conditioned plants leave of its digits."""
+FLOOR_ERROR = 1e-6
+"""Relative error of that part for ill-conditioned plants: a gamma below it by more contradicts it.
+"""
 
-PART = 0.3
-"""Signals with at least this part of a direction are named."""
+NAMED_FRACTION = 0.3
+"""Least component of a signal in a direction, relative to the largest, with which the signal is
+named.
+"""
 
 
 def reasons(
@@ -36,7 +45,8 @@ def reasons(
     gamma: float | None = None,
     at: Sequence[object] | None = None,
 ) -> tuple[str, ...]:
-    """Why a synthesis for this plant must fail, or why its gamma says nothing, a sentence each.
+    """Return why a synthesis for this plant must fail, or why its gamma is not meaningful, a
+    sentence each.
 
     Modes that the controls cannot stabilise or the measurements cannot detect; controls without a
     price and measurements without noise; invariant zeros on the border of stability, where the
@@ -52,7 +62,7 @@ def reasons(
     dt : float, optional
         Sample period, s; None: continuous.
     gamma : float, optional
-        A level that is wanted, or was reached.
+        A requested level, or the level reached.
     at : sequence, optional
         What to call each frozen model, for a family: "airspeed = 3 m/s".
 
@@ -106,7 +116,9 @@ def _reasons(P: Generalized, names: Channels, dt: float | None, gamma: float | N
 
 
 def _modes(P: Generalized, names: Channels, dt: float | None, *, dual: bool = False) -> list[str]:
-    """Modes that cannot be stabilised; of the dual plant those that cannot be detected."""
+    """Return sentences on modes that cannot be stabilised; for the dual plant, on those that cannot
+    be detected.
+    """
     hidden = hidden_modes(
         P.A.T, P.B2.T, lambda value, size: unstable(value, size, sampled=dt is not None)
     )
@@ -133,7 +145,9 @@ def _place(mode: Mode, dt: float | None) -> str:
 
 
 def _singular(P: Generalized, names: Channels, dt: float | None) -> list[str]:
-    """Controls without a price, measurements without noise, zeros on the border of stability."""
+    """Return sentences on controls without a weight, measurements without noise, and zeros on the
+    stability boundary.
+    """
     if dt is not None:
         if np.any(np.abs(np.linalg.eigvals(P.A) + 1) < SINGULAR):
             return ["a mode at z = -1, half the sample frequency: sample at another rate"]
@@ -150,8 +164,8 @@ def _singular(P: Generalized, names: Channels, dt: float | None) -> list[str]:
 
 
 def unpriced(D12: Array, names: Sequence[str], where: str = "", *, dual: bool = False) -> list[str]:
-    """Directions of the controls `names` that D12 (.., nz, nu) does not see; of the dual plant, of
-    measurements that no disturbance enters. One sentence each.
+    """Return a sentence for each direction of the controls `names` that D12 (.., nz, nu) does not
+    see; for the dual plant, for measurements that no disturbance enters.
     """
     found: dict[str, None] = {}
     for each in D12.reshape(-1, *D12.shape[-2:]):
@@ -168,7 +182,9 @@ def unpriced(D12: Array, names: Sequence[str], where: str = "", *, dual: bool = 
 
 
 def free_directions(D12: Array) -> Array:
-    """Directions (nu, k) of the controls that D12 (nz, nu) does not see, in units of their own."""
+    """Return the directions (nu, k) of the controls that D12 (nz, nu) does not see, in units of
+    their own.
+    """
     nu = D12.shape[1]
     if not np.any(D12):
         return np.eye(nu)
@@ -180,7 +196,8 @@ def free_directions(D12: Array) -> Array:
 
 
 def axis_zeros(P: Generalized) -> list[Mode]:
-    """Invariant zeros of (A, B2, C1, D12) on the imaginary axis; D12 has full column rank.
+    """Return the invariant zeros of (A, B2, C1, D12) on the imaginary axis; D12 has full column
+    rank.
 
     They are the modes of the plant with z's part along D12 held at zero that the rest of z does not
     see.
@@ -214,8 +231,8 @@ def decided(
     at: Sequence[str],
     dt: float | None = None,
 ) -> tuple[str, ...]:
-    """What of a level `gamma` no scheduled controller can lower, at which of the frozen models
-    (leading axis, called `at`); and whether all keep it with the controls at rest.
+    """Return which part of a level `gamma` no scheduled controller can lower, at which of the
+    frozen models (leading axis, called `at`); and whether all keep it with the controls at rest.
 
     One is known that keeps `reached`: a floor above that is rounding.
     """
@@ -224,7 +241,8 @@ def decided(
     close = [
         k
         for k, floor in enumerate(floors)
-        if gamma <= floor.gamma * (1 + CLOSE) and floor.gamma <= reached * (1 + CLOSE)
+        if gamma <= floor.gamma * (1 + FLOOR_TOLERANCE)
+        and floor.gamma <= reached * (1 + FLOOR_TOLERANCE)
     ]
     close.sort(key=lambda k: -floors[k].gamma)
     out = []
@@ -241,7 +259,8 @@ def decided_by(
     dt: float | None = None,
     reached: float = math.inf,
 ) -> list[str]:
-    """What of a level `gamma` no controller can lower, where that is all of it or more.
+    """Return sentences on the part of a level `gamma` that no controller can lower, where that is
+    all of it or more.
 
     Where a controller that keeps `reached` is known, a floor above that is rounding.
     """
@@ -250,19 +269,19 @@ def decided_by(
 
 
 def _unreachable(floor: Unreachable, names: Channels, gamma: float) -> list[str]:
-    if gamma < floor.gamma * (1 - BELOW):
+    if gamma < floor.gamma * (1 - FLOOR_ERROR):
         return [f"gamma = {gamma:.6g} cannot be reached: {_floor(floor, names)}"]
-    if gamma > floor.gamma * (1 + CLOSE):
+    if gamma > floor.gamma * (1 + FLOOR_TOLERANCE):
         return []
-    if floor.at_rest <= floor.gamma * (1 + CLOSE):
+    if floor.at_rest <= floor.gamma * (1 + FLOOR_TOLERANCE):
         return [
             f"gamma = {gamma:.6g} proves nothing: {_floor(floor, names)}, as it is with the"
             " controls at rest; scale those signals or their weights, or give the"
             " controls a lower price"
         ]
     return [
-        f"gamma = {gamma:.6g} is decided at one frequency: {_floor(floor, names)}; of the"
-        " loop elsewhere it says little"
+        f"gamma = {gamma:.6g} is limited at a single frequency: {_floor(floor, names)}; it does"
+        " not reflect the rest of the loop"
     ]
 
 
@@ -271,7 +290,7 @@ def _at_rest(P: Generalized, dt: float | None) -> float:
 
 
 def _idle(idle: float, gamma: float) -> list[str]:
-    if idle > gamma * (1 + CLOSE):
+    if idle > gamma * (1 + FLOOR_TOLERANCE):
         return []
     return [
         f"the gain is {idle:.6g} with the controls at rest: a controller for gamma ="
@@ -296,11 +315,11 @@ def _floor(floor: Unreachable, names: Channels) -> str:
 
 def _foremost(sizes: Array, names: tuple[str, ...]) -> str:
     order = np.argsort(-sizes)
-    return _listed([names[i] for i in order if sizes[i] >= PART * sizes.max()])
+    return _listed([names[i] for i in order if sizes[i] >= NAMED_FRACTION * sizes.max()])
 
 
 def _direction(direction: Array, names: Sequence[str]) -> str:
-    """One signal by its name, a combination with its coefficients."""
+    """Return one signal by its name, a combination with its coefficients."""
     parts = [(c, n) for c, n in zip(direction, names, strict=True) if abs(c) > 1e-6]
     if len(parts) == 1:
         return str(parts[0][1])

@@ -17,8 +17,10 @@ from synthesis.worst.frozen import to_continuous
 
 Array = np.ndarray
 
-SIZES = 1e-100, 1e100
-"""Riccati equations square what a control costs and a measurement errs, and invert the squares."""
+SIZE_LIMITS = 1e-100, 1e100
+"""Least and largest entries: Riccati equations square control weights and measurement noise, and
+invert the squares.
+"""
 
 
 class Generalized(NamedTuple):
@@ -49,17 +51,17 @@ class Generalized(NamedTuple):
         disturbances: Sequence[str] | None = None,
         performance: Sequence[str] | None = None,
     ) -> Generalized:
-        """The channels of a model by name; see `Channels.of`."""
+        """Return the channels of a model by name; see `Channels.of`."""
         return cls.between(
             model, Channels.of(model, controls, measurements, disturbances, performance)
         )
 
     @classmethod
     def between(cls, model: LinearModel, channels: Channels) -> Generalized:
-        """The matrices of a model that has these channels.
+        """Return the matrices of a model that has these channels.
 
         Raises `InputError` for numbers whose squares are no numbers: an entry beyond the second of
-        `SIZES`, a price of a control or noise of a measurement below the first.
+        `SIZE_LIMITS`, a price of a control or noise of a measurement below the first.
         """
         w = indices(channels.disturbances, model.inputs, "input")
         u = indices(channels.controls, model.inputs, "input")
@@ -76,15 +78,15 @@ class Generalized(NamedTuple):
             ("noise", channels.measurements, noises),
         ):
             for signal, size in zip(signals, sizes, strict=True):
-                if 0 < size < SIZES[0]:
+                if 0 < size < SIZE_LIMITS[0]:
                     raise InputError(
                         f"the {what} of {signal} is {size:.3g}, whose square underflows; increase"
                         " its weight"
                     )
-        if max(np.abs(M).max(initial=0.0) for M in plant) > SIZES[1]:
+        if max(np.abs(M).max(initial=0.0) for M in plant) > SIZE_LIMITS[1]:
             raise InputError(
-                f"a model with entries beyond {SIZES[1]:.0e} cannot be squared; choose other units"
-                " or weights"
+                f"a model with entries beyond {SIZE_LIMITS[1]:.0e} cannot be squared; choose other"
+                " units or weights"
             )
         return plant
 
@@ -92,7 +94,9 @@ class Generalized(NamedTuple):
     def split(
         cls, A: Array, B: Array, C: Array, D: Array, controls: int, measured: int
     ) -> Generalized:
-        """From one model whose last `controls` inputs and last `measured` outputs are u and y."""
+        """Return the plant of one model whose last `controls` inputs and last `measured` outputs
+        are u and y.
+        """
         w, z = B.shape[-1] - controls, C.shape[-2] - measured
         through = (
             D[..., rows, columns]
@@ -120,7 +124,7 @@ class Generalized(NamedTuple):
     def closed(
         self, Ak: Array, Bk: Array, Ck: Array, Dk: Array
     ) -> tuple[Array, Array, Array, Array]:
-        """A, B, C, D from w to z of the loop u = K y, the states of the plant first.
+        """Return A, B, C, D from w to z of the loop u = K y, the states of the plant first.
 
         Raises `InputError` where I - Dk D22 is singular: the loop is not well posed.
         """
@@ -150,7 +154,7 @@ class Generalized(NamedTuple):
 
 
 class Channels(NamedTuple):
-    """The names behind a `Generalized`, in its order."""
+    """The signal names of a `Generalized`, in its order."""
 
     states: tuple[Signal, ...]
     disturbances: tuple[Signal, ...]
@@ -167,7 +171,7 @@ class Channels(NamedTuple):
         disturbances: Sequence[str] | None = None,
         performance: Sequence[str] | None = None,
     ) -> Channels:
-        """Which inputs and outputs of a model are what.
+        """Assign the inputs and outputs of a model to the four channels.
 
         What is no control is a disturbance, what is not measured is performance, unless they are
         named. Raises `UnknownNameError` for a name the model does not have, `InputError` for a
@@ -206,7 +210,8 @@ class Channels(NamedTuple):
 
 
 def continuous_plant(plant: Generalized) -> Generalized:
-    """The continuous plant of a sampled one: stability and H-infinity norms of loops are the same.
+    """Return the continuous plant of a sampled one: stability and H-infinity norms of loops are the
+    same.
 
     Its state is (x(k+1) + x(k))/sqrt(2), in the coordinates of x. Raises `InputError` where the
     plant has a mode at z = -1.
@@ -223,8 +228,8 @@ def continuous_plant(plant: Generalized) -> Generalized:
 def sampled_controller(
     A: Array, B: Array, C: Array, D: Array
 ) -> tuple[Array, Array, Array, Array] | None:
-    """The sampled controller of a continuous one, the way back; None where it has a pole at
-    s = 1, which is one at infinite z.
+    """Return the sampled controller of a continuous one, the inverse map; None where it has a pole
+    at s = 1, which is one at infinite z.
     """
     eye = np.eye(len(A))
     if is_singular(eye - A):
@@ -234,7 +239,7 @@ def sampled_controller(
 
 
 def blocks(rows: Sequence[Sequence[Array]]) -> Array:
-    """A block matrix of blocks that may have leading axes, which are made alike."""
+    """Return a block matrix of blocks that may have leading axes, which are broadcast."""
     leading = np.broadcast_shapes(*(M.shape[:-2] for row in rows for M in row))
     return np.concatenate(
         [

@@ -1,4 +1,4 @@
-"""Modes that cannot be seen or driven, by the test of Popov, Belevitch and Hautus."""
+"""Unobservable and uncontrollable modes, by the test of Popov, Belevitch and Hautus."""
 
 from __future__ import annotations
 
@@ -13,22 +13,24 @@ from symheli.lpv.equilibration import equilibrate
 Array = np.ndarray
 
 HIDDEN = 1e-9
-"""[A - s I; C] with rows and columns in units of their own loses rank at s where its smallest
-singular value is below this part of A's largest entry.
+"""[A - s I; C], with rows and columns in units of their own, loses rank at s where its smallest
+singular value is below this fraction of A's largest entry.
 """
 
 BOUNDARY = 1e-9
-"""Beside the size of A, a mode this near to the border of stability is on it."""
+"""Distance from the stability boundary, relative to the size of A, within which a mode counts as
+on it.
+"""
 
 ROUNDING = 1e-7
-"""Beside the size of A: an eigenvalue of a cluster is not known better."""
+"""Accuracy of an eigenvalue in a cluster, relative to the size of A."""
 
-SHARE = 0.3
-"""States with this part of the participation of the foremost are named with it."""
+NAMED_FRACTION = 0.3
+"""Least participation of a state, relative to the largest, with which the state is named."""
 
 
 class Mode(NamedTuple):
-    """An eigenvalue with a part of its eigenvector that a matrix cannot see.
+    """An eigenvalue with a part of its eigenvector in the null space of a matrix.
 
     `participation` (n,): share of each state in it, the largest 1.
     """
@@ -37,14 +39,14 @@ class Mode(NamedTuple):
     participation: Array
 
     def among(self, states: tuple[str, ...]) -> str:
-        """The states that take the foremost part, by name."""
+        """Return the names of the states with the largest participation."""
         order = np.argsort(-self.participation)
-        return ", ".join(states[i] for i in order[:4] if self.participation[i] >= SHARE)
+        return ", ".join(states[i] for i in order[:4] if self.participation[i] >= NAMED_FRACTION)
 
 
 def hidden_modes(A: Array, C: Array, counts: Callable[[complex, float], bool]) -> list[Mode]:
-    """Eigenvalues of A (n, n), of each complex pair one, with an eigenvector that C (m, n) does not
-    see.
+    """Return eigenvalues of A (n, n), of each complex pair one, with an eigenvector in the null
+    space of C (m, n).
 
     Only where `counts(value, size)` is true, `size` being that of A. Units of states and outputs
     play no part. An eigenvalue of a nearly defective cluster is known to a root of the rounding
@@ -77,7 +79,7 @@ def hidden_modes(A: Array, C: Array, counts: Callable[[complex, float], bool]) -
 
 
 def _rounded(value: complex, size: float) -> complex:
-    """Without what is rounding, in the upper half plane."""
+    """Return the eigenvalue in the upper half plane, with rounding errors set to zero."""
     real, imaginary = (x if abs(x) > ROUNDING * size else 0.0 for x in (value.real, value.imag))
     return complex(real, abs(imaginary))
 

@@ -1,5 +1,5 @@
-"""What a design plant gets in front of and behind it: weights, actuators, delays, filters and
-integrators, each with one input and one output.
+"""Systems in series with a design plant: weights, actuators, delays, filters and integrators, each
+with one input and one output.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from symheli.values.signal import Signal
 Part = LinearModel | LPVStateSpace
 Model = LPVStateSpace | UncertainStateSpace
 DISTURBANCE = "_disturbance"
-"""Ends the name of what is added to a control."""
+"""Suffix of the name of a disturbance added to a control."""
 
 
 @runtime_checkable
@@ -29,34 +29,38 @@ class Actuator(Protocol):
     """A servo: anything that has a linear model."""
 
     def linear(self, name: str) -> LinearModel:
-        """From `<name>_command` to `name`, continuous."""
+        """Return the linear model from `name`_command to `name`, continuous."""
         ...
 
 
 def positive(given: Any, what: str) -> float:
-    """The number; raises `InputError` where it is none, or not > 0 and finite."""
+    """Return the number; raise `InputError` unless it is a finite number > 0."""
     if not (_is_number(given) and 0 < float(given) < math.inf):
         raise InputError(f"{what}: expected a number > 0, got {given!r:.60}")
     return float(given)
 
 
 def weight(given: object, name: str, dt: float | None) -> Part:
-    """A weight as a part: a number > 0, or a filter, on a sampled plant by Tustin's rule."""
+    """Return a weight as a system: a number > 0, or a filter, on a sampled plant by
+    Tustin's rule.
+    """
     if _is_number(given):
         return _gain(positive(given, f"the weight of {name}"), name)
     return _filter(given, f"the weight of {name}", "a number > 0", dt, "tustin")
 
 
 def actuator(given: object, name: str, dt: float | None) -> Part:
-    """An actuator as a part, on a sampled plant with its command held between the samples."""
+    """Return an actuator as a system, on a sampled plant with its command held between the
+    samples.
+    """
     if isinstance(given, Actuator):
         given = given.linear(name)
     return _filter(given, f"the actuator of {name}", "a Servo", dt, "hold")
 
 
 def sensor_filter(given: object, name: str, dt: float | None) -> Part:
-    """A filter as a part: a first-order lag where a bandwidth (rad/s) is given; on a sampled plant
-    by Tustin's rule.
+    """Return a filter as a system: a first-order lag for a given bandwidth (rad/s); on a sampled
+    plant by Tustin's rule.
     """
     if _is_number(given):
         omega = positive(given, f"the bandwidth of the filter of {name}")
@@ -65,7 +69,9 @@ def sensor_filter(given: object, name: str, dt: float | None) -> Part:
 
 
 def delay(seconds: float, name: str, order: int, dt: float | None) -> LinearModel:
-    """Whole samples on a sampled plant, Pade's approximation on a continuous one."""
+    """Return a delay: whole samples on a sampled plant, Pade's approximation on a
+    continuous one.
+    """
     if dt is None:
         return pade_delay(name, seconds, order)
     samples = positive(seconds, "the delay") / dt
@@ -81,21 +87,23 @@ def delay(seconds: float, name: str, order: int, dt: float | None) -> LinearMode
 
 
 def integrator(name: str, dt: float | None) -> LinearModel:
-    """From the rate of a command to the command: u(k+1) = u(k) + dt v(k) on a sampled plant."""
+    """Return the integrator from the rate of a command to the command: u(k+1) = u(k) + dt v(k) on a
+    sampled plant.
+    """
     A, B = (0.0, 1.0) if dt is None else (1.0, dt)
     return _first_order(A, B, f"{name}_command", name, dt)
 
 
 def on(model: Model, change: Callable[[LPVStateSpace], LPVStateSpace]) -> Model:
-    """The model changed; of an uncertain one, the model around its block."""
+    """Apply the change to the model; to an uncertain one, around its block."""
     if isinstance(model, UncertainStateSpace):
         return replace(model, model=change(model.model))
     return change(model)
 
 
 def passing(names: Sequence[Signal]) -> Callable[[LPVStateSpace], LPVStateSpace]:
-    """The model with outputs that pass these inputs; `InputError` where it has another output of
-    that name.
+    """Return the model with outputs that equal these inputs; `InputError` where it has another
+    output of that name.
     """
 
     def add(model: LPVStateSpace) -> LPVStateSpace:
@@ -113,14 +121,16 @@ def passing(names: Sequence[Signal]) -> Callable[[LPVStateSpace], LPVStateSpace]
 
 
 def _passes(model: LPVStateSpace, name: Signal) -> bool:
-    """Whether the output is the input of that name."""
+    """Whether the output equals the input of that name."""
     row = model.select(outputs=[name]).matrices(model.basis.samples(model.box))
     unit = np.array([float(u == name) for u in model.inputs])
     return not np.any(row.C) and bool(np.allclose(row.D, unit, rtol=0.0, atol=1e-12))
 
 
 def disturbed(model: LPVStateSpace, controls: Sequence[Signal]) -> LPVStateSpace:
-    """The model with one more input for each of these inputs, `<name>_disturbance`, added to it."""
+    """Return the model with an additional input `<name>_disturbance` for each of these inputs,
+    added to it.
+    """
     inputs = itself(model.inputs)
     for name in controls:
         added = Signal(f"{name}{DISTURBANCE}", name.unit)
@@ -134,7 +144,7 @@ def with_row(
     of: Mapping[str, float],
     across: Mapping[str, float] | None = None,
 ) -> LPVStateSpace:
-    """One more output: a sum `of` outputs, and of inputs `across`."""
+    """Add an output: a sum `of` outputs, and of inputs `across`."""
     outputs = {**itself(model.outputs), **new_name(new, model.outputs, "output", of)}
     return mixed(model, itself(model.inputs), outputs, {new: across or {}})
 
@@ -142,7 +152,7 @@ def with_row(
 def new_name(
     name: Signal, known: Sequence[str], kind: str, of: Mapping[str, float] | None = None
 ) -> dict[Signal, Mapping[str, float]]:
-    """{name: of} for `mixed`; raises `InputError` for a name that is known already."""
+    """Return {name: of} for `mixed`; raise `InputError` for an existing name."""
     if name in known:
         raise InputError(f"the plant has an {kind} {name} already: rename that one")
     return {name: of or {}}
@@ -164,7 +174,7 @@ def _filter(
 
 
 def _first_order(A: float, B: float, state: str, name: str, dt: float | None) -> LinearModel:
-    """With the state as its output, in the unit of the signal."""
+    """Return a first-order lag with the state as its output, in the unit of the signal."""
     a, b, c, d = (np.array([[entry]]) for entry in (A, B, 1.0, 0.0))
     signal = Signal(name)
     return LinearModel(a, b, c, d, (Signal(state, signal.unit),), (signal,), (signal,), dt)

@@ -1,5 +1,5 @@
-"""The plant of a design: a model that knows its disturbances, performance, controls and
-measurements, and what stands between it and the controller.
+"""The design plant: a model with named disturbances, performance, controls and measurements, and
+the systems between it and the controller.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ from synthesis.plant.generalized import Channels, Generalized
 from synthesis.plant.parts import DISTURBANCE, Model, disturbed, new_name, on, passing, with_row
 
 TRUE, WEIGHTED = "true_", "weighted_"
-"""Before the name of a performance signal of which the measurement is another: without its noise
-and filter, or without the weight.
+"""Prefixes of a performance signal that is also measured: without the noise and filter of the
+measurement, and with a weight.
 """
 
 
@@ -119,7 +119,7 @@ class Plant:
 
     @property
     def nominal(self) -> LPVStateSpace:
-        """The model; of an uncertain one that of Delta = 0."""
+        """The model; for an uncertain one, that of Delta = 0."""
         return self.model.nominal if isinstance(self.model, UncertainStateSpace) else self.model
 
     @property
@@ -139,17 +139,17 @@ class Plant:
 
     @property
     def basis(self) -> FunctionSpace:
-        """The functions of the parameters that the matrices are sums of."""
+        """The basis functions of the matrices."""
         return self.nominal.basis
 
     def matrices(self, p: object) -> Generalized:
-        """The nine matrices at p; see `LPVStateSpace.matrices`. Of an uncertain plant those of
-        Delta = 0.
+        """Return the nine matrices at p; see `LPVStateSpace.matrices`. For an uncertain plant,
+        those of Delta = 0.
         """
         return Generalized(*Partition.of(self.nominal.matrices(p), self._positions))
 
     def at(self, *p: float) -> Generalized:
-        """The nine matrices frozen at p, one value a parameter."""
+        """Return the nine matrices frozen at p, one value a parameter."""
         model = self.nominal.at(*p)
         return Generalized(*Partition.of((model.A, model.B, model.C, model.D), self._positions))
 
@@ -175,9 +175,8 @@ class Plant:
         )
 
     def weighted(self, weights: Mapping[str, object]) -> Plant:
-        """With `weights` {disturbance or performance signal: weight}, a number > 0, a LinearModel
-        or python-control system of one input and output, or an LPVStateSpace over the same
-        parameters.
+        """Add `weights` {disturbance or performance signal: weight}: a number > 0, a LinearModel or
+        python-control system of one input and output, or an LPVStateSpace over the same parameters.
 
         A disturbance drives its weight and keeps its name; a performance signal is weighted, and
         called `weighted_<name>` where the name itself stays that of a measurement, disturbance or
@@ -195,7 +194,7 @@ class Plant:
         return plant
 
     def with_servo(self, servos: Mapping[str, object]) -> Plant:
-        """With actuators {control: Servo, LinearModel or python-control system}; the controls keep
+        """Add actuators {control: Servo, LinearModel or python-control system}; the controls keep
         their names and are the commands.
 
         A sampled plant takes them with their output held between the samples: put them before
@@ -207,7 +206,7 @@ class Plant:
     def with_delay(
         self, seconds: float, signals: Sequence[str] | None = None, order: int = 4
     ) -> Plant:
-        """With a delay at all or at these controls: exact in a sampled plant, Pade's approximation
+        """Add a delay at all or at these controls: exact in a sampled plant, Pade's approximation
         of `order` states in a continuous one.
 
         Raises `InputError` for a delay that is no whole number of samples, and where the control is
@@ -217,7 +216,7 @@ class Plant:
         return self._driven({name: parts.delay(seconds, name, order, self.dt) for name in names})
 
     def with_filter(self, filters: Mapping[str, object]) -> Plant:
-        """With filters {measurement: LinearModel, python-control system, or the bandwidth of a
+        """Add filters {measurement: LinearModel, python-control system, or the bandwidth of a
         first-order lag in rad/s}, on a sampled plant by Tustin's rule.
 
         The performance stays unfiltered, as `true_<name>` where it had the name of the
@@ -231,9 +230,9 @@ class Plant:
         return plant
 
     def with_input_disturbance(self, controls: Sequence[str] | None = None) -> Plant:
-        """With a disturbance `<control>_disturbance`, in the unit of the control, added to all or
-        to these controls: called before `with_servo` behind the servo, after it to the command. A
-        control that is performance stays the command alone.
+        """Add a disturbance `<control>_disturbance`, in the unit of the control, to all or to these
+        controls: called before `with_servo` behind the servo, after it to the command. A control
+        that is performance stays the command alone.
 
         Raises `InputError` where the control is weighted already.
         """
@@ -246,7 +245,7 @@ class Plant:
         )
 
     def with_noise(self, sizes: Mapping[str, float]) -> Plant:
-        """With a disturbance `<measurement>_noise` (unit "1") of {measurement: size} in the unit of
+        """Add a disturbance `<measurement>_noise` (unit "1") for {measurement: size} in the unit of
         each.
 
         The performance stays without noise, as `true_<name>` where it had the name of the
@@ -285,8 +284,8 @@ class Plant:
     def velocity_form(
         self, controls: Sequence[str] | None = None, *, measured: bool = False
     ) -> Plant:
-        """With integrators in front of all or of these controls: the new controls are their rates
-        `<name>_rate`, per second, the states that they move `<name>_command`.
+        """Add integrators in front of all or of these controls: the new controls are their rates
+        `<name>_rate`, per second, and the integrator states `<name>_command`.
 
         In discrete time u(k+1) = u(k) + dt v(k). Where the control was performance, its command is.
         With `measured` the commands are measurements too, `<name>_command`.
@@ -297,34 +296,35 @@ class Plant:
         return plant
 
     def sampled(self, dt: float, degree: int | Sequence[int] | None = None) -> Plant:
-        """Every `dt` s with the inputs held between; see `LPVStateSpace.discretize`, whose
-        `.residuals` the model has. Raises `InputError` for an uncertain plant.
+        """Sample the plant every `dt` s with the inputs held between; see
+        `LPVStateSpace.discretize`, whose `.residuals` the model has. Raises `InputError` for an
+        uncertain plant.
         """
         if isinstance(self.model, UncertainStateSpace):
             raise InputError(
-                "an uncertain plant is not sampled: what its block returns is not held between the"
-                " samples; start from an uncertain model that is sampled"
+                "an uncertain plant is not sampled: the outputs of its block are not held between"
+                " the samples; start from an uncertain model that is sampled"
             )
         return self._changed(lambda model: model.discretize(dt, degree=degree))
 
     def lagged(self, seconds: float) -> Plant:
-        """The plant over its parameter seen through a lag and the rate of that, both known to a
-        controller: X and Y may then move with the first; see `symheli.lpv.lagged`.
+        """Return the plant scheduled by a lag of its parameter and the rate of that lag, both known
+        to a controller: X and Y may then depend on the lag; see `symheli.lpv.lagged`.
         """
         if isinstance(self.model, UncertainStateSpace):
             raise InputError("an uncertain plant has no lagged parameter: take its .nominal")
         return self._changed(lambda model: lagged(model, seconds))
 
     def with_rate(self, rate: Rates) -> Plant:
-        """The same plant with |dp/dt| <= rate; see `LPVStateSpace.with_rate`."""
+        """Return the same plant with |dp/dt| <= rate; see `LPVStateSpace.with_rate`."""
         return replace(self, model=self.model.with_rate(rate))
 
     def with_scheduling(self, scheduling: Scheduling | Sequence[Scheduling]) -> Plant:
-        """The same plant over narrower ranges or with other rate limits."""
+        """Return the same plant over narrower ranges or with other rate limits."""
         return replace(self, model=self.model.with_scheduling(scheduling))
 
     def close(self, controller: Any) -> Model:
-        """The loop of u = K y from the disturbances to the performance; see
+        """Return the loop of u = K y from the disturbances to the performance; see
         `symheli.lpv.lower_feedback`.
 
         `controller`: {(control, measurement): gain}, an array (controls, measurements) of gains, a
@@ -340,7 +340,9 @@ class Plant:
         )
 
     def _changed(self, change: Callable[[LPVStateSpace], LPVStateSpace], **groups: Any) -> Plant:
-        """With another model, to which inputs that are performance are added anew."""
+        """Return the plant with another model, to which inputs that are performance are
+        added anew.
+        """
         inputs = (*self.disturbances, *self.controls)
         own = self.model.select(outputs=[y for y in self.model.outputs if y not in inputs])
         return replace(self, model=on(own, change), **groups)
@@ -351,7 +353,7 @@ class Plant:
         return self._changed(lambda model: model.driven_by(by))
 
     def _bare(self, controls: Iterable[str]) -> None:
-        """Raises `InputError` where one of them is weighted."""
+        """Raise `InputError` where one of these signals is weighted."""
         for name in controls:
             if WEIGHTED + name in self.performance:
                 raise InputError(
@@ -391,7 +393,9 @@ class Plant:
         return self._changed(change, performance=_with(self.performance, name, new))
 
     def _with_own_measurement(self, name: str) -> Plant:
-        """A measurement that is not performance too: that becomes `true_<name>`."""
+        """Separate a measurement from a performance signal of the same name: the latter becomes
+        `true_<name>`.
+        """
         (i,) = indices([name], self.measurements, "measurement")
         if name not in self.performance:
             return self
@@ -402,7 +406,7 @@ class Plant:
         )
 
     def _with_disturbance(self, new: Signal, enters: Mapping[str, float]) -> Plant:
-        """One more disturbance, which adds {output: gain} to outputs."""
+        """Add a disturbance that adds {output: gain} to outputs."""
 
         def change(model: LPVStateSpace) -> LPVStateSpace:
             across = {Signal(y): {new: gain} for y, gain in enters.items()}
@@ -455,11 +459,11 @@ class Plant:
 
 
 def require_plant(given: object) -> None:
-    """Raises `InputError`, with what to write, for anything but a `Plant`."""
+    """Raise `InputError`, with an example, for anything but a `Plant`."""
     if not isinstance(given, Plant):
         raise InputError(
-            f"plant: expected a synthesis.Plant, got {type(given).__name__}; say what is what of a"
-            " model first: synthesis.Plant(model, disturbances=[...], performance=[...],"
+            f"plant: expected a synthesis.Plant, got {type(given).__name__}; declare the signals of"
+            " a model first: synthesis.Plant(model, disturbances=[...], performance=[...],"
             " controls=[...], measurements=[...])"
         )
 
@@ -478,7 +482,9 @@ def _scheduled(given: Any) -> Model:
 
 
 def _named(given: Iterable[str], known: Sequence[Signal], kind: str) -> tuple[Signal, ...]:
-    """These of the known signals, with their units; raises `InputError` for a name that repeats."""
+    """Return these of the known signals, with their units; raise `InputError` for a name that
+    repeats.
+    """
     return signals(tuple(known[i] for i in indices(_tuple(given), known, kind)))
 
 

@@ -1,4 +1,4 @@
-"""What a synthesis refuses, and why one has failed: with the names of the plant."""
+"""Input checks of a synthesis, and the error of a failed one, with the names of the plant."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def levels_above(back_off: float | Sequence[float]) -> tuple[float, ...]:
 
 
 def conditions(plant: Plant) -> tuple[Array, list[str]]:
-    """Some p all over the box, as `Plant.matrices` takes them, and what to call each."""
+    """Return some p all over the box, as `Plant.matrices` takes them, and a name for each."""
     p = lobatto_points(5 if len(plant.parameters) == 1 else 3, plant.nominal.box)
     names = [s.name for s in plant.parameters]
     said = [
@@ -50,8 +50,8 @@ def conditions(plant: Plant) -> tuple[Array, list[str]]:
 
 
 def least_ranks(plant: Plant, *, controls: bool = True, measurements: bool = True) -> None:
-    """Raises `InputError` where a control costs nothing or a measurement is free of disturbances at
-    some p, and where the plant has none.
+    """Raise `InputError` where a control has no weight or a measurement no disturbance at some p,
+    and where the plant has none of these.
     """
     named = require_channels(plant, controls=controls, measurements=measurements)
     at = plant.matrices(conditions(plant)[0])
@@ -65,7 +65,7 @@ def least_ranks(plant: Plant, *, controls: bool = True, measurements: bool = Tru
 
 
 def require_channels(plant: Plant, *, controls: bool = True, measurements: bool = True) -> Channels:
-    """The channels of a plant; raises `InputError` where a group has none."""
+    """Return the channels of a plant; raise `InputError` where a group has none."""
     named = plant.channels
     for wanted, group in (
         (True, "disturbances"),
@@ -79,11 +79,11 @@ def require_channels(plant: Plant, *, controls: bool = True, measurements: bool 
 
 
 def failed(plant: Plant, attempts: Sequence[Attempt], asked: Sequence[str] = ()) -> SynthesisError:
-    """The error that says why: what was `asked` for, modes, directions and weights, and every
-    program that was tried.
+    """Return the error with the reasons: the `asked` options, modes, directions and weights, and
+    every program tried.
     """
     p, said = conditions(plant)
-    # what a solve that ran out of digits left is no level of this plant
+    # the result of a solve without accuracy is no level of this plant
     least = min((a.bound for a in attempts if a.answer.startswith("solved")), default=math.inf)
     why = reasons(
         plant.matrices(p),

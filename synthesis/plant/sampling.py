@@ -1,4 +1,4 @@
-"""A controller sampled, and the plant that it then meets."""
+"""Sampling of a controller, and the plant with its inputs held for it."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from synthesis.plant.plant import Plant
 Array = np.ndarray
 
 NODES = {1: 41, 2: 13}
-"""Values of each parameter at which the rule is applied, at least (more parameters: 7)."""
-EACH = 5
-"""Parts of every piece of the functions of one parameter, at least."""
+"""Least number of values of each parameter at which the rule is applied (more parameters: 7)."""
+PARTS_PER_PIECE = 5
+"""Least number of parts of every piece of the functions of one parameter."""
 
 
 def tustin(model: LPVStateSpace, dt: float) -> LPVStateSpace:
-    """The trapezoidal rule at every frozen p, by the same functions of p fitted to that: what is
-    stable stays so. The misfit is in `.residuals`.
+    """Apply the trapezoidal rule at every frozen p and fit the same functions of p: stability is
+    preserved. The misfit is in `.residuals`.
 
     Raises `InputError` for a model that is sampled already and a period that is not positive.
     """
@@ -36,9 +36,9 @@ def tustin(model: LPVStateSpace, dt: float) -> LPVStateSpace:
 
 
 def held(plant: Plant, dt: float) -> Plant:
-    """The plant with its inputs held between the samples at every frozen p. Polynomials of p become
-    those of twice the degree, in which the exponential is right to the second power of dt; other
-    functions stay the same ones. The misfit is in `.model.residuals`.
+    """Return the plant with its inputs held between the samples at every frozen p. Polynomials of p
+    become those of twice the degree, in which the exponential is right to the second power of dt;
+    other functions stay the same. The misfit is in `.model.residuals`.
 
     Raises `InputError` for an uncertain plant.
     """
@@ -66,7 +66,7 @@ def resampled(
     change: Callable[[Array, Array, Array, Array], tuple[Array, ...]],
     dt: float | None,
 ) -> LPVStateSpace:
-    """The model with its matrices (K, ..) changed at every p, by the same functions of p."""
+    """Return the model with its matrices (K, ..) changed at every p, by the same functions of p."""
     p = _nodes(model)
     exact = Matrices(*change(*model.matrices(p)))
     A, B, C, D = (model.basis.fit(p, M) for M in exact)
@@ -82,4 +82,4 @@ def _nodes(model: LPVStateSpace) -> Array:
     pieces = model.basis.pieces()
     ((low, high),) = model.box  # may be narrower than the range of the functions
     knots = [low, *(piece.high for piece in pieces if low < piece.high < high), high]
-    return piecewise_lobatto(knots, max(EACH, -(-NODES[1] // (len(knots) - 1))))
+    return piecewise_lobatto(knots, max(PARTS_PER_PIECE, -(-NODES[1] // (len(knots) - 1))))

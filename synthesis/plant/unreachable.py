@@ -1,4 +1,4 @@
-"""The part of a gain that no controller can lower, and where it comes from."""
+"""The part of a gain that no controller can lower, and its origin."""
 
 from __future__ import annotations
 
@@ -11,20 +11,21 @@ from synthesis.plant.generalized import Generalized
 
 Array = np.ndarray
 
-ABSENT = 1e-11
-"""A direction of a response is zero where what is left of its terms is below this part of them."""
+NEGLIGIBLE = 1e-11
+"""Fraction of its terms below which a direction of a response counts as zero."""
 
-NEAR = 1e13
-"""Condition of s I - A above which s is on a pole."""
+POLE_CONDITION = 1e13
+"""Condition number of s I - A above which s counts as a pole."""
 
-ASIDE = 1e-9
-"""So far is such an s moved, beside the size of A."""
+POLE_OFFSET = 1e-9
+"""Distance by which such an s is moved, relative to the size of A."""
 
-FLAT = 1e-9
-"""Gains as near to each other are one: the first frequency of a plateau is named."""
+PLATEAU_TOLERANCE = 1e-9
+"""Relative difference up to which gains count as equal: the first frequency of a plateau is named.
+"""
 
-GRID = 400
-"""Frequencies to begin with."""
+FREQUENCIES = 400
+"""Number of frequencies in the initial grid."""
 
 
 class Unreachable(NamedTuple):
@@ -43,8 +44,8 @@ class Unreachable(NamedTuple):
 
 
 def unreachable_gain(plant: Generalized, dt: float | None = None) -> Unreachable:
-    """The largest gain of the disturbances on the part of the performance that the controls do not
-    reach, and of the part of the disturbances that is not measured on the performance.
+    """Return the largest gain of the disturbances on the part of the performance that the controls
+    do not reach, and of the part of the disturbances that is not measured on the performance.
 
     Parrott's bound at each frequency: with N orthogonal to the columns of P12 there, N'(P11 + P12 Q
     P21) = N' P11 for every Q. On a grid of frequencies made closer around its top: never too high,
@@ -57,13 +58,15 @@ def unreachable_gain(plant: Generalized, dt: float | None = None) -> Unreachable
     poles = np.abs(_speeds(plant.A, dt))
     poles = poles[poles > 0]
     slow, fast = float(poles.min(initial=1.0)), float(poles.max(initial=1.0))
-    omega = np.unique(np.concatenate([[0.0], np.geomspace(1e-3 * slow, 1e3 * fast, GRID), poles]))
+    omega = np.unique(
+        np.concatenate([[0.0], np.geomspace(1e-3 * slow, 1e3 * fast, FREQUENCIES), poles])
+    )
     if dt is not None:
         omega = np.append(omega[omega < math.pi / dt], math.pi / dt)
     best = _direct(plant) if dt is None else Unreachable(0.0, 0.0, 0.0, np.zeros(0), np.zeros(0))
     for _ in range(8):
         found, sizes = _largest(plant, omega, dt)
-        if found.gamma > best.gamma * (1 + FLAT):
+        if found.gamma > best.gamma * (1 + PLATEAU_TOLERANCE):
             best = found
         top = int(np.argmax(sizes))
         omega = np.linspace(omega[max(top - 1, 0)], omega[min(top + 1, len(omega) - 1)], 21)
@@ -71,7 +74,7 @@ def unreachable_gain(plant: Generalized, dt: float | None = None) -> Unreachable
 
 
 def _speeds(A: Array, dt: float | None) -> Array:
-    """Logarithms of the poles (rad/s)."""
+    """Return the poles (rad/s), those of a sampled plant as log(z)/dt."""
     poles = np.linalg.eigvals(A).astype(complex)
     return poles if dt is None else np.log(poles[np.abs(poles) > 1e-12]) / dt
 
@@ -86,12 +89,16 @@ def _direct(plant: Generalized) -> Unreachable:
 
 
 def _largest(plant: Generalized, omega: Array, dt: float | None) -> tuple[Unreachable, Array]:
-    """The highest of these frequencies, and the gain of each."""
+    """Return the highest gain with its frequency, and the gain at each frequency."""
     A, B, C, D = plant.joined
     s = 1j * omega if dt is None else np.exp(1j * omega * dt)
-    on_a_pole = np.linalg.cond(s[:, None, None] * np.eye(len(A)) - A) > NEAR if len(A) else False
+    on_a_pole = (
+        np.linalg.cond(s[:, None, None] * np.eye(len(A)) - A) > POLE_CONDITION if len(A) else False
+    )
     # into the unstable side, where the bound holds by the maximum principle as well
-    step = ASIDE * (float(np.abs(A).max(initial=0.0)) or 1.0) if dt is None else ASIDE * s
+    step = (
+        POLE_OFFSET * (float(np.abs(A).max(initial=0.0)) or 1.0) if dt is None else POLE_OFFSET * s
+    )
     s = np.where(on_a_pole, s + step, s)
     pencil = s[:, None, None] * np.eye(len(A)) - A
     X = np.linalg.solve(pencil, np.broadcast_to(B, (len(omega), *B.shape)))
@@ -105,7 +112,7 @@ def _largest(plant: Generalized, omega: Array, dt: float | None) -> tuple[Unreac
 def _of(P11: Array, left: Array, right: Array, omega: Array) -> tuple[Unreachable, Array]:
     unreached, unmeasured = left @ P11, P11 @ right
     sizes = np.stack([_norms(unreached), _norms(unmeasured)])
-    which, k = np.argwhere(sizes >= sizes.max() * (1 - FLAT))[0]
+    which, k = np.argwhere(sizes >= sizes.max() * (1 - PLATEAU_TOLERANCE))[0]
     U, values, V = np.linalg.svd((unreached, unmeasured)[which][k])
     at_rest = float(np.linalg.norm(P11[k], 2))
     found = Unreachable(float(values[0]), float(omega[k]), at_rest, np.abs(U[:, 0]), np.abs(V[0]))
@@ -121,11 +128,11 @@ def _adjoint(M: Array) -> Array:
 
 
 def _left_over(P: Array, terms: Array) -> Array:
-    """Projectors (k, n, n) on what is orthogonal to the columns of P (k, n, m); directions below
-    the rounding of their terms (k, n, m) are no columns.
+    """Return projectors (k, n, n) on the orthogonal complement of the columns of P (k, n, m);
+    directions below the rounding of their terms (k, n, m) are no columns.
     """
     size = np.linalg.norm(terms, axis=1)
     size = np.where(size > 0, size, 1.0)[:, None, :]
     U, values, _ = np.linalg.svd(P / size, full_matrices=False)
-    U = U * (values > ABSENT)[:, None, :]
+    U = U * (values > NEGLIGIBLE)[:, None, :]
     return np.eye(P.shape[1]) - U @ _adjoint(U)

@@ -20,7 +20,7 @@ Array = np.ndarray
 
 
 def blossom(arguments: Sequence[Any]) -> Array:
-    """Weights (d + 1,) of the Bernstein coefficients in the blossom at d local arguments
+    """Return the weights (d + 1,) of the Bernstein coefficients in the blossom at d local arguments
     (symmetric, affine in each).
 
     blossom(t, ..., t) gives the value at t; blossom(a, .., b, ..) the coefficients over [a, b].
@@ -33,15 +33,15 @@ def blossom(arguments: Sequence[Any]) -> Array:
 
 
 def restriction(degree: int, a: Any, b: Any) -> Array:
-    """Matrix (d + 1, d + 1) from the coefficients over [0, 1] to those over [a, b] (local
-    coordinates).
+    """Return the matrix (d + 1, d + 1) from the coefficients over [0, 1] to those over [a, b]
+    (local coordinates).
     """
     return np.array([blossom([a] * (degree - k) + [b] * k) for k in range(degree + 1)])
 
 
 def composition(degree: int, corners: Sequence[Sequence[Any]]) -> Array:
-    """Array (d + 1, d + 1, d + 1): coefficients [i, k] in (x, s) of f(t(x, s)) from those of f,
-    last axis.
+    """Return the array (d + 1, d + 1, d + 1) with coefficients [i, k] in (x, s) of f(t(x, s)) from
+    those of f, last axis.
 
     t is bilinear with t = corners[e][f] (local coordinates of f) at x = e, s = f.
     """
@@ -60,7 +60,9 @@ def composition(degree: int, corners: Sequence[Sequence[Any]]) -> Array:
 
 
 def product_weights(a: int, b: int) -> Array:
-    """Array (a + b + 1, a + 1, b + 1): the product's coefficient m is sum_ik W[m, i, k] f_i g_k."""
+    """Return the array W (a + b + 1, a + 1, b + 1): coefficient m of a product is sum_ik W[m, i, k]
+    f_i g_k.
+    """
     W = np.zeros((a + b + 1, a + 1, b + 1))
     for i, k in np.ndindex(a + 1, b + 1):
         W[i + k, i, k] = comb(a, i) * comb(b, k) / comb(a + b, i + k)
@@ -68,5 +70,7 @@ def product_weights(a: int, b: int) -> Array:
 
 
 def elevation_matrix(low: int, high: int) -> Array:
-    """Matrix (high + 1, low + 1) from coefficients of degree `low` to those of degree `high`."""
+    """Return the matrix (high + 1, low + 1) from coefficients of degree `low` to those of degree
+    `high`.
+    """
     return product_weights(high - low, low).sum(axis=1)

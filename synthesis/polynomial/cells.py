@@ -1,6 +1,4 @@
-"""Where the scheduling parameter is, and where it may be next: regions on which an LMI is one
-polynomial.
-"""
+"""Regions of the scheduling parameter, and of its next value, on which an LMI is one polynomial."""
 
 from __future__ import annotations
 
@@ -16,7 +14,7 @@ Array = np.ndarray
 
 
 class Cell(NamedTuple):
-    """p in [low, high], inside the model's `piece` and segment `segment` of P."""
+    """The interval p in [low, high], inside the model's `piece` and segment `segment` of P."""
 
     low: float
     high: float
@@ -25,8 +23,8 @@ class Cell(NamedTuple):
 
 
 class Strip(NamedTuple):
-    """p in [cell.low, cell.high] and p(k+1) between two straight lines in p, both in segment
-    `next_segment` of P.
+    """The region p in [cell.low, cell.high] with p(k+1) between two straight lines in p, both in
+    segment `next_segment` of P.
 
     `corners[e][f]` is p(k+1) on line f (0 lower, 1 upper) at the end e of the cell.
     """
@@ -39,7 +37,7 @@ class Strip(NamedTuple):
 def cells(
     pieces: Sequence[ModelPiece], knots: Array, cuts: Sequence[float] = ()
 ) -> tuple[Cell, ...]:
-    """The range cut at the model's breaks, the knots of P and the extra `cuts`."""
+    """Return the range cut at the model's breaks, the knots of P and the extra `cuts`."""
     low, high = float(knots[0]), float(knots[-1])
     points = sorted(
         {*map(float, knots), *(q.low for q in pieces[1:]), *(c for c in cuts if low < c < high)}
@@ -58,8 +56,8 @@ def strips(
     span: tuple[float, float],
     cuts: Sequence[float] = (),
 ) -> tuple[Strip, ...]:
-    """All (p, p(k+1)) with p(k+1) - p in the `span` (least, largest), both in range, covered
-    without gaps.
+    """Return strips that cover all (p, p(k+1)) with p(k+1) - p in the `span` (least, largest), both
+    in range, without gaps.
 
     The range is cut at the knots, at the ends of the span to either side of them and at the extra
     `cuts`; over each such cell the limits of p(k+1) are straight lines that cross no knot, and the

@@ -1,5 +1,5 @@
-"""Is a given polynomial matrix negative definite on its whole box? Bernstein coefficients, halving
-the box where they do not tell.
+"""Negative definiteness of a polynomial matrix on its whole box, by Bernstein coefficients, halving
+the box where they are inconclusive.
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ from synthesis.polynomial.matrix import PolynomialMatrix
 
 Array = np.ndarray
 
-CELLS = 4000
-"""Most boxes looked at before giving up: the answer is then "not shown"."""
+MAX_BOXES = 4000
+"""Largest number of boxes examined; beyond it the answer is "not shown"."""
 
 
-def negative_definite(F: PolynomialMatrix, cells: int = CELLS) -> bool:
-    """Floating point, all boxes of a generation at once; False too where `cells` boxes did not
-    suffice.
+def negative_definite(F: PolynomialMatrix, cells: int = MAX_BOXES) -> bool:
+    """Check in floating point, all boxes of a generation at once; False also where `cells` boxes
+    were not enough.
     """
     m, spent = len(F.box), 0
     waiting = F.coefficients[None]
@@ -41,10 +41,8 @@ def negative_definite(F: PolynomialMatrix, cells: int = CELLS) -> bool:
     return True
 
 
-def negative_definite_exactly(F: PolynomialMatrix, cells: int = CELLS) -> bool:
-    """The same in the exact arithmetic of the coefficients: an LDL' factorisation of each
-    decides.
-    """
+def negative_definite_exactly(F: PolynomialMatrix, cells: int = MAX_BOXES) -> bool:
+    """Check in the exact arithmetic of the coefficients, by an LDL' factorisation of each."""
     waiting, spent = [F], 0
     while waiting:
         spent += 1
@@ -53,7 +51,7 @@ def negative_definite_exactly(F: PolynomialMatrix, cells: int = CELLS) -> bool:
         G = waiting.pop()
         matrices = G.coefficients.reshape(-1, *G.shape)
         numbers = matrices.astype(float)
-        # where rounded numbers already say no, halving comes before exact work
+        # a check in floating point that fails saves the exact one
         promising = bool(np.all(np.linalg.eigvalsh(_normalised(numbers))[:, -1] < 0))
         if promising and all(positive_definite(-M) for M in matrices):
             continue
@@ -67,8 +65,8 @@ def negative_definite_exactly(F: PolynomialMatrix, cells: int = CELLS) -> bool:
 
 
 def _normalised(F: Array) -> Array:
-    """Matrices (..., n, n) with a diagonal of -1 where it is negative: rounding then means the same
-    in all units.
+    """Return matrices (..., n, n) scaled to a diagonal of -1 where it is negative, so that rounding
+    does not depend on units.
     """
     size = np.sqrt(np.abs(np.diagonal(F, axis1=-2, axis2=-1)))
     size = np.where(size > 0, size, 1.0)
@@ -80,8 +78,8 @@ def _corners(shape: tuple[int, ...]) -> tuple[slice, ...]:
 
 
 def _curvature(c: Array, m: int) -> Array:
-    """(boxes, m): how far the coefficients are from affine along each parameter, which is what
-    halving improves.
+    """Return the deviation (boxes, m) of the coefficients from an affine function along each
+    parameter, which halving reduces.
     """
     out = np.zeros((len(c), m))
     for i in range(m):
@@ -91,7 +89,7 @@ def _curvature(c: Array, m: int) -> Array:
 
 
 def _halves(c: Array, m: int) -> Array:
-    """Both halves of every box, along the axis in which the coefficients are most curved."""
+    """Return both halves of every box, along the axis in which the coefficients are most curved."""
     curvature = _curvature(c, m)
     best = np.argmax(curvature, axis=1)
     out = []
@@ -103,7 +101,7 @@ def _halves(c: Array, m: int) -> Array:
 
 
 def _bisect(c: Array, axis: int) -> list[Array]:
-    """de Casteljau at the middle of one axis."""
+    """Apply de Casteljau's algorithm at the middle of one axis."""
     row = np.moveaxis(c, axis, 0)
     left, right = [row[0]], [row[-1]]
     while len(row) > 1:

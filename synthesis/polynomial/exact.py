@@ -12,11 +12,11 @@ from scipy import linalg
 
 Array = np.ndarray
 Number = Callable[[float], Any]
-"""Turns a double into a number of the arithmetic: `float`, or the rational it is."""
+"""Conversion of a double into a number of the arithmetic: `float`, or its exact rational."""
 
 
 def rational() -> Number:
-    """The exact rational of a double, in the fastest arithmetic installed."""
+    """Return the conversion to exact rationals, in the fastest arithmetic installed."""
     try:
         from flint import fmpq  # type: ignore[import-not-found]
     except ImportError:
@@ -35,18 +35,18 @@ def positive_definite(M: Array) -> bool:
     strictly dominant in its diagonal: a few products of integers. Else all pivots of an LDL'
     factorisation decide, whose numbers grow with every row.
     """
-    return (len(M) > FEW and _dominant(M)) or _pivots_are_positive(M)
+    return (len(M) > MAX_DIRECT_ROWS and _dominant(M)) or _pivots_are_positive(M)
 
 
-FEW = 6
-"""Rows up to which the factorisation is as fast."""
-DIGITS = 50
-"""Bits of the rounded numbers of the congruence."""
+MAX_DIRECT_ROWS = 6
+"""Number of rows up to which the exact factorisation is as fast as the congruence."""
+CONGRUENCE_BITS = 50
+"""Number of bits to which the entries of the congruence are rounded."""
 
 
 def _dominant(M: Array) -> bool:
-    """Whether R' M R is strictly dominant in its diagonal, R the inverse of a Cholesky factor in
-    floating point, rounded: it is then positive definite, and R regular, so that M is too. Exact.
+    """Whether R' M R is strictly diagonally dominant, R the rounded inverse of a Cholesky factor in
+    floating point: it is then positive definite, and R regular, so that M is too. Exact.
     """
     try:
         rounded = M.astype(float)
@@ -66,7 +66,7 @@ def _dominant(M: Array) -> bool:
     if not np.all(np.isfinite(R)):
         return False
     # R is `whole` times a power of two a column
-    whole = np.rint(np.ldexp(R, DIGITS - exponents)).astype(np.int64).astype(object)
+    whole = np.rint(np.ldexp(R, CONGRUENCE_BITS - exponents)).astype(np.int64).astype(object)
     own = _whole(M)
     Q = whole.T @ (own @ whole)
     steps = [1 << int(e) for e in exponents - exponents.min()]
@@ -80,7 +80,9 @@ def _dominant(M: Array) -> bool:
 
 
 def _whole(M: Array) -> Array:
-    """The symmetric matrix of this lower triangle times what makes all its entries integers."""
+    """Return the symmetric matrix of this lower triangle times a factor that makes all entries
+    integers.
+    """
     denominators = {int(v.denominator) for v in M.ravel()}
     common = math.lcm(*denominators)
     out = np.array(
@@ -107,7 +109,7 @@ def _pivots_are_positive(M: Array) -> bool:
 
 
 def growth_of(alpha: float, dt: float) -> float:
-    """exp(2 alpha dt) or a few units in the last place more: what is proven with it holds for
+    """Return exp(2 alpha dt), increased by a few units in the last place: a proof with it holds for
     alpha, however exp and its argument are rounded.
     """
     if alpha == 0.0:
@@ -118,7 +120,7 @@ def growth_of(alpha: float, dt: float) -> float:
 
 
 def exact(values: Any, number: Number) -> Array:
-    """The doubles as numbers of the arithmetic."""
+    """Return the doubles as numbers of the arithmetic."""
     values = np.asarray(values, dtype=float)
     if number is float:
         return values

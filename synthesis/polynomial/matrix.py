@@ -22,7 +22,8 @@ Box = tuple[tuple[Any, Any], ...]
 
 @dataclass(frozen=True, eq=False)
 class PolynomialMatrix:
-    """F(p) for p in `box`, by its coefficients in tensor-product Bernstein form.
+    """A polynomial matrix F(p) for p in `box`, by its coefficients in tensor-product Bernstein
+    form.
 
     On the whole box F(p) lies in the convex hull of its coefficients; those at the corners are its
     values there. Operands must share the box.
@@ -75,13 +76,15 @@ class PolynomialMatrix:
 
     @classmethod
     def constant(cls, M: Any, box: Box) -> PolynomialMatrix:
-        """The matrix M (..., rows, columns) everywhere."""
+        """Return the constant matrix M (..., rows, columns)."""
         M = np.asarray(M)
         return cls(box, M.reshape((1,) * len(box) + M.shape))
 
     @classmethod
     def from_monomials(cls, terms: Mapping[tuple[int, ...], Any], box: Box) -> PolynomialMatrix:
-        """sum of p_1^e1 p_2^e2 ... M over {(e1, e2, ...): M}, p in the units of the box."""
+        """Return the sum of p_1^e1 p_2^e2 ... M over {(e1, e2, ...): M}, p in the units of
+        the box.
+        """
         if not terms:
             raise InputError("expected at least one term {exponents: matrix}")
         m = len(box)
@@ -99,8 +102,8 @@ class PolynomialMatrix:
         return cls(box, out)
 
     def to_monomials(self) -> dict[tuple[int, ...], Array]:
-        """{exponents: matrix}, every exponent up to the degrees; ill-conditioned for high degrees
-        on a box far from 0.
+        """Return {exponents: matrix}, every exponent up to the degrees; ill-conditioned for high
+        degrees on a box far from 0.
         """
         c = self.coefficients
         for i, (d, bounds) in enumerate(zip(self.degrees, self.box, strict=True)):
@@ -190,7 +193,7 @@ class PolynomialMatrix:
         return replace(self, coefficients=d * np.diff(self.coefficients, axis=axis) / (high - low))
 
     def elevate(self, degrees: Sequence[int]) -> PolynomialMatrix:
-        """The same polynomial with coefficients of these higher degrees."""
+        """Return the same polynomial with coefficients of these higher degrees."""
         extra = tuple(b - a for a, b in zip(self.degrees, degrees, strict=True))
         if not any(extra):
             return self
@@ -204,7 +207,7 @@ class PolynomialMatrix:
         return _unweighted(self.box, out)
 
     def restrict(self, box: Box) -> PolynomialMatrix:
-        """The same polynomial over another box."""
+        """Return the same polynomial over another box."""
         c = self.coefficients
         for i, ((low, high), (a, b)) in enumerate(zip(self.box, box, strict=True)):
             if (low, high) != (a, b):
@@ -218,7 +221,7 @@ class PolynomialMatrix:
         return replace(self, box=box, coefficients=c)
 
     def split(self, axis: int) -> tuple[PolynomialMatrix, PolynomialMatrix]:
-        """The two halves of the box along a parameter."""
+        """Return the two halves of the box along a parameter."""
         low, high = self.box[axis]
         middle = (low + high) / 2
         return tuple(
@@ -227,16 +230,18 @@ class PolynomialMatrix:
         )  # type: ignore[return-value]
 
     def extremes(self) -> tuple[Any, Any]:
-        """(lowest, highest) coefficient: bounds of every entry on the whole box."""
+        """Return (lowest, highest) coefficient: bounds of every entry on the whole box."""
         return self.coefficients.min(), self.coefficients.max()
 
     def corners(self) -> Array:
-        """The values (2^m or fewer, rows, columns) at the corners of the box."""
+        """Return the values (2^m or fewer, rows, columns) at the corners of the box."""
         ends = tuple(slice(None, None, max(d, 1)) for d in self.degrees)
         return self.coefficients[ends].reshape(-1, *self.shape)
 
     def extend(self, box: Box) -> PolynomialMatrix:
-        """The same with further parameters, those of `box`, on which it does not depend."""
+        """Return the same matrix with further parameters, those of `box`, on which it does not
+        depend.
+        """
         m = len(self.box)
         shape = (*self.coefficients.shape[:m], *(1,) * len(box), *self.coefficients.shape[m:])
         return PolynomialMatrix((*self.box, *box), self.coefficients.reshape(shape))
@@ -251,7 +256,7 @@ class PolynomialMatrix:
 
 
 def block(rows: Sequence[Sequence[PolynomialMatrix]]) -> PolynomialMatrix:
-    """The matrix of these blocks; degrees are raised and stacks broadcast to the largest."""
+    """Return the matrix of these blocks; degrees are raised and stacks broadcast to the largest."""
     every = [F for row in rows for F in row]
     box, m = every[0].box, len(every[0].box)
     degrees = reduce(lambda a, b: tuple(map(max, a, b)), (F.degrees for F in every))
@@ -272,15 +277,15 @@ def _padded(c: Array, m: int, ndim: int) -> Array:
 
 
 def _stacked(F: Array, G: Array, m: int) -> tuple[Array, Array]:
-    """Both with as many stack axes, so that these broadcast and not the axes of the
-    coefficients.
+    """Return both with the same number of stack axes, so that these broadcast and not the axes of
+    the coefficients.
     """
     ndim = max(F.ndim, G.ndim)
     return _padded(F, m, ndim), _padded(G, m, ndim)
 
 
 def _along(T: Array, coefficients: Array, axis: int) -> Array:
-    """The matrix T applied to one axis, in any arithmetic."""
+    """Apply the matrix T to one axis, in any arithmetic."""
     return np.moveaxis(np.tensordot(T, coefficients, axes=(1, axis)), 0, axis)
 
 
@@ -309,8 +314,8 @@ def _unweighted(box: Box, c: Array) -> PolynomialMatrix:
 
 
 def _power_to_bernstein(degree: int, low: float, high: float) -> Array:
-    """Matrix (d + 1, d + 1): Bernstein coefficients over [low, high] of p^e in column e (the
-    blossom of p^e).
+    """Return the matrix (d + 1, d + 1) with the Bernstein coefficients over [low, high] of p^e in
+    column e (the blossom of p^e).
     """
     out = np.zeros((degree + 1, degree + 1))
     for e in range(degree + 1):

@@ -1,4 +1,6 @@
-"""How the parameters of a model may move: each at a rate of its own, or one as another says."""
+"""Motion of the parameters of a model: at independent rates, or with one parameter the rate of
+another.
+"""
 
 from __future__ import annotations
 
@@ -13,16 +15,15 @@ from symheli.lpv import Scheduling
 
 Array = np.ndarray
 
-SHARES = {True: 2, False: 4}
-"""In how many parts either sign of a parameter that is the rate of another is cut, by whether time
-is continuous: so closely is its reach, and in discrete time the step of the other, known.
+PARTS_PER_SIGN = {True: 2, False: 4}
+"""Number of parts into which either sign of a parameter that is the rate of another is divided, by
+whether time is continuous: this limits how closely its reach and, in discrete time, the step of
+the other parameter are known.
 """
 
 
 class Drift(NamedTuple):
-    """One way in which p moves: dp_i/dt is `rates[i]`, or parameter `ties[i]` where there is
-    one.
-    """
+    """One motion of p: dp_i/dt is `rates[i]`, or parameter `ties[i]` where there is one."""
 
     rates: tuple[float, ...]
     ties: tuple[int | None, ...]
@@ -43,7 +44,7 @@ class Motion(NamedTuple):
 
     @classmethod
     def of(cls, parameters: Sequence[Scheduling]) -> Motion:
-        """By their own limits."""
+        """Return the motion within the limits of these parameters."""
         names = [s.name for s in parameters]
         ties = tuple(names.index(s.rate) if isinstance(s.rate, str) else None for s in parameters)
         rates = tuple(
@@ -53,7 +54,7 @@ class Motion(NamedTuple):
         return cls(tuple((float(s.low), float(s.high)) for s in parameters), rates, ties)
 
     def suits(self, parameters: Sequence[Scheduling]) -> bool:
-        """Whether these parameters move so, but for the limits of those that no other ties."""
+        """Whether these parameters move so, except for the limits of those not tied to another."""
         own = Motion.of(parameters)
         if len(self.rates) != len(own.rates) or not all(r >= 0 for r in self.rates):
             return False
@@ -62,11 +63,11 @@ class Motion(NamedTuple):
 
     @property
     def tied(self) -> tuple[tuple[int, int], ...]:
-        """(i, j) for every p_i whose rate is p_j."""
+        """Pairs (i, j) for every p_i whose rate is p_j."""
         return tuple((i, j) for i, j in enumerate(self.ties) if j is not None)
 
     def drifts(self, varying: Sequence[bool]) -> Iterator[Drift]:
-        """Every extreme way to move, as far as P is `varying` with it."""
+        """Yield every extreme motion, as far as P is `varying` with it."""
         choices = [
             (0.0,) if not used or tie is not None or rate == 0 else (-rate, rate)
             for used, rate, tie in zip(varying, self.rates, self.ties, strict=True)
@@ -76,7 +77,7 @@ class Motion(NamedTuple):
             yield Drift(rates, ties)
 
     def reaches(self, box: Sequence[tuple[float, float]]) -> bool:
-        """Whether p can be somewhere in this box and stay in its ranges for good."""
+        """Whether p can be somewhere in this box and stay in its ranges forever."""
         for i, j in self.tied:
             (a, b), (c, d), jerk = box[i], box[j], self.rates[j]
             if math.isinf(jerk):
@@ -89,17 +90,19 @@ class Motion(NamedTuple):
         return True
 
     def cuts(self, axis: int, continuous: bool) -> tuple[float, ...]:
-        """Where a parameter that is the rate of another is cut."""
+        """Return the values at which the range of a parameter that is the rate of another
+        is cut.
+        """
         if all(j != axis for _, j in self.tied):
             return ()
         if continuous and math.isinf(self.rates[axis]):
             return ()  # every inequality is affine in it, and all of it can be reached
         low, high = self.box[axis]
-        count = SHARES[continuous]
+        count = PARTS_PER_SIGN[continuous]
         return tuple(side * k / count for side in (low, high) for k in range(count))
 
     def span(self, i: int, cell: Sequence[tuple[float, float]], dt: float) -> tuple[float, float]:
-        """(least, largest) change of p_i in a sample while p is in this cell."""
+        """Return the (least, largest) change of p_i in a sample while p is in this cell."""
         j = self.ties[i]
         if j is None:
             return -self.rates[i] * dt, self.rates[i] * dt
@@ -108,5 +111,5 @@ class Motion(NamedTuple):
         return max(cell[j][0] * dt - slack, low * dt), min(cell[j][1] * dt + slack, high * dt)
 
     def at_rest(self) -> tuple[int, ...]:
-        """The parameters that are zero where p is frozen: those that are the rate of another."""
+        """Parameters that are zero where p is frozen: those that are the rate of another."""
         return tuple(j for _, j in self.tied)

@@ -27,8 +27,8 @@ from synthesis.polynomial.matrix import PolynomialMatrix
 Array = np.ndarray
 
 CONSTANT = 1e-14
-"""In the search for a proof alone, coefficients of an entry that differ by less than this fraction
-of its terms are one constant: the rounding of the basis itself. A proof knows nothing of it.
+"""In the search for a proof only, coefficients of an entry that differ by less than this fraction
+of its terms count as one constant: the rounding of the basis. The proof does not use it.
 """
 
 
@@ -47,8 +47,8 @@ class ModelPiece(NamedTuple):
     def scaled(
         self, left: Array, right: Array, inputs: Array, outputs: Array, time: float
     ) -> ModelPiece:
-        """The piece with states x = right z (left = right^-1), dt = time dtau and u and y in the
-        units `inputs` (nu,) and `outputs` (ny,).
+        """Return the piece with states x = right z (left = right^-1), dt = time dtau and u and y in
+        the units `inputs` (nu,) and `outputs` (ny,).
 
         Both are per square root of the new time unit, so that energies keep their ratio.
         """
@@ -62,7 +62,7 @@ class ModelPiece(NamedTuple):
 
 
 def model_pieces(lpv: LPVStateSpace) -> tuple[ModelPiece, ...]:
-    """The pieces of the model over its scheduling range, in order of p.
+    """Return the pieces of the model over its scheduling range, in order of p.
 
     The coefficients are doubles: an exact proof is about the model they define, which is the given
     one but for the rounding of each. What varies with p in the last place only varies there too; a
@@ -84,7 +84,7 @@ def model_pieces(lpv: LPVStateSpace) -> tuple[ModelPiece, ...]:
 
 
 def rounded(lpv: LPVStateSpace, exactly: Sequence[ModelPiece]) -> tuple[ModelPiece, ...]:
-    """The pieces with a constant for every matrix that changes by rounding alone: fewer
+    """Return the pieces with a constant for every matrix that changes by rounding alone: fewer
     inequalities for the search.
     """
     s = lpv.scheduling
@@ -104,9 +104,9 @@ def rounded(lpv: LPVStateSpace, exactly: Sequence[ModelPiece]) -> tuple[ModelPie
 
 
 def function_pieces(basis: FunctionSpace, low: float, high: float) -> tuple[Piece, ...]:
-    """The pieces of the functions of a basis between `low` and `high`, however narrow: none is left
-    out. Where the basis ends before the range does, by rounding, its first and last polynomial go
-    on, as its values do.
+    """Return the pieces of the functions of a basis between `low` and `high`, however narrow: none
+    is left out. Where the basis ends before the range does, by rounding, its first and last
+    polynomial continue, as its values do.
     """
     every = basis.pieces()
     out = []
@@ -138,7 +138,7 @@ def same_pieces(a: Sequence[ModelPiece], b: Sequence[ModelPiece]) -> bool:
 
 
 def _each(every: Sequence[list[Array] | None], k: int, lpv: LPVStateSpace) -> list[Array]:
-    """Of the piece k: coefficients, of a constant one alone."""
+    """Return the coefficients on piece k; for a constant matrix, a single one."""
     return [
         found[k] if found is not None else _constant(lpv.basis, M)[None]  # type: ignore[index]
         for found, M in zip(every, (lpv.A, lpv.B, lpv.C, lpv.D), strict=True)
@@ -146,8 +146,8 @@ def _each(every: Sequence[list[Array] | None], k: int, lpv: LPVStateSpace) -> li
 
 
 def _in_least_degree(basis: FunctionSpace, M: Array) -> tuple[FunctionSpace | None, Array]:
-    """The same function of one parameter in as few functions as the zeros of M allow; None and the
-    matrix (1, ...) of a constant. Exact: no number is small.
+    """Return the same function of one parameter in as few functions as the zeros of M allow; None
+    and the matrix (1, ...) of a constant. Exact: no small number is dropped.
     """
     constant = _constant(basis, M)
     if constant is not None:
@@ -159,7 +159,9 @@ def _in_least_degree(basis: FunctionSpace, M: Array) -> tuple[FunctionSpace | No
 
 
 def _constant(basis: FunctionSpace, M: Array) -> Array | None:
-    """The matrix that the coefficients M are those of at every p, None where they are of none."""
+    """Return the constant matrix that the coefficients M represent, None where they
+    represent none.
+    """
     try:
         one = basis.constant()
     except InputError:
@@ -183,13 +185,13 @@ class Pieces(NamedTuple):
     dt: float | None
 
     def at(self, p: Array) -> Matrices:
-        """The matrices at p (k, m) by the model's own code, for checks."""
+        """Return the matrices at p (k, m) by the model's own code, for checks."""
         return self.source.matrices(p[..., 0] if len(self.parameters) == 1 else p)
 
     @property
     def passes_peaks(self) -> bool:
-        """Whether an input of any height passes at once to the outputs: feedthrough in continuous
-        time.
+        """Whether an input peak of any height passes to the outputs at once: feedthrough in
+        continuous time.
         """
         return self.dt is None and any(np.any(D.coefficients) for *_, D in self.models.values())
 
@@ -211,8 +213,8 @@ class Pieces(NamedTuple):
 
     @property
     def rounded(self) -> Pieces:
-        """The same, each matrix in the degrees that it has but for rounding: fewer inequalities for
-        the search.
+        """The same pieces, each matrix in its least degree up to rounding: fewer
+        inequalities for the search.
         """
         models = {}
         for key, matrices in self.models.items():
@@ -227,14 +229,16 @@ class Pieces(NamedTuple):
 
     @property
     def sizes(self) -> tuple[int, int, int]:
-        """Number of states, inputs and outputs."""
+        """Numbers of states, inputs and outputs."""
         A, B, C, _ = next(iter(self.models.values()))
         return A.shape[0], B.shape[1], C.shape[0]
 
     def scaled(
         self, left: Array, right: Array, inputs: float, outputs: float, time: float
     ) -> Pieces:
-        """x = right z, dt = time dtau, u and y in the units `inputs` and `outputs`."""
+        """Return the model with x = right z, dt = time dtau, u and y in the units `inputs` and
+        `outputs`.
+        """
 
         def change(M: PolynomialMatrix, L: Any, R: Any, factor: float) -> PolynomialMatrix:
             return PolynomialMatrix(M.box, factor * (L @ M.coefficients @ R))
@@ -254,7 +258,7 @@ class Pieces(NamedTuple):
 
 
 def pieces(model: LPVStateSpace) -> Pieces:
-    """The model in polynomial pieces over its box."""
+    """Return the model in polynomial pieces over its box."""
     s = model.parameters
     if len(s) == 1:
         return joined(model, model_pieces(model))
@@ -278,7 +282,7 @@ def pieces(model: LPVStateSpace) -> Pieces:
 
 
 def joined(model: LPVStateSpace, parts: Sequence[ModelPiece]) -> Pieces:
-    """The `parts` of a model of one parameter, in any units."""
+    """Return the pieces of the `parts` of a model of one parameter, in any units."""
     models = {
         (k,): tuple(PolynomialMatrix(((piece.low, piece.high),), M) for M in piece[2:])
         for k, piece in enumerate(parts)
@@ -290,8 +294,8 @@ def joined(model: LPVStateSpace, parts: Sequence[ModelPiece]) -> Pieces:
 def _along_axes(
     basis: Product, M: Array, s: Sequence[Scheduling]
 ) -> tuple[Array, list[list[Array]]]:
-    """M as a tensor, in as few functions of each parameter as its zeros allow, and the Bernstein
-    coefficients of those on every piece of each.
+    """Return M as a tensor, in as few functions of each parameter as its zeros allow, and the
+    Bernstein coefficients of those on every piece of each.
     """
     tensor, functions = basis.tensor(M), []
     for i, (factor, q) in enumerate(zip(basis.factors, s, strict=True)):
@@ -304,7 +308,9 @@ def _along_axes(
 
 
 def _over_box(tensor: Array, functions: Sequence[Array], box: Any) -> PolynomialMatrix:
-    """Bernstein coefficients of sum_j f_j M_j, f_j products of functions on one piece each."""
+    """Return the Bernstein coefficients of sum_j f_j M_j, f_j products of functions on one piece
+    each.
+    """
     coefficients = tensor
     for i, bernstein in enumerate(functions):
         coefficients = np.moveaxis(np.tensordot(bernstein.T, coefficients, axes=(1, i)), 0, i)
@@ -312,7 +318,7 @@ def _over_box(tensor: Array, functions: Sequence[Array], box: Any) -> Polynomial
 
 
 def _lowered(coefficients: Array, axis: int) -> Array:
-    """The same polynomial written in the degree it has along one axis, to rounding."""
+    """Return the same polynomial in its least degree along one axis, to rounding."""
     c = np.moveaxis(coefficients, axis, 0)
     while (d := len(c) - 1) > 0:
         binomials = np.array([comb(d, k) for k in range(d + 1)], dtype=float)

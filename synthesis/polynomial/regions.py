@@ -1,4 +1,4 @@
-"""The boxes on which an inequality is one polynomial, and the model and P there, in any
+"""Boxes on which an inequality is one polynomial, and the model and P on them, in any
 arithmetic.
 """
 
@@ -21,8 +21,8 @@ Array = np.ndarray
 
 
 class Region(NamedTuple):
-    """One strip a parameter: p in a box, inside one piece of the model and one segment of P, and
-    where p(k+1) may be.
+    """One strip a parameter: a box for p, inside one piece of the model and one segment of P, and
+    the limits of p(k+1).
     """
 
     strips: tuple[Strip, ...]
@@ -47,8 +47,8 @@ class Region(NamedTuple):
 def regions(
     model: Pieces, knots: Sequence[Array], motion: Motion, varying: Sequence[bool]
 ) -> Iterator[Region]:
-    """All of them: the ranges cut at knots and breaks, and in discrete time where p may be next, as
-    far as P is `varying` with it. What p cannot reach is left out.
+    """Yield all regions: the ranges cut at knots and breaks, and in discrete time at the limits of
+    the next p, as far as P is `varying` with it. Regions that p cannot reach are left out.
     """
     m = len(motion.box)
     free = [i for i in range(m) if motion.ties[i] is None]
@@ -72,7 +72,9 @@ def _strips(
     i: int,
     cell: Mapping[int, tuple[float, float]] | None,
 ) -> tuple[Strip, ...]:
-    """Those of one parameter; of one whose rate is another, where that is in its `cell`."""
+    """Return the strips of one parameter; where its rate is another parameter, for that in its
+    `cell`.
+    """
     nothing = np.zeros((1, 0, 0))
     # only the ends of the pieces matter here
     stretches = [
@@ -94,27 +96,27 @@ def _region(model: Pieces, choice: tuple[Strip, ...]) -> Region:
 
 
 def convert(F: PolynomialMatrix, number: Number) -> PolynomialMatrix:
-    """The polynomial with its doubles as numbers of the arithmetic."""
+    """Return the polynomial with its doubles as numbers of the arithmetic."""
     box = tuple((number(float(a)), number(float(b))) for a, b in F.box)
     return PolynomialMatrix(box, exact(F.coefficients, number))
 
 
 def model_on(model: Pieces, region: Region, number: Number) -> tuple[PolynomialMatrix, ...]:
-    """A, B, C, D over the box of the region."""
+    """Return A, B, C, D over the box of the region."""
     box = _box(region, number)
     return tuple(convert(M, number).restrict(box) for M in model.models[region.piece])
 
 
 def now(P: PolynomialMatrix, region: Region, number: Number) -> PolynomialMatrix:
-    """P(p) over the box of the region; P in the arithmetic of the proof, on its segment."""
+    """Return P(p) over the box of the region; P in the arithmetic of the proof, on its segment."""
     return P.restrict(_box(region, number))
 
 
 def successor(
     P: PolynomialMatrix, region: Region, number: Number, moving: Sequence[bool]
 ) -> PolynomialMatrix:
-    """P(p(k+1)) over the box of p and one [0, 1] a parameter, which runs from the lower to the
-    upper limit of p(k+1).
+    """Return P(p(k+1)) over the box of p and one [0, 1] a parameter, which runs from the lower to
+    the upper limit of p(k+1).
     """
     m = len(P.box)
     box, c = _box(region, number), P.coefficients

@@ -1,5 +1,5 @@
-"""What a proof must look like before any inequality is asked of it: each check gives the fault in
-words, None where there is none.
+"""Checks of the form of a proof before any inequality is checked: each returns the fault in words,
+None where there is none.
 """
 
 from __future__ import annotations
@@ -15,12 +15,14 @@ Array = np.ndarray
 
 
 def first(*faults: str | None) -> str | None:
-    """The first fault there is."""
+    """Return the first fault, None where there is none."""
     return next((fault for fault in faults if fault), None)
 
 
 def numbers(values: Any, name: str) -> Array:
-    """A read-only array of doubles. Raises `InputError` where `values` are something else."""
+    """Return a read-only array of doubles. Raises `InputError` where `values` are something
+    else.
+    """
     try:
         array = np.array(values, dtype=float)
     except (TypeError, ValueError, OverflowError):
@@ -30,7 +32,7 @@ def numbers(values: Any, name: str) -> Array:
 
 
 def ascending(knots: Array, name: str = "knots") -> str | None:
-    """Two knots or more, finite, each larger than the one before."""
+    """Check that there are two finite knots or more, each larger than the one before."""
     if (
         knots.ndim != 1
         or len(knots) < 2
@@ -42,7 +44,7 @@ def ascending(knots: Array, name: str = "knots") -> str | None:
 
 
 def covering(knots: Array, low: float, high: float, name: str = "p") -> str | None:
-    """The knots reach from one end of the range to the other."""
+    """Check that the knots reach from one end of the range to the other."""
     if knots[0] != low or knots[-1] != high:
         return (
             f"P is known for {name} in [{knots[0]:.6g}, {knots[-1]:.6g}], the model holds on"
@@ -52,7 +54,7 @@ def covering(knots: Array, low: float, high: float, name: str = "p") -> str | No
 
 
 def whole(value: Any, least: int, name: str) -> str | None:
-    """An integer of at least `least`."""
+    """Check for an integer of at least `least`."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
         return f"{name} must be an integer >= {least}, got {value!r:.60}"
     return None
@@ -61,7 +63,7 @@ def whole(value: Any, least: int, name: str) -> str | None:
 def symmetric(
     coefficients: Array, shape: Sequence[int], name: str = "Lyapunov coefficients"
 ) -> str | None:
-    """Finite matrices, exactly symmetric, in an array of this shape."""
+    """Check for finite matrices, exactly symmetric, in an array of this shape."""
     if coefficients.shape != tuple(shape):
         return f"expected {name} of shape {tuple(shape)}, got {coefficients.shape}"
     if not np.all(np.isfinite(coefficients)):
@@ -72,8 +74,8 @@ def symmetric(
 
 
 def coordinates(left: Any, right: Any, units: Sequence[Any], size: int) -> str | None:
-    """`left` and `right` (size, size) inverse to each other, every one of the `units` a finite
-    number > 0.
+    """Check that `left` and `right` (size, size) are inverse to each other, and every one of the
+    `units` a finite number > 0.
     """
     try:
         left, right, sizes = numbers(left, "left"), numbers(right, "right"), numbers(units, "units")

@@ -13,13 +13,13 @@ Array = np.ndarray
 
 
 def length(n: int) -> int:
-    """Number of entries n (n + 1) / 2."""
+    """Return the number of entries n (n + 1) / 2."""
     return n * (n + 1) // 2
 
 
 @lru_cache(maxsize=64)
 def indices(n: int) -> tuple[Array, Array, Array]:
-    """Row and column of every entry of such a vector, and its weight."""
+    """Return the row and column of every entry of such a vector, and its weight."""
     columns, rows = np.tril_indices(n)
     return rows, columns, np.where(rows == columns, 1.0, math.sqrt(2.0))
 
@@ -41,9 +41,7 @@ def smat(v: Array, n: int) -> Array:
 
 
 def symmetrized(M: Array) -> Array:
-    """The symmetric part of matrices (..., n, n): rounding leaves a product that ought to be
-    symmetric a little skew.
-    """
+    """Return the symmetric part of matrices (..., n, n), to remove the rounding of a product."""
     return 0.5 * (M + np.swapaxes(M, -1, -2))
 
 
@@ -55,7 +53,7 @@ def extended(M: Array, by: int) -> Array:
 
 
 def schur_complement(F: Array, n: int) -> Array:
-    """What is left of matrices (..., N, N) where the first n variables are eliminated."""
+    """Return the Schur complement of matrices (..., N, N), eliminating the first n variables."""
     top, side, corner = F[..., :n, :n], F[..., :n, n:], F[..., n:, n:]
     return corner - np.swapaxes(side, -1, -2) @ np.linalg.solve(top, side)
 

@@ -1,4 +1,5 @@
-"""Forms of degree 2m as quadratic forms in the monomials of degree m, and the freedom that leaves.
+"""Forms of degree 2m as quadratic forms in the monomials of degree m, and the null space of that
+representation.
 
 z(x) holds the monomials x^a, |a| = m, of n variables, N = C(n + m - 1, m) of them. A form z' M z
 does not determine M: the symmetric matrices with z' L z = 0 are added at will (the Gram method,
@@ -86,7 +87,7 @@ def _pairs(n: int, m: int) -> tuple[tuple[tuple[int, int], tuple[int, int]], ...
 
 
 def null_size(n: int, m: int) -> int:
-    """Dimension of the symmetric matrices with z' L z = 0."""
+    """Return the dimension of the symmetric matrices L with z' L z = 0."""
     return len(_pairs(n, m)) if m > 1 else 0
 
 

@@ -1,1 +1,1 @@
-"""Cone programs, the solvers that take them, and the units in which they are solved."""
+"""Cone programs, their solvers, and the units in which they are solved."""

@@ -1,5 +1,5 @@
-"""Cholesky's factorisation of a symmetric matrix of square blocks, most of which are zero: a band,
-where P is a spline; or none of which are, where functions of P overlap all over the range.
+"""Cholesky factorisation of a symmetric matrix of square blocks, sparse if P is a spline (a band),
+dense if functions of P overlap over the whole range.
 """
 
 from __future__ import annotations
@@ -14,8 +14,10 @@ from synthesis.polynomial.symmetric import length
 Array = np.ndarray
 
 
-LARGE = 128
-"""Rows of a block from which on a matrix without a zero block is not factored as one."""
+MAX_DENSE_ROWS = 128
+"""Number of rows of a block below which a matrix without zero blocks is factored as one dense
+matrix.
+"""
 
 
 class BlockCholesky:
@@ -29,7 +31,7 @@ class BlockCholesky:
         self.whole: Array | None = None
         self.columns: list[dict[int, Array]] = [{} for _ in range(self.size)]
         rows = len(next(iter(blocks.values())))
-        if rows < LARGE and len(blocks) == length(self.size):
+        if rows < MAX_DENSE_ROWS and len(blocks) == length(self.size):
             self._factor_whole(blocks, rows)
         else:
             self._factor_blocks(blocks)
@@ -64,7 +66,7 @@ class BlockCholesky:
                         self.columns[j][i] = -update
 
     def solve(self, b: Array) -> Array:
-        """x (size, v) with M x = b."""
+        """Return x (size, v) with M x = b."""
         if self.whole is not None:
             solved = linalg.cho_solve((self.whole, False), b.ravel(), check_finite=False)
             return solved.reshape(b.shape)

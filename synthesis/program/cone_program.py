@@ -1,8 +1,8 @@
-"""Semidefinite programs in conic form, and the solvers that take them.
+"""Semidefinite programs in conic form, and their solvers.
 
     minimise c' x  subject to  b - A x in a product of positive semidefinite cones
 
-(vectors as in `symmetric`), after some rows, where asked for, that are zero.
+(vectors as in `symmetric`), after optional rows that are zero.
 
 Clarabel and SCS are called directly; CVXOPT, MOSEK, SDPA and COPT, where installed, through cvxpy.
 Whatever a solver answers is a candidate: nothing is believed before it is verified.
@@ -33,11 +33,12 @@ Array = np.ndarray
 
 
 LYAPUNOV = "LYAPUNOV"
-"""What `Solver` takes for the method of `interior_point`, of Lyapunov inequalities alone."""
+"""Name in `Solver` of the method of `interior_point`, for programs of Lyapunov inequalities only.
+"""
 
 
 class Answer(Enum):
-    """What the solver says of the program."""
+    """Status that the solver reports for the program."""
 
     SOLVED = "the solver reports a solution"
     INFEASIBLE = "the solver reports that no solution exists"
@@ -47,7 +48,7 @@ class Answer(Enum):
 
 @dataclass(frozen=True)
 class Solver:
-    """Which solver, and when it stops.
+    """Name of the solver, and its stopping criteria.
 
     Parameters
     ----------
@@ -105,7 +106,7 @@ class Solver:
 
     @property
     def options(self) -> dict[str, Any]:
-        """The settings in the solver's own words, as they are handed to it."""
+        """The settings in the solver's own names, as they are passed to it."""
         return {
             option: getattr(self, setting)
             for setting, options in _OPTIONS[self.name].items()
@@ -127,7 +128,7 @@ class Solver:
 
 
 _OWN = "interior-point method for Lyapunov inequalities"
-"""What certificates and messages call "LYAPUNOV"."""
+"""Name of "LYAPUNOV" in certificates and messages."""
 
 _PACKAGES = {
     "CLARABEL": "clarabel",
@@ -178,13 +179,13 @@ _OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
         "time_limit": ("TimeLimit",),
     },
 }
-"""What each solver calls tolerance, iterations and time limit; a setting that is missing has no
+"""Names of tolerance, iterations and time limit in each solver; a missing setting has no such
 option.
 """
 
 
 def general_solver(solver: Solver | str) -> Solver:
-    """A solver for any cone program; raises `InputError` for the one that is not."""
+    """Return a solver for any cone program; raise `InputError` for the one that is not."""
     solver = solver if isinstance(solver, Solver) else Solver(solver)
     if solver.name == LYAPUNOV:
         raise InputError(
@@ -196,7 +197,7 @@ def general_solver(solver: Solver | str) -> Solver:
 
 
 def installed_solvers() -> tuple[str, ...]:
-    """Semidefinite solvers for any program that can be used here.
+    """Return the installed semidefinite solvers for any program.
 
     Returns
     -------
@@ -221,8 +222,8 @@ def installed_solvers() -> tuple[str, ...]:
 
 @dataclass(frozen=True, eq=False)
 class ConeProgram:
-    """minimise c' x subject to b - A x in the product of semidefinite cones of `sizes`; the first
-    `equalities` rows are zero.
+    """The problem: minimise c' x subject to b - A x in the product of semidefinite cones of
+    `sizes`; the first `equalities` rows are zero.
     """
 
     c: Array
@@ -234,8 +235,8 @@ class ConeProgram:
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A solver's answer and point `x`, None where it gave none; `seconds` of solving, `message` in
-    the solver's words.
+    """A solver's answer and point `x`, None without one; `seconds` of solving, `message` of the
+    solver.
     """
 
     answer: Answer
@@ -245,7 +246,7 @@ class Candidate:
 
 
 def solve(program: ConeProgram, solver: Solver) -> Candidate:
-    """The solver's candidate. Never raises for a failed solve: that is an answer."""
+    """Return the solver's candidate. Never raises for a failed solve: that is an answer."""
     method: Callable[[ConeProgram, Solver], tuple[Answer, Any, str]] = {
         "CLARABEL": _clarabel,
         "SCS": _scs,
@@ -258,20 +259,20 @@ def solve(program: ConeProgram, solver: Solver) -> Candidate:
     return Candidate(answer, x, time.perf_counter() - start, message)
 
 
-SHORT = 3e8
-"""Operations of an iteration that takes some tenths of a second: Clarabel and SCS can be
-interrupted between two.
+SHORT_ITERATION = 3e8
+"""Operations of an iteration that takes some tenths of a second: below it Clarabel and SCS can be
+interrupted between two iterations.
 """
 
 
 def _interruptible(
     method: Callable[[ConeProgram, Solver], Any], program: ConeProgram, solver: Solver
 ) -> tuple[Answer, Any, str]:
-    """Here where the solver looks up often enough, else in a process that an interrupt can end:
-    starting it takes half a second.
+    """Solve here if the solver can be interrupted often enough, else in a process that an interrupt
+    can end: starting it takes half a second.
     """
     operations = (sum(length(n) ** 3 for n in program.sizes) + len(program.c) ** 3) / 3
-    if method is not _cvxpy and operations < SHORT:
+    if method is not _cvxpy and operations < SHORT_ITERATION:
         return method(program, solver)
     try:
         return in_process(method, program, solver)
@@ -279,21 +280,21 @@ def _interruptible(
         return Answer.FAILED, None, str(error)
 
 
-MEMORY = 4e9
-"""Bytes beyond which a program is left alone by an interior-point method: the operating system
-would end the process.
+MAX_BYTES = 4e9
+"""Bytes above which an interior-point method refuses a program: the operating system would end the
+process.
 """
 
 
 def _bytes(program: ConeProgram) -> float:
-    """What the scaling matrices of the cones take, in an interior-point method; their factors take
-    a few times as much.
+    """Return the memory of the scaling matrices of the cones in an interior-point method, bytes;
+    their factors take a few times as much.
     """
     return 8.0 * sum(length(n) ** 2 for n in program.sizes)
 
 
 def _clarabel(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
-    if _bytes(program) > MEMORY / 4:
+    if _bytes(program) > MAX_BYTES / 4:
         words = (
             f"not tried: cones of size {max(program.sizes)} would need several times"
             f" {_bytes(program) / 1e9:.2g} GB"
@@ -345,7 +346,7 @@ def _scs(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
     )
     solution = engine.solve()
     word = str(solution["info"]["status"])
-    if word == "interrupted":  # SCS hears the keyboard itself
+    if word == "interrupted":  # SCS handles the interrupt itself
         raise KeyboardInterrupt
     if word.startswith("infeasible"):
         return Answer.INFEASIBLE, None, word

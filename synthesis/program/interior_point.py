@@ -39,47 +39,45 @@ from synthesis.program.lyapunov_program import LyapunovBlocks, Program, Sizes
 Array = np.ndarray
 Normal = dict[tuple[int, int], Array]
 
-START = 10.0
-"""Least multiple of the identity to start from, for slacks and multipliers."""
+MIN_START = 10.0
+"""Least multiple of the identity from which slacks and multipliers start."""
 FEASIBLE = 1e-9
-"""Residual of the blocks, of their constants, below which they are kept without one, where they
-can be.
+"""Residual of the blocks, relative to their constants, at which a point counts as feasible."""
+MIN_LEVEL = 0.01
+"""Least level relative to which the gap is measured."""
+MIN_STEP = 1e-4
+"""Step length below which the iteration ends."""
+NORMAL_RESIDUAL = 1e-11
+"""Relative residual of the normal equations at which conjugate gradients end."""
+MAX_REFINEMENTS = 12
+"""Largest number of conjugate gradient steps for a solution of the normal equations."""
+DIAGONAL_SHIFT = 1e-13
+"""Relative increase of the diagonal of the normal equations before factoring; conjugate gradients
+correct for it.
 """
-LEAST = 0.01
-"""A level smaller than this is known to fractions of this."""
-SMALL = 1e-4
-"""Steps below this lead nowhere."""
-REFINED = 1e-11
-"""Residual of the normal equations, relative, that is small enough."""
-REFINEMENTS = 12
-"""Most conjugate gradients for a solution of the normal equations."""
-SHIFT = 1e-13
-"""The diagonal of the normal equations is factored larger by this fraction, and the gradients put
-it right.
-"""
-DUAL = 1e-6
-"""Residual of the multipliers, of the largest of their entries, at a solution."""
-IMPOSSIBLE = 1e-7
-"""Residual of multipliers, of what they show to be contradictory, that prove that there is no P."""
+DUAL_RESIDUAL = 1e-6
+"""Residual of the multipliers at a solution, relative to the largest of their entries."""
+INFEASIBILITY_RESIDUAL = 1e-7
+"""Relative residual of multipliers that prove infeasibility."""
 
-EARLY = 0.1
-"""Gap of the point from which the method may start on a program that differs little."""
-NEARLY = 10.0
-"""A gap this many times as large as it was asked for is no reason to start again from afar."""
-TRUSTED = 1e-3
-"""Residual of the multipliers, of the largest of their entries, beyond which the gap says nothing
-of the level: there it does start again.
+EARLY_GAP = 0.1
+"""Gap of the point from which the method may start on a similar program."""
+GAP_FACTOR = 10.0
+"""Factor on the requested gap up to which the result still counts as reached."""
+MAX_DUAL_RESIDUAL = 1e-3
+"""Residual of the multipliers, relative to the largest of their entries, above which the gap does
+not bound the level and the result does not count as reached.
 """
-FEW = 10
-"""So many products of matrices by coefficient take the time of one by place."""
-TOGETHER = 2_000_000
-"""Entries of n^4 by place that are summed at a time: 16 MB."""
+PRODUCT_COST = 10
+"""Number of products of matrices by coefficient that take the time of one product by place."""
+CHUNK_ENTRIES = 2_000_000
+"""Number of entries of n^4 by place that are summed at a time: 16 MB."""
 
 
 class Early(NamedTuple):
-    """A feasible P (K, n, n) and y in the middle of the cones, with the level <S, Z> / order of the
-    central path there and the least eigenvalue of a slack of every cone: where the method may start
-    on a program with more blocks.
+    """A feasible P (K, n, n) and y near the centre of the cones, with the level <S, Z> / order of
+    the central path there and the least eigenvalue of a slack of every cone: a starting point for a
+    program with more blocks.
     """
 
     P: Array
@@ -90,8 +88,8 @@ class Early(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Minimum(Candidate):
-    """Whether the gap that was asked for is `reached`, at least nearly; with the point at which it
-    first was `EARLY`, None where it never was.
+    """Result: whether the requested gap is `reached`, at least nearly; with the point at which it
+    first was below `EARLY_GAP`, None where it never was.
     """
 
     reached: bool = False
@@ -99,8 +97,8 @@ class Minimum(Candidate):
 
 
 def minimise(program: Program, solver: Solver, start: Early | None = None) -> Minimum:
-    """The least level, to the tolerance of the solver or as near as rounding, iterations and time
-    allow.
+    """Minimise the level, to the tolerance of the solver or as near as rounding, iterations and
+    time allow.
 
     The point has the coefficients of P as vectors, then the level; where it is not optimal, it is
     feasible to rounding or there is none. From `start`, of another program, and where that leads
@@ -131,14 +129,14 @@ def _minimised(program: Program, solver: Solver, solving: Task, start: Early | N
         if close and not feasible and cones.inside(point):
             feasible, point = True, point._replace(S=cones.slacks(point.P, point.y))
             at = cones.residuals(point)
-        if feasible and early is None and at.gap <= EARLY:
+        if feasible and early is None and at.gap <= EARLY_GAP:
             least = tuple(float(np.linalg.eigvalsh(S).min()) for S in point.S)
             early = Early(point.P, point.y, at.product / cones.order, least)
-        if close and at.gap <= tolerance and at.dual_size <= DUAL:
+        if close and at.gap <= tolerance and at.dual_size <= DUAL_RESIDUAL:
             word = "solved"
         elif close and at.gap <= tolerance and at.dual_size >= before:
             word = "out of digits"  # the multipliers no longer improve
-        elif at.contradiction < IMPOSSIBLE:
+        elif at.contradiction < INFEASIBILITY_RESIDUAL:
             word = "infeasible"
         elif count == iterations:
             word = "out of iterations"
@@ -157,12 +155,12 @@ def _minimised(program: Program, solver: Solver, solving: Task, start: Early | N
         x = np.r_[svec(point.P).ravel(), point.y[1:], point.y[0]] if close else None
         gap = "" if word == "infeasible" else f", relative gap {at.gap:.1e}"
         message = f"{word} after {count} iterations{gap}"
-        reached = close and at.gap <= NEARLY * tolerance and at.dual_size <= TRUSTED
+        reached = close and at.gap <= GAP_FACTOR * tolerance and at.dual_size <= MAX_DUAL_RESIDUAL
         return Minimum(answer, x, time.perf_counter() - begin, message, reached, early)
 
 
 def _digits(gap: float, tolerance: float) -> float:
-    """Of the level that are found, as far as they are asked for."""
+    """Return the number of accurate digits of the level, at most as many as requested."""
     return round(-math.log10(max(gap, tolerance)), 1) if gap < 1.0 else 0.0
 
 
@@ -176,9 +174,9 @@ class _Point(NamedTuple):
 
 
 class _Residuals(NamedTuple):
-    """What is missing: to the slacks `primal`, to the multipliers `dual` and `dual_y`, with their
-    sizes; <S, Z> `product`, relative to the level `gap`. `contradiction`: how nearly the
-    multipliers prove infeasibility.
+    """Residuals: of the slacks `primal`, of the multipliers `dual` and `dual_y`, with their sizes;
+    <S, Z> `product`, relative to the level `gap`. `contradiction`: relative residual of the
+    multipliers as a proof of infeasibility.
     """
 
     primal: list[Array]
@@ -197,23 +195,23 @@ class _Cone(Protocol):
     constant: Array
 
     def along(self, y: Array) -> Array:
-        """Matrices (m, N, N) from y."""
+        """Return the matrices (m, N, N) of y."""
         ...
 
     def across(self, Z: Array) -> Array:
-        """The adjoint of that, of the length of y."""
+        """Return the adjoint of `along`, of the length of y."""
         ...
 
     def linear(self, P: Array) -> Array:
-        """Matrices (m, N, N) from the coefficients of P."""
+        """Return the matrices (m, N, N) of the coefficients of P."""
         ...
 
     def add_adjoint(self, Z: Array, out: Array) -> None:
-        """To `out` (K, n, n) its share in <Z, linear(.)>."""
+        """Add to `out` (K, n, n) the contribution to <Z, linear(.)>."""
         ...
 
     def add_normal(self, H: Array, out: Normal) -> None:
-        """To the lower blocks of the normal equations those of P -> adjoint(H linear(P) H)."""
+        """Add to the lower blocks of the normal equations those of P -> adjoint(H linear(P) H)."""
         ...
 
 
@@ -258,7 +256,7 @@ class _Inequalities:
         # the functions of each matrix
         own = [np.flatnonzero(np.any(weights[:, :, a], axis=0)) for a in range(A)]
         total = np.zeros((k, k, v * v))
-        together = max(1, TOGETHER // n**4)
+        together = max(1, CHUNK_ENTRIES // n**4)
         for first in range(0, G, together):
             places = slice(first, first + together)
             g = [weights[places, j, a] for a, j in enumerate(own)]
@@ -273,8 +271,8 @@ class _Inequalities:
                 _add(out, (columns[j], columns[i]), blocks[j, i])
 
     def _of_places(self, H: Array, places: slice) -> Iterator[tuple[int, int, Array]]:
-        """(a, b, blocks), a >= b, of the normal equations between the matrices Q_a and Q_b of each
-        of these places.
+        """Yield (a, b, blocks), a >= b, of the normal equations between the matrices Q_a and Q_b
+        of each of these places.
         """
         f, n = self.blocks.fixed, self.blocks.fixed.shape[1]
         G, N = self.blocks.places, H.shape[1]
@@ -356,17 +354,17 @@ class _Multiplier:
 
 def _few(blocks: LyapunovBlocks) -> bool:
     """Whether so few coefficients are involved that their normal equations are summed over all
-    blocks sooner than those of every place are formed.
+    blocks faster than those of every place are formed.
     """
     if blocks.weights is None:
         return False
     places, k, A = blocks.weights.shape
     motions = len(blocks.constant) // places
-    return k * (k + 1) * motions <= FEW * A * (A + 1)
+    return k * (k + 1) * motions <= PRODUCT_COST * A * (A + 1)
 
 
 def _contracted(g: Array, h: Array, blocks: Array) -> Array:
-    """sum_m g_mj h_mk blocks_m (j, k, v^2), the blocks (m, v, v)."""
+    """Return sum_m g_mj h_mk blocks_m (j, k, v^2), the blocks (m, v, v)."""
     pairs = (g[:, :, None] * h[:, None, :]).reshape(len(g), -1)
     return (pairs.T @ blocks.reshape(len(g), -1)).reshape(g.shape[1], h.shape[1], -1)
 
@@ -382,8 +380,8 @@ def _add(out: Normal, at: tuple[int, int], block: Array) -> None:
 
 
 def _on_vectors(K: Array, n: int) -> Array:
-    """Matrices on vectors of V -> the symmetric part of sum L V R, where K = sum vec(L) vec(R)' by
-    rows, (..., n^2, n^2).
+    """Return the map V -> the symmetric part of sum L V R as matrices on vectors, where K = sum
+    vec(L) vec(R)' by rows, (..., n^2, n^2).
     """
     a, b, _ = indices(n)
     K = np.moveaxis(K.reshape(-1, n, n, n, n), -1, 1)
@@ -406,9 +404,9 @@ class _Cones:
         self.order = sum(c.constant.shape[0] * c.constant.shape[1] for c in self.each)
 
     def start(self) -> _Point:
-        """Far inside the cones, wherever that is."""
+        """Return a starting point far inside the cones, wherever that is."""
         n = self.sizes.states
-        far = max(START, self.size)
+        far = max(MIN_START, self.size)
         S = [
             far * np.broadcast_to(np.eye(c.constant.shape[1]), c.constant.shape) for c in self.each
         ]
@@ -416,24 +414,26 @@ class _Cones:
         return _Point(np.zeros((self.sizes.unknowns, n, n)), y, S, S)
 
     def near(self, start: Early) -> _Point:
-        """On the central path as far as a start of another program allows."""
+        """Return a starting point as close to the central path as the one of another program
+        allows.
+        """
         slacks = self.slacks(start.P, start.y)
         S = [_raised(slack, least) for slack, least in zip(slacks, start.least, strict=True)]
         return _Point(start.P, start.y, S, [start.level * np.linalg.inv(s) for s in S])
 
     def change(self, P: Array, y: Array) -> list[Array]:
-        """Of the slacks with P and y."""
+        """Return the change of the slacks with P and y."""
         return [cone.along(y) + cone.linear(P) for cone in self.each]
 
     def slacks(self, P: Array, y: Array) -> list[Array]:
-        """As they ought to be."""
+        """Return the slacks that belong to this P and y."""
         return [
             cone.constant + change
             for cone, change in zip(self.each, self.change(P, y), strict=True)
         ]
 
     def inside(self, point: _Point) -> bool:
-        """Whether the slacks as they ought to be are in the cones."""
+        """Whether the slacks that belong to P and y are in the cones."""
         try:
             for S in self.slacks(point.P, point.y):
                 np.linalg.cholesky(S)
@@ -442,7 +442,7 @@ class _Cones:
         return True
 
     def adjoint(self, Z: list[Array]) -> tuple[Array, Array]:
-        """(P', y') with <Z, change(P, y)> = <P', P> + <y', y>."""
+        """Return (P', y') with <Z, change(P, y)> = <P', P> + <y', y>."""
         out = np.zeros((self.sizes.unknowns, self.sizes.states, self.sizes.states))
         across = np.zeros(1 + self.sizes.multipliers)
         for cone, each in zip(self.each, Z, strict=True):
@@ -451,7 +451,7 @@ class _Cones:
         return out, across
 
     def residuals(self, point: _Point) -> _Residuals:
-        """Of slacks and multipliers at this point."""
+        """Return the residuals of slacks and multipliers at this point."""
         primal = [
             wanted - S for wanted, S in zip(self.slacks(point.P, point.y), point.S, strict=True)
         ]
@@ -469,14 +469,14 @@ class _Cones:
             dual_y,
             _largest(dual, dual_y) / max(1.0, most),
             product,
-            product / max(abs(float(point.y[0])), LEAST),
+            product / max(abs(float(point.y[0])), MIN_LEVEL),
             _largest(dual, level) / -constant if constant < 0 else np.inf,
         )
 
 
 def _raised(S: Array, least: float) -> Array:
-    """Matrices (m, N, N) with a multiple of the identity each that leaves no eigenvalue below the
-    least.
+    """Return matrices (m, N, N) plus the least multiple of the identity with no eigenvalue below
+    the limit.
     """
     missing = np.maximum(least - np.linalg.eigvalsh(S)[:, 0], 0.0)
     return S + missing[:, None, None] * np.eye(S.shape[-1])
@@ -487,7 +487,7 @@ def _largest(P: Array, y: Array) -> float:
 
 
 class _Scaling(NamedTuple):
-    """Nesterov and Todd's of one cone: r^-1 S r^-T = r' Z r = diag(values), H = (r r')^-1;
+    """Nesterov-Todd scaling of one cone: r^-1 S r^-T = r' Z r = diag(values), H = (r r')^-1;
     `inverse` is r^-1.
     """
 
@@ -507,34 +507,34 @@ class _Scaling(NamedTuple):
 
     @property
     def diagonal(self) -> Array:
-        """Slack and multiplier themselves."""
+        """Slack and multiplier in the scaled coordinates."""
         return self.values[:, :, None] * np.eye(self.values.shape[1])
 
     def of_slack(self, change: Array) -> Array:
-        """A change of the slack in the coordinates in which both are diagonal."""
+        """Return a change of the slack in the coordinates in which both are diagonal."""
         return symmetrized(self.inverse @ change @ np.swapaxes(self.inverse, 1, 2))
 
     def slack(self, scaled: Array) -> Array:
-        """The change of the slack that is `scaled` in them."""
+        """Return the change of the slack that is `scaled` in them."""
         return symmetrized(self.r @ scaled @ np.swapaxes(self.r, 1, 2))
 
     def multiplier(self, scaled: Array) -> Array:
-        """The change of the multiplier that is."""
+        """Return the change of the multiplier that is `scaled` in them."""
         return symmetrized(np.swapaxes(self.inverse, 1, 2) @ scaled @ self.inverse)
 
     def divided(self, M: Array) -> Array:
-        """T with (T diag + diag T)/2 = M."""
+        """Return T with (T diag + diag T)/2 = M."""
         return 2.0 * M / (self.values[:, :, None] + self.values[:, None, :])
 
     def extent(self, scaled: Array) -> tuple[float, float]:
-        """The least and the largest eigenvalue of `scaled` by the slack."""
+        """Return the least and the largest eigenvalue of `scaled` relative to the slack."""
         root = np.sqrt(self.values)
         found = np.linalg.eigvalsh(scaled / (root[:, :, None] * root[:, None, :]))
         return float(found.min()), float(found.max())
 
 
 class _NormalEquations:
-    """M (P, y) = adjoint(H change(P, y) H), factored."""
+    """The equations M (P, y) = adjoint(H change(P, y) H), factored."""
 
     def __init__(self, cones: _Cones, scalings: list[_Scaling]):
         self.cones, self.scalings = cones, scalings
@@ -543,7 +543,7 @@ class _NormalEquations:
             cone.add_normal(scaling.H, blocks)
         for (i, j), block in blocks.items():
             if i == j:
-                block[np.diag_indices(len(block))] *= 1.0 + SHIFT
+                block[np.diag_indices(len(block))] *= 1.0 + DIAGONAL_SHIFT
         self.factor = BlockCholesky(blocks)
         start = cones.start()
         columns = [self.times(np.zeros_like(start.P), unit) for unit in np.eye(len(start.y))]
@@ -554,7 +554,7 @@ class _NormalEquations:
         self.pivot = corner - np.einsum("ikl,jkl->ij", self.border, self.across)
 
     def times(self, P: Array, y: Array) -> tuple[Array, Array]:
-        """M (P, y), block by block."""
+        """Return M (P, y), block by block."""
         moved = self.cones.change(P, y)
         return self.cones.adjoint(
             [at.H @ M @ at.H for at, M in zip(self.scalings, moved, strict=True)]
@@ -566,13 +566,13 @@ class _NormalEquations:
         return smat(x - np.tensordot(y, self.across, axes=1), b.shape[-1]), y
 
     def solve(self, b: Array, d: Array) -> tuple[Array, Array]:
-        """(P, y) of the right-hand side (b, d), by conjugate gradients that the factors
-        precondition: near the end these know the equations to some digits only.
+        """Return (P, y) for the right-hand side (b, d), by conjugate gradients preconditioned with
+        the factors, which near the end are accurate to a few digits only.
         """
         P, y, rest, left = np.zeros_like(b), np.zeros_like(d), b, d
         along, pace, size = None, 0.0, _inner(b, d, b, d)
         best, least = (P, y), np.inf
-        for _ in range(REFINEMENTS):
+        for _ in range(MAX_REFINEMENTS):
             zP, zy = self._by_factors(rest, left)
             before, pace = pace, _inner(rest, left, zP, zy)
             if along is not None:
@@ -587,7 +587,7 @@ class _NormalEquations:
                 raise np.linalg.LinAlgError
             if misfit < least:
                 best, least = (P, y), misfit
-            if misfit <= REFINED:
+            if misfit <= NORMAL_RESIDUAL:
                 break
         return best
 
@@ -597,12 +597,14 @@ def _inner(P: Array, y: Array, Q: Array, z: Array) -> float:
 
 
 def _longest(least: float, share: float = 1.0) -> float:
-    """Of a step in a direction with this least eigenvalue, the part that stays in the cone."""
+    """Return the part of a step in a direction with this least eigenvalue that stays in the
+    cone.
+    """
     return min(1.0, share / -least) if least < 0 else 1.0
 
 
 def _step(cones: _Cones, point: _Point, at: _Residuals, feasible: bool) -> _Point | None:
-    """The next point, None where no step is left."""
+    """Return the next point, None where no step is possible."""
     scalings = [_Scaling.of(s, z) for s, z in zip(point.S, point.Z, strict=True)]
     normal = _NormalEquations(cones, scalings)
     diagonals = [scaling.diagonal for scaling in scalings]
@@ -640,7 +642,7 @@ def _step(cones: _Cones, point: _Point, at: _Residuals, feasible: bool) -> _Poin
     share = 0.9 + 0.08 * min(along, across)
     dP, dy, dS, dZ = direction(targets)
     along, across = (_longest(extent(scaled)[0], share) for scaled in (dS, dZ))
-    if max(along, across) < SMALL:
+    if max(along, across) < MIN_STEP:
         return None
     P, y = symmetrized(point.P + along * dP), point.y + along * dy
     if feasible:

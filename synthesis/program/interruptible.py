@@ -1,5 +1,5 @@
-"""Work in native code: an interrupt from the keyboard ends it at once, which such code does not
-hear while one iteration may take minutes, and a panic becomes an error.
+"""Interruptible native code: an interrupt from the keyboard ends it at once, although one iteration
+may take minutes; a panic becomes an error.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from symheli.worker import ProcessEndedError, Worker, pickled
 
 T = TypeVar("T")
 
-PATIENCE = 1.0
-"""Seconds that interrupted work has to end."""
+MAX_WAIT = 1.0
+"""Longest time for interrupted work to end, s."""
 
 
 def in_thread(work: Callable[[threading.Event], T]) -> T:
-    """work(stop) in a thread of its own, for work that releases Python's lock; what it raises is
-    raised here.
+    """Call work(stop) in a thread of its own, for work that releases Python's lock, and raise its
+    exceptions here.
 
     An interrupt sets `stop`, at which the work must look often, and is raised here when it has
-    ended, or `PATIENCE` later.
+    ended, or `MAX_WAIT` later.
     """
     stop, done, outcome = threading.Event(), threading.Event(), []
 
@@ -37,11 +37,11 @@ def in_thread(work: Callable[[threading.Event], T]) -> T:
 
     threading.Thread(target=run, daemon=True, name="symheli solver").start()
     try:
-        while not done.wait(0.2):  # on Windows a wait without end hears no interrupt
+        while not done.wait(0.2):  # on Windows a wait without timeout cannot be interrupted
             pass
     except BaseException:
         stop.set()
-        done.wait(PATIENCE)  # Python ends badly where native code still runs
+        done.wait(MAX_WAIT)  # Python ends badly where native code still runs
         raise
     value, error = outcome[0]
     if error is not None:
@@ -50,8 +50,8 @@ def in_thread(work: Callable[[threading.Event], T]) -> T:
 
 
 def in_process(function: Callable[..., T], *arguments: Any) -> T:
-    """function(*arguments) in a process of its own, for work that keeps Python's lock; what it
-    raises is raised here.
+    """Call function(*arguments) in a process of its own, for work that keeps Python's lock, and
+    raise its exceptions here.
 
     The function is one of a module, arguments and result can be pickled. An interrupt ends the
     process. Raises `SolverError` where it ends without an answer.
@@ -65,8 +65,8 @@ def in_process(function: Callable[..., T], *arguments: Any) -> T:
 
 @contextmanager
 def no_panic() -> Iterator[None]:
-    """A panic of a solver written in Rust, which is no `Exception` and passes every `except
-    Exception`, becomes `SolverError`.
+    """Raise `SolverError` for a panic of a solver written in Rust, which is no `Exception` and
+    passes every `except Exception`.
     """
     try:
         yield

@@ -2,7 +2,7 @@
 Lyapunov and Riccati inequalities are.
 
 Kept as those products, a block of N rows takes n N numbers for each coefficient of P and not n^2
-N^2/4, and all that an interior-point method asks of it is a few products of matrices.
+N^2/4, and an interior-point method only needs a few products of matrices with it.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ import numpy as np
 
 Array = np.ndarray
 
-MANY = 12
-"""States beyond which fewer coefficients of P are tried."""
-GENERAL = 9
-"""States up to which a general solver is as fast."""
+MANY_STATES = 12
+"""Number of states above which fewer coefficients of P are tried."""
+MAX_STATES_GENERAL = 9
+"""Number of states up to which a general solver is as fast."""
 
 
 class Sizes(NamedTuple):
-    """Of a program: `states`, and the inputs d of a block, which are held below a margin; `inputs`
-    u, to which g belongs; coefficients of P (`unknowns`) and of the multiplier.
+    """Sizes of a program: `states`, and the inputs d of a block, which are held below a margin;
+    `inputs` u, to which g belongs; coefficients of P (`unknowns`) and of the multiplier.
     """
 
     states: int
@@ -43,8 +43,8 @@ class Sizes(NamedTuple):
 
 
 class Supplied(NamedTuple):
-    """sum_j each[., j] multipliers[columns[j]], what a norm-bounded block adds to F: `columns`
-    (k,), `each` (m, k, N, N).
+    """Supply rate of a norm-bounded block, sum_j each[., j] multipliers[columns[j]], added to F:
+    `columns` (k,), `each` (m, k, N, N).
     """
 
     columns: Array
@@ -55,7 +55,7 @@ class Supplied(NamedTuple):
         return np.einsum("j,mjab->mab", multipliers[self.columns], self.each)
 
     def add_adjoint(self, Z: Array, out: Array) -> None:
-        """To `out`, of the length of the multiplier, its share in <Z, matrices(.)>."""
+        """Add to `out`, of the length of the multiplier, the contribution to <Z, matrices(.)>."""
         out[self.columns] += np.einsum("mjab,mab->j", self.each, Z)
 
 
@@ -84,7 +84,7 @@ class LyapunovBlocks(NamedTuple):
 
     @property
     def places(self) -> int:
-        """G, between which the matrices Q differ."""
+        """Number G of different tuples of matrices Q."""
         return 1 if self.weights is None else len(self.weights)
 
     def linear(self, P: Array) -> Array:
@@ -110,7 +110,9 @@ class LyapunovBlocks(NamedTuple):
         return half + np.swapaxes(half, -1, -2)
 
     def by_coefficients(self) -> LyapunovBlocks:
-        """The same with the coefficients themselves for the matrices Q, without weights."""
+        """Return the same blocks with the coefficients themselves for the matrices Q, without
+        weights.
+        """
         if self.weights is None:
             return self
         m, R, A, n, N = self.varying.shape
@@ -120,7 +122,7 @@ class LyapunovBlocks(NamedTuple):
         return self._replace(varying=wide.reshape(m, R, k, n, N), weights=None)
 
     def keep(self, which: Array) -> LyapunovBlocks:
-        """Those blocks alone; without a `supply` or a level of their own."""
+        """Return these blocks only; without a `supply` or a level of their own."""
         weights = self.weights
         if weights is not None:
             weights = weights[np.arange(len(self.constant))[which] % len(weights)]
@@ -139,9 +141,9 @@ class LyapunovBlocks(NamedTuple):
 
 
 class Program(Protocol):
-    """minimise cost g subject to every block F <= -back_off, F with g `level` where a block has no
-    level of its own, and sign P + constant I >= 0 for every coefficient of P and every (sign,
-    constant) of the `bounds`.
+    """The problem: minimise cost g subject to every block F <= -back_off, F with g `level` where a
+    block has no level of its own, and sign P + constant I >= 0 for every coefficient of P and every
+    (sign, constant) of the `bounds`.
     """
 
     @property
@@ -151,34 +153,34 @@ class Program(Protocol):
 
     @property
     def sizes(self) -> Sizes:
-        """Of the program."""
+        """Sizes of the program."""
         ...
 
     @property
     def cost(self) -> float:
-        """Of the level in what is minimised."""
+        """Coefficient of the level in the objective."""
         ...
 
     @property
     def level(self) -> Array:
-        """What one unit of g relaxes a block by, where it has no level of its own."""
+        """Matrix by which one unit of g relaxes a block that has no level of its own."""
         ...
 
     @property
     def back_off(self) -> Array:
-        """By which a block stays below zero."""
+        """Matrix by which a block stays below zero."""
         ...
 
     @property
     def bounds(self) -> tuple[tuple[float, float], ...]:
-        """(sign, constant) of every sign P + constant I >= 0."""
+        """Pairs (sign, constant) of every sign P + constant I >= 0."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class LyapunovProgram:
-    """minimise g subject to every block <= -margin diag(I, 0) and every coefficient of P >= floor
-    I, every one of a multiplier >= 0.
+    """The problem: minimise g subject to every block <= -margin diag(I, 0) and every coefficient of
+    P >= floor I, every one of a multiplier >= 0.
 
     Without inputs: maximise t subject to blocks <= -t I and 0 <= P <= I; t > 0 proves stability.
     """
@@ -190,7 +192,7 @@ class LyapunovProgram:
 
     @property
     def cost(self) -> float:
-        """Of the level, g or t, in what is minimised."""
+        """Coefficient of the level, g or t, in the objective."""
         return 1.0 if self.sizes.inputs else -1.0
 
     @property

@@ -1,4 +1,4 @@
-"""One constant change of coordinates in which the numbers of an LMI are of order one, whatever the
+"""A constant change of coordinates in which the numbers of an LMI are of order one, whatever the
 units of the states.
 """
 
@@ -23,33 +23,35 @@ from synthesis.worst.frozen import norm
 
 Array = np.ndarray
 
-LARGEST = 1e100
-"""Gramians square the entries of a model."""
+MAX_ENTRY = 1e100
+"""Largest entry of a model: Gramians square the entries."""
 
-UNSEEN = 0.3
-"""Every state is driven and seen by this fraction of what inputs and outputs do: what they do not
-reach needs a scale too.
+MIN_COUPLING = 0.3
+"""Every state is reached and observed at least by this fraction of the inputs and outputs, so that
+states which they do not reach have a scale too.
 """
-DECOUPLED = 1e-3
-"""Balancing leaves a coupling alone where both of its directions are below this fraction of the
-states' own pace.
+MIN_BALANCED = 1e-3
+"""Couplings of which both directions are below this fraction of the states' own rate are not
+balanced.
 """
-NOTHING = 1e-6
-"""A gain below this fraction of the response of the states is what cancellation leaves, and no
-scale of anything.
+NEGLIGIBLE_GAIN = 1e-6
+"""A gain below this fraction of the response of the states is the remainder of a cancellation and
+sets no scale.
 """
-ROUNDED = 1e-7
-"""A response below this fraction is rounding: the root of that of a Gramian."""
-START = 0.1
-"""Fraction of that response from which a proof then sets out."""
-FAR = 30.0
-"""A bound this many times larger or smaller than the scale it was found in deserves its own."""
-RESCALED = 3
-"""Most changes of scale."""
+NEGLIGIBLE_RESPONSE = 1e-7
+"""Fraction below which a response is rounding: the square root of the rounding of a Gramian."""
+INITIAL_FRACTION = 0.1
+"""Fraction of that response with which the search then begins."""
+MAX_SCALE_RATIO = 30.0
+"""Ratio of a bound to the scale in which it was found beyond which it is computed again in a new
+scale.
+"""
+MAX_RESCALINGS = 3
+"""Largest number of changes of scale."""
 LEVELS = (1.01, 2.0, 10.0, 100.0, 1e4)
-"""Multiples of the expected gain at which a storage function is sought in turn."""
-SWEEPS = 100
-"""Most sweeps of balancing."""
+"""Multiples of the expected gain at which a storage function is computed in turn."""
+MAX_SWEEPS = 100
+"""Largest number of sweeps of balancing."""
 
 
 T = TypeVar("T")
@@ -72,7 +74,7 @@ class Scaling(NamedTuple):
     multiplier: float = 1.0
 
     def fault(self, states: int) -> str | None:
-        """What keeps these from being coordinates of so many states, None where nothing does."""
+        """Return why these are not coordinates of this number of states; None where they are."""
         return structure.first(
             structure.coordinates(
                 self.left, self.right, (self.channel, self.time, self.multiplier), states
@@ -83,7 +85,7 @@ class Scaling(NamedTuple):
     def of_pieces(
         self, pieces: Iterable[ModelPiece], block: NormBounded | None = None
     ) -> tuple[ModelPiece, ...]:
-        """The pieces of a model in these units, those of the channels of a `block` too."""
+        """Return the pieces of a model in these units, those of the channels of a `block` too."""
 
         def scaled(piece: ModelPiece) -> ModelPiece:
             inputs, outputs = np.ones(piece.B.shape[2]), np.full(piece.C.shape[1], self.channel)
@@ -95,8 +97,8 @@ class Scaling(NamedTuple):
         return tuple(map(scaled, pieces))
 
     def storage(self, model: LinearModel, above: float) -> Array | None:
-        """P of a frozen model in these units, which dissipates strictly at the level 1 + `above` of
-        the channel; None where there is none.
+        """Return P of a frozen model in these units, which dissipates strictly at the level 1 +
+        `above` of the channel; None where there is none.
         """
         inner = linalg.inv(self.weight)
         share = 0.5 * above / (LEVELS[0] - 1.0)
@@ -105,34 +107,34 @@ class Scaling(NamedTuple):
         )
 
     def of_model(self, model: LinearModel) -> Matrices:
-        """A frozen model in these units."""
+        """Return a frozen model in these units."""
         every = self.of_matrices(Matrices(*(M[None] for M in (model.A, model.B, model.C, model.D))))
         return Matrices(*(M[0] for M in every))
 
     def of_matrices(self, model: Matrices, block: NormBounded | None = None) -> Matrices:
-        """The matrices (K, ...) of a model in these units, as `of_pieces`."""
+        """Return the matrices (K, ...) of a model in these units, as `of_pieces`."""
         return Matrices(*self.of_pieces([ModelPiece(0.0, 1.0, *model)], block)[0][2:])
 
     def to_physical(self, P: Array) -> Array:
-        """Lyapunov matrices in physical units from those in z."""
+        """Return Lyapunov matrices in physical units from those in z."""
         return symmetrized(self.channel**2 * self.left.T @ P @ self.left)
 
     def to_scaled(self, P: Array) -> Array:
-        """The inverse of `to_physical`."""
+        """Return the inverse of `to_physical`."""
         return symmetrized(self.right.T @ P @ self.right / self.channel**2)
 
 
 def scaling(lpv: LPVStateSpace, gain: float) -> Scaling:
-    """From the model at mid-range, and what drives and shows the states all over it; `gain` is the
-    expected one.
+    """Return the scaling by the model at mid-range and the inputs and outputs of the states over
+    the whole range; `gain` is the expected one.
     """
     s = lpv.scheduling
     return model_scaling(lpv.at(s.middle), gain, lpv.matrices(np.linspace(s.low, s.high, 9)))
 
 
 def block_scaling(lpv: LPVStateSpace, block: NormBounded, gain: float) -> Scaling:
-    """The same with a norm-bounded block: a multiplier of 1 in these units balances d to y with u
-    to v, as a constant one would.
+    """Return the same with a norm-bounded block: a multiplier of 1 in these units balances d to y
+    with u to v, as a constant one would.
     """
     d, v = slice(None, block.inputs), slice(len(lpv.outputs) - block.outputs, None)
     u, y = slice(block.inputs, None), slice(None, len(lpv.outputs) - block.outputs)
@@ -157,8 +159,8 @@ def block_scaling(lpv: LPVStateSpace, block: NormBounded, gain: float) -> Scalin
 
 
 def _response(lpv: LPVStateSpace, inputs: slice, outputs: slice) -> float:
-    """Largest gain of some frozen models from these inputs to these outputs; 0 where none is
-    stable.
+    """Return the largest gain of some frozen models from these inputs to these outputs; 0 where
+    none is stable.
     """
     s = lpv.scheduling
     found = [0.0]
@@ -169,7 +171,7 @@ def _response(lpv: LPVStateSpace, inputs: slice, outputs: slice) -> float:
 
 
 def model_scaling(model: LinearModel, gain: float, elsewhere: Matrices | None = None) -> Scaling:
-    """The same from one frozen model, with the size of its matrices `elsewhere` (K, ...).
+    """Return the scaling by one frozen model, with the size of its matrices `elsewhere` (K, ...).
 
     The Lyapunov function of order one is the sum of that by the outputs and the inverse of the
     Gramian of the inputs, between which those of the bounded real lemma lie: both go with the
@@ -177,9 +179,9 @@ def model_scaling(model: LinearModel, gain: float, elsewhere: Matrices | None = 
     """
     n, continuous = len(model.states), model.dt is None
     every = elsewhere or Matrices(*(M[None] for M in (model.A, model.B, model.C, model.D)))
-    if max(np.abs(M).max(initial=0.0) for M in every) > LARGEST:
+    if max(np.abs(M).max(initial=0.0) for M in every) > MAX_ENTRY:
         raise InputError(
-            f"a model with entries beyond {LARGEST:.0e} cannot be squared; choose other units"
+            f"a model with entries beyond {MAX_ENTRY:.0e} cannot be squared; choose other units"
         )
     B, C = np.hstack([*every.B]), np.vstack([*every.C])
     D = balance(np.abs(every.A).max(axis=0), B, C)
@@ -189,8 +191,8 @@ def model_scaling(model: LinearModel, gain: float, elsewhere: Matrices | None = 
     time = 1.0 / float(np.median(pace)) if continuous and np.median(pace) > 0 else 1.0
     A = _stabilised(A, poles, continuous)
     own = _pace(A if continuous else A - np.eye(n))
-    reached = np.hstack([B, UNSEEN * _size(B) * np.diag(np.sqrt(own))])
-    seen = np.vstack([C, UNSEEN * _size(C) * np.diag(np.sqrt(own))])
+    reached = np.hstack([B, MIN_COUPLING * _size(B) * np.diag(np.sqrt(own))])
+    seen = np.vstack([C, MIN_COUPLING * _size(C) * np.diag(np.sqrt(own))])
     Wc, Wo = _gramian(A, reached, continuous), _gramian(A.T, seen.T, continuous)
     inverse = linalg.inv(Wc)
     # where inputs and outputs weigh alike: the geometric mean of the Hankel singular values
@@ -210,7 +212,7 @@ def model_scaling(model: LinearModel, gain: float, elsewhere: Matrices | None = 
         float(np.sum(heard)),
         *(np.sqrt(np.trace(c) * np.trace(o)) for c, o in (alone, (Wc, Wo))),
     )
-    channel = _channel(gain, response if response > ROUNDED * silent else hardly)
+    channel = _channel(gain, response if response > NEGLIGIBLE_RESPONSE * silent else hardly)
     size_B, size_C = (
         np.linalg.norm(weight @ linalg.solve(root, B)),
         np.linalg.norm(C @ root @ weight) / channel,
@@ -222,8 +224,8 @@ def model_scaling(model: LinearModel, gain: float, elsewhere: Matrices | None = 
 
 
 def dissipative(units: Scaling, model: LinearModel, gain: float) -> Scaling | None:
-    """Units in which P = I is a storage function of a frozen model that dissipates strictly just
-    above the expected `gain`, and weight^-2 what it dissipates; None where there is none.
+    """Return units in which P = I is a storage function of a frozen model that dissipates strictly
+    just above the expected `gain`, and weight^-2 the dissipation; None where there is none.
 
     At that level a margin of one is reached, and by convexity a smaller one costs that share of
     what the level is above the norm.
@@ -253,30 +255,33 @@ def dissipative(units: Scaling, model: LinearModel, gain: float) -> Scaling | No
 
 
 def in_its_own_scale(found: Callable[[float], tuple[T, float, float]], expected: float) -> list[T]:
-    """What `found(expected)` brings, (result, bound, scale it was found in); again in the scale of
-    the bound while that is far off.
+    """Return the result of `found(expected)`, (result, bound, scale it was found in); again in the
+    scale of the bound while that is far off.
 
     The frozen gain is a scale that no search changes, but a moving p may have a gain of another
     order.
     """
     results: list[T] = []
     least = 0.0
-    for _ in range(1 + RESCALED):
+    for _ in range(1 + MAX_RESCALINGS):
         result, bound, scale = found(expected)
         results.append(result)
-        least = least or NOTHING * scale
-        if not least < bound < math.inf or scale / FAR < bound < scale * FAR:
+        least = least or NEGLIGIBLE_GAIN * scale
+        if (
+            not least < bound < math.inf
+            or scale / MAX_SCALE_RATIO < bound < scale * MAX_SCALE_RATIO
+        ):
             break
         expected = bound
     return results
 
 
 def balance(A: Array, B: Array, C: Array) -> Array:
-    """d (n,) such that what enters each state of z = x/d from other states and inputs is as large
-    as what leaves it.
+    """Return d (n,) such that each state of z = x/d is driven by other states and inputs as
+    strongly as it drives other states and outputs.
 
     A (n, n) of sizes, its diagonal the states' own. Osborne's balancing of the whole system matrix;
-    a state that is reached or seen by nothing else ends at `DECOUPLED`.
+    a state without other couplings ends at `MIN_BALANCED`.
     """
     n = len(A)
     d, own = np.ones(n), np.abs(np.diag(A))
@@ -286,14 +291,14 @@ def balance(A: Array, B: Array, C: Array) -> Array:
         np.linalg.norm(B, axis=1),
         np.linalg.norm(C, axis=0),
     )
-    for _ in range(SWEEPS):
+    for _ in range(MAX_SWEEPS):
         # inputs and outputs in the units in which they are as large as one another
         ratio = _size(out * d) / _size(into / d)
         unit = np.sqrt(ratio) if into.any() and out.any() else 1.0
         before = d.copy()
         for i in range(n):
-            entering = A[i] @ d / d[i] + into[i] * unit / d[i] + DECOUPLED * own[i]
-            leaving = A[:, i] @ (1 / d) * d[i] + out[i] / unit * d[i] + DECOUPLED * own[i]
+            entering = A[i] @ d / d[i] + into[i] * unit / d[i] + MIN_BALANCED * own[i]
+            leaving = A[:, i] @ (1 / d) * d[i] + out[i] / unit * d[i] + MIN_BALANCED * own[i]
             d[i] *= np.sqrt(entering / leaving)
         if np.abs(np.log(d / before)).max(initial=0.0) < 0.05:
             break
@@ -301,25 +306,31 @@ def balance(A: Array, B: Array, C: Array) -> Array:
 
 
 def _channel(gain: float, response: float) -> float:
-    """The gain expected; where that is nothing beside the `response` of the states to inputs and
-    outputs, a gain to begin with.
+    """Return the expected gain; where that is negligible beside the `response` of the states to
+    inputs and outputs, an initial gain.
     """
-    return gain if math.isfinite(gain) and gain > NOTHING * response else START * response
+    return (
+        gain
+        if math.isfinite(gain) and gain > NEGLIGIBLE_GAIN * response
+        else INITIAL_FRACTION * response
+    )
 
 
 def _size(M: Array) -> float:
-    """Largest entry, 1 where there is none."""
+    """Return the largest entry, 1 where there is none."""
     return float(np.abs(M).max(initial=0.0)) or 1.0
 
 
 def _pace(A: Array) -> Array:
-    """How fast each state moves (n,), relative ones at least 1e-12 of the fastest."""
+    """Return the rate of each state (n,), relative to the fastest at least 1e-12."""
     size = np.maximum(np.linalg.norm(A, axis=0), np.linalg.norm(A, axis=1))
     return np.maximum(size, 1e-12 * _size(size))
 
 
 def _stabilised(A: Array, poles: Any, continuous: bool) -> Array:
-    """A with its poles moved inside the stability region by as little as the Gramians need."""
+    """Return A with its poles moved inside the stability region by as little as the
+    Gramians need.
+    """
     if continuous:
         shift = float(poles.real.max()) + 1e-6 * float(
             np.abs(poles).min() or np.abs(poles).max() or 1.0
@@ -329,7 +340,7 @@ def _stabilised(A: Array, poles: Any, continuous: bool) -> Array:
 
 
 def _gramian(A: Array, B: Array, continuous: bool, least: float = 1e-12) -> Array:
-    """With no eigenvalue below the fraction `least` of the largest."""
+    """Return the Gramian with no eigenvalue below the fraction `least` of the largest."""
     X = (
         linalg.solve_continuous_lyapunov(A, -B @ B.T)
         if continuous

@@ -14,21 +14,21 @@ from synthesis.worst.frozen import to_continuous
 
 Array = np.ndarray
 
-LEAST = 1e-12
-"""Share of the pace of the states below which there is no strict dissipation to speak of."""
-REFINED = 2
-"""Steps of Newton that put right what the Schur form leaves where paces are far apart."""
-AGAIN = 3
-"""Most changes of coordinates on the way, each to those of the function found last."""
-ROUND = 100.0
-"""Condition of P below which they are left at that."""
-SHRINK = 8.0
-"""By which the share falls until there is a solution, and once more from there."""
+MIN_DISSIPATION = 1e-12
+"""Least dissipation, as a fraction of the rates of the states."""
+NEWTON_STEPS = 2
+"""Number of Newton steps that correct the Schur solution where rates are far apart."""
+MAX_CHANGES = 3
+"""Largest number of changes of coordinates, each to those of the last storage function."""
+MAX_CONDITION = 100.0
+"""Condition number of P below which the coordinates are kept."""
+REDUCTION = 8.0
+"""Factor by which the dissipation is reduced until a solution exists, and once more from there."""
 
 
 class Storage(NamedTuple):
-    """x = T z and V = z'z: with the supply level^2 |u|^2 - |y|^2, V falls by z'Wz more than is
-    supplied, per unit of time or sample.
+    """A storage function V = z'z of x = T z: with the supply rate level^2 |u|^2 - |y|^2, V
+    decreases by z'Wz more than is supplied, per unit of time or sample.
     """
 
     T: Array
@@ -38,8 +38,8 @@ class Storage(NamedTuple):
 def strict_storage(
     A: Array, B: Array, C: Array, D: Array, level: float, *, discrete: bool
 ) -> Storage | None:
-    """The storage function of a model whose norm is below `level`, near the middle of all; None
-    where rounding leaves none.
+    """Return a storage function of a model whose norm is below `level`, near the centre of the set
+    of all; None where rounding leaves none.
 
     W is as large a share of the pace of the states as the level allows. By convexity a share t of
     W costs at most the share t of what the level is above the norm.
@@ -49,14 +49,14 @@ def strict_storage(
         into = _midway(A)
         A, B, C, D = to_continuous(A, B, C, D)
     T, found = np.eye(len(A)), None
-    for _ in range(AGAIN):
+    for _ in range(MAX_CHANGES):
         own = _strict(linalg.solve(T, A @ T), linalg.solve(T, B), C @ T, D, level)
         if own is None:
             break
         P, W = own
         step = powered(P, -0.5)
         T, found = T @ step, Storage(T @ step, symmetrized(step @ W @ step))
-        if np.linalg.cond(P) < ROUND:
+        if np.linalg.cond(P) < MAX_CONDITION:
             break
     if found is None:
         return None
@@ -67,7 +67,7 @@ def strict_storage(
 def least_storage(
     A: Array, B: Array, C: Array, D: Array, level: float, W: Array, *, discrete: bool
 ) -> Array | None:
-    """The least P of a storage function that dissipates W at this level, None where there is
+    """Return the least P of a storage function that dissipates W at this level, None where there is
     none.
     """
     if discrete:
@@ -77,25 +77,27 @@ def least_storage(
 
 
 def _midway(A: Array) -> Array:
-    """From the state of a discrete model that of the continuous one, of the same norm and P."""
+    """Return the continuous model of the same norm and P for the state of a discrete one."""
     return (A + np.eye(len(A))) / math.sqrt(2.0)
 
 
 def _strict(A: Array, B: Array, C: Array, D: Array, level: float) -> tuple[Array, Array] | None:
-    """P and W."""
+    """Return P and W."""
     pace = _pace(A)
     share = 1.0
-    while share > LEAST:
+    while share > MIN_DISSIPATION:
         if _least(A, B, C, D, level, share * pace) is not None:
-            W = share / SHRINK * pace
+            W = share / REDUCTION * pace
             P = _least(A, B, C, D, level, W)
             return (P, W) if P is not None and linalg.eigvalsh(P)[0] > 0 else None
-        share /= SHRINK
+        share /= REDUCTION
     return None
 
 
 def _least(A: Array, B: Array, C: Array, D: Array, level: float, W: Array) -> Array | None:
-    """The least P with A'P + PA + C'C + W + (PB + C'D) R^-1 (PB + C'D)' = 0, R = level^2 - D'D."""
+    """Return the least P with A'P + PA + C'C + W + (PB + C'D) R^-1 (PB + C'D)' = 0, R = level^2 -
+    D'D.
+    """
     R = level**2 * np.eye(D.shape[1]) - D.T @ D
     if linalg.eigvalsh(R)[0] <= 0:
         return None
@@ -104,14 +106,14 @@ def _least(A: Array, B: Array, C: Array, D: Array, level: float, W: Array) -> Ar
     X = stabilising(F, G, Q)
     if X is None:
         return None
-    for _ in range(REFINED):
+    for _ in range(NEWTON_STEPS):
         residual = symmetrized(X @ F + F.T @ X + X @ G @ X + Q)
         X = symmetrized(X + linalg.solve_continuous_lyapunov((F + G @ X).T, -residual))
     return X
 
 
 def _pace(A: Array) -> Array:
-    """(A'A)^1/2: by how much which states move."""
+    """Return (A'A)^1/2, the rates of the states."""
     _, values, directions = linalg.svd(A)
     values = np.maximum(values, 1e-13 * values[0])
     return symmetrized((directions.T * values) @ directions)

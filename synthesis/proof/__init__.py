@@ -1,1 +1,3 @@
-"""Whether a V is a proof: recomputed from the model and V alone, in floating point and exactly."""
+"""Verification of a Lyapunov function V, from the model and V alone, in floating point and
+exactly.
+"""

@@ -1,8 +1,7 @@
-"""Is this P(p) a proof on the whole box? Recomputed from the model and P alone, whichever
-relaxation found P.
+"""Verification of P(p) on the whole box, from the model and P alone, for every relaxation.
 
-Floating point: Bernstein coefficients, boxes halved until they tell, and a grid through the model's
-own code. Exact: the same boxes in rational arithmetic, and single p by `pointwise`. The
+Floating point: Bernstein coefficients, boxes halved until they decide, and a grid through the
+model's own code. Exact: the same boxes in rational arithmetic, and single p by `pointwise`. The
 inequalities themselves (`inequalities`), the regions and the algebra of polynomials are those from
 which the cone program was assembled; `pointwise` has none of them.
 """
@@ -34,28 +33,28 @@ from synthesis.proof.inequalities import Demand, Pair, decrease, peak, positivit
 
 Array = np.ndarray
 
-LADDER = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
-"""The bound is loosened by these fractions in turn until the whole box is shown to admit it."""
+LOOSENINGS = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
+"""Fractions by which the bound is increased in turn until it is verified on the whole box."""
 
 
-FURTHER = (1e2, 1e4, 1e6)
-"""Steps beyond, where the model has no response to compare rounding with."""
+LARGE_LOOSENINGS = (1e2, 1e4, 1e6)
+"""Further fractions, for a model without a response to compare rounding with."""
 
 GRID = 100
-"""Values of p at which a proof is checked in floating point."""
+"""Number of values of p at which a proof is checked in floating point."""
 
-WITNESSES = 40
-"""Values of several parameters at which a proof is checked once more, through the model's own
-matrices.
+INDEPENDENT_POINTS = 40
+"""Number of values of several parameters at which a proof is checked once more, through the
+model's own matrices.
 """
 
-TINY = 1e-8
-"""Least g in scaled units: a model without response is given a small gain rather than none."""
+MIN_LEVEL = 1e-8
+"""Least g in scaled units: no strict inequality proves zero."""
 
 
 class Evidence(NamedTuple):
-    """A model and what is asked of it, against which any P and bound can be checked; `demand.shift`
-    is left to the bound.
+    """A model with the required property, against which any P and bound can be checked;
+    `demand.shift` is left to the bound.
     """
 
     model: Pieces
@@ -68,19 +67,19 @@ class Evidence(NamedTuple):
         return self.model.parameters
 
     def fault(self, P: BoxLyapunov, kind: str, rates: tuple[float, ...]) -> str | None:
-        """What keeps P from being about this model and this claim, before any inequality; None
-        where nothing does.
+        """Return why P does not belong to this model and statement, before any inequality is
+        checked; None where it does.
         """
         if not isinstance(P, BoxLyapunov):
             return f"expected a BoxLyapunov, got {type(P).__name__}"
         if kind != self.demand.kind or self.demand.shift != 0.0:
-            return f"the proof is of the {self.demand.kind}, the claim of the {kind}"
+            return f"the proof is of the {self.demand.kind}, the certificate of the {kind}"
         if (
             len(rates) != len(self.model.parameters)
             or not all(r >= 0 for r in rates)
             or rates != self.demand.rates
         ):
-            return f"the proof is for rates {self.demand.rates}, the claim for {rates}"
+            return f"the proof is for rates {self.demand.rates}, the certificate for {rates}"
         if not self.demand.motion.suits(self.model.parameters) or self.demand.time != 1.0:
             return "the parameters of the model do not move as those of the proof"
         if not self.model.original:
@@ -94,8 +93,8 @@ class Evidence(NamedTuple):
 
     @property
     def scaled(self) -> tuple[Pieces, Demand]:
-        """Model and demand in the scaled units; outputs per root of time where their energy counts,
-        and as they are where their peaks do.
+        """The model and the required property in scaled units; outputs per root of time where their
+        energy counts, unchanged where their peaks do.
         """
         u, root = self.units, math.sqrt(self.units.time)
         outputs = u.channel if self._peaks else u.channel / root
@@ -107,19 +106,19 @@ class Evidence(NamedTuple):
         return self.demand.kind == "energy-to-peak gain"
 
     def in_units(self, value: float) -> float:
-        """A physical gain (decay rate, 1/s) in the scaled units."""
+        """Return a physical gain (decay rate, 1/s) in the scaled units."""
         if self.demand.kind == "decay rate":
             return value * self.units.time if self.model.dt is None else value
         return value / self.units.channel
 
     def to_physical(self, P: Array) -> Array:
-        """Lyapunov matrices of V in physical units, squared outputs times seconds or, where peaks
-        count, squared inputs times seconds, from those in scaled ones.
+        """Return Lyapunov matrices of V in physical units, squared outputs times seconds or, where
+        peaks count, squared inputs times seconds, from those in scaled ones.
         """
         return self.units.to_physical(P) / self._input_energy
 
     def to_scaled(self, P: Array) -> Array:
-        """The inverse of `to_physical`."""
+        """Return the inverse of `to_physical`."""
         return self.units.to_scaled(P) * self._input_energy
 
     def _back(self, P: BoxLyapunov) -> BoxLyapunov:
@@ -130,7 +129,7 @@ class Evidence(NamedTuple):
         return self.units.channel**2 if self._peaks else 1.0
 
     def sampled(self, P: BoxLyapunov, points: int) -> tuple[BoxLyapunov, float]:
-        """(P, the bound it admits at `points` values of each parameter in every region); inf
+        """Return (P, the bound it admits at `points` values of each parameter in every region); inf
         (decay: -inf) where none.
 
         For the energy-to-peak gain P is scaled so that its first inequality just holds; NaN for
@@ -150,23 +149,23 @@ class Evidence(NamedTuple):
         g = samples.gain()
         if kind == "l2 gain" or not 0 < g < math.inf:
             return P, math.sqrt(g) / self.in_units(1.0)
-        factor = 1.0 / (g * (1 + LADDER[0]))
+        factor = 1.0 / (g * (1 + LOOSENINGS[0]))
         P = replace(P, coefficients=P.coefficients * factor)
         back = self._back(P)
         return P, math.sqrt(_samples(model, back, demand, points).peak()) / self.in_units(1.0)
 
     def least(self, P: BoxLyapunov, points: int) -> tuple[BoxLyapunov, float] | None:
-        """(P, the best bound shown to hold on the whole box), None where P proves nothing. Floating
-        point.
+        """Return (P, the best bound verified on the whole box), None where P proves nothing.
+        Floating point.
         """
         P, value = self.sampled(P, points)
         kind = self.demand.kind
         if math.isinf(value):
             return None
         nothing = kind.endswith("gain") and value * self.in_units(1.0) <= math.sqrt(
-            TINY * (1 + LADDER[0])
+            MIN_LEVEL * (1 + LOOSENINGS[0])
         )
-        for fraction in (*LADDER, *FURTHER) if nothing else LADDER:
+        for fraction in (*LOOSENINGS, *LARGE_LOOSENINGS) if nothing else LOOSENINGS:
             # gains: of gamma^2
             bound = (
                 value
@@ -189,15 +188,17 @@ class Evidence(NamedTuple):
         return None
 
     def conditioning(self, P: BoxLyapunov) -> float:
-        """Largest condition number of P in scaled coordinates, at its knots and a few values
-        between; inf where P is not positive.
+        """Return the largest condition number of P in scaled coordinates, at its knots and a few
+        values between; inf where P is not positive.
         """
         axes = [np.unique([np.linspace(a, b, 5) for a, b in pairwise(k)]) for k in P.knots]
         values = np.linalg.eigvalsh(self.to_scaled(P.at(np.array(list(product(*axes))))))
         return float((values[:, -1] / values[:, 0]).max()) if values.min() > 0 else math.inf
 
     def floating(self, P: BoxLyapunov, bound: float) -> bool:
-        """The whole box in floating point, and a grid of p through the model's own matrices."""
+        """Check the whole box in floating point, and a grid of p through the model's own
+        matrices.
+        """
         model, demand = self.scaled
         if not demand.meaningful(model.dt, P.degrees) or math.isinf(bound):
             return False
@@ -209,21 +210,23 @@ class Evidence(NamedTuple):
         return self.on_grid(P, bound)
 
     def exact(self, P: BoxLyapunov, bound: float) -> bool:
-        """The whole box in rational arithmetic: the doubles of model, P, rates and bound as the
-        rationals they are.
+        """Check the whole box in rational arithmetic: the doubles of model, P, rates and bound as
+        exact rationals.
         """
         if not self.demand.meaningful(self.model.dt, P.degrees) or math.isinf(bound):
             return False
         asked = self.model, P, self.demand, bound
         count = sum(1 for _ in polynomials(*asked, float))
         every = tracked("verifying in rational arithmetic", polynomials(*asked, rational()), count)
-        return all(map(negative_definite_exactly, every)) and self.witnessed(P, bound, rational())
+        return all(map(negative_definite_exactly, every)) and self.checked_independently(
+            P, bound, rational()
+        )
 
-    def witnessed(self, P: BoxLyapunov, bound: float, number: Number) -> bool:
-        """The pieces are the model, and the inequalities hold at some p without them; see
-        `pointwise`.
+    def checked_independently(self, P: BoxLyapunov, bound: float, number: Number) -> bool:
+        """Check that the pieces are the model, and that the inequalities hold at some p without
+        them; see `pointwise`.
         """
-        points = self._points(P, 1, WITNESSES)
+        points = self._points(P, 1, INDEPENDENT_POINTS)
         own = self.model.at(points)
         if not all(self._reproduced(p, [M[k] for M in own]) for k, p in enumerate(points)):
             return False
@@ -238,7 +241,7 @@ class Evidence(NamedTuple):
         return pointwise.negative(every, number)
 
     def on_grid(self, P: BoxLyapunov, bound: float) -> bool:
-        """The same in floating point at more p, in scaled units."""
+        """Check the same in floating point at more p, in scaled units."""
         u, points, (_, demand) = self.units, self._points(P, GRID, GRID), self.scaled
         model = u.of_matrices(self.model.at(points))
         if self._peaks:
@@ -255,8 +258,8 @@ class Evidence(NamedTuple):
         return pointwise.negative(every, float, u.weight)
 
     def _points(self, P: BoxLyapunov, least: int, count: int) -> Array:
-        """Values of p that it can take for good, on every stretch between knots of P and breaks of
-        the model's own functions, whatever the pieces say.
+        """Return values of p at which it can stay forever, on every interval between knots of P and
+        breaks of the model's own functions, independent of the pieces.
         """
         axes = []
         for factor, s, breaks, knots in zip(
@@ -286,7 +289,7 @@ class Evidence(NamedTuple):
 def polynomials(
     model: Pieces, P: BoxLyapunov, demand: Demand, bound: float, number: Number
 ) -> Iterator[PolynomialMatrix]:
-    """Every polynomial matrix that must be negative definite, with the bound in its place."""
+    """Yield every polynomial matrix that must be negative definite, for this bound."""
     for index in np.ndindex(*P.segments):
         yield positivity(convert(P.segment(index), number))
     nx, nu, ny = model.sizes
@@ -313,8 +316,8 @@ def _less(F: PolynomialMatrix, where: Array, g: object, number: Number) -> Polyn
 
 
 class _Samples(NamedTuple):
-    """Values of the inequalities and of P at points: `moves` of V, `here` P itself; `outputs` of
-    the second inequality.
+    """Values of the inequalities and of P at points: `moves` for V along trajectories, `here` P
+    itself; `outputs` of the second inequality.
     """
 
     moves: list[Array]
@@ -324,17 +327,17 @@ class _Samples(NamedTuple):
     ny: int
 
     def gain(self) -> float:
-        """Least g of the corner block."""
+        """Return the least g of the corner block."""
         if any(np.linalg.eigvalsh(P).min() <= 0 for P in self.here):
             return math.inf
-        return max([TINY, *(_least_level(F, self.nx) for F in self.moves)])
+        return max([MIN_LEVEL, *(_least_level(F, self.nx) for F in self.moves)])
 
     def peak(self) -> float:
-        """Least g of the second inequality."""
-        return max([TINY, *(_least_level(F, F.shape[1] - self.ny) for F in self.outputs)])
+        """Return the least g of the second inequality."""
+        return max([MIN_LEVEL, *(_least_level(F, F.shape[1] - self.ny) for F in self.outputs)])
 
     def decay(self, dt: float | None) -> float:
-        """Largest alpha."""
+        """Return the largest alpha."""
         worst = math.inf
         for F, P in zip(self.moves, self.here, strict=True):
             if np.linalg.eigvalsh(P).min() <= 0:
@@ -350,8 +353,8 @@ class _Samples(NamedTuple):
 
 
 def _least_level(F: Array, n: int) -> float:
-    """Least g of the last block of matrices (K, N, N) with n rows before it; inf where those are
-    not negative definite.
+    """Return the least g of the last block of matrices (K, N, N) with n rows before it; inf where
+    those are not negative definite.
     """
     if np.linalg.eigvalsh(F[:, :n, :n]).max() >= 0:
         return math.inf
@@ -374,7 +377,7 @@ def _samples(model: Pieces, P: BoxLyapunov, demand: Demand, points: int) -> _Sam
 
 
 def _grid(F: PolynomialMatrix, points: int) -> Array:
-    """Points of the box, ends included."""
+    """Return points of the box, ends included."""
     every = [
         np.linspace(low, high, points if d else 1)
         for d, (low, high) in zip(F.degrees, F.box, strict=True)

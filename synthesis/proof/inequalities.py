@@ -1,4 +1,4 @@
-"""What must be negative definite over the box, as polynomial matrices in p, linear in P.
+"""The polynomial matrices in p, linear in P, that must be negative definite over the box.
 
 Continuous time, V = x' P(p) x, at every corner nu of the box of rates, Pdot = sum_i nu_i dP/dp_i,
 nu_i = p_j where the rate of p_i is p_j:
@@ -42,7 +42,7 @@ Array = np.ndarray
 
 
 class Demand(NamedTuple):
-    """What is asked: `kind`; how p moves; `shift`: alpha of a decay rate, 1/s, else 0.
+    """The property to be proven: `kind`; how p moves; `shift`: alpha of a decay rate, 1/s, else 0.
 
     `time`: seconds in the unit of time of the model in continuous time.
     """
@@ -58,17 +58,19 @@ class Demand(NamedTuple):
         return self.motion.rates
 
     def moving(self, degrees: Sequence[int]) -> list[bool]:
-        """Which parameters move in a way that matters to P."""
+        """Return for each parameter whether its motion changes P."""
         return [bool(d) and rate > 0 for d, rate in zip(degrees, self.rates, strict=True)]
 
     def steps(self, dt: float | None, degrees: Sequence[int]) -> tuple[float, ...]:
-        """Largest change of each parameter in a sample that matters to P; 0 in continuous time."""
+        """Return the largest change of each parameter in a sample that changes P; 0 in continuous
+        time.
+        """
         return tuple(
             rate * dt if dt and d else 0.0 for rate, d in zip(self.rates, degrees, strict=True)
         )
 
     def meaningful(self, dt: float | None, degrees: Sequence[int]) -> bool:
-        """False where P varies with a p that may jump in continuous time: dV/dt has no bound
+        """Return False where P varies with a p that may jump in continuous time: dV/dt is unbounded
         then.
         """
         return dt is not None or all(
@@ -84,15 +86,15 @@ class Pair(NamedTuple):
 
 
 def positivity(P: PolynomialMatrix) -> PolynomialMatrix:
-    """-P, which must be negative definite."""
+    """Return -P, which must be negative definite."""
     return -P
 
 
 def decrease(
     model: Pieces, region: Region, P: Pair, demand: Demand, number: Number
 ) -> Iterator[PolynomialMatrix]:
-    """The dissipation inequalities on a region, without the term in g; one a corner of the box of
-    rates.
+    """Yield the dissipation inequalities on a region, without the term in g; one a corner of the
+    box of rates.
     """
     m = len(model.parameters)
     system, here = model_on(model, region, number), now(P.here, region, number)
@@ -117,8 +119,8 @@ def dissipation(
     drifts: Sequence[PolynomialMatrix | None] = (None,),
     after: PolynomialMatrix | None = None,
 ) -> Iterator[PolynomialMatrix]:
-    """The blocks of the table above without the term in g for the `system` A, B, C, D; one for each
-    of the `drifts` dP/dt (None: 0), or in discrete time for P+ = `after`.
+    """Yield the blocks of the table above without the term in g for the `system` A, B, C, D; one
+    for each of the `drifts` dP/dt (None: 0), or in discrete time for P+ = `after`.
     """
     A, B, C, D = system
     if after is not None:
@@ -134,7 +136,9 @@ def dissipation(
 
 
 def peak(model: Pieces, region: Region, P: PolynomialMatrix, number: Number) -> PolynomialMatrix:
-    """The second inequality of the energy-to-peak gain, negated and without the term in g."""
+    """Return the second inequality of the energy-to-peak gain, negated and without the term
+    in g.
+    """
     _, _, C, D = model_on(model, region, number)
     here = now(P, region, number)
     if model.dt is None:
@@ -152,8 +156,9 @@ class Form(NamedTuple):
     weight: PolynomialMatrix
 
 
-class Claim(NamedTuple):
-    """What is to be verified of a model of one parameter: P, and the rate (units of p per second).
+class Statement(NamedTuple):
+    """The statement to verify for a model of one parameter: P, and the rate (units of p per
+    second).
 
     `elevation` raises the degree of the Bernstein forms, which brings their coefficients closer to
     the values.
@@ -167,13 +172,12 @@ class Claim(NamedTuple):
 
     @property
     def strict(self) -> int:
-        """Rows of a block of the LMI to which g does not belong."""
+        """Number of rows of a block of the LMI without g."""
         return self.P.coefficients.shape[-1] + (0 if self.block is None else self.block.inputs)
 
     @property
     def meaningful(self) -> bool:
-        """False where a P that varies meets a p that may jump in continuous time: dV/dt has no
-        bound then.
+        """False where P varies with a p that may jump in continuous time: dV/dt is unbounded then.
 
         False also where this form of V is not written for the model: a memory or a higher order in
         discrete time or with channels, or a multiplier without a block and a block without one.
@@ -187,22 +191,22 @@ class Claim(NamedTuple):
         return self.model.dt is not None or self.P.degree == 0 or math.isfinite(self.rate)
 
     def invariant(self, number: Number) -> bool:
-        """Whether p, with its lag where P has one, stays where the claim is made."""
+        """Whether p, with its lag where P has one, stays in the region of the statement."""
         return not isinstance(self.P, MemoryLyapunov) or self.P.region.invariant(self.rate, number)
 
 
-def lmi_polynomials(claim: Claim, number: Number) -> Iterator[Form]:
-    """Every block over the whole range, with g = 0. `number` turns a double into the arithmetic of
-    the proof.
+def lmi_polynomials(statement: Statement, number: Number) -> Iterator[Form]:
+    """Yield every block over the whole range, with g = 0. `number` turns a double into the
+    arithmetic of the proof.
     """
-    P, used = claim.P, 0
+    P, used = statement.P, 0
     slack = (
         None
         if P.slack is None
-        else null_matrix(exact(P.slack, number), claim.model.sizes[0], P.order)
+        else null_matrix(exact(P.slack, number), statement.model.sizes[0], P.order)
     )
-    for F, weight in _polynomials(claim, number):
-        F = F.elevate((F.degrees[0] + claim.elevation, *F.degrees[1:]))
+    for F, weight in _polynomials(statement, number):
+        F = F.elevate((F.degrees[0] + statement.elevation, *F.degrees[1:]))
         if slack is not None:
             c = F.coefficients
             own = slack[used : used + len(c)]
@@ -213,10 +217,10 @@ def lmi_polynomials(claim: Claim, number: Number) -> Iterator[Form]:
 
 
 def _polynomials(
-    claim: Claim, number: Number
+    statement: Statement, number: Number
 ) -> Iterator[tuple[PolynomialMatrix, PolynomialMatrix]]:
-    model, P, rate, _, channel = claim
-    assert claim.meaningful  # noqa: S101 - checked by the callers
+    model, P, rate, _, channel = statement
+    assert statement.meaningful  # noqa: S101 - checked by the callers
     ends = ((model.breaks[0][0], model.breaks[0][-1]),)
     demand = Demand("l2 gain", Motion(ends, (rate,), (None,)))
     one, own = np.array([[number(1.0)]]), _observed(model, P.order, channel)
@@ -242,8 +246,8 @@ def _on_segment(knots: Array, coefficients: Array, j: int) -> PolynomialMatrix:
 
 
 def _observed(model: Pieces, order: int, channel: NormBounded | None) -> Pieces:
-    """The model without the outputs v of a norm-bounded block; for `order` > 1 the linear system
-    that the monomials follow.
+    """Return the model without the outputs v of a norm-bounded block; for `order` > 1 the linear
+    system of the monomials.
     """
     if order == 1 and channel is None:
         return model
@@ -268,8 +272,8 @@ def _observed(model: Pieces, order: int, channel: NormBounded | None) -> Pieces:
 def _supply(
     model: Pieces, region: Region, P: SplineLyapunov, channel: NormBounded, number: Number
 ) -> PolynomialMatrix:
-    """lambda (bound^2 [G J H]'[G J H] - diag(0, I, 0)) on a region for a block d = Delta v, v = G x
-    + J d + H u.
+    """Return lambda (bound^2 [G J H]'[G J H] - diag(0, I, 0)) on a region for a block d = Delta v,
+    v = G x + J d + H u.
     """
     _, _, C, D = (M.T for M in model_on(model, region, number))
     v, bound = slice(-channel.outputs, None), number(channel.bound)
@@ -290,8 +294,8 @@ def _remembering(
     rate: float,
     number: Number,
 ) -> Iterator[tuple[PolynomialMatrix, PolynomialMatrix]]:
-    """Blocks times height(p) = upper - lower, in p and the share of the lead, e = lower + share
-    height.
+    """Yield the blocks times height(p) = upper - lower, in p and the share s of the lag error, e =
+    lower + s height.
     """
     (j,), lag, (cell,) = region.segment, P.region, system[0].box
     lower, upper = (
@@ -323,14 +327,14 @@ def _remembering(
 
 
 def _scaled(f: PolynomialMatrix, F: PolynomialMatrix) -> PolynomialMatrix:
-    """f F for a scalar polynomial f."""
+    """Return f F for a scalar polynomial f."""
     return PolynomialMatrix(f.box, f.coefficients * np.eye(F.shape[0], dtype=int)) @ F
 
 
 def _slope(
     here: PolynomialMatrix, drift: Drift, time: float, number: Number
 ) -> PolynomialMatrix | None:
-    """dP/dt while p moves so; None where it does not."""
+    """Return dP/dt for this motion of p; None where P does not change."""
     total = None
     for i, (rate, j) in enumerate(zip(drift.rates, drift.ties, strict=True)):
         if rate == 0 and j is None:
@@ -342,7 +346,7 @@ def _slope(
 
 
 def _times(F: PolynomialMatrix, axis: int) -> PolynomialMatrix:
-    """The polynomial times the parameter of that axis."""
+    """Return the polynomial times the parameter of that axis."""
     low, high = F.box[axis]
     shape = [1] * len(F.box)
     shape[axis] = 2

@@ -1,5 +1,5 @@
-"""Is this P a proof? Recomputed from the model and P alone, in floating point or in exact rational
-arithmetic.
+"""Verification of P for one parameter, from the model and P alone, in floating point or in exact
+rational arithmetic.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from synthesis.polynomial.pieces import ModelPiece, joined, model_pieces, same_p
 from synthesis.polynomial.symmetric import extended, schur_complement, symmetrized
 from synthesis.program.scaling import Scaling
 from synthesis.proof import pointwise
-from synthesis.proof.inequalities import Claim, Demand, lmi_polynomials
+from synthesis.proof.inequalities import Demand, Statement, lmi_polynomials
 
 Array = np.ndarray
 
@@ -30,8 +30,8 @@ GRID = 100
 
 
 class Findings(NamedTuple):
-    """`positive`: P > 0 in every coefficient; `decreasing`: so is the state block; `g`: least
-    gamma^2 the blocks admit.
+    """Result of a check: `positive`: P > 0 in every coefficient; `decreasing`: the state block is
+    negative; `g`: least gamma^2 the blocks admit.
 
     `conditioning` is the largest condition number of a coefficient of P in the scaled coordinates.
     """
@@ -42,21 +42,21 @@ class Findings(NamedTuple):
     conditioning: float
 
 
-def examine(claim: Claim, weight: Array) -> Findings:
-    """Floating point: eigenvalues of every coefficient, and the least g by Schur complement. Pass
-    scaled data.
+def examine(statement: Statement, weight: Array) -> Findings:
+    """Check by eigenvalues of every coefficient in floating point, and return the least g by Schur
+    complement. Pass scaled data.
 
     `weight` changes the coordinates of the state blocks for the sake of rounding.
     """
-    P = claim.P
-    if not claim.meaningful:
+    P = statement.P
+    if not statement.meaningful:
         return Findings(False, False, math.inf, math.inf)
-    states, n = P.coefficients.shape[-1], claim.strict
+    states, n = P.coefficients.shape[-1], statement.strict
     values = np.linalg.eigvalsh(P.coefficients.reshape(-1, states, states))
     positive = bool(np.all(values[:, 0] > _rounding(states) * np.abs(values).max()))
     conditioning = float(np.max(values[:, -1] / values[:, 0])) if positive else math.inf
     decreasing, g = True, 0.0
-    for form in lmi_polynomials(claim, float):
+    for form in lmi_polynomials(statement, float):
         F = form.block.coefficients.reshape(-1, *form.block.shape)
         if len(weight) == states:
             W = extended(weight, F.shape[1] - states)
@@ -77,17 +77,17 @@ def _rounding(n: int) -> float:
     return 20 * n * np.finfo(float).eps
 
 
-def proven(claim: Claim, gamma: float) -> bool:
-    """Exact rational arithmetic over the whole interval: P > 0 and every block < 0 with g = gamma^2
-    (NaN: stability).
+def proven(statement: Statement, gamma: float) -> bool:
+    """Check in exact rational arithmetic over the whole interval: P > 0 and every block < 0 with g
+    = gamma^2 (NaN: stability).
 
     The doubles of the pieces, of P, of rate and of gamma are taken as the rationals they are. Uses
     python-flint where installed, else the (slower) fractions of the standard library.
     """
-    number, P = rational(), claim.P
-    if not (claim.meaningful and claim.invariant(number)):
+    number, P = rational(), statement.P
+    if not (statement.meaningful and statement.invariant(number)):
         return False
-    states, n = P.coefficients.shape[-1], claim.strict
+    states, n = P.coefficients.shape[-1], statement.strict
     if P.multiplier is not None and not np.all(P.multiplier >= 0):
         return False
     for coefficient in P.coefficients.reshape(-1, states, states):
@@ -96,8 +96,8 @@ def proven(claim: Claim, gamma: float) -> bool:
         ):
             return False
     g = None if math.isnan(gamma) else number(gamma) * number(gamma)
-    count = sum(1 for _ in lmi_polynomials(claim, float))
-    blocks = lmi_polynomials(claim, number)
+    count = sum(1 for _ in lmi_polynomials(statement, float))
+    blocks = lmi_polynomials(statement, number)
     for block, weight in tracked("verifying in rational arithmetic", blocks, count):
         for F, factor in zip(
             block.coefficients.reshape(-1, *block.shape), weight.coefficients.ravel(), strict=True
@@ -129,12 +129,12 @@ class Evidence(NamedTuple):
 
     @property
     def parameters(self) -> tuple[Scheduling, ...]:
-        """The one parameter of the model."""
+        """The parameter of the model, as a tuple."""
         return (self.lpv.scheduling,)
 
     def fault(self, P: Lyapunov, kind: str, rates: tuple[float, ...]) -> str | None:
-        """What keeps P from being about this model and this claim, before any inequality; None
-        where nothing does.
+        """Return why P does not belong to this model and statement, before any inequality is
+        checked; None where it does.
         """
         if not isinstance(P, SplineLyapunov | MemoryLyapunov):
             return f"expected a SplineLyapunov or a MemoryLyapunov, got {type(P).__name__}"
@@ -144,7 +144,7 @@ class Evidence(NamedTuple):
         if kind != ("l2 gain" if len(self.lpv.inputs) > own else "stability"):
             return f"the model of the proof is not one of the kind {kind!r}"
         if not self.rate >= 0 or rates != (self.rate,):
-            return f"the proof is for rates {(self.rate,)}, the claim for {rates}"
+            return f"the proof is for rates {(self.rate,)}, the certificate for {rates}"
         s = self.lpv.scheduling
         return structure.first(
             P.fault_for(s.low, s.high, len(self.lpv.states)),
@@ -168,17 +168,17 @@ class Evidence(NamedTuple):
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """For which perturbations a proof holds; nothing without a block."""
+        """Sentences on the perturbations for which a proof holds; none without a block."""
         return () if self.block is None else (self.block.sentence,)
 
     def least_gain(self, P: Lyapunov) -> tuple[float, float]:
-        """(gain that P admits, conditioning of P); inf where P proves nothing, NaN without
+        """Return (gain that P admits, conditioning of P); inf where it proves nothing, NaN without
         channels. Floating point.
         """
         units, scaled = self.units, self.units.of_pieces(self.pieces, self.block)
         model = joined(self.lpv, scaled)
-        claim = Claim(model, self._scaled(P), self._rate, self.elevation, self.block)
-        findings = examine(claim, units.weight)
+        statement = Statement(model, self._scaled(P), self._rate, self.elevation, self.block)
+        findings = examine(statement, units.weight)
         if not (findings.positive and findings.decreasing and math.isfinite(findings.g)):
             return math.inf, math.inf
         own = 0 if self.block is None else self.block.inputs
@@ -191,20 +191,20 @@ class Evidence(NamedTuple):
 
     @property
     def _rate(self) -> float:
-        """Of p, per scaled unit of time."""
+        """Rate of p, per scaled unit of time."""
         return self.rate * self.units.time if self.lpv.dt is None else self.rate
 
     def floating(self, P: Lyapunov, gamma: float) -> bool:
-        """Every Bernstein coefficient and a grid of p, in floating point."""
+        """Check every Bernstein coefficient and a grid of p, in floating point."""
         least = self.least_gain(P)[0]
         enough = math.isnan(least) if math.isnan(gamma) else least < gamma
-        claim = self._claim(P)
-        if not (enough and claim.meaningful and claim.invariant(rational())):
+        statement = self._statement(P)
+        if not (enough and statement.meaningful and statement.invariant(rational())):
             return False
         return self.on_grid(P, gamma)
 
     def on_grid(self, P: Lyapunov, gamma: float) -> bool:
-        """The inequalities at many p, from the model's own matrices in scaled units."""
+        """Check the inequalities at many p, from the model's own matrices in scaled units."""
         plain = isinstance(P, SplineLyapunov) and P.order == 1
         u, points = self.units, pointwise.inside(self._ends(P), GRID if plain else 1)
         model = u.of_matrices(self.lpv.matrices(np.array(points)), self.block)
@@ -215,14 +215,16 @@ class Evidence(NamedTuple):
         return pointwise.negative(every, float, u.weight)
 
     def exact(self, P: Lyapunov, gamma: float) -> bool:
-        """The same over the whole interval in rational arithmetic, and again at some p through the
-        model's own matrices.
+        """Check the whole interval in rational arithmetic, and again some p through the model's own
+        matrices.
         """
-        return proven(self._claim(P), gamma) and self.witnessed(P, gamma, rational())
+        return proven(self._statement(P), gamma) and self.checked_independently(
+            P, gamma, rational()
+        )
 
-    def witnessed(self, P: Lyapunov, gamma: float, number: Number) -> bool:
-        """The pieces are the model, and the inequalities hold at some p without them; see
-        `pointwise`.
+    def checked_independently(self, P: Lyapunov, gamma: float, number: Number) -> bool:
+        """Check that the pieces are the model, and that the inequalities hold at some p without
+        them; see `pointwise`.
         """
         if not all(self._reproduced(p) for p in pointwise.inside(self._ends())):
             return False
@@ -239,7 +241,9 @@ class Evidence(NamedTuple):
         return Demand(kind, Motion(((s.low, s.high),), (rate,), (None,)))
 
     def _ends(self, P: Lyapunov | None = None) -> list[float]:
-        """Of the stretches on which model and P are polynomial, by the model's own breaks."""
+        """Return the ends of the intervals on which model and P are polynomial, by the model's own
+        breaks.
+        """
         s = self.lpv.scheduling
         breaks = [b for piece in self.lpv.basis.pieces() for b in (piece.low, piece.high)]
         knots = [] if P is None else P.knots.tolist()
@@ -260,9 +264,9 @@ class Evidence(NamedTuple):
                 return False
         return True
 
-    def _claim(self, P: Lyapunov) -> Claim:
+    def _statement(self, P: Lyapunov) -> Statement:
         model = joined(self.lpv, self.pieces)
-        return Claim(model, P, self.rate, self.elevation, self.block)
+        return Statement(model, P, self.rate, self.elevation, self.block)
 
 
 def _at_points(
@@ -276,7 +280,9 @@ def _at_points(
     number: Number,
     channel: NormBounded | None,
 ) -> Iterator[Array]:
-    """What must be negative definite at the points, where the model has these matrices (K, ...)."""
+    """Yield the matrices that must be negative definite at the points, where the model has these
+    matrices (K, ...).
+    """
     (rate,) = demand.rates
     for k, p in enumerate(points):
         own = Matrices(*(exact(M[k], number) for M in model))

@@ -1,10 +1,9 @@
-"""The inequalities at single values of p, in any arithmetic: from the model's own matrices and the
-definition of P, nothing else.
+"""The inequalities at single values of p, in any arithmetic, from the model's own matrices and the
+definition of P only.
 
-This is the second witness of a proof. What assembly and proof have in common (pieces of the model,
-cells, strips, the algebra of Bernstein coefficients; in several parameters the inequalities
-themselves) is not used here, so that an error there, which both would believe, does not pass here
-where it matters.
+This is the independent check of a proof. The code that assembly and proof have in common (pieces of
+the model, cells, strips, the algebra of Bernstein coefficients; in several parameters the
+inequalities themselves) is not used here, so that an error in it is detected.
 """
 
 from __future__ import annotations
@@ -29,9 +28,9 @@ if TYPE_CHECKING:
 
 Array = np.ndarray
 
-INSIDE = (0.03, 0.382, 0.764, 0.97)
-"""Where in a stretch between knots and breaks an inequality is looked at: near its ends, where
-derivatives jump, and between.
+RELATIVE_POSITIONS = (0.03, 0.382, 0.764, 0.97)
+"""Positions in an interval between knots and breaks at which an inequality is checked: near its
+ends, where derivatives jump, and in between.
 """
 ROUNDING = 1e-10
 """Largest difference of an entry of a polynomial piece from the model's own, as a fraction of what
@@ -40,18 +39,20 @@ its terms add up to in size.
 
 
 def inside(points: Any, least: int = 1) -> list[float]:
-    """Values of p within each stretch between `points`, which are cut so that there are `least`
-    values or more.
+    """Return values of p within each interval between `points`, which are cut so that there are
+    `least` values or more.
     """
     ends = sorted(set(map(float, points)))
-    parts = -(-least // (len(INSIDE) * (len(ends) - 1)))
+    parts = -(-least // (len(RELATIVE_POSITIONS) * (len(ends) - 1)))
     finer = np.interp(np.arange(parts * (len(ends) - 1) + 1) / parts, np.arange(len(ends)), ends)
-    return [a + share * (b - a) for a, b in pairwise(finer.tolist()) for share in INSIDE]
+    return [
+        a + share * (b - a) for a, b in pairwise(finer.tolist()) for share in RELATIVE_POSITIONS
+    ]
 
 
 def combined(axes: Sequence[Sequence[float]], count: int) -> Array:
-    """Points (k, m): all values of a single axis, of several a diagonal of `count` points through
-    their product.
+    """Return points (k, m): all values of a single axis; for several axes a diagonal of `count`
+    points through their product.
     """
     count = count if len(axes) > 1 else len(axes[0])
     return np.array(
@@ -88,15 +89,15 @@ def bernstein(coefficients: Array, t: Any) -> Array:
 
 
 def segment_of(knots: Array, p: float) -> int:
-    """Index of the segment that p lies in."""
+    """Return the index of the segment that p lies in."""
     return max(i for i in range(len(knots) - 1) if i == 0 or knots[i] <= p)
 
 
 def spline(
     knots: Array, degree: int, coefficients: Array, p: float, number: Number
 ) -> tuple[Array, Array]:
-    """(value, derivative) at p of a spline by its Bernstein coefficients (K d + 1, ...), in the
-    arithmetic.
+    """Return (value, derivative) at p of a spline by its Bernstein coefficients (K d + 1, ...), in
+    the arithmetic.
     """
     j = segment_of(knots, p)
     low, width = number(float(knots[j])), number(float(knots[j + 1])) - number(float(knots[j]))
@@ -110,8 +111,8 @@ def spline(
 def tensor_spline(
     knots: Sequence[Array], degrees: Sequence[int], coefficients: Array, p: Any, number: Number
 ) -> tuple[Array, list[Array]]:
-    """(value, derivative by each parameter) at p (m,) of a spline in several parameters, in the
-    arithmetic.
+    """Return (value, derivative by each parameter) at p (m,) of a spline in several parameters, in
+    the arithmetic.
     """
     index = [segment_of(k, float(q)) for k, q in zip(knots, p, strict=True)]
     ends = [
@@ -132,7 +133,7 @@ def tensor_spline(
 
 
 def tensor(coefficients: Array, box: Sequence[tuple[float, float]], p: Array) -> Array:
-    """The polynomial of these Bernstein coefficients over the box at p (m,)."""
+    """Return the polynomial of these Bernstein coefficients over the box at p (m,)."""
     return _at(coefficients, [(q - a) / (b - a) for q, (a, b) in zip(p, box, strict=True)])
 
 
@@ -161,8 +162,8 @@ def dissipation(
     g: Any,
     block: Supplied | None = None,
 ) -> Array:
-    """The bounded real inequality at one p as a quadratic form in x, d and u: dV/dt + |y|^2 - g
-    |u|^2 + multiplier (bound^2 |v|^2 - |d|^2), the last term around a `block` d = Delta v.
+    """Return the bounded real inequality at one p as a quadratic form in x, d and u: dV/dt + |y|^2
+    - g |u|^2 + multiplier (bound^2 |v|^2 - |d|^2), the last term around a `block` d = Delta v.
 
     `drift` is dP/dt, `after` P(p(k+1)) in discrete time. g None: dV/dt and the last term alone, in
     x and d.
@@ -193,7 +194,9 @@ def paces(
     degrees: Sequence[int],
     number: Number,
 ) -> Iterator[tuple[Any, ...]]:
-    """Every extreme dp/dt that matters to P: plus or minus its rate, or the parameter it is."""
+    """Yield every extreme dp/dt that changes P: plus or minus its rate, or the parameter that is
+    the rate.
+    """
     each = [
         (0,)
         if not d
@@ -215,8 +218,8 @@ def spans(
     box: Sequence[tuple[float, float]],
     dt: float,
 ) -> list[tuple[float, float]]:
-    """(least, largest) change of each parameter in a sample that matters to P: dt p_j with an error
-    of dt^2/2 times the rate of p_j where p_j is the rate.
+    """Return the (least, largest) change of each parameter in a sample that changes P: dt p_j with
+    an error of dt^2/2 times the rate of p_j where p_j is the rate.
     """
     out = []
     for r, j, d in zip(rates, ties, degrees, strict=True):
@@ -233,8 +236,8 @@ def spans(
 def reached(
     p: Any, moves: Sequence[tuple[float, float]], box: Sequence[tuple[float, float]]
 ) -> Iterator[tuple[float, ...]]:
-    """Values of p(k+1) where each parameter changes by (least, largest): as far as it goes either
-    way, and part of the way.
+    """Yield values of p(k+1) where each parameter changes by (least, largest): both extremes, and
+    values between.
     """
     each = []
     for q, (back, on), (low, high) in zip(p, moves, box, strict=True):
@@ -254,8 +257,8 @@ def inequalities(
     number: Number,
     channel: NormBounded | None = None,
 ) -> Iterator[Array]:
-    """What must be negative definite at p (m,) for V = x'P(p)x: P, the multiplier of a norm-bounded
-    `channel`, and the inequalities of the `demand` with this `bound`.
+    """Yield the matrices that must be negative definite at p (m,) for V = x'P(p)x: P, the
+    multiplier of a norm-bounded `channel`, and the inequalities of the `demand` with this `bound`.
     """
     if isinstance(P, SplineLyapunov):
         knots, degrees = (P.knots,), (P.degree,)
@@ -266,7 +269,7 @@ def inequalities(
     g = number(bound) * number(bound) if demand.kind.endswith("gain") else None
     if demand.kind == "energy-to-peak gain":
         # V grows by at most the energy of the input, and the outputs are seen by it
-        yield -_seen(here, model, dt, g)
+        yield -_peak_form(here, model, dt, g)
         model, g = model._replace(C=model.C * 0, D=model.D * 0), number(1.0)
     supplied = None
     if channel is not None and isinstance(P, SplineLyapunov) and P.multiplier is not None:
@@ -289,8 +292,10 @@ def inequalities(
         yield dissipation(model, here, None, after, g, supplied)
 
 
-def _seen(P: Array, model: Matrices, dt: float | None, g: Any) -> Array:
-    """What must be positive definite for |y|^2 < g V, or < g (V + |u|^2) in discrete time."""
+def _peak_form(P: Array, model: Matrices, dt: float | None, g: Any) -> Array:
+    """Return the matrix that must be positive definite for |y|^2 < g V, or < g (V + |u|^2) in
+    discrete time.
+    """
     _, B, C, D = model
     corner = np.eye(len(C), dtype=int) * g
     if dt is None:
@@ -302,8 +307,8 @@ def _seen(P: Array, model: Matrices, dt: float | None, g: Any) -> Array:
 def memory_inequalities(
     P: MemoryLyapunov, p: float, model: Matrices, rate: float, g: Any, number: Number
 ) -> Iterator[Array]:
-    """What must be negative definite at p, and at some leads e within their limits, for V = x'P(p,
-    e)x, de/dt = dp/dt - e/time.
+    """Yield the matrices that must be negative definite at p, and at some lag errors e within their
+    limits, for V = x'P(p, e)x, de/dt = dp/dt - e/time.
     """
     region, d = P.region, P.degree
     j = segment_of(P.knots, p)
@@ -337,7 +342,7 @@ def memory_inequalities(
 def monomial_inequalities(
     P: SplineLyapunov, p: float, A: Array, rate: float, transform: Array, number: Number
 ) -> Iterator[Array]:
-    """V > 0 > dV/dt as numbers (1, 1) below zero for V of higher degree, at states in all
+    """Yield V > 0 > dV/dt as numbers (1, 1) below zero for V of higher degree, at states in all
     directions: dV/dt = sum_i (A x)_i dV/dx_i from the monomials themselves.
     """
     here, slope = spline(P.knots, P.degree, P.coefficients, p, number)
@@ -360,5 +365,5 @@ def monomial_inequalities(
 
 
 def same_entries(found: Array, expected: Array, size: Array) -> bool:
-    """Whether the entries agree to rounding, each beside the size of the terms it is the sum of."""
+    """Whether the entries agree to rounding, each relative to the size of its own terms."""
     return bool(np.all(np.abs(found - expected) <= ROUNDING * size))

@@ -1,4 +1,4 @@
-"""The worst p(t): ascent on a whole periodic trajectory, one linear program a step.
+"""The worst p(t): ascent on a periodic trajectory, one linear program a step.
 
 The gradient of growth or gain with respect to p at every node comes from the adjoint along the
 cycle. The linear program moves all nodes (and the period) to where the linearised objective is
@@ -26,26 +26,28 @@ from synthesis.worst.waves import Steps, steps
 
 Array = np.ndarray
 
-REACH = 0.25
-"""First trust region, as a fraction of the range of p; the period may then change by a tenth."""
+INITIAL_RADIUS = 0.25
+"""Radius of the first trust region, as a fraction of the range of p; the period may then change by
+a tenth.
+"""
 SHORTEST_REACH = 1e-3
-"""The ascent ends where a trust region this small brings nothing."""
+"""Radius of the trust region at which the ascent ends."""
 
 
 SHORTEST_PERIOD = 0.01
-"""No cycle becomes shorter than this fraction of the longest: a p that is faster than every mode
-acts by its mean.
+"""Shortest period of a cycle, as a fraction of the longest: a p faster than every mode acts by its
+mean.
 """
 
 
 class Objective(NamedTuple):
-    """What is made large along a cycle: a `measure`, divided by the period where `a_second`."""
+    """Objective along a cycle: a `measure`, divided by the period where `a_second`."""
 
     measure: Callable[[Steps], Sensitivity]
     a_second: bool
 
     def score(self, value: float, period: float) -> float:
-        """The number that an ascent raises."""
+        """Return the number that an ascent increases."""
         return value / period if self.a_second else value
 
 
@@ -58,8 +60,8 @@ GAIN = Objective(gain, False)
 def on_nodes(
     trajectory: SchedulingTrajectory, nodes: int, dt: float | None
 ) -> SchedulingTrajectory:
-    """The cycle on an even number of equal intervals, about `nodes`; in discrete time each a whole
-    number of samples.
+    """Return the cycle on an even number of equal intervals, about `nodes`; in discrete time each a
+    whole number of samples.
     """
     time, p = trajectory
     period, nodes = float(time[-1] - time[0]), 2 * math.ceil(nodes / 2)
@@ -83,12 +85,12 @@ def ascend(
     evaluations: int,
     budget: Budget = UNLIMITED,
 ) -> tuple[SchedulingTrajectory, float]:
-    """(cycle, measure of it) from `start` on equal intervals: no cycle longer than `longest` s, so
-    many gradients, within the `budget`.
+    """Return (cycle, its measure) of an ascent from `start` on equal intervals, with no cycle
+    longer than `longest` s, this number of gradients, within the `budget`.
     """
     s = lpv.scheduling
     width = s.high - s.low
-    best, reach = start, REACH
+    best, reach = start, INITIAL_RADIUS
     here, gradient = _gradient(lpv, best, objective)
     for _ in range(evaluations - 1):
         if reach < SHORTEST_REACH or not math.isfinite(here.value) or budget.over:
@@ -103,7 +105,12 @@ def ascend(
             objective.score(there.value, trial.time[-1])
             > objective.score(here.value, best.time[-1]) + 1e-9
         ):
-            best, here, gradient, reach = trial, there, new_gradient, min(1.5 * reach, 2 * REACH)
+            best, here, gradient, reach = (
+                trial,
+                there,
+                new_gradient,
+                min(1.5 * reach, 2 * INITIAL_RADIUS),
+            )
         else:
             reach /= 3.0
     return best, here.value
@@ -112,8 +119,8 @@ def ascend(
 def _gradient(
     lpv: Scheduled, cycle: SchedulingTrajectory, objective: Objective
 ) -> tuple[Sensitivity, Array]:
-    """The measure, and the gradient (N + 1,) of the score: by p at each node, and by the logarithm
-    of the period.
+    """Return the measure, and the gradient (N + 1,) of the score: by p at each node, and by the
+    logarithm of the period.
 
     The steps are differenced, which costs three more evaluations: every second node moves at once,
     so that each step feels one of them alone.
@@ -160,8 +167,8 @@ def _step(
     *,
     fixed: bool,
 ) -> SchedulingTrajectory | None:
-    """The best vertex within `reach`; the period may change by reach/range of 0.4 unless `fixed`.
-    None where the program fails.
+    """Return the best vertex within `reach`; the period may change by reach/range of 0.4 unless
+    `fixed`. None where the program fails.
     """
     time, p = cycle
     low, high = limits

@@ -1,5 +1,5 @@
-"""What no certificate over a box can beat: frozen models all over it, and trajectories along
-straight lines through it.
+"""Lower bounds over a box: frozen models all over it, and trajectories along straight lines through
+it.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ Array = np.ndarray
 Measure = Callable[[Array, Array, Array, Array], float]
 
 WAVES = 30
-"""Waves looked at along each line for peaks and slow decay, those of the fastest growth first; for
-peaks, those of many periods too.
+"""Number of waves examined along each line for peaks and slow decay, those of the fastest growth
+first; for peaks also waves of many periods.
 """
 
 
@@ -47,8 +47,8 @@ class Worst(NamedTuple):
 
 
 def measure(demand: Demand, dt: float | None) -> Measure:
-    """What a frozen model is measured by, larger is worse: its gain, or minus its decay rate (1/s)
-    for stability too.
+    """Return the measure of a frozen model, larger is worse: its gain, or minus its decay rate
+    (1/s), also for stability.
     """
     if demand.kind == "l2 gain":
         return lambda A, B, C, D: norm(A, B, C, D, dt)[0]
@@ -58,7 +58,7 @@ def measure(demand: Demand, dt: float | None) -> Measure:
 
 
 def frozen_decay(A: Array, dt: float | None) -> float:
-    """Decay rate of the slowest mode, 1/s; negative where it grows."""
+    """Return the decay rate of the slowest mode, 1/s; negative where it grows."""
     poles = np.linalg.eigvals(A)
     return (
         float(-poles.real.max())
@@ -68,8 +68,8 @@ def frozen_decay(A: Array, dt: float | None) -> float:
 
 
 def energy_to_peak(A: Array, B: Array, C: Array, D: Array, dt: float | None) -> float:
-    """max |y(t)| over inputs of unit energy: sqrt of the largest eigenvalue of C X C' (+ D D'), X
-    the controllability Gramian.
+    """Return max |y(t)| over inputs of unit energy: sqrt of the largest eigenvalue of C X C' (+ D
+    D'), X the controllability Gramian.
 
     inf where the model is not stable. Source: Rotea (1993); discrete time by the same argument.
     """
@@ -85,7 +85,7 @@ def energy_to_peak(A: Array, B: Array, C: Array, D: Array, dt: float | None) -> 
 
 
 def worst_frozen(model: Pieces, size: Measure) -> Worst:
-    """The largest over the box."""
+    """Return the worst frozen model over the box."""
 
     axes = _axes(model)
     free = [i for i, axis in enumerate(axes) if len(axis) > 1]
@@ -103,8 +103,8 @@ def worst_frozen(model: Pieces, size: Measure) -> Worst:
 
 
 def unstable_at(model: Pieces, suspect: tuple[float, ...]) -> tuple[float, ...] | None:
-    """A p, the suspect one first, at which the frozen model is unstable beyond rounding; None where
-    there is none on the grid.
+    """Return a p, the suspect first, at which the frozen model is unstable beyond rounding; None
+    where there is none on the grid.
     """
     points = np.vstack([suspect, grid_of(_axes(model))])
     return next(
@@ -132,8 +132,8 @@ def worst_moving(
     frozen: Worst,
     search: Search | None,
 ) -> Worst:
-    """The worst found along p that moves on lines through the box within its rates; `frozen` where
-    nothing is worse.
+    """Return the worst found along p that moves on lines through the box within its rates; `frozen`
+    where nothing is worse.
 
     Gains and minus decay rates: inf (gain) or a value >= 0 (decay) means a trajectory along which
     the state grows.
@@ -162,14 +162,16 @@ def worst_moving(
 def growing(
     model: LPVStateSpace, demand: Demand, search: Search | None
 ) -> SchedulingTrajectory | None:
-    """A p(t) on such a line along which the state grows, None where none was found."""
+    """Return a p(t) on such a line along which the state grows, None where none was found."""
     if demand.motion.tied:
         return worst_tied(model, demand, Worst(0.0), search).trajectory
     return growing_on(_lines(model, demand.rates), search)
 
 
 def worst_tied(model: LPVStateSpace, demand: Demand, frozen: Worst, search: Search | None) -> Worst:
-    """The worst found along cycles that keep to rate and jerk; for gains and growth alone."""
+    """Return the worst found along cycles within rate and jerk limits; for gains and growth
+    only.
+    """
     if search is None or demand.kind not in ("l2 gain", "stability"):
         return frozen
     found = tied_lower_bound(model, demand.motion, search)
@@ -183,14 +185,14 @@ def worst_tied(model: LPVStateSpace, demand: Demand, frozen: Worst, search: Sear
 def _peaks(
     line: LPVStateSpace, rate: float, search: Search
 ) -> tuple[float, SchedulingTrajectory | None]:
-    """Energy to peak along waves: the Gramian of inputs held over each step, from rest over some
-    cycles.
+    """Return the energy-to-peak gain along waves: the Gramian of inputs held over each step, from
+    rest over some cycles.
     """
     family = WaveFamily(line, rate, search)
     best: tuple[float, SchedulingTrajectory | None] = (0.0, None)
     # where A does not depend on p, growth ranks nothing
     budget = Budget(search.seconds)
-    for wave in tracked("looking for peaks", (*family.coarse()[:WAVES], *family.spread())):
+    for wave in tracked("searching for peaks", (*family.coarse()[:WAVES], *family.spread())):
         if budget.over:
             break
         cycle = SchedulingTrajectory(*wave.vertices())
@@ -216,13 +218,13 @@ def _peaks(
 def _slowest(
     line: LPVStateSpace, rate: float, search: Search
 ) -> tuple[float, SchedulingTrajectory | None]:
-    """Minus the slowest decay, 1/s, over whole cycles of waves, by Floquet multipliers; the error
-    of the time steps taken off.
+    """Return minus the slowest decay, 1/s, over whole cycles of waves, by Floquet multipliers, less
+    the error of the time steps.
     """
     family = WaveFamily(line, rate, search)
     best: tuple[float, SchedulingTrajectory | None] = (-math.inf, None)
     budget = Budget(search.seconds)
-    for wave in tracked("looking for slow decay", family.coarse()[:WAVES]):
+    for wave in tracked("searching for slow decay", family.coarse()[:WAVES]):
         if budget.over:
             break
         cycle = SchedulingTrajectory(*wave.vertices())
@@ -239,7 +241,7 @@ def _slowest(
 
 
 def _lines(model: LPVStateSpace, rates: Sequence[float]) -> Iterator[Line]:
-    """Diagonals and axes of the box as models of one parameter within the rates."""
+    """Yield the diagonals and axes of the box as models of one parameter within the rates."""
     if len(model.parameters) == 1:
         yield Line(model.with_rate(rates[0]), rates[0], lambda p: p)
         return

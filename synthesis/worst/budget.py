@@ -1,4 +1,4 @@
-"""How long a search may go on."""
+"""Time limit of a search."""
 
 from __future__ import annotations
 
@@ -9,33 +9,33 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Budget:
-    """So many `seconds` of wall time from when it was made."""
+    """A limit of `seconds` of wall time, from when it was made."""
 
     seconds: float = math.inf
     start: float = field(default_factory=time.perf_counter)
 
     @property
     def left(self) -> float:
-        """Seconds left, 0 at least."""
+        """Remaining time, at least 0, s."""
         return max(self.seconds - (time.perf_counter() - self.start), 0.0)
 
     @property
     def over(self) -> bool:
-        """Whether it is used up."""
+        """Whether no time is left."""
         return self.left <= 0.0
 
 
 UNLIMITED = Budget()
 
 
-def said(seconds: float | None, spent: float) -> tuple[str, ...]:
-    """The budget of a search as a hypothesis of the bound it gave; None: nothing was searched."""
+def search_hypothesis(seconds: float | None, spent: float) -> tuple[str, ...]:
+    """Return the budget of a search as a hypothesis of its bound; None: nothing was searched."""
     if seconds is None:
-        return ("no trajectory was looked for: what no proof can beat is the worst frozen model",)
+        return ("no trajectory was searched: the lower bound is that of the worst frozen model",)
     ended = ", which ended the search" if spent >= seconds else ""
     return (
         (
-            f"bad trajectories were looked for during at most {seconds:g} s{ended}: the bound they"
-            " give can only become sharper"
+            f"worst trajectories were searched for at most {seconds:g} s{ended}: a longer search"
+            " can only increase their lower bound"
         ),
     )

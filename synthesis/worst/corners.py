@@ -1,5 +1,5 @@
-"""The worst trapezoids: ascent on the levels at which p rests and the times it stays there, corners
-where they are.
+"""The worst trapezoids: ascent on the levels at which p rests and the times it stays there, with
+corners at fixed steps.
 
 Between two levels p moves as fast as it may, or jumps. An ascent on equal nodes (`ascent`) finds
 any shape but blurs a jump, or a steep ramp in a long cycle, over one interval; here every corner is
@@ -24,23 +24,27 @@ from synthesis.worst.waves import Steps, steps
 
 Array = np.ndarray
 
-SHIFT = 1e-6
-"""Relative change of a rest or of a level by which the steps are differenced."""
+RELATIVE_STEP = 1e-6
+"""Relative change of a rest or of a level in the finite differences of the steps."""
 
 
 class Corners(NamedTuple):
-    """p rests at `levels` (k,) for `rests` (k,) s each, in turn and over and over; k even."""
+    """A cycle in which p rests at `levels` (k,) for `rests` (k,) s each, in turn and repeatedly; k
+    even.
+    """
 
     levels: Array
     rests: Array
 
     @classmethod
     def of(cls, wave: SchedulingTrajectory) -> Corners:
-        """The levels and rests of a `Wave`'s cycle; its ramps become as steep as may be."""
+        """Return the levels and rests of a `Wave`'s cycle; its ramps become as steep as the rate
+        permits.
+        """
         return cls(wave.p[:4:2], np.diff(wave.time)[::2])
 
     def ramps(self, rate: float) -> Array:
-        """Time from each level to the next, s (k,)."""
+        """Return the time from each level to the next, s (k,)."""
         if math.isinf(rate):
             return np.zeros(len(self.levels))
         # equal levels are joined by a ramp too, of next to no time, so that the number of steps
@@ -50,22 +54,22 @@ class Corners(NamedTuple):
         )
 
     def twice(self) -> Corners:
-        """Two cycles in one, the second unlike the first: by symmetry equal ones would stay
+        """Return two cycles in one, the second unlike the first: by symmetry equal ones would stay
         equal.
         """
         uneven = np.repeat([1.2, 0.8], len(self.rests))
         return Corners(np.tile(self.levels, 2), np.tile(self.rests, 2) * uneven)
 
     def cycle(self, rate: float) -> SchedulingTrajectory:
-        """One cycle; where p jumps a time stands twice."""
+        """Return one cycle; where p jumps, it has a time twice."""
         duration = np.column_stack([self.rests, self.ramps(rate)]).ravel()
         time = np.append(0.0, np.cumsum(duration))
         return SchedulingTrajectory(time, np.append(np.repeat(self.levels, 2), self.levels[0]))
 
 
 class _Path(NamedTuple):
-    """A model along corners in a fixed number of steps for every rest and ramp (2 k,), of which
-    some last no time.
+    """A model along corners, with a fixed number of steps for every rest and ramp (2 k,), some of
+    zero length.
     """
 
     lpv: Scheduled
@@ -79,7 +83,7 @@ class _Path(NamedTuple):
 
     @property
     def part(self) -> Array:
-        """For every step, the rest (2 j) or ramp (2 j + 1) it belongs to."""
+        """Return, for every step, the rest (2 j) or ramp (2 j + 1) to which it belongs."""
         every = np.repeat(np.arange(len(self.counts)), self.counts)
         return every if math.isfinite(self.rate) else every[every % 2 == 0]
 
@@ -104,7 +108,7 @@ class _Path(NamedTuple):
 def gradient(
     lpv: Scheduled, corners: Corners, rate: float, objective: Objective, longest: float
 ) -> tuple[float, Array, Array]:
-    """(score, its gradient by the rests (k,) and by the levels (k,)); `longest` step in s.
+    """Return (score, its gradient by the rests (k,) and by the levels (k,)); `longest` step in s.
 
     All rests are stretched at once, then every second level is moved: each step feels one of them
     alone.
@@ -119,17 +123,17 @@ def gradient(
         return score, np.zeros(k), np.zeros(k)
 
     def change(other: Corners) -> Array:
-        """Of the measure, by part (2 k,)."""
+        """Return the change of the measure, by part (2 k,)."""
         difference = found.along(path.steps(other).step - system.step)
         return np.bincount(part, difference, 2 * k)
 
-    of_rests = change(corners._replace(rests=corners.rests * (1 + SHIFT)))[::2] / (
-        SHIFT * corners.rests
+    of_rests = change(corners._replace(rests=corners.rests * (1 + RELATIVE_STEP)))[::2] / (
+        RELATIVE_STEP * corners.rests
     )
     of_levels, longer = np.zeros(k), np.zeros(k)
     for parity in (0, 1):
         moved = np.arange(k) % 2 == parity
-        shift = SHIFT * 2 * s.radius * np.where(corners.levels > s.middle, -1.0, 1.0)
+        shift = RELATIVE_STEP * 2 * s.radius * np.where(corners.levels > s.middle, -1.0, 1.0)
         other = corners._replace(levels=corners.levels + np.where(moved, shift, 0.0))
         # a level is felt on its rest and on the ramps before and after it
         rest, ramp = change(other).reshape(k, 2).T
@@ -151,8 +155,8 @@ def climb(
     evaluations: int,
     budget: Budget = UNLIMITED,
 ) -> Corners:
-    """The best corners an ascent from `start` meets, in steps of at most `longest` s and cycles of
-    about `period` s at most.
+    """Return the best corners of an ascent from `start`, in steps of at most `longest` s and cycles
+    of about `period` s at most.
 
     It ends at once where the measure is infinite. Continuous time.
     """
@@ -189,4 +193,6 @@ def climb(
 
 
 class _Ended(Exception):
-    """The state grows along the corners met last, or does not respond at all; or time is up."""
+    """Raised where the state grows along the last corners, or does not respond at all; or time is
+    up.
+    """

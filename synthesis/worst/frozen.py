@@ -1,5 +1,5 @@
-"""The largest H-infinity norm of the models frozen at each p: what no gain of the LPV model can
-undercut.
+"""The largest H-infinity norm of the models frozen at each p, a lower bound on the gain of the LPV
+model.
 """
 
 from __future__ import annotations
@@ -80,8 +80,8 @@ def frozen_gain(lpv: Scheduled, *, points: int = 61, tolerance: float = 1e-8) ->
 def norm(
     A: Array, B: Array, C: Array, D: Array, dt: float | None = None, tolerance: float = 1e-8
 ) -> tuple[float, float]:
-    """H-infinity norm and the frequency (rad/s) of its peak; (inf, nan) where a pole is not
-    strictly stable.
+    """Return the H-infinity norm and the frequency (rad/s) of its peak; (inf, nan) where a pole is
+    not strictly stable.
 
     Level sets of the largest singular value (Boyd and Balakrishnan 1990; Bruinsma and Steinbuch
     1990), with two differences that light damping asks for. No eigenvalue of the Hamiltonian is
@@ -154,7 +154,7 @@ def stable(poles: Array, dt: float | None) -> Array:
 
 def below(A: Array, B: Array, C: Array, D: Array, level: float, dt: float | None = None) -> bool:
     """Whether every pole is strictly stable and the response below `level` at, and between, the
-    frequencies where eigenvalues of the Hamiltonian of that level come near the axis: a quick look
+    frequencies where eigenvalues of the Hamiltonian of that level come near the axis: a fast check
     in double precision, no bound.
     """
     if min(B.shape[1], C.shape[0]) == 0:
@@ -173,8 +173,8 @@ def below(A: Array, B: Array, C: Array, D: Array, level: float, dt: float | None
 
 
 class _Response(NamedTuple):
-    """The largest singular value over frequency; of a discrete model over omega = tan(theta/2),
-    theta the angle of z.
+    """Largest singular value over frequency; for a discrete model over omega = tan(theta/2), theta
+    the angle of z.
     """
 
     A: Array
@@ -184,13 +184,13 @@ class _Response(NamedTuple):
     discrete: bool
 
     def scaled(self, power: int) -> _Response:
-        """2^`power` times this one."""
+        """Return 2^`power` times this one."""
         B, C = of_one_size(self.B, self.C, power)
         return self._replace(B=B, C=C, D=np.ldexp(self.D, power))
 
     def gain(self, omega: Array) -> Array:
-        """At each omega (k,), refined once with residuals in extended precision: at light damping
-        rounding is magnified by its inverse.
+        """Return the gain at each omega (k,), refined once with residuals in extended precision:
+        with light damping rounding is magnified by its inverse.
         """
         omega = omega.astype(np.longdouble)
         points = (1 + 1j * omega) / (1 - 1j * omega) if self.discrete else 1j * omega
@@ -213,14 +213,14 @@ class _Peak(NamedTuple):
     omega: float
 
     def or_higher(self, response: _Response, omega: Array) -> _Peak:
-        """This or the highest of these frequencies."""
+        """Return this or the highest of these frequencies."""
         gains = response.gain(omega)
         k = int(gains.argmax())
         return _Peak(float(gains[k]), float(omega[k])) if gains[k] > self.gain else self
 
     def climbed(self, response: _Response, poles: Array) -> _Peak:
-        """The top nearby, by parabolas through ever narrower windows: the distance of the nearest
-        pole is the width of a peak.
+        """Return the nearest maximum, by parabolas through ever narrower windows: the distance of
+        the nearest pole is the width of a peak.
         """
         if not math.isfinite(self.omega):
             return self
@@ -248,18 +248,19 @@ class _Peak(NamedTuple):
 
 
 WINDOW = np.linspace(-1.0, 1.0, 9)
-"""Where a response is looked at, in units of the half-width of a window."""
+"""Frequencies at which a response is evaluated, in units of the half-width of a window."""
 
 
 def pace_of(poles: Array) -> int:
-    """The power of two next to the fastest pole, 0 where all rest."""
+    """Return the power of two next to the fastest pole, 0 where all are zero."""
     fastest = np.abs(poles).max(initial=0.0)
     return round(math.log2(fastest)) if fastest > 0 else 0
 
 
 def of_one_size(B: Array, C: Array, power: int = 0) -> tuple[Array, Array]:
-    """B and C whose product is 2^`power` times the given one, their largest entries of one size: so
-    their squares stay within the range of numbers. All factors are powers of two, no digit is lost.
+    """Return B and C whose product is 2^`power` times the given one, their largest entries of equal
+    size, so that their squares neither over- nor underflow. All factors are powers of two, no digit
+    is lost.
     """
     b, c = np.abs(B).max(initial=0.0), np.abs(C).max(initial=0.0)
     if min(b, c) == 0:
@@ -269,8 +270,8 @@ def of_one_size(B: Array, C: Array, power: int = 0) -> tuple[Array, Array]:
 
 
 def _hamiltonian_eigenvalues(A: Array, B: Array, C: Array, D: Array, level: float) -> Array:
-    """Those on the imaginary axis are the frequencies at which a singular value of the response
-    equals `level`.
+    """Return the eigenvalues of the Hamiltonian: those on the imaginary axis are the frequencies at
+    which a singular value of the response equals `level`.
     """
     R = level**2 * np.eye(D.shape[1]) - D.T @ D
     RD, RB = np.linalg.solve(R, D.T @ C), np.linalg.solve(R, B.T)
@@ -279,8 +280,8 @@ def _hamiltonian_eigenvalues(A: Array, B: Array, C: Array, D: Array, level: floa
 
 
 def crossings(A: Array, B: Array, C: Array, D: Array, level: float) -> Array:
-    """Frequencies >= 0 where a singular value of the response equals `level`: imaginary eigenvalues
-    of the Hamiltonian.
+    """Return frequencies >= 0 where a singular value of the response equals `level`: imaginary
+    eigenvalues of the Hamiltonian.
     """
     values = _hamiltonian_eigenvalues(A, B, C, D, level)
     on_axis = np.abs(np.real(values)) <= 1e-7 * (1e-3 * np.abs(values).max() + np.abs(values))
@@ -289,7 +290,7 @@ def crossings(A: Array, B: Array, C: Array, D: Array, level: float) -> Array:
 
 
 def to_continuous(A: Array, B: Array, C: Array, D: Array) -> tuple[Array, Array, Array, Array]:
-    """The continuous model with the same norm: z = (1 + s)/(1 - s)."""
+    """Return the continuous model with the same norm: z = (1 + s)/(1 - s)."""
     n = len(A)
     inverse = np.linalg.inv(A + np.eye(n))
     root = math.sqrt(2.0)

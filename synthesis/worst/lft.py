@@ -1,4 +1,4 @@
-"""What no gain of an LFT can undercut: frozen models all over the box, and trajectories along
+"""Lower bounds on the gain of an LFT: frozen models all over the box, and trajectories along
 straight lines through it.
 """
 
@@ -72,8 +72,8 @@ def frozen_box_gain(lft: LFT, *, tolerance: float = 1e-8) -> BoxGain:
 
 
 def _at_poles(lft: LFT, grid: Array) -> Array:
-    """For each delta (K, m) the largest gain at the frequencies of the model's own poles, at rest
-    and of D; inf where unstable.
+    """Return for each delta (K, m) the largest gain at the frequencies of the model's own poles, at
+    rest and of D; inf where unstable.
     """
     M, x = lft.matrix(grid), len(lft.states)
     A, B, C, D = M[:, :x, :x], M[:, :x, x:], M[:, x:, :x], M[:, x:, x:]
@@ -109,8 +109,8 @@ def _at_poles(lft: LFT, grid: Array) -> Array:
 
 
 def box_lower_bound(lft: LFT, frozen: BoxGain, search: Search | None) -> LowerBound:
-    """The best lower bound over p that moves along a line through the box, its diagonals and its
-    axes: jumping, and at rate limits.
+    """Return the best lower bound over p that moves along a line through the box, its diagonals and
+    its axes: jumping, and at rate limits.
 
     One parameter: its whole range. A search over jumps alone misses slower waves that are worse, so
     the limits of the parameters, where they have some, give a second try. `search` None: the frozen
@@ -130,13 +130,13 @@ def box_lower_bound(lft: LFT, frozen: BoxGain, search: Search | None) -> LowerBo
 
 
 def box_growing_trajectory(lft: LFT, search: Search | None) -> SchedulingTrajectory | None:
-    """A p(t) along such a line on which the free state grows, None where none was found."""
+    """Return a p(t) along such a line on which the free state grows, None where none was found."""
     return growing_on(_lines(lft, math.inf), search)
 
 
 def along(lft: LFT, start: Array, end: Array) -> LFT:
-    """One parameter s in [-1, 1] that moves all the normalised parameters on a straight line from
-    `start` to `end`.
+    """Return the LFT with one parameter s in [-1, 1] that moves all the normalised parameters on a
+    straight line from `start` to `end`.
     """
     middle, half = (
         np.repeat(0.5 * (start + end), lft.sizes),

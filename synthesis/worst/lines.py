@@ -1,5 +1,5 @@
-"""Straight lines through a box of parameters, on which one parameter alone moves; one budget for
-all.
+"""Straight lines through a box of parameters, along which a single parameter moves; one time budget
+for all.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Array = np.ndarray
 
 
 class Line(NamedTuple):
-    """The `model` on a line, how fast its parameter may move (per second), and the way `back` to
+    """The `model` along a line, how fast its parameter may move (per second), and the map `back` to
     p.
     """
 
@@ -29,12 +29,12 @@ class Line(NamedTuple):
     back: Callable[[Array], Array]
 
     def in_box(self, found: SchedulingTrajectory) -> SchedulingTrajectory:
-        """A trajectory on the line as one of the box."""
+        """Return a trajectory on the line as one of the box."""
         return SchedulingTrajectory(found.time, self.back(found.p))
 
 
 def directions(m: int) -> list[Array]:
-    """The diagonals of a box of m parameters, and its axes where there are several."""
+    """Return the diagonals of a box of m parameters, and its axes where there are several."""
     if not m:
         return []
     diagonals = [np.array((1.0, *signs)) for signs in product((1.0, -1.0), repeat=m - 1)]
@@ -42,12 +42,12 @@ def directions(m: int) -> list[Array]:
 
 
 def alone(p: Array) -> Array:
-    """p (k,) where there is one parameter (k, 1)."""
+    """Return p (k,) where there is one parameter (k, 1)."""
     return p[:, 0] if p.shape[1] == 1 else p
 
 
 def shared(lines: Iterable[Line], search: Search | None) -> Iterator[tuple[Line, Search]]:
-    """Every line with what is left of the search for it, while there is time; none without a
+    """Yield every line with its share of the remaining time, while there is time; none without a
     search.
     """
     if search is None:
@@ -60,7 +60,9 @@ def shared(lines: Iterable[Line], search: Search | None) -> Iterator[tuple[Line,
 
 
 def growing_on(lines: Iterable[Line], search: Search | None) -> SchedulingTrajectory | None:
-    """A p(t) on one of the lines along which the free state grows, None where none was found."""
+    """Return a p(t) on one of the lines along which the free state grows, None where none was
+    found.
+    """
     for line, share in shared(lines, search):
         found = growing_trajectory(line.model, line.rate, share)
         if found is not None:

@@ -1,5 +1,4 @@
-"""Bad scheduling trajectories: a gain that no certificate may undercut, or growth that no
-certificate can deny.
+"""Worst scheduling trajectories: lower bounds on the gain, or growth that disproves stability.
 
 Trapezoid waves within the range and the rate are the start: the Floquet multipliers of a coarse
 family from a table of transition matrices, and for the gain waves of many periods. From the best of
@@ -99,7 +98,7 @@ class Search:
 
 
 THOROUGH = Search()
-"""The default: some seconds for five states, ten at most."""
+"""Default effort: some seconds for five states, ten at most."""
 
 
 class LowerBound(NamedTuple):
@@ -171,7 +170,7 @@ def lower_bound(
     best = LowerBound(frozen.gain, None)
     if search is None or limit == 0 or not math.isfinite(frozen.gain):
         return best
-    hunt = _Hunt(lpv, limit, search)
+    hunt = _TrajectorySearch(lpv, limit, search)
     cycles, growing = hunt.fastest()
     if growing is not None:
         return growing
@@ -184,7 +183,7 @@ def lower_bound(
     # the starts stay beside what they lead to: corners may fall between the nodes
     found = list(tops)
     ascents = hunt.improved(tops, [*near[-1:], *spread[-1:]])
-    for cycle in tracked("looking for gain", ascents):
+    for cycle in tracked("searching for gain", ascents):
         if hunt.grows(cycle):
             return hunt.growing(cycle)
         found += hunt.ranked([cycle])
@@ -197,22 +196,24 @@ def lower_bound(
 def growing_trajectory(
     lpv: Scheduled, rate: float, search: Search | None = THOROUGH
 ) -> SchedulingTrajectory | None:
-    """One cycle of a p(t) within the limits along which the free state grows, repeated; None where
-    none was found.
+    """Return one cycle of a p(t) within the limits along which the free state grows if repeated;
+    None where none was found.
     """
     if search is None or rate == 0:
         return None
-    growing = _Hunt(lpv, rate, search).fastest()[1]
+    growing = _TrajectorySearch(lpv, rate, search).fastest()[1]
     return growing.trajectory if growing else None
 
 
 def along_cycle(lpv: Scheduled, cycle: SchedulingTrajectory, search: Search) -> LowerBound:
-    """What one cycle shows, repeated: growth, or the gain of an explicit input from rest."""
-    hunt = _Hunt(lpv, lpv.scheduling.limit, search)
+    """Return the bound of one cycle, repeated: growth, or the gain of an explicit input
+    from rest.
+    """
+    hunt = _TrajectorySearch(lpv, lpv.scheduling.limit, search)
     return hunt.growing(cycle) if hunt.grows(cycle) else hunt.explicit(cycle)
 
 
-class _Hunt:
+class _TrajectorySearch:
     """The search along one model at one rate."""
 
     def __init__(self, lpv: Scheduled, rate: float, search: Search):
@@ -221,11 +222,11 @@ class _Hunt:
         self.family = WaveFamily(lpv, rate, search)
 
     def fastest(self) -> tuple[list[SchedulingTrajectory], LowerBound | None]:
-        """Cycles made to grow as fast as they can, the fastest last; and the verdict where one of
-        them grows.
+        """Return cycles along which the state grows fast, the fastest last; and the lower bound
+        where the state grows along one of them.
         """
         reached: list[tuple[float, SchedulingTrajectory]] = []
-        for cycle in tracked("looking for growth", self._steepening()):
+        for cycle in tracked("searching for growth", self._steepening()):
             if self.budget.over and reached:
                 break
             if self.grows(cycle):
@@ -240,8 +241,8 @@ class _Hunt:
         tops: list[tuple[float, SchedulingTrajectory]],
         waves: list[tuple[float, SchedulingTrajectory]],
     ) -> Iterator[SchedulingTrajectory]:
-        """What ascents of the gain lead to: on the nodes of the `tops`, on the corners of the
-        `waves`; as far as there is time.
+        """Yield the results of ascents of the gain: on the nodes of the `tops`, on the corners of
+        the `waves`; as long as there is time.
         """
         for _, cycle in tops:
             if not self.budget.over:
@@ -259,7 +260,7 @@ class _Hunt:
             yield self.ascend(wave, GROWTH)
 
     def near(self) -> list[SchedulingTrajectory]:
-        """Waves of fast growth, and slower ones, which now and then are worse."""
+        """Return waves of fast growth, and slower ones, which are sometimes worse."""
         slower = (
             self.rate / 2
             if math.isfinite(self.rate)
@@ -274,8 +275,8 @@ class _Hunt:
     def ranked(
         self, cycles: Iterable[SchedulingTrajectory]
     ) -> list[tuple[float, SchedulingTrajectory]]:
-        """Gains of the repeated cycles, the largest last, without those along which the state
-        grows.
+        """Return gains of the repeated cycles, the largest last, without those along which the
+        state grows.
         """
         # one at least, so that there is something to improve
         gains = (
@@ -288,8 +289,8 @@ class _Hunt:
     def climb(
         self, wave: SchedulingTrajectory, objective: Objective
     ) -> Iterator[SchedulingTrajectory]:
-        """The cycles that ascents on the corners of a wave lead to: two corners, and where growth
-        is asked four; none in discrete time.
+        """Yield the cycles at the end of ascents on the corners of a wave: two corners, and for
+        growth four; none in discrete time.
         """
         if self.lpv.dt is not None:
             return
@@ -311,7 +312,7 @@ class _Hunt:
             yield corners.cycle(self.rate)
 
     def ascend(self, cycle: SchedulingTrajectory, objective: Objective) -> SchedulingTrajectory:
-        """The cycle a whole ascent leads to."""
+        """Return the cycle at the end of an ascent on all nodes."""
         limit = self.limit(cycle)
         # nodes as close in a slow cycle, as far as the time steps allow
         nodes = self.search.nodes * min(
@@ -323,8 +324,8 @@ class _Hunt:
         )[0]
 
     def limit(self, cycle: SchedulingTrajectory) -> float:
-        """How long an ascent may make this cycle, s: a slow one as long as p needs to cross its
-        range and come back.
+        """Return the longest period an ascent may give this cycle, s: for a slow one, the time for
+        p to cross its range and come back.
         """
         return (
             self.family.longest_period
@@ -333,30 +334,30 @@ class _Hunt:
         )
 
     def along(self, cycle: SchedulingTrajectory, finer: int = 1, split: int = 1) -> Steps:
-        """The model along one cycle."""
+        """Return the model along one cycle."""
         longest = max(self.family.longest, float(cycle.time[-1]) / self.search.steps) / finer
         return steps(self.lpv, *cycle, longest, split)
 
     def multiplier(self, cycle: SchedulingTrajectory, finer: int = 1) -> float:
-        """Largest Floquet multiplier (modulus) of one cycle."""
+        """Return the largest Floquet multiplier (modulus) of one cycle."""
         return multiplier(self.along(cycle, finer))
 
     def grows(self, cycle: SchedulingTrajectory) -> bool:
-        """Whether a multiplier exceeds one by more than the time steps can be wrong."""
+        """Whether a multiplier exceeds one by more than the error of the time steps."""
         coarse, fine = self.multiplier(cycle, 2), self.multiplier(cycle, 4)
         return fine - abs(fine - coarse) > 1 + 1e-7
 
     def growing(self, cycle: SchedulingTrajectory) -> LowerBound:
-        """The verdict on a cycle along which the state grows."""
+        """Return the lower bound of a cycle along which the state grows."""
         shown = cycle if self.lpv.dt is None else samples(cycle, self.lpv.dt)
         return LowerBound(math.inf, shown, None, self.multiplier(cycle, 4))
 
     def gain(self, cycle: SchedulingTrajectory) -> float:
-        """L2 gain of the periodic system, inf where it grows."""
+        """Return the L2 gain of the periodic system, inf where it grows."""
         return worst_input(self.along(cycle))[0]
 
     def explicit(self, cycle: SchedulingTrajectory) -> LowerBound:
-        """|y|/|u| of an explicit input over many cycles from rest."""
+        """Return |y|/|u| of an explicit input over many cycles from rest."""
         system = self.along(cycle, finer=2)
         lifted = Lifted.of(system)
         gain, angle, shape = worst_input(system, lifted)
@@ -401,8 +402,8 @@ def _first(pair: tuple[float, SchedulingTrajectory]) -> float:
 def _flown(
     cycle: SchedulingTrajectory, at: Array, count: int, held: Array
 ) -> tuple[SchedulingTrajectory, Array]:
-    """The cycle so many times over, and the input held from each time to the next; where p jumps,
-    one time with both values.
+    """Return the repeated cycle, and the input held from each time to the next; where p jumps, one
+    time with both values.
     """
     start = np.interp(at[:-1], *cycle)
     # the value a step ends with: of two at the same time interpolation takes the later one,

@@ -1,4 +1,4 @@
-"""The largest value of a function over a box: the one search behind every worst frozen model."""
+"""The largest value of a function over a box: the common search for every worst frozen model."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from scipy.optimize import minimize, minimize_scalar
 Array = np.ndarray
 
 STARTS = 3
-"""The highest peaks of the grid are climbed, so many of them."""
+"""Number of grid peaks, the highest first, from which an ascent starts."""
 
 
 def grid_of(axes: Sequence[Array]) -> Array:
-    """All points (K, m) of a grid."""
+    """Return all points (K, m) of a grid."""
     return np.array(list(product(*axes)), dtype=float)
 
 
 def worst_over(
     size: Callable[[Array], float], axes: Sequence[Array], values: Array | None = None
 ) -> tuple[float, Array]:
-    """(value, p) of the largest `size(p)` found over the grid of the `axes` and by local searches
-    from its highest peaks; the first infinite value ends it.
+    """Return (value, p) of the largest `size(p)` found over the grid of the `axes` and by local
+    searches from its highest peaks; the first infinite value ends it.
 
     `values` (K,) on the grid, where they are known already, or something close to them.
     """
@@ -83,7 +83,7 @@ def _in_box(size: Callable[[Array], float], axes: Sequence[Array], start: Array)
 
 
 def _peaks(values: Array) -> list[int]:
-    """Flat indices that no neighbour on the grid exceeds, the largest first."""
+    """Return the flat indices that no neighbour on the grid exceeds, the largest first."""
     padded = np.pad(values, 1, constant_values=-np.inf)
     inner = tuple(slice(1, -1) for _ in values.shape)
     highest = np.ones(values.shape, dtype=bool)

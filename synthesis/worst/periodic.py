@@ -1,5 +1,4 @@
-"""What a linear system does along one cycle, repeated for ever: its growth and its gain, with their
-sensitivities.
+"""Growth and gain of a linear system along one cycle, repeated forever, with their sensitivities.
 
 Over one cycle of N steps z_k = [x; v] -> [x(k+1); y], lifted: x(+) = F x + G v, y = H x + J v with
 all v and all y of the cycle stacked. The growth is the largest Floquet multiplier, an eigenvalue of
@@ -20,11 +19,11 @@ from synthesis.worst.waves import Steps
 Array = np.ndarray
 
 LANCZOS_STEPS = 30
-"""Most steps for the norm at one frequency: what is missing after them makes the bound smaller,
-never wrong.
+"""Largest number of steps for the norm at one frequency: an unconverged norm makes the bound
+smaller, never wrong.
 """
 RESIDUAL = 1e-3
-"""They end where the residual of the squared norm is this fraction of it."""
+"""Residual of the squared norm, relative to it, at which the iteration ends."""
 
 
 class Sensitivity(NamedTuple):
@@ -37,12 +36,14 @@ class Sensitivity(NamedTuple):
     right: Array
 
     def along(self, change: Array) -> Array:
-        """Change of the value (N,) due to the change (N, nx + r, nx + nu) of each step."""
+        """Return the change of the value (N,) due to the change (N, nx + r, nx + nu) of
+        each step.
+        """
         return np.real(np.einsum("ki,kij,kj->k", self.left, change, self.right))
 
 
 class Lifted(NamedTuple):
-    """x(+) = F x + G v, y = H x + J v over one cycle."""
+    """A system over one cycle: x(+) = F x + G v, y = H x + J v."""
 
     F: Array
     G: Array
@@ -51,7 +52,7 @@ class Lifted(NamedTuple):
 
     @classmethod
     def of(cls, system: Steps) -> Lifted:
-        """One cycle of the system."""
+        """Return the system over one cycle."""
         n, N = system.states, len(system.step)
         m, r = system.step.shape[2] - n, system.step.shape[1] - n
         F, G = np.eye(n), np.zeros((n, N * m))
@@ -66,13 +67,13 @@ class Lifted(NamedTuple):
 
 
 def multiplier(system: Steps) -> float:
-    """Largest Floquet multiplier (modulus) of one cycle."""
+    """Return the largest Floquet multiplier (modulus) of one cycle."""
     return float(np.abs(np.linalg.eigvals(system.transition)).max())
 
 
 def growth(system: Steps) -> Sensitivity:
-    """Logarithm of the largest multiplier, by its left and right eigenvectors carried around the
-    cycle.
+    """Return the logarithm of the largest multiplier, by its left and right eigenvectors carried
+    around the cycle.
     """
     n, (N, rows, columns) = system.states, system.step.shape
     values, vectors = np.linalg.eig(system.transition)
@@ -93,8 +94,8 @@ def growth(system: Steps) -> Sensitivity:
 
 
 def worst_input(system: Steps, lifted: Lifted | None = None) -> tuple[float, float, Array]:
-    """(gain, phase advance a cycle in rad, worst input (N, nu), complex) of the repeated cycle;
-    gain inf where the state grows.
+    """Return (gain, phase advance a cycle in rad, worst input (N, nu), complex) of the repeated
+    cycle; gain inf where the state grows.
     """
     n, N = system.states, len(system.step)
     m = system.step.shape[2] - n
@@ -127,8 +128,8 @@ def worst_input(system: Steps, lifted: Lifted | None = None) -> tuple[float, flo
 
 
 def gain(system: Steps) -> Sensitivity:
-    """Logarithm of the gain, with the worst response and its adjoint; the phase advance a cycle is
-    held.
+    """Return the logarithm of the gain, with the worst response and its adjoint; the phase advance
+    a cycle is held.
     """
     n, N = system.states, len(system.step)
     lifted = Lifted.of(system)
@@ -157,8 +158,8 @@ def gain(system: Steps) -> Sensitivity:
 
 
 def ratio_from_rest(lifted: Lifted, v: Array, rounds: int) -> tuple[float, Array]:
-    """(|y|/|v|, v) from rest over len(v) cycles, v (cycles, N nu), after `rounds` of forward and
-    adjoint passes.
+    """Return (|y|/|v|, v) from rest over len(v) cycles, v (cycles, N nu), after `rounds` of forward
+    and adjoint passes.
     """
     F, G, H, J = lifted
     ratio, best = 0.0, v
@@ -182,8 +183,8 @@ def ratio_from_rest(lifted: Lifted, v: Array, rounds: int) -> tuple[float, Array
 
 
 def _largest(squared: Callable[[Array], Array], size: int) -> tuple[float, Array]:
-    """(largest eigenvalue, its vector) of a positive semidefinite operator from below, by Lanczos
-    with full reorthogonalisation.
+    """Return (largest eigenvalue, its vector) of a positive semidefinite operator from below, by
+    Lanczos with full reorthogonalisation.
     """
     start = np.random.default_rng(0).standard_normal((2, size))
     v = start[0] + 1j * start[1]
@@ -204,6 +205,6 @@ def _largest(squared: Callable[[Array], Array], size: int) -> tuple[float, Array
 
 
 def _times(M: Array, v: Array) -> Array:
-    """Complex M times complex v, v as real and imaginary columns."""
+    """Return complex M times complex v, v as real and imaginary columns."""
     w = M @ (v[:, 0] + 1j * v[:, 1])
     return np.column_stack([w.real, w.imag])

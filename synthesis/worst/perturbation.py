@@ -1,5 +1,5 @@
-"""The worst model of an uncertain one: a Delta of the set at which some frozen model has the
-largest gain, or the slowest mode.
+"""The worst model of an uncertain one: a Delta of the set with the largest gain of a frozen model,
+or the slowest mode.
 
 The derivative of a peak gain, or of a pole, by Delta is a matrix of rank two at most; the point of
 the ball that it grows fastest towards has its polar factor as direction. From some Deltas the
@@ -23,15 +23,17 @@ from synthesis.worst.spectrum import surely_unstable
 Array = np.ndarray
 
 GRID = 17
-"""Values of p between which the worst of a Delta is looked for, and the breaks of a spline."""
+"""Number of values of p between which the worst perturbation Delta is searched, and of the breaks
+of a spline.
+"""
 STARTS = 2
-"""Ascents begin without a perturbation, and from so many extreme points of the set."""
-ROUNDS = 3
-"""Most times p is chosen anew."""
-STEPS = 20
-"""Most steps of an ascent at one p."""
-GAINED = 1e-4
-"""An ascent ends where a step gains less than this fraction."""
+"""Number of extreme points of the set from which ascents start, besides the nominal model."""
+MAX_ROUNDS = 3
+"""Largest number of times that p is chosen anew."""
+MAX_STEPS = 20
+"""Largest number of steps of an ascent at one p."""
+MIN_INCREASE = 1e-4
+"""Relative increase of a step below which an ascent ends."""
 SEED = 0
 
 
@@ -47,7 +49,7 @@ class Perturbed(NamedTuple):
 
 
 def worst_perturbation(unc: UncertainStateSpace, *, gains: bool) -> Perturbed:
-    """The worst Delta found: of the largest gain of a frozen model (inf: unstable), or with
+    """Return the worst Delta found: of the largest gain of a frozen model (inf: unstable), or with
     `gains` False of the fastest growing mode.
     """
     frozen = _Frozen.of(unc, gains)
@@ -60,7 +62,7 @@ def worst_perturbation(unc: UncertainStateSpace, *, gains: bool) -> Perturbed:
     best = Perturbed(starts[0], -math.inf, float(grid[0]))
     for start in starts:
         delta = start
-        for _ in range(ROUNDS):
+        for _ in range(MAX_ROUNDS):
             value, at = worst_over(lambda p, d=delta: frozen.value(d, float(p[0])), [grid])
             p = float(at[0])
             if value > best.value:
@@ -70,7 +72,7 @@ def worst_perturbation(unc: UncertainStateSpace, *, gains: bool) -> Perturbed:
             delta, climbed = frozen.climbed(delta, value, p, unc.bound)
             if climbed > best.value:
                 best = Perturbed(delta, climbed, p)
-            if climbed <= value + GAINED * abs(value) or climbed == math.inf:
+            if climbed <= value + MIN_INCREASE * abs(value) or climbed == math.inf:
                 break
         if best.value == math.inf:
             break
@@ -102,7 +104,7 @@ class _Frozen(NamedTuple):
         )
 
     def closed(self, delta: Array, p: float) -> Matrices:
-        """With d = delta v + what is added to d."""
+        """Return the frozen model with d = delta v + the input d."""
         A, B, C, D = self.unc.model.matrices(p)
         K = np.zeros((B.shape[1], C.shape[0]))
         K[np.ix_(self.d, self.v)] = delta
@@ -110,7 +112,7 @@ class _Frozen(NamedTuple):
         return Matrices(A + B @ N @ K @ C, B @ N, C + D @ N @ K @ C, D @ N)
 
     def value(self, delta: Array, p: float) -> float:
-        """What is to be made large."""
+        """Return the objective of the ascent."""
         return self._value(self.closed(delta, p))
 
     def _value(self, at: Matrices) -> float:
@@ -126,7 +128,7 @@ class _Frozen(NamedTuple):
         return math.log(max(float(np.abs(poles).max()), 1e-300)) / self.unc.dt
 
     def slope(self, at: Matrices) -> Array:
-        """The derivative of the value by Delta, (nd, nv), up to a positive factor."""
+        """Return the derivative of the value by Delta, (nd, nv), up to a positive factor."""
         A, B, C, D = at
         E, G = B[:, self.d], C[self.v]
         if not self.gains:
@@ -150,8 +152,8 @@ class _Frozen(NamedTuple):
         return np.real(np.outer(np.conj(left[:, 0]) @ into, heard @ np.conj(right[0])))
 
     def climbed(self, delta: Array, value: float, p: float, bound: float) -> tuple[Array, float]:
-        """A better Delta at this p, and its value; the same where none was found."""
-        for _ in range(STEPS):
+        """Return a better Delta at this p, and its value; the same where none was found."""
+        for _ in range(MAX_STEPS):
             at = self.closed(delta, p)
             left, sizes, right = np.linalg.svd(self.slope(at), full_matrices=False)
             # where it does not matter Delta stays: directions of no slope are rounding
@@ -166,6 +168,6 @@ class _Frozen(NamedTuple):
                 return delta, value
             gained = found - value
             delta, value = trial, found
-            if value == math.inf or gained <= GAINED * abs(value):
+            if value == math.inf or gained <= MIN_INCREASE * abs(value):
                 return delta, value
         return delta, value

@@ -1,4 +1,4 @@
-"""How fast each scheduling parameter may move, in the forms a user writes it."""
+"""Rate limits of the scheduling parameters, in the forms a user writes them."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from symheli.lpv import Scheduling
 from symheli.lpv.scheduling import Rates, with_rates
 
 Rate = Rates | None
-"""In units of p per second: one for all parameters, one for each in order, or {name: rate}; the
-name of a parameter says that it is the rate; the parameter's own where none is given.
+"""Rate limit, in units of p per second: one for all parameters, one for each in order, or {name:
+rate}; the name of a parameter states that it is the rate; None: the parameter's own.
 """
 
 
-def asked(parameters: Sequence[Scheduling], rate: Rate) -> tuple[Scheduling, ...]:
-    """The parameters with the limits asked for; raises `InputError` for a wrong number of them or
-    one that is not >= 0, `UnknownNameError` for a name.
+def limits(parameters: Sequence[Scheduling], rate: Rate) -> tuple[Scheduling, ...]:
+    """Return the parameters with the requested limits; raise `InputError` for a wrong number of
+    them or one that is not >= 0, `UnknownNameError` for a name.
     """
     if rate is None:
         return tuple(parameters)
@@ -33,5 +33,5 @@ def asked(parameters: Sequence[Scheduling], rate: Rate) -> tuple[Scheduling, ...
 
 
 def rates(parameters: Sequence[Scheduling], rate: Rate) -> tuple[float, ...]:
-    """One number a parameter; raises `InputError` where it is another parameter."""
-    return tuple(s.limit for s in asked(parameters, rate))
+    """Return one number a parameter; raise `InputError` where the rate is another parameter."""
+    return tuple(s.limit for s in limits(parameters, rate))

@@ -1,4 +1,4 @@
-"""What a search for bad trajectories asks of a model."""
+"""Interface of a model to the search for worst trajectories."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Scheduled(Protocol):
 
     @property
     def states(self) -> Sequence[object]:
-        """One for each state."""
+        """Names of the states."""
         ...
 
     @property

@@ -1,4 +1,4 @@
-"""Is a matrix unstable for sure, or only to the rounding of its eigenvalues?"""
+"""Instability of a matrix beyond the rounding of its eigenvalues."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ Array = np.ndarray
 
 
 def surely_unstable(A: Array, dt: float | None) -> bool:
-    """Whether A (n, n) has a pole on the wrong side, and so has every matrix within the backward
-    error of the eigenvalues.
+    """Whether A (n, n), and every matrix within the backward error of the eigenvalues, has an
+    unstable pole.
 
     That error is at most 10 n eps |A|, A balanced; no such change takes a pole across the border
     where the smallest singular value of s - A is larger all along it. dt None: continuous time.

@@ -1,4 +1,5 @@
-"""Bad trajectories where the rate of one parameter is another: cycles that keep to rate and jerk.
+"""Worst trajectories where the rate of one parameter is another: cycles within rate and jerk
+limits.
 
 A trapezoid p(t) within |dp/dt| <= rate, averaged over a window of 2 rate/jerk, keeps its range and
 its rate and has |d2p/dt2| <= jerk: the difference of two rates over the window. The trapezoids are
@@ -26,19 +27,19 @@ from synthesis.worst.waves import Wave
 Array = np.ndarray
 
 CANDIDATES = 24
-"""Trapezoids that are averaged and flown."""
-MOVED = 40
-"""Evaluations by which the best is moved about."""
+"""Number of trapezoidal trajectories that are averaged and simulated."""
+MAX_EVALUATIONS = 40
+"""Number of evaluations with which the best trajectory is refined."""
 
 
 class Smooth(NamedTuple):
-    """A trapezoid `wave` of p, averaged over `window` s (0: as it is)."""
+    """A trapezoid `wave` of p, averaged over `window` s (0: not averaged)."""
 
     wave: Wave
     window: float
 
     def at(self, t: Array) -> tuple[Array, Array]:
-        """p and dp/dt at times t."""
+        """Return p and dp/dt at times t."""
         if self.window == 0:
             return self._wave(t), self._slope(t)
         before = t - self.window
@@ -56,7 +57,7 @@ class Smooth(NamedTuple):
         return np.where(width > 0, np.diff(p) / np.where(width > 0, width, 1.0), 0.0)[k]
 
     def _integral(self, t: Array) -> Array:
-        """Of the wave from 0, over as many cycles as it takes."""
+        """Return the integral of the wave from 0, over as many cycles as needed."""
         time, p = self.wave.vertices()
         area = np.append(0.0, np.cumsum(0.5 * (p[1:] + p[:-1]) * np.diff(time)))
         cycles, rest = np.divmod(t, self.wave.period)
@@ -67,7 +68,7 @@ class Smooth(NamedTuple):
 
 
 class AlongPath:
-    """A model of several parameters along a path of them, as one of the single parameter time."""
+    """A model of several parameters along a path of them, with time as its single parameter."""
 
     def __init__(self, lpv: LPVStateSpace, tie: tuple[int, int], path: Smooth):
         self.lpv, self.tie, self.path = lpv, tie, path
@@ -75,7 +76,7 @@ class AlongPath:
         self.scheduling = Scheduling("time", "s", 0.0, path.wave.period, 1.0)
 
     def points(self, t: Array) -> Array:
-        """The parameters at times t, (..., 2)."""
+        """Return the parameters at times t, (..., 2)."""
         p, rate = self.path.at(np.asarray(t, dtype=float))
         out = np.empty((*np.shape(t), 2))
         for i, values in zip(self.tie, (p, rate), strict=True):
@@ -84,13 +85,13 @@ class AlongPath:
         return out
 
     def matrices(self, t: object, /) -> Matrices:
-        """A, B, C, D at times t."""
+        """Return A, B, C, D at times t."""
         return self.lpv.matrices(self.points(np.asarray(t, dtype=float)))
 
 
 def tied_lower_bound(lpv: LPVStateSpace, motion: Motion, search: Search) -> LowerBound | None:
-    """The largest gain found along such cycles, inf where the state grows; None where none was
-    found. Its trajectory has p (n, 2).
+    """Return the largest gain found along such cycles, inf where the state grows; None where none
+    was found. Its trajectory has p (n, 2).
     """
     if len(lpv.parameters) != 2:
         raise InputError(
@@ -122,7 +123,7 @@ def tied_lower_bound(lpv: LPVStateSpace, motion: Motion, search: Search) -> Lowe
 def _candidates(
     lpv: LPVStateSpace, tie: tuple[int, int], top: float, search: Search
 ) -> Iterator[Wave]:
-    """The fastest growing trapezoids where the rate is held at zero, and slow ones."""
+    """Yield the fastest growing trapezoids with the rate parameter held at zero, and slow ones."""
     i = tie[0]
     s = lpv.parameters[i]
     ends = np.zeros((2, 2))
@@ -137,7 +138,7 @@ def _candidates(
 
 
 def _flown(lpv: LPVStateSpace, tie: tuple[int, int], path: Smooth, search: Search) -> LowerBound:
-    """The gain along the path over and over, by an explicit input from rest."""
+    """Return the gain along the repeated path, by an explicit input from rest."""
     along = AlongPath(lpv, tie, path)
     period = path.wave.period
     found = along_cycle(
@@ -161,7 +162,9 @@ def _moved(
     search: Search,
     budget: Budget,
 ) -> LowerBound:
-    """The best of waves near this one, by Nelder and Mead's search on levels, rests and speed."""
+    """Return the best wave near this one, by Nelder and Mead's search on levels, rests and
+    speed.
+    """
     s, best = lpv.parameters[tie[0]], LowerBound(0.0, None)
     swing = wave.top - wave.bottom
     unit = max(wave.period, 1e-9)
@@ -196,6 +199,6 @@ def _moved(
         cost,
         start,
         method="Nelder-Mead",
-        options={"maxfev": MOVED, "initial_simplex": simplex},
+        options={"maxfev": MAX_EVALUATIONS, "initial_simplex": simplex},
     )
     return best

@@ -12,8 +12,8 @@ Array = np.ndarray
 
 
 class SchedulingTrajectory(NamedTuple):
-    """How the scheduling parameters move: `time` (n,) in s, `p` (n,), straight lines between them;
-    a jump has one time twice.
+    """Trajectory of the scheduling parameters: `time` (n,) in s, `p` (n,), straight lines between
+    them; a jump has one time twice.
 
     Discrete time: one p for every sample. A cycle is to be repeated. Several parameters: `p` (n,
     m).

@@ -1,5 +1,5 @@
-"""All trapezoid waves within range and rate on a grid of levels and dwell times: where the search
-for the worst p(t) starts.
+"""All trapezoid waves within range and rate on a grid of levels and dwell times: the starting
+points of the search for the worst p(t).
 """
 
 from __future__ import annotations
@@ -18,23 +18,23 @@ if TYPE_CHECKING:
 
 Array = np.ndarray
 
-STRETCH = 2.0
-"""Along the slowest cycles time steps are at most this many times what resolves the fastest
+MAX_STEP_RATIO = 2.0
+"""Largest ratio of a time step along the slowest cycles to the step that resolves the fastest
 mode.
 """
 
-FINEST = 8
-"""For a slow p the levels are at most this many times closer than asked for."""
+MAX_LEVEL_RATIO = 8
+"""Largest factor by which levels may be closer than requested for a slow p."""
 
 
 PERIODS = 7
-"""Periods of the waves that `spread` looks at, from half that of the fastest mode to the
+"""Number of periods of the waves that `spread` tries, from half that of the fastest mode to the
 longest.
 """
 
 
 class WaveFamily:
-    """The waves of a model within `rate`, as coarse as `search` says.
+    """The waves of a model within `rate`, on the grid that `search` sets.
 
     `slow`: time scale of the slowest mode, s, at most twenty times that of the fastest;
     `longest`: the longest time step that resolves the fastest mode, s.
@@ -53,23 +53,23 @@ class WaveFamily:
         # a slow p covers little of the range in the longest cycle: levels close enough for some
         # steps up and down
         spacing = min((s.high - s.low) / search.levels, self.rate * self.longest_period / 6)
-        levels = min(math.ceil((s.high - s.low) / spacing), FINEST * search.levels)
+        levels = min(math.ceil((s.high - s.low) / spacing), MAX_LEVEL_RATIO * search.levels)
         self.grid = np.linspace(s.low, s.high, levels + 1)
 
     @property
     def longest_period(self) -> float:
-        """No cycle made to grow lasts longer, s."""
+        """Longest period of a cycle in the search for growth, s."""
         return self.search.cycles * self.slow
 
     @property
     def slowest_period(self) -> float:
-        """No cycle made to have a large gain lasts longer, s: a slow p may cross its range and come
-        back, as far as time steps go.
+        """Longest period of a cycle in the search for a large gain, s: a slow p may cross its range
+        and come back, as far as the time steps permit.
         """
         if self.lpv.dt is not None:
             # every sample of a cycle counts, so that long cycles are dear
             return min(self.longest_period, self.search.steps * self.lpv.dt)
-        s, reach = self.lpv.scheduling, STRETCH * self.search.steps * self.longest
+        s, reach = self.lpv.scheduling, MAX_STEP_RATIO * self.search.steps * self.longest
         return max(self.longest_period, min(2 * (s.high - s.low) / self.rate, reach))
 
     def wave(
@@ -81,8 +81,8 @@ class WaveFamily:
         ramp: float = 0.0,
         longest: float | None = None,
     ) -> Wave | None:
-        """The wave with ramps as steep as allowed, but of `ramp` s at least; None where it lasts
-        over `longest` s (`longest_period`).
+        """Return the wave with ramps as steep as allowed, but of `ramp` s at least; None where it
+        lasts over `longest` s (`longest_period`).
         """
         longest = self.longest_period if longest is None else longest
         ramp = max(ramp, 0.0 if math.isinf(self.rate) else (top - bottom) / self.rate)
@@ -90,8 +90,8 @@ class WaveFamily:
         return wave if 0 < wave.period <= longest else None
 
     def coarse(self) -> list[Wave]:
-        """The waves on the grid of levels and dwell times, that of the fastest growth first, one a
-        pair of levels.
+        """Return the waves on the grid of levels and dwell times, that of the fastest growth first,
+        one a pair of levels.
         """
         dwell = np.linspace(0.0, 0.75 * self.slow, self.search.dwells)
         if self.lpv.dt is not None:
@@ -125,8 +125,8 @@ class WaveFamily:
         return [wave for _, wave in sorted(found, key=lambda pair: -pair[0])]
 
     def spread(self, around: float | None = None) -> list[Wave]:
-        """Waves of many periods, whatever their growth: as much of the range as the rate allows,
-        with rests and as triangles.
+        """Return waves of many periods, whatever their growth: as much of the range as the rate
+        allows, with rests and as triangles.
 
         Where A does not depend on p all waves grow alike, and what p does to the gain depends on
         its period alone. A p too slow for its range moves at its ends, in its middle, and `around`

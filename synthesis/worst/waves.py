@@ -16,12 +16,12 @@ from synthesis.worst.trajectory import SchedulingTrajectory
 Array = np.ndarray
 
 GAUSS = math.sqrt(3.0) / 6.0
-"""The two Gauss points of a step lie at 1/2 -+ this fraction of it."""
+"""Offset of the two Gauss points from the middle of a step, as a fraction of it."""
 
 
 class Wave(NamedTuple):
-    """p dwells at `bottom` and at `top` (s each) and ramps between them in `ramp` s (0: it jumps),
-    over and over.
+    """A trapezoidal wave: p dwells at `bottom` and at `top` (s each) and ramps between them in
+    `ramp` s (0: it jumps), repeatedly.
     """
 
     bottom: float
@@ -36,7 +36,9 @@ class Wave(NamedTuple):
         return self.dwell_bottom + self.dwell_top + 2.0 * self.ramp
 
     def in_samples(self, dt: float | None) -> Wave:
-        """The wave in whole samples, of one at least, with ramps no steeper; as it is without."""
+        """Return the wave in whole samples, of one at least, with ramps no steeper; unchanged in
+        continuous time.
+        """
         if dt is None:
             return self
         bottom, top = (max(1.0, round(d / dt)) * dt for d in (self.dwell_bottom, self.dwell_top))
@@ -44,19 +46,19 @@ class Wave(NamedTuple):
         return self._replace(dwell_bottom=bottom, dwell_top=top, ramp=ramp)
 
     def cycle(self) -> SchedulingTrajectory:
-        """One cycle; where p jumps a time stands twice."""
+        """Return one cycle; where p jumps, it has a time twice."""
         return SchedulingTrajectory(*self.vertices())
 
     def vertices(self, cycles: int = 1) -> tuple[Array, Array]:
-        """Corner times (s) and values of p over whole cycles."""
+        """Return corner times (s) and values of p over whole cycles."""
         time = np.cumsum([0.0, self.dwell_bottom, self.ramp, self.dwell_top, self.ramp])
         p = np.array([self.bottom, self.bottom, self.top, self.top, self.bottom])
         return np.concatenate([time + k * self.period for k in range(cycles)]), np.tile(p, cycles)
 
 
 class Steps(NamedTuple):
-    """z_k = [x; v] -> [x(k+1); y_k] = step[k] z_k, scaled so that |v|^2 and |y|^2 are energies.
-    step (N, nx + r, nx + nu).
+    """Transition matrices: z_k = [x; v] -> [x(k+1); y_k] = step[k] z_k, scaled so that |v|^2 and
+    |y|^2 are energies. step (N, nx + r, nx + nu).
 
     In continuous time v is held over a step, and y stacks the outputs at its two Gauss points.
     `time` (N + 1,) in s.
@@ -76,8 +78,8 @@ class Steps(NamedTuple):
 
 
 def samples(trajectory: SchedulingTrajectory, dt: float) -> SchedulingTrajectory:
-    """One value of p a sample, from the start to one sample before the end: a cycle can be repeated
-    as it is.
+    """Return one value of p a sample, from the start to one sample before the end, so that a cycle
+    can be repeated.
     """
     time, p = trajectory
     at = time[0] + dt * np.arange(max(1, round((time[-1] - time[0]) / dt)))
@@ -85,7 +87,7 @@ def samples(trajectory: SchedulingTrajectory, dt: float) -> SchedulingTrajectory
 
 
 def steps(lpv: Scheduled, time: Array, p: Array, longest: float, split: int = 1) -> Steps:
-    """The model along straight lines between the corners (`time`, `p`), in steps of at most
+    """Return the model along straight lines between the corners (`time`, `p`), in steps of at most
     `longest` s, each cut in `split`.
 
     Continuous: fourth-order Magnus exponentials, exact where p rests (Hairer, Lubich and Wanner,

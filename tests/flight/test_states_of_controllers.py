@@ -10,7 +10,7 @@ from flight.flown import INPUTS, SHORT, STORM, InPython, dynamic
 
 import symheli
 from symheli import InputError, PureController, StatefulController, TableController, fly
-from symheli.flight.controller import SCHEDULING, TOLD
+from symheli.flight.controller import CONTROLLER_INPUTS, SCHEDULING
 from symheli.flight.plan_text import described
 from symheli.values import NamedVector, Signal
 
@@ -76,8 +76,10 @@ def test_a_flight_leaves_its_controller_as_it_was(ideal, controller):
 
 def told(k):
     rng = np.random.default_rng(k)
-    states = (*TOLD, Signal("airspeed", "m/s"))
-    reference = NamedVector((*TOLD, *INPUTS), np.zeros(len(TOLD) + len(INPUTS)))
+    states = (*CONTROLLER_INPUTS, Signal("airspeed", "m/s"))
+    reference = NamedVector(
+        (*CONTROLLER_INPUTS, *INPUTS), np.zeros(len(CONTROLLER_INPUTS) + len(INPUTS))
+    )
     return (
         NamedVector(states, 0.1 * rng.standard_normal(len(states))),
         reference,

@@ -17,7 +17,7 @@ def graded(m, n, smallest=1.0, seed=0):
 @pytest.fixture
 def small_blocks(monkeypatch):
     """Of four times as many rows as columns: the triangles are cut in turn."""
-    monkeypatch.setattr(tall_factors, "WORK", 1.0)
+    monkeypatch.setattr(tall_factors, "MAX_OPERATIONS", 1.0)
 
 
 @pytest.mark.parametrize("smallest", [1.0, 1e-12])
@@ -55,4 +55,4 @@ def test_a_block_is_some_tenths_of_a_second_of_work():
     """Of an hour at 50 Hz and 288 instruments: 180 000 rows, in blocks of 5000."""
     parts = tall_factors._blocks(np.broadcast_to(1.0, (180_000, 288)))
     assert sum(map(len, parts)) == 180_000
-    assert max(map(len, parts)) * 288**2 <= 1.2 * tall_factors.WORK
+    assert max(map(len, parts)) * 288**2 <= 1.2 * tall_factors.MAX_OPERATIONS

@@ -185,7 +185,7 @@ def test_motion_is_counted_column_by_column(look, tmp_path):
     [
         ("airspeed", "without it the model is LTI", True),
         ("lon", "an input that moves", False),
-        ("t", "a clock: say how far apart the rows are", True),
+        ("t", "a clock: give the time between rows", True),
         ("q", "angular rates p, q, r", True),
     ],
 )
@@ -218,7 +218,7 @@ def test_an_xplane_log_without_a_clock_is_looked_at_and_with_dt_identified(look,
     log = DATA / "xplane" / "Forward.txt"
     seen, text = look(log)
     assert seen["suggested_command"] is not None
-    assert "a clock: say how far apart the rows are" in text
+    assert "a clock: give the time between rows" in text
     assert 0.09 < seen["suggested_step"] < 0.11  # nominal 10 Hz
     found = answer(log, "--dt", 0.1)
     assert "models" in found

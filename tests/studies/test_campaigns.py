@@ -489,7 +489,7 @@ def test_a_killed_campaign_goes_on_where_it_was(tmp_path, importable, kind):
 
 def test_a_scheduler_that_does_not_answer_is_named(monkeypatch):
     pytest.importorskip("distributed", reason="needs dask: pip install 'symheli[campaigns]'")
-    monkeypatch.setattr("studies.campaigns.runners.PATIENCE", 0.2)
+    monkeypatch.setattr("studies.campaigns.runners.SCHEDULER_TIMEOUT", 0.2)
     with pytest.raises(InputError, match=r"no scheduler .* answers at 'tcp://127\.0\.0\.1:9'"):
         runner(scheduler="tcp://127.0.0.1:9")
 

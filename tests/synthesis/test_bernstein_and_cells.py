@@ -15,7 +15,7 @@ from synthesis.polynomial.cells import strips
 from synthesis.polynomial.matrix import PolynomialMatrix
 from synthesis.polynomial.pieces import ModelPiece, model_pieces, pieces
 from synthesis.polynomial.symmetric import smat, svec
-from synthesis.proof.inequalities import Claim, lmi_polynomials
+from synthesis.proof.inequalities import Statement, lmi_polynomials
 
 
 def value(F, x, s=0.0):
@@ -128,7 +128,7 @@ def test_lmi_polynomials_are_the_lmi_at_every_point(dt):
     P = SplineLyapunov(
         np.array([0.0, 0.25, 1.0]), 2, coefficients + np.swapaxes(coefficients, 1, 2)
     )
-    forms = [form.block for form in lmi_polynomials(Claim(pieces(lpv), P, 0.7), float)]
+    forms = [form.block for form in lmi_polynomials(Statement(pieces(lpv), P, 0.7), float)]
     p = 0.6
     A, B, C, D = lpv.matrices(p)
     Y = np.hstack([C, D])

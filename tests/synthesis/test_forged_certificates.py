@@ -246,7 +246,7 @@ def test_the_proof_of_another_model_is_refused(form, other):
 def test_the_reason_of_a_refusal_can_be_read():
     cert = genuine("spline")
     evidence = cert.proof.evidence
-    assert "rates (0.3,), the claim for (2.0,)" in replace(cert, rates=(2.0,)).fault
+    assert "rates (0.3,), the certificate for (2.0,)" in replace(cert, rates=(2.0,)).fault
     assert (
         "not those of the model"
         in forged(cert, evidence=evidence._replace(pieces=evidence.pieces[:0])).fault

@@ -141,6 +141,6 @@ def test_both_ways_of_solving_give_the_same_point(monkeypatch):
         np.ones(1), sparse.csc_matrix([[-1.0], [0.0], [-1.0]]), -M, (2,)
     )
     here = cone_program.solve(program, cone_program.Solver()).x
-    monkeypatch.setattr(cone_program, "SHORT", 0.0)
+    monkeypatch.setattr(cone_program, "SHORT_ITERATION", 0.0)
     np.testing.assert_array_equal(cone_program.solve(program, cone_program.Solver()).x, here)
     assert here[0] == pytest.approx((5 + 5**0.5) / 2, abs=1e-7)

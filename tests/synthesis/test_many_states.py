@@ -166,8 +166,8 @@ def test_the_normal_equations_of_functions_are_those_of_dense_matrices(
     """F and the normal equations from each coefficient of each block, one entry at a time; by place
     in batches of one, two and all of them, and by coefficient.
     """
-    monkeypatch.setattr(method, "FEW", few)
-    monkeypatch.setattr(method, "TOGETHER", together)
+    monkeypatch.setattr(method, "PRODUCT_COST", few)
+    monkeypatch.setattr(method, "CHUNK_ENTRIES", together)
     rng = np.random.default_rng(2)
     places, n, count = 4, 3, 6
     blocks = random_blocks(rng, motions, places)

@@ -81,7 +81,7 @@ def test_what_is_printed_is_what_the_solver_was_given(monkeypatch):
 
 @pytest.mark.parametrize("analysis", [l2_gain, stability, generalized_h2, decay_rate])
 def test_what_was_never_tried_has_not_failed(analysis, monkeypatch):
-    monkeypatch.setattr(cone_program, "MEMORY", 1.0)
+    monkeypatch.setattr(cone_program, "MAX_BYTES", 1.0)
     for options in ({"form": COARSE}, SOS):
         cert = analysis(spring(damping=0.4), 0.1, **options, search=None)
         assert cert.status is Status.UNTRIED
@@ -91,7 +91,7 @@ def test_what_was_never_tried_has_not_failed(analysis, monkeypatch):
 
 
 def test_an_lft_program_that_was_never_tried_has_not_failed(monkeypatch):
-    monkeypatch.setattr(cone_program, "MEMORY", 1.0)
+    monkeypatch.setattr(cone_program, "MAX_BYTES", 1.0)
     for analysis in (lft_gain, lft_stability):
         assert analysis(spring(damping=0.4).to_lft().reduce(), search=None).status is Status.UNTRIED
 

@@ -165,7 +165,7 @@ def test_an_error_shared_by_assembly_and_proof_is_found(case, analysis, monkeypa
     judge, P = cert.proof
     number = verify.rational()
     believed = (
-        verify.proven(judge._claim(P), cert.gamma)
+        verify.proven(judge._statement(P), cert.gamma)
         if analysis == "splines"
         else all(
             map(
@@ -190,7 +190,7 @@ def test_the_witness_of_the_decay_and_of_higher_degrees_looks_too(monkeypatch):
     for cert in (decay, quartic, memory):
         assert cert.verify(rigorous=True)
         judge, P = cert.proof
-        assert judge.witnessed(P, cert.proven, verify.rational())
+        assert judge.checked_independently(P, cert.proven, verify.rational())
         # the same P against a model that grows: without proof and pieces the witness must see it
         lpv = judge.model.source if cert is decay else judge.lpv
         grows = replace(
@@ -203,4 +203,4 @@ def test_the_witness_of_the_decay_and_of_higher_degrees_looks_too(monkeypatch):
                 if cert is decay
                 else judge._replace(lpv=grows)
             )
-            assert not other.witnessed(P, cert.proven, verify.rational())
+            assert not other.checked_independently(P, cert.proven, verify.rational())

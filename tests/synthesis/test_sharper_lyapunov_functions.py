@@ -37,7 +37,7 @@ from synthesis.polynomial.symmetric_power import (
     null_weights,
     power,
 )
-from synthesis.proof.inequalities import Claim, lmi_polynomials
+from synthesis.proof.inequalities import Statement, lmi_polynomials
 
 MEMORY = Memory(1.5, segments=8, degree=2, grading=1.0, across_segments=2)
 QUARTIC = HigherOrder(2, segments=4)
@@ -106,7 +106,7 @@ def test_memory_polynomials_are_the_lmi_at_every_point():
     region = LagRegion.reached(np.array([0.0, 0.25, 1.0]), rate, 0.4)
     M = rng.standard_normal((5, 5, 3, 3))
     P = MemoryLyapunov(region, 2, np.array([0.0, 0.3, 1.0]), 2, M + np.swapaxes(M, -1, -2))
-    forms = list(lmi_polynomials(Claim(pieces(lpv), P, rate), float))
+    forms = list(lmi_polynomials(Statement(pieces(lpv), P, rate), float))
     assert len(forms) == 2 * 2 * 2
     p, share = 0.6, 0.8
     lower, height, _, _ = (float(v) for v in region.locate(np.array(p)))

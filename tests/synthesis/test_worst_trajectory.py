@@ -116,13 +116,13 @@ def test_the_ascent_keeps_range_and_rate_and_never_loses(dt):
 
 def test_the_search_finds_more_than_the_waves_it_starts_from():
     from synthesis import Search, lower_bound
-    from synthesis.worst.lower_bound import _Hunt
+    from synthesis.worst.lower_bound import _TrajectorySearch
 
     search = Search(
         levels=6, dwells=5, starts=1, nodes=40, evaluations=15, steps=80, samples=20_000
     )
     lpv = lateral().with_rate(3.0)
-    hunt = _Hunt(lpv, 3.0, search)
+    hunt = _TrajectorySearch(lpv, 3.0, search)
     waves = max(
         gain
         for wave in hunt.family.coarse()

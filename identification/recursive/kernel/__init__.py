@@ -18,9 +18,7 @@ from identification.recursive.kernel.configuration import Configuration
 from symheli.errors import CompilerWarning
 
 SOURCES = ("rls.h", "rls.c", "python.c")
-"""What the compiled kernel is made from, in this folder; the first two are all an autopilot
-needs.
-"""
+"""Source files of the compiled kernel, in this folder; an autopilot needs only the first two."""
 
 
 def kernel(configuration: Configuration) -> Any:
@@ -33,8 +31,8 @@ def kernel(configuration: Configuration) -> Any:
 
 @functools.cache
 def compiled_kernel(precision: str) -> Any | None:
-    """The class in the compiled module; None, with a warning that says why, where there is none to
-    use.
+    """Return the class in the compiled module; None, with a warning that gives the reason, where
+    none is available.
     """
     if os.environ.get("SYMHELI_COMPILE") == "0":
         return _without("SYMHELI_COMPILE=0")
@@ -50,8 +48,8 @@ def compiled_kernel(precision: str) -> Any | None:
 
 
 def compiled_kernels(precision: str) -> dict[str, Any]:
-    """{level: compiled module} of what is built here and runs on this processor, the fastest first;
-    all give the same bits.
+    """Return {level: compiled module} of the modules built here that run on this processor, the
+    fastest first; all give the same bits.
     """
     kernels: dict[str, Any] = {}
     for level in processor_levels():

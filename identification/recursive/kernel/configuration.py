@@ -1,5 +1,5 @@
-"""What the kernel is told about a structure, and where in its memory everything lies; the same for
-C and NumPy.
+"""Configuration of the kernel for a structure, and the layout of its memory; the same for C and
+NumPy.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from symheli.lpv import Basis, Product
 from symheli.values.arrays import Array
 
 LANES = 8
-"""Rows start, and sums run, in steps of so many numbers."""
+"""Number of elements to which rows are aligned and by which sums advance."""
 
 HEADER, GROUP_HEADER = LANES, LANES
 COUNT, MILLIONS, FILLED = 0, 1, 2
@@ -28,7 +28,7 @@ KINDS = ("output", "input", "offset", "increment")
 
 
 def padded(n: int) -> int:
-    """Rounded up to whole LANES."""
+    """Return the number rounded up to whole LANES."""
     return -(-n // LANES) * LANES
 
 
@@ -180,7 +180,7 @@ class Configuration:
 
     @cached_property
     def factors(self) -> tuple[Factor, ...]:
-        """Those of the basis, one a scheduling parameter; none where its functions are not
+        """Factors of the basis, one a scheduling parameter; none where its functions are not
         piecewise polynomial.
         """
         basis = self.structure.basis
@@ -249,7 +249,7 @@ class Configuration:
 
     @cached_property
     def arguments(self) -> tuple:
-        """What `Kernel` is made from, compiled or not."""
+        """Arguments of `Kernel`, compiled or not."""
         arx = self.structure
         groups = tuple(
             (

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.design.determined import BEYOND, PRIOR, determined
+from identification.design.determined import MIN_INFORMATION_RATIO, PRIOR, determined
 from identification.recursive.kernel import configuration as at
 from identification.recursive.kernel.configuration import LANES, Configuration, Factor, GroupLayout
 from symheli.values.arrays import Array
@@ -83,7 +83,7 @@ class View:
 
 
 class Kernel:
-    """As the compiled `Kernel`, made from a `Configuration`."""
+    """NumPy twin of the compiled `Kernel`, made from a `Configuration`."""
 
     def __init__(self, configuration: Configuration):
         self._c = configuration
@@ -267,7 +267,9 @@ class Kernel:
             solve_anew(a)
 
     def _is_determined(self, a: View, kept_awake: bool) -> bool:
-        beyond = (0.0 if a.header[at.DETERMINED] != 0 else 2.0) if kept_awake else BEYOND
+        beyond = (
+            (0.0 if a.header[at.DETERMINED] != 0 else 2.0) if kept_awake else MIN_INFORMATION_RATIO
+        )
         return bool(determined(a.d[: a.n], a.energy[: a.n], a.fed[: a.n], beyond).all())
 
     def _new_peaks(self, a: View, samples: Any, kept_awake: bool) -> None:
@@ -459,7 +461,7 @@ def is_outside(p: Any, factor: Factor) -> bool:
 
 
 def evaluate(factor: Factor, p: Any) -> Array:
-    """All functions of a factor at p, by Bernstein's form of the piece p lies in."""
+    """Return all functions of a factor at p, by Bernstein's form of the piece p lies in."""
     knots, coefficients = factor.knots, factor.bernstein
     piece = int(np.searchsorted(knots[1:-1], p, side="right"))
     x = (p - knots[piece]) / (knots[piece + 1] - knots[piece])

@@ -8,7 +8,7 @@ from studies.campaigns.trial import Trial
 from symheli.errors import InputError, UnknownNameError
 
 NAMES = ("identification", "flight", "control", "gain", "marks", "pays")
-"""Each is the module of that name here."""
+"""Names of the trials, each a module of this package."""
 
 
 def trial(name: str) -> Trial:

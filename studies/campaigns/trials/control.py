@@ -1,4 +1,4 @@
-"""The whole circle: identify where the controller asks for it, design, certify, fly."""
+"""The complete chain: identification, controller design, certification and simulation."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ CONTROLLERS = {
     "lpv": designs.BASELINE,
     "identified": designs.IDENTIFIED,
 }
-"""Of the study, by the words of a campaign."""
+"""Controllers of the study by their names in campaigns."""
 
 
 def control(
@@ -81,7 +81,7 @@ def control(
 
 @cache
 def designed(vehicle: str, controller: str, flown_to_identify: int) -> Design:
-    """For the vehicle of the file, once a process."""
+    """Design for the vehicle of the file, once a process."""
     if controller not in CONTROLLERS:
         raise UnknownNameError("controller", controller, CONTROLLERS)
     name, (base, flown) = CONTROLLERS[controller], plants(vehicle)
@@ -95,14 +95,16 @@ def designed(vehicle: str, controller: str, flown_to_identify: int) -> Design:
 
 @cache
 def plants(vehicle: str) -> tuple[LPVStateSpace, Plant]:
-    """The baseline, and what of it is flown and certified."""
+    """Return the baseline, and the plants to simulate and certify."""
     base = baseline(helicopter(vehicle))
     return base, flown_plant(base)
 
 
 @cache
 def identified(vehicle: str, seed: int) -> KinematicModel:
-    """From an aggressive and a gentle flight, over airspeed and acceleration, as in the study."""
+    """Identify from an aggressive and a gentle flight, over airspeed and acceleration, as in the
+    study.
+    """
     heli, pilot = helicopter(vehicle), autopilot(vehicle)
     records = [
         symheli.fly(heli, make(seed, pilot)) for make in (training.aggressive, training.gentle)

@@ -71,7 +71,7 @@ def flight(
 
 @cache
 def designed(vehicle: str, controller: str) -> Autopilot:
-    """For the vehicle of the file, once a process."""
+    """Design for the vehicle of the file, once a process."""
     if controller not in CONTROLLERS:
         raise UnknownNameError("controller", controller, CONTROLLERS)
     top, points = (0.5, 2) if controller == "lqr of hover" else (TOP, 14)

@@ -1,4 +1,4 @@
-"""The chain from a flight to a model: fly, identify, judge on another flight."""
+"""The chain from a flight to a model: simulation, identification, validation on another flight."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ BASES = {
     "linear": lambda degree: PiecewiseLinear(tuple(np.linspace(0.0, TOP, degree + 1))),
     "spline": lambda degree: BSpline(2, tuple(np.linspace(0.0, TOP, max(degree, 2)))),
 }
-"""Of degree + 1 functions of airspeed each."""
+"""Bases of degree + 1 functions of airspeed each."""
 MODE_MISS = "rotor mode miss"
 
 

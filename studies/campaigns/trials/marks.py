@@ -16,8 +16,8 @@ DECIBELS = dict(zip(NOISES, (None, NOISE_DB), strict=True))
 
 
 def marks(*, vehicle: str = "xcell60", seed: int = 0) -> dict[str, float]:
-    """Fly, identify and judge without and with noise: fits in percent 1 s ahead, misses of the
-    frozen rotor modes, and the fits of the baselines.
+    """Simulate, identify and validate without and with noise: fits in percent 1 s ahead, errors of
+    the frozen rotor modes, and the fits of the baselines.
     """
     heli, row = helicopter(vehicle), {}
     for noise, decibels in DECIBELS.items():
@@ -35,17 +35,17 @@ def marks(*, vehicle: str = "xcell60", seed: int = 0) -> dict[str, float]:
 
 
 def ahead(axis: Axis, output: str, noise: str) -> str:
-    """The name of a fit 1 s ahead."""
+    """Return the name of a fit 1 s ahead."""
     return f"{output}, 1 s ahead, {noise} ({axis.name})"
 
 
 def of_mode(axis: Axis, airspeed: float) -> str:
-    """The name of the miss of a frozen mode."""
+    """Return the name of the error of a frozen mode."""
     return f"{axis.mode} mode at {airspeed:g} m/s"
 
 
 def of_baseline(model: str, output: str) -> str:
-    """The name of a fit of a baseline 1 s ahead."""
+    """Return the name of a fit of a baseline 1 s ahead."""
     return f"{output}, {model}, 1 s ahead"
 
 

@@ -23,8 +23,8 @@ def pays(
     ramps: int = len(ACCELERATIONS),
     seed: int = 0,
 ) -> dict[str, float]:
-    """Held-out fits in percent of both models by axis, output and horizon; 1 where scheduling
-    pays. `noise_db` inf: no noise.
+    """Return validation fits in percent of both models by axis, output and horizon; 1 where
+    scheduling pays. `noise_db` inf: no noise.
     """
     heli, pilot, row = helicopter(vehicle), autopilot(vehicle), {}
     noise = None if math.isinf(noise_db) else noise_db

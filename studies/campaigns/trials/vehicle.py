@@ -14,7 +14,7 @@ INERTIAS = ("Ixx", "Iyy", "Izz")
 
 @cache
 def helicopter(vehicle: str, governor: Governor = "ideal") -> Helicopter:
-    """With its rotor speed held, or another governor."""
+    """Return the helicopter with its rotor speed held, or with another governor."""
     return Helicopter.load(vehicle, governor=governor)
 
 
@@ -27,7 +27,7 @@ def autopilot(vehicle: str, period: float = 0.02) -> Autopilot:
 def scattered(
     vehicle: str, mass: float, inertia: float, governor: Governor = "ideal"
 ) -> Helicopter:
-    """With `mass` and `inertia` times what its file says."""
+    """Return the helicopter with `mass` and `inertia` times the values of its file."""
     known = helicopter(vehicle, governor)
     factors = {"body.mass": mass} | {f"body.{name}": inertia for name in INERTIAS}
     return known.with_parameters({n: f * known.parameters[n] for n, f in factors.items()})

@@ -1,4 +1,4 @@
-"""What every basis over the range of one scheduling parameter can answer."""
+"""Interface of every basis over the range of one scheduling parameter."""
 
 from __future__ import annotations
 

@@ -15,8 +15,7 @@ from symheli.values.arrays import frozen
 
 @dataclass(frozen=True)
 class BSpline(PiecewisePolynomial):
-    """B-splines between breakpoints, degree - 1 times continuously differentiable; they add up to
-    1.
+    """B-splines between breakpoints, degree - 1 times continuously differentiable; their sum is 1.
 
     Each differs from zero over at most degree + 1 intervals: what the data say of one speed stays
     there. Degree 1 is `PiecewiseLinear`; the end knots are repeated, so that the first and last
@@ -77,7 +76,9 @@ class BSpline(PiecewisePolynomial):
 
     @property
     def distinct_values(self) -> int:
-        """As many as there are functions (and one in the support of each)."""
+        """Number of distinct p needed: as many as there are functions (and one in the support of
+        each).
+        """
         return self.size
 
     def _piecewise(self) -> PPoly:

@@ -1,4 +1,4 @@
-"""What every family of functions of the scheduling can answer, of one parameter or several."""
+"""Interface of every family of functions of the scheduling, of one parameter or several."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class FunctionSpace(ABC):
     @property
     @abstractmethod
     def distinct_values(self) -> int:
-        """How many distinct p are needed before the functions can be told apart."""
+        """Number of distinct p needed to distinguish the functions."""
 
     @abstractmethod
     def _values(self, p: Array, derivative: Any) -> Array: ...
@@ -76,8 +76,8 @@ class FunctionSpace(ABC):
 
     @abstractmethod
     def samples(self, ranges: Sequence[Range] | None = None) -> Array:
-        """Points (K,) or (K, d) of the box, or of smaller `ranges`, at which combinations of the
-        functions that differ there can be told apart.
+        """Return points (K,) or (K, d) of the box, or of smaller `ranges`, at which different
+        combinations of the functions differ.
         """
 
     def pieces(self) -> tuple[Piece, ...]:

@@ -1,4 +1,4 @@
-"""Discontinuous piecewise polynomials, for models that jump at known values of p."""
+"""Piecewise polynomials without continuity at their breaks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the piecewise polynomial bases have in common."""
+"""Common part of the piecewise polynomial bases."""
 
 from __future__ import annotations
 

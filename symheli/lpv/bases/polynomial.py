@@ -18,8 +18,8 @@ from symheli.lpv.recentred import centre, recentred
 from symheli.values.arrays import Array, frozen
 from symheli.values.numbers import whole
 
-DIGITS = 8.0
-"""More decimal digits lost than this, half of a double's, are worth a warning."""
+MAX_LOST_DIGITS = 8.0
+"""Number of lost decimal digits, half of a double's, above which a warning is given."""
 
 
 @dataclass(frozen=True)
@@ -141,7 +141,7 @@ class Polynomial(Basis):
 
     def _physical(self) -> Array:
         """`monomial`, with a warning where it loses too much."""
-        if self.digits_lost > DIGITS:
+        if self.digits_lost > MAX_LOST_DIGITS:
             warnings.warn(
                 f"powers of p lose about {self.digits_lost:.0f} of 16 digits on [{self.low:g},"
                 f" {self.high:g}]; keep the coefficients of the basis, or write the model in powers"
@@ -192,8 +192,8 @@ class Polynomial(Basis):
         return self.from_scaled(padded)
 
     def from_scaled(self, coefficients: Array) -> Array:
-        """Coefficients in this basis (n, ...) of sum_i x^i M_i, x from -1 at `low` to 1 at
-        `high`.
+        """Return the coefficients in this basis (n, ...) of sum_i x^i M_i, x from -1 at `low` to 1
+        at `high`.
         """
         flat = np.reshape(coefficients, (self.size, -1))
         return np.linalg.solve(self._powers.T, flat).reshape(np.shape(coefficients))

@@ -14,7 +14,9 @@ from symheli.values.arrays import Array
 
 
 def polynomials(degrees: Sequence[int], ranges: Sequence[Range]) -> Polynomial | Product:
-    """All polynomials of these degrees in each of the parameters, orthonormal over the box."""
+    """Return all polynomials of these degrees in each of the parameters, orthonormal over
+    the box.
+    """
     factors = tuple(
         Polynomial(d, low, high) for d, (low, high) in zip(degrees, ranges, strict=True)
     )

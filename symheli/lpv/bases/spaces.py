@@ -1,6 +1,4 @@
-"""Sums and products of function spaces: where the sum and the product of two functions live, and
-the coefficients of a function there.
-"""
+"""Sums and products of function spaces, and the coefficients of a function in them."""
 
 from __future__ import annotations
 
@@ -18,9 +16,9 @@ from symheli.lpv.bases.polynomials import factors_of
 from symheli.lpv.bases.product import Product
 from symheli.values.arrays import Array
 
-TWICE = 4
-"""Breaks of two bases that differ by at most this many units in the last place of the larger end of
-the range are one number, computed twice.
+MERGE_ULPS = 4
+"""Breaks of two bases that differ by at most this many units in the last place of the larger end
+of the range are the same number, computed twice.
 """
 WIDER = 1e6
 """Such breaks are joined only where the pieces on both sides are wider than they are apart by this
@@ -29,7 +27,7 @@ factor, and the functions do not jump: what joining changes is then below the ro
 
 
 def sum_space(a: FunctionSpace, b: FunctionSpace) -> FunctionSpace:
-    """A space that holds every f + g, f of `a` and g of `b`, factor by factor.
+    """Return a space that contains every f + g, f in `a` and g in `b`, factor by factor.
 
     Polynomials stay polynomials, other piecewise polynomials become `Patches` over the breaks of
     both. Raises `InputError` for functions that are neither, unless the other is a constant.
@@ -38,7 +36,9 @@ def sum_space(a: FunctionSpace, b: FunctionSpace) -> FunctionSpace:
 
 
 def product_space(a: FunctionSpace, b: FunctionSpace) -> FunctionSpace:
-    """A space that holds every f g, f of `a` and g of `b`: as `sum_space`, the degrees added."""
+    """Return a space that contains every f g, f in `a` and g in `b`: as `sum_space`, the degrees
+    added.
+    """
     return _combined(a, b, _product)
 
 
@@ -95,12 +95,12 @@ def _either(f: FunctionSpace, g: FunctionSpace, degree: Callable[[int, int], int
 def _breaks(
     spaces: Sequence[Sequence[Piece]], low: float, high: float, degree: int
 ) -> tuple[float, ...]:
-    """Those of every space between `low` and `high`; equal ones count once, and those that two
-    spaces computed of one number.
+    """Return the breaks of every space between `low` and `high`; equal ones count once, also those
+    that two spaces computed from one number.
     """
     unit = float(np.spacing(max(abs(low), abs(high))))
     # room for degree + 1 values of p that can be told apart
-    least = unit * max(TWICE, 8 * (degree + 1))
+    least = unit * max(MERGE_ULPS, 8 * (degree + 1))
     breaks = [low]
     for at in sorted({low, high, *(p.low for each in spaces for p in each)}):
         apart = at - breaks[-1]
@@ -108,7 +108,7 @@ def _breaks(
             continue
         if apart > least:
             breaks.append(at)
-        elif apart > TWICE * unit or not all(_joins(each, breaks[-1], at) for each in spaces):
+        elif apart > MERGE_ULPS * unit or not all(_joins(each, breaks[-1], at) for each in spaces):
             raise InputError(
                 f"the functions have breaks at {breaks[-1]!r} and at {at!r}, too near to one"
                 " another to tell the polynomial between them, and they are not the same: give"
@@ -142,8 +142,8 @@ def _basis(factor: FunctionSpace) -> Basis:
 
 
 def _nodes(factor: FunctionSpace) -> Array:
-    """Points of one parameter at which the functions are told apart without loss of digits, none on
-    a break that they may jump at.
+    """Return points of one parameter at which the functions are distinguished without loss of
+    digits, none on a break at which they may jump.
     """
     if isinstance(factor, Polynomial):
         x = np.polynomial.legendre.leggauss(factor.size)[0]

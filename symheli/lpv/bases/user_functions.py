@@ -1,4 +1,4 @@
-"""Functions of the scheduling parameter that the user brings along."""
+"""User-supplied functions of the scheduling parameter."""
 
 from __future__ import annotations
 

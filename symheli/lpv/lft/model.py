@@ -186,7 +186,7 @@ class LFT:
         inputs: Sequence[str] | None = None,
         outputs: Sequence[str] | None = None,
     ) -> LFT:
-        """From matrices of rational SymPy expressions in the symbols of the parameters
+        """Return the LFT of matrices of rational SymPy expressions in the symbols of the parameters
         (`Scheduling.symbol`, in their units), and numbers; exact, with as many copies of each
         parameter as `reduce` leaves.
 
@@ -299,8 +299,8 @@ class LFT:
         )
 
     def well_posed(self, boxes: int = 4000) -> WellPosedness:
-        """Whether I - M11 Delta is invertible over the whole box; at most `boxes` cells are looked
-        at.
+        """Whether I - M11 Delta is invertible over the whole box; at most `boxes` cells are
+        examined.
         """
         from symheli.lpv.lft.well_posed import well_posed
 
@@ -309,8 +309,8 @@ class LFT:
     # -- equivalent representations
 
     def with_scheduling(self, scheduling: Scheduling) -> LFT:
-        """The same model with the parameter of that name over another range, with another rate or
-        in another unit of the same quantity, to which it is converted; exact.
+        """Return the same model with the parameter of that name over another range, with another
+        rate or in another unit of the same quantity, to which it is converted; exact.
         """
         from symheli.lpv.lft.algebra import over_range
 
@@ -371,8 +371,8 @@ class LFT:
         )
 
     def reduce(self, tolerance: float = 1e-12) -> LFT:
-        """The same model with fewer copies of the parameters: minimal for one parameter, structured
-        Kalman for several.
+        """Return the same model with fewer copies of the parameters: minimal for one parameter,
+        structured Kalman for several.
 
         What is below `tolerance` of the size that its row and column give an entry counts as
         rounding.
@@ -382,8 +382,8 @@ class LFT:
         return reduce(self, tolerance)
 
     def truncate(self, error: float | None = None, *, order: int | None = None) -> Truncation:
-        """Fewer copies at the price of an error, which is measured and, where possible, bounded;
-        see `Truncation`.
+        """Return an approximation with fewer copies, whose error is measured and, where possible,
+        bounded; see `Truncation`.
         """
         from symheli.lpv.lft.truncation import truncate
 
@@ -424,8 +424,8 @@ class LFT:
         return tustin(self, dt)
 
     def hold_error(self, dt: float, *, band: float = 0.25) -> HoldError:
-        """How far Tustin's rule is from the zero-order hold, for frozen p, up to `band` of the
-        Nyquist frequency.
+        """Return the difference of Tustin's rule from the zero-order hold, for frozen p, up to
+        `band` of the Nyquist frequency.
         """
         from symheli.lpv.lft.sampling import hold_error
 

@@ -1,4 +1,4 @@
-"""From polynomials in one or several parameters to an LFT, and back."""
+"""Conversion of polynomials in one or several parameters to an LFT, and back."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from symheli.values.arrays import Array
 from symheli.values.signal import signals
 
 ROUNDING = 16 * np.finfo(float).eps
-"""By how much of itself an entry of an LFT may be off: it was rounded when the LFT was made."""
+"""Relative rounding error of an entry of an LFT."""
 
 
 def from_lpv(lpv: LPVStateSpace) -> LFT:
@@ -156,8 +156,8 @@ def expanded(lft: LFT) -> dict[tuple[int, ...], Array] | None:
 
 
 def _rounding(lft: LFT, size: Array) -> Array:
-    """What M can change anywhere in the box, to first order, where every entry of M11 .. M22
-    changes by `ROUNDING` of itself.
+    """Return the largest change of M anywhere in the box, to first order, where every entry of M11
+    .. M22 changes by `ROUNDING` of itself.
 
     `size` bounds (I - M11 Delta)^-1 entry by entry.
     """
@@ -166,7 +166,7 @@ def _rounding(lft: LFT, size: Array) -> Array:
 
 
 def _rest(lft: LFT, size: Array, last: Array) -> Array:
-    """Bound of all that follows the k powers of L summed so far: |L^k| <= `last`, |(I - L)^-1| <=
+    """Return a bound of all powers of L after the k summed so far: |L^k| <= `last`, |(I - L)^-1| <=
     `size` (I - last)^-1.
     """
     if not np.any(last):

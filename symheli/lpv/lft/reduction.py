@@ -1,4 +1,4 @@
-"""Fewer copies of the parameters, the same model."""
+"""Reduction of the copies of the parameters without change of the model."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from symheli.lpv.lft.model import LFT, Block, parts
 from symheli.values.arrays import Array
 
 SAMPLES = 12
-"""Points of the box at which the size of what depends on the parameters is looked at."""
+"""Number of points of the box at which the parameter-dependent part is evaluated."""
 
 
 def reduce(lft: LFT, tolerance: float) -> LFT:
@@ -67,12 +67,12 @@ def _one_parameter(lft: LFT, tolerance: float) -> LFT:
         np.where(np.any(depends, axis=0), M12, 0.0),
         np.where(np.any(depends, axis=1)[:, None], M21, 0.0),
     )
-    return _as_much_reached_as_seen(
+    return _balanced(
         replace(lft, M11=M11, M12=M12, M21=M21, blocks=(Block(lft.blocks[0].scheduling, r),))
     )
 
 
-def _as_much_reached_as_seen(lft: LFT) -> LFT:
+def _balanced(lft: LFT) -> LFT:
     """Coordinates of the copies of one parameter in which its Hankel matrix is balanced, near the
     units the model came in.
 
@@ -98,7 +98,7 @@ def _as_much_reached_as_seen(lft: LFT) -> LFT:
 
 
 def _structured(lft: LFT, tolerance: float) -> LFT:
-    """Remove what no input reaches and what no output sees, block by block, all blocks together.
+    """Remove unreachable and unobservable parts, block by block, all blocks together.
 
     The subspaces of each parameter's copies that words in the M11 blocks reach (and, transposed,
     see) are the smallest realization for parameters that do not commute; parameters that do may
@@ -149,8 +149,8 @@ def _samples(lft: LFT) -> Array:
 
 
 def _without_rounding(lft: LFT, tolerance: float) -> LFT:
-    """Rows and columns of M in which no entry depends on the parameters by more than rounding are
-    cut off from them.
+    """Decouple rows and columns of M in which no entry depends on the parameters by more than
+    rounding.
     """
     change = np.abs(lft.matrix(_samples(lft)) - lft.M22).max(axis=0)
     depends = significant(change, lft.M22, tolerance)

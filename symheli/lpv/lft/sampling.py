@@ -1,4 +1,4 @@
-"""From continuous to discrete time without leaving the LFTs."""
+"""Discretization of an LFT as an LFT."""
 
 from __future__ import annotations
 

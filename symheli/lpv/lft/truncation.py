@@ -1,4 +1,4 @@
-"""Fewer copies of the parameters than the model needs, with the error that costs."""
+"""Approximation with fewer copies of the parameters, and its error."""
 
 from __future__ import annotations
 
@@ -32,7 +32,8 @@ class Truncation(NamedTuple):
 
 
 def truncate(lft: LFT, error: float | None, order: int | None) -> Truncation:
-    """Structured balanced truncation: copies that little reaches and little sees go first.
+    """Return the structured balanced truncation: copies with the smallest reachability and
+    observability are removed first.
 
     Block-diagonal Gramians X >= M11 X M11' + M12 M12' and Y >= M11' Y M11 + M21' M21 make the error
     at most twice the sum of the singular values cut off, for any Delta of norm one. Source: Beck,
@@ -110,7 +111,8 @@ def _balanced(lft: LFT, row: Array, column: Array) -> tuple[LFT, Array, bool]:
 
 
 def _gramians(M11: Array, B: Array, sizes: tuple[int, ...], factor: int) -> list[Array] | None:
-    """Fixed point of X_i = factor (sum_j M_ij X_j M_ij' + B_i B_i'), None where it diverges.
+    """Return the fixed point of X_i = factor (sum_j M_ij X_j M_ij' + B_i B_i'), None where it
+    diverges.
 
     A positive semidefinite matrix of m block rows is at most m times its block diagonal: with
     factor m the inequality holds.

@@ -65,7 +65,9 @@ def _perron(lft: LFT, middle: Array, half: Array) -> float:
 
 
 def _crossing(lft: LFT, delta: Array, sizes: tuple[int, ...]) -> Array:
-    """Where the determinant changes sign on the way from the middle of the box to delta."""
+    """Return the point at which the determinant changes sign on the way from the middle of the box
+    to delta.
+    """
     low, high = 0.0, 1.0
     for _ in range(60):
         t = 0.5 * (low + high)

@@ -232,7 +232,7 @@ def test_a_gamma_that_one_frequency_decides_is_said_to_be_that():
     design = arm(1e-3)
     (sentence,) = design.reasons
     assert design.optimum < 0.3 * 3.819833
-    assert "is decided at one frequency" in sentence
+    assert "is limited at a single frequency" in sentence
     assert "KS_torque" in sentence
 
 

@@ -226,8 +226,10 @@ def test_both_sides_move_where_that_is_asked_and_the_rate_is_neglected():
 
 
 def test_where_neglecting_the_rate_keeps_no_gamma_it_is_said_what_to_write(monkeypatch):
-    monkeypatch.setattr("synthesis.lpv.search.FURTHER", 0.5)
-    with pytest.raises(SynthesisError, match=r"not told its rate .* X=0, or .*plant\.lagged"):
+    monkeypatch.setattr("synthesis.lpv.search.MAX_RATE_LOSS", 0.5)
+    with pytest.raises(
+        SynthesisError, match=r"without a measurement of its rate .* X=0, or .*plant\.lagged"
+    ):
         output_feedback(spring(), 0.5, X=2, Y=2, back_off=BACK_OFF)
 
 
