@@ -134,20 +134,26 @@ def enclose(
     kinks = kinks if by or implicit else []
     symbols = _Symbols.of(function, domains, implicit, len(kinks))
     seeds = sum(domains[i].size for i in by)
-    inputs = symbols.inputs(by)
-    over = _Over(program, {k: symbols.own + i for i, k in enumerate(kinks)}, continuous)
+    inputs = symbols.inputs(by, implicit)
+    over = _Over(
+        program, {k: symbols.own + i for i, k in enumerate(kinks)}, continuous, seeds + implicit
+    )
     outputs = list(program.outputs)
+    values: list[Value] = [None] * len(program.operations)
     found: list[_Dual] = []
     if start is not None:
         guesses = _at_centres(start, symbols)
         inputs.append(found)
         for i, position in enumerate(outputs.pop()):
-            found.append(_solve(over, position, inputs, guesses[:, i], seeds))
-    flat = over.evaluate([a for output in outputs for a in output], inputs, seeds)
+            found.append(_solve(over, position, inputs, guesses[:, i], seeds, values))
+    flat = over.evaluate([a for output in outputs for a in output], inputs, values)
     like = inputs[0][0].value
     value = _stacked([d.value for d in flat], like)
     roots = _stacked([d.value for d in found], like)
-    slopes = _stacked([d.derivative(seeds) for d in flat], like, (seeds,)) if by else None
+    slopes = None
+    if by:
+        rows = [d.derivative(over.seeds)[:, :seeds] for d in flat]
+        slopes = _stacked(rows, like, (seeds,))
     return Enclosure(*symbols.finished(value, slopes, roots), symbols.own)
 
 
@@ -188,8 +194,10 @@ class _Symbols:
     def centres(self) -> list[Array]:
         return [np.broadcast_to(d.centre, (self.count, d.size)) for d in self.domains]
 
-    def inputs(self, by: Sequence[int]) -> list[list[_Dual]]:
-        """The inputs as forms, with derivatives by those at the positions `by`."""
+    def inputs(self, by: Sequence[int], implicit: int) -> list[list[_Dual]]:
+        """The inputs as forms, with derivatives by those at the positions `by` and, after them, by
+        the implicit variables.
+        """
         sizes = [self.domains[i].size for i in by]
         column = dict(zip(by, np.cumsum([0, *sizes])[:-1].tolist(), strict=True))
         out: list[list[_Dual]] = []
@@ -201,7 +209,9 @@ class _Symbols:
             row = []
             for i in range(domain.size):
                 value = Form(centre[:, i], slopes[:, i], np.zeros(self.count), self.groups)
-                seed = _seed(value, column[position] + i, sum(sizes)) if position in by else None
+                seed = None
+                if position in by:
+                    seed = _seed(value, column[position] + i, sum(sizes) + implicit)
                 row.append(_Dual(value, seed))
             out.append(row)
             place += width
@@ -364,22 +374,25 @@ KINKS = ("fabs", "min", "max", "select", "number")
 
 @dataclass(frozen=True)
 class _Over:
-    """A program evaluated over sets; `kinks`: the symbol of each operation that may have a kink."""
+    """A program evaluated over sets, with derivatives by `seeds` variables; `kinks`: the symbol of
+    each operation that may have a kink.
+    """
 
     program: Program
     kinks: Mapping[int, int]
     continuous: bool
+    seeds: int
 
     def evaluate(
-        self, positions: Sequence[int], inputs: Sequence[Sequence[_Dual]], seeds: int
+        self, positions: Sequence[int], inputs: Sequence[Sequence[_Dual]], values: list[Value]
     ) -> list[_Dual]:
-        """The numbers at these positions of the program."""
-        operations_ = self.program.operations
-        needed = self.needed(positions)
-        values: list[Value] = [None] * len(operations_)
+        """The numbers at these positions of the program; `values` holds those computed before, None
+        for the others, and is filled.
+        """
         with np.errstate(all="ignore"):
-            for k in needed:
-                values[k] = self._apply(k, values, inputs, seeds)
+            for k in self.needed(positions):
+                if values[k] is None:
+                    values[k] = self._apply(k, values, inputs)
             return [_dual(values[k], inputs[0][0].value) for k in positions]
 
     def needed(self, positions: Sequence[int]) -> list[int]:
@@ -397,9 +410,7 @@ class _Over:
         slopes[:, self.kinks[position]] = 1.0
         return Form(np.zeros(like.shape), slopes, np.zeros(like.shape), like.groups)
 
-    def _apply(
-        self, k: int, values: list[Value], inputs: Sequence[Sequence[_Dual]], seeds: int
-    ) -> Value:
+    def _apply(self, k: int, values: list[Value], inputs: Sequence[Sequence[_Dual]]) -> Value:
         o = self.program.operations[k]
         if o.name == "input":
             return inputs[o.element[0]][o.element[1]]
@@ -407,7 +418,7 @@ class _Over:
             return o.value
         a = [values[i] for i in o.arguments]
         like = inputs[0][0].value
-        kink = self._kink(k, like) if seeds else None
+        kink = self._kink(k, like) if self.seeds else None
         match o.name:
             case "lt" | "le" | "eq" | "ne":
                 return _compared(o.name, *(_dual(v, like).value for v in a))
@@ -420,7 +431,7 @@ class _Over:
                 false, true = (a[0] == 0) & (a[1] == 0), (a[0] == 1) | (a[1] == 1)
                 return np.where(true, 1, np.where(false, 0, -1))
             case "number":
-                return self._select(a[0], _dual(1.0, like), _dual(0.0, like), seeds, kink)
+                return self._select(a[0], _dual(1.0, like), _dual(0.0, like), kink)
             case "select":
                 yes, no = _dual(a[1], like), _dual(a[2], like)
                 match _extreme(self.program, o):
@@ -428,7 +439,7 @@ class _Over:
                         return -((-yes).maximum(-no, kink))
                     case "max":
                         return yes.maximum(no, kink)
-                return self._select(a[0], yes, no, seeds, kink)
+                return self._select(a[0], yes, no, kink)
             case "mul" if isinstance(a[0], float) and isinstance(a[1], _Dual):
                 return a[1].scaled(a[0])
             case "mul" if isinstance(a[1], float) and isinstance(a[0], _Dual):
@@ -463,9 +474,7 @@ class _Over:
                 return d[0].chain(d[0].value.elementary(o.name), outer)
         raise InputError(f"{self.program.name}: the operation {o.name} has no bounds")
 
-    def _select(
-        self, condition: Array, yes: _Dual, no: _Dual, seeds: int, kink: Form | None
-    ) -> _Dual:
+    def _select(self, condition: Array, yes: _Dual, no: _Dual, kink: Form | None) -> _Dual:
         """One of two numbers; both where the condition is open."""
         value = pick(condition == 0, no.value, hull(yes.value, no.value))
         value = pick(condition == 1, yes.value, value)
@@ -475,7 +484,7 @@ class _Over:
         if self.continuous or np.all(condition >= 0):
             return _Dual(value, slope)
         # the function may jump: no bound of its slope
-        return _Dual(value, _endless(slope or _zero(kink, seeds), condition < 0))
+        return _Dual(value, _endless(slope or _zero(kink, self.seeds), condition < 0))
 
 
 def _endless(slope: Form, where: Array) -> Form:
@@ -569,7 +578,12 @@ def _angle(y: _Dual, x: _Dual) -> _Dual:
 
 
 def _solve(
-    over: _Over, position: int, inputs: list[list[_Dual]], start: Array, seeds: int
+    over: _Over,
+    position: int,
+    inputs: list[list[_Dual]],
+    start: Array,
+    seeds: int,
+    values: list[Value],
 ) -> _Dual:
     """The zero of the equation at a position over each set, as a form, with its derivatives.
 
@@ -578,25 +592,30 @@ def _solve(
     and only one, for every z (Newton's operator).
     """
     like, known = inputs[0][0].value, len(inputs[-1])
-    read = (over.program.operations[k] for k in over.needed([position]))
-    if any(o.name == "input" and o.element > (len(inputs) - 1, known) for o in read):
-        raise InputError(
-            f"{over.program.name}: equation {known} of the balance holds a later implicit variable;"
-            " order the variables so that each equation brings one new variable"
-        )
+    element, own = (len(inputs) - 1, known), seeds + known
+    depends: set[int] = set()
+    for k in over.needed([position]):
+        o = over.program.operations[k]
+        if o.name == "input" and o.element > element:
+            raise InputError(
+                f"{over.program.name}: equation {known} of the balance holds a later implicit"
+                " variable; order the variables so that each equation brings one new variable"
+            )
+        if (o.name == "input" and o.element == element) or depends.intersection(o.arguments):
+            depends.add(k)
+    fixed = [a for k in depends for a in over.program.operations[k].arguments if a not in depends]
+    if fixed:
+        over.evaluate(fixed, inputs, values)
 
-    def residual(guess: Form) -> tuple[Form, Form]:
-        """Residual and its slope by the implicit variable."""
-        plain = [[_Dual(d.value) for d in row] for row in inputs]
-        plain[-1].append(_Dual(guess, _seed(guess, 0, 1)))
-        found = over.evaluate([position], plain, 1)[0]
-        return found.value, found.derivative(1)[:, 0]
+    def residual(guess: Form) -> _Dual:
+        """The residual with its derivatives, the implicit variable free."""
+        free = [*inputs[:-1], [*inputs[-1], _Dual(guess, _seed(guess, own, over.seeds))]]
+        return over.evaluate([position], free, list(values))[0]
 
     with np.errstate(all="ignore"):
         line = Form.constant(start, like)
         for _ in range(NEWTON_STEPS):
-            value, slope = residual(line)
-            before = line
+            value, slope, before = *_with_slope(residual(line), own, over.seeds), line
             rate = np.where(slope.centre == 0, np.nan, slope.centre)
             line = Form(
                 np.nan_to_num(line.centre - value.centre / rate),
@@ -609,7 +628,7 @@ def _solve(
             )
             if np.all(moved <= 1e-8 * (np.abs(line.centre) + np.abs(line.slopes).sum(-1))):
                 break
-        on_line, slope = residual(line)
+        on_line, slope = _with_slope(residual(line), own, over.seeds)
         radius = np.nan_to_num(
             FIRST_RADIUS * on_line.interval.magnitude / np.abs(slope.centre), posinf=1e300
         )
@@ -617,7 +636,7 @@ def _solve(
         proven = np.zeros(like.shape, bool)
         step = Interval(np.full(like.shape, -np.inf), np.full(like.shape, np.inf))
         for _ in range(TRIALS):
-            _, slope = residual(replace(line, rest=radius))
+            _, slope = _with_slope(residual(replace(line, rest=radius)), own, over.seeds)
             trial = -on_line.interval * slope.interval.inverse()
             inside = (trial.lower > -radius) & (trial.upper < radius) & ~proven
             step = Interval(
@@ -634,26 +653,24 @@ def _solve(
             step.reach(middle) + np.spacing(np.abs(line.centre) + np.abs(middle)),
             like.groups,
         ).settled()
-        if not seeds:
-            return _Dual(value)
-        # dx_root = -(dF/dinputs) / (dF/droot), by one more direction
-        wider = [[_Dual(d.value, _padded(d.slope)) for d in row] for row in inputs]
-        wider[-1].append(_Dual(value, _seed(value, seeds, seeds + 1)))
-        total = over.evaluate([position], wider, seeds + 1)[0].derivative(seeds + 1)
-        slope = total[:, -1]
-        return _Dual(value, _times(-slope.inverse(), total[:, :-1]))
+        # dx_root = -(dF/dinputs) / (dF/droot)
+        total = residual(value).derivative(over.seeds)
+        derivative = _times(-total[:, own].inverse(), total)
+        return _Dual(value, None if derivative is None else _without(derivative, seeds))
 
 
-def _padded(slope: Form | None) -> Form | None:
-    """Derivatives with one more direction, by which all are 0."""
-    if slope is None:
-        return None
+def _with_slope(found: _Dual, column: int, seeds: int) -> tuple[Form, Form]:
+    return found.value, found.derivative(seeds)[:, column]
+
+
+def _without(slope: Form, seeds: int) -> Form:
+    """Derivatives by the first variables only, those by the others set to 0."""
+    kept = np.arange(slope.shape[-1]) < seeds
     bound = slope.interval
-    last = [(0, 0), (0, 1)]
     return Form(
-        np.pad(slope.centre, last),
-        np.pad(slope.slopes, [*last, (0, 0)]),
-        np.pad(slope.rest, last),
+        np.where(kept, slope.centre, 0.0),
+        np.where(kept[:, None], slope.slopes, 0.0),
+        np.where(kept, slope.rest, 0.0),
         slope.groups,
-        Interval(np.pad(bound.lower, last), np.pad(bound.upper, last)),
+        Interval(np.where(kept, bound.lower, 0.0), np.where(kept, bound.upper, 0.0)),
     )

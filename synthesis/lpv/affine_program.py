@@ -192,7 +192,8 @@ def from_lower(rows: Sequence[Sequence[Array | None]]) -> Array:
     at = [slice(a, b) for a, b in pairwise(ends)]
     there = [(i, j, M) for i, row in enumerate(rows) for j, M in enumerate(row) if M is not None]
     leading = np.broadcast_shapes(*(M.shape[:-2] for _, _, M in there))
-    out = np.zeros((*leading, ends[-1], ends[-1]))
+    dtype = np.result_type(*(M.dtype for _, _, M in there))
+    out = np.zeros((*leading, ends[-1], ends[-1]), dtype=dtype)
     for i, j, M in there:
         out[..., at[i], at[j]] = M
         if i != j:

@@ -34,44 +34,81 @@ BALANCED = (0, 1, 2, 3, 4, 5, 8, 9)
 class Reference:
     """States and controls x_r, u_r of the commanded airspeed p, its acceleration a and jerk j.
 
-    Heading and height are constant. With these, f(x_r, u_r) = dx_r/dt at the nodes, but for the
-    motion of j; what is left between them is bounded where a tube is proven.
+    Heading and height are constant. With these, f(x_r, u_r) = dx_r/dt at the nodes while the jerk
+    is constant; what is left elsewhere is bounded where a tube is proven. On each piece a cubic in p
+    through values and slopes at its ends, so that pieces join exactly.
 
     Attributes
     ----------
     airspeeds : array (m + 1,)
-        Breaks in p, m/s.
+        Ends of the pieces in p, m/s.
     acceleration, jerk : float
         Largest |a| (m/s^2) and |j| (m/s^3).
-    coefficients : array (m, n + 4, 4, 5, 3)
-        Of tau^k (a/acceleration)^l (j/jerk)^i on each piece, tau in [-1, 1]; states, then controls.
+    values, slopes : array (m + 1, n + 4, 5, 3)
+        Factors of (a/acceleration)^l (j/jerk)^i of states and controls at the airspeeds, and their
+        derivatives by p.
     """
 
     airspeeds: Array
     acceleration: float
     jerk: float
-    coefficients: Array
+    values: Array
+    slopes: Array
 
     @cached_property
     def half_widths(self) -> Array:
         """Half the length of each piece, m/s."""
         return 0.5 * np.diff(self.airspeeds)
 
+    @cached_property
+    def nodal(self) -> Array:
+        """(m, 4, n + 4, 5, 3): values and slopes at the lower, then at the upper end of a piece."""
+        v, s = self.values, self.slopes
+        return np.stack([v[:-1], s[:-1], v[1:], s[1:]], axis=1)
+
+    def polynomial(self, tau: Any, a: Any, j: Any, nodal: Any, half: Any) -> Any:
+        """x_r and u_r as CasADi expressions: tau in [-1, 1] on a piece of half length `half`, a and
+        j over their limits, `nodal` the numbers of that piece in C order.
+        """
+        t = 0.5 * (1 + tau)
+        rows, powers = self.values.shape[1], self.values.shape[2:]
+
+        def cubic(place: int) -> Any:
+            """Hermite's cubic as a line and what bends it: exact at both ends."""
+            v0, s0, v1, s1 = (nodal[k * rows * powers[0] * powers[1] + place] for k in range(4))
+            rise = v1 - v0
+            bend = (2 * half * s0 - rise) * (1 - t) - (2 * half * s1 - rise) * t
+            return v0 + t * rise + t * (1 - t) * bend
+
+        out = []
+        for x in range(rows):
+            total = 0
+            for l in reversed(range(powers[0])):
+                inner = 0
+                for i in reversed(range(powers[1])):
+                    inner = inner * j + cubic((x * powers[0] + l) * powers[1] + i)
+                total = total * a + inner
+            out.append(total)
+        return casadi.vertcat(*out)
+
     def at(self, airspeed: float, acceleration: float = 0.0, jerk: float = 0.0) -> Array:
         """x_r and u_r, one vector (n + 4,)."""
-        i = int(np.clip(np.searchsorted(self.airspeeds, airspeed) - 1, 0, len(self.half_widths) - 1))
-        tau = (airspeed - self.airspeeds[i]) / self.half_widths[i] - 1
-        powers = (
-            tau ** np.arange(4),
-            (acceleration / self.acceleration) ** np.arange(NODES),
-            (jerk / self.jerk) ** np.arange(3),
-        )
-        return np.einsum("xkli,k,l,i->x", self.coefficients[i], *powers)
+        last = len(self.half_widths) - 1
+        i = int(np.clip(np.searchsorted(self.airspeeds, airspeed) - 1, 0, last))
+        half = self.half_widths[i]
+        tau = (airspeed - self.airspeeds[i]) / half - 1
+        return np.asarray(
+            self.polynomial(
+                tau,
+                acceleration / self.acceleration,
+                jerk / self.jerk,
+                casadi.DM(self.nodal[i].ravel()),
+                half,
+            )
+        ).ravel()
 
 
-def reference(
-    heli: Helicopter, airspeeds: Any, acceleration: float, jerk: float
-) -> Reference:
+def reference(heli: Helicopter, airspeeds: Any, acceleration: float, jerk: float) -> Reference:
     """The reference of a helicopter whose governor is "ideal", for airspeeds between the first and
     the last of `airspeeds` (m/s, rising), accelerations up to `acceleration` (m/s^2) and jerk up to
     `jerk` (m/s^3).
@@ -108,11 +145,12 @@ def reference(
     for _ in range(SWEEPS):
         free = _newton(balance, free, np.column_stack([p, rates, target]))
         points = _states(p, free, rates).reshape(*shape, 14)
-        coefficients = _coefficients(points, airspeeds, a, j)
-        moving = _derivatives(coefficients, airspeeds, a, j, acceleration, jerk)
+        values = _coefficients(points, a, j)
+        slopes = CubicSpline(airspeeds, values)(airspeeds, 1)
+        moving = _derivatives(values, slopes, a, j, acceleration, jerk)
         rates = moving[..., [6, 7]].reshape(-1, 2)
         target = moving[..., list(BALANCED)].reshape(-1, 8)
-    return Reference(airspeeds, float(acceleration), float(jerk), coefficients)
+    return Reference(airspeeds, float(acceleration), float(jerk), values, slopes)
 
 
 def _states(p: Any, free: Any, rates: Any) -> Any:
@@ -169,32 +207,18 @@ def _newton(balance: casadi.Function, free: Array, given: Array) -> Array:
     )
 
 
-def _coefficients(points: Array, airspeeds: Array, a: Array, j: Array) -> Array:
-    """(m, 14, 4, 5, 3) of values (m + 1, 5, 3, 14) at the nodes."""
+def _coefficients(points: Array, a: Array, j: Array) -> Array:
+    """(m + 1, 14, 5, 3) of values (m + 1, 5, 3, 14) at the nodes."""
     in_a, in_j = (np.linalg.inv(np.vander(nodes, increasing=True)) for nodes in (a, j))
-    spline = CubicSpline(airspeeds, np.einsum("la,ij,majx->mxli", in_a, in_j, points))
-    local = spline.c[::-1]  # powers of p - p_m, (4, m, 14, 5, 3)
-    half = 0.5 * np.diff(airspeeds)
-    # p - p_m = half (1 + tau)
-    shift = np.array([[1, 1, 1, 1], [0, 1, 2, 3], [0, 0, 1, 3], [0, 0, 0, 1]], float)
-    scale = half[:, None] ** np.arange(4)
-    return np.einsum("tk,mk,kmxli->mxtli", shift, scale, local)
+    return np.einsum("la,ij,majx->mxli", in_a, in_j, points)
 
 
 def _derivatives(
-    coefficients: Array, airspeeds: Array, a: Array, j: Array, acceleration: float, jerk: float
+    values: Array, slopes: Array, a: Array, j: Array, acceleration: float, jerk: float
 ) -> Array:
-    """dx_r/dt (m + 1, 5, 3, 14) at the nodes where j is constant."""
-    half = 0.5 * np.diff(airspeeds)
-    powers = (lambda t, k: t ** np.arange(k), lambda t, k: np.r_[0, np.arange(1, k) * t ** np.arange(k - 1)])
-    out = np.zeros((len(airspeeds), len(a), len(j), coefficients.shape[1]))
-    for m in range(len(airspeeds)):
-        piece, tau = (m, -1.0) if m < len(half) else (m - 1, 1.0)
-        values, slopes = powers[0](tau, 4), powers[1](tau, 4)
-        for l, t in enumerate(a):
-            for i, s in enumerate(j):
-                c = coefficients[piece]
-                by_p = np.einsum("xkli,k,l,i->x", c, slopes, powers[0](t, 5), powers[0](s, 3))
-                by_a = np.einsum("xkli,k,l,i->x", c, values, powers[1](t, 5), powers[0](s, 3))
-                out[m, l, i] = by_p / half[piece] * t * acceleration + by_a / acceleration * s * jerk
-    return out
+    """dx_r/dt (m + 1, 5, 3, 14) at the nodes while j is constant."""
+    powers_a, powers_j = (np.vander(t, k, increasing=True) for t, k in ((a, NODES), (j, 3)))
+    rising_a = np.hstack([np.zeros((NODES, 1)), powers_a[:, :-1] * np.arange(1, NODES)])
+    by_p = np.einsum("mxli,al,ji->majx", slopes, powers_a, powers_j)
+    by_a = np.einsum("mxli,al,ji->majx", values, rising_a, powers_j) / acceleration
+    return by_p * (a * acceleration)[:, None, None] + by_a * (j * jerk)[:, None]
