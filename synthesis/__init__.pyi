@@ -86,3 +86,9 @@ from synthesis.worst.lower_bound import Search as Search
 from synthesis.worst.lower_bound import lower_bound as lower_bound
 
 __version__: str
+from synthesis.tubes.tube import (
+    Tube as Tube,
+)
+from synthesis.tubes.tube import (
+    tube as tube,
+)

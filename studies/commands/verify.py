@@ -16,7 +16,7 @@ HELP = "prove saved certificates again, exactly, from their files alone"
 ARGUMENTS = (
     positional(
         "files",
-        "written by Certificate.save, symheli certify --save or a study (DIR/proofs)",
+        "written by Certificate.save, Tube.save, symheli certify --save or a study (DIR/proofs)",
         nargs="+",
         metavar="file",
     ),
@@ -25,12 +25,12 @@ ARGUMENTS = (
 
 def run(arguments: argparse.Namespace) -> Output:
     """Load, verify in rational arithmetic; exit status 1 where a proof fails."""
-    if len(arguments.files) == 1:
+    if len(arguments.files) == 1 and not _holds_a_tube(arguments.files[0]):
         cert, verdict, data = _verified(arguments.files[0])
         return Output(f"{cert.details}\n{verdict}", data, status=0 if data["exact"] else 1)
     lines, proofs = [], []
     for file in arguments.files:
-        _, verdict, data = _verified(file)
+        _, verdict, data = _tube(file) if _holds_a_tube(file) else _verified(file)
         lines.append(f"{file}: {verdict}")
         proofs.append(data)
     exact = all(proof["exact"] for proof in proofs)
@@ -68,6 +68,37 @@ def _verified(file: str) -> tuple[Certificate, str, dict[str, Any]]:
             "status": cert.status.name,
             "exact": exact,
             "hypotheses": cert.hypotheses,
+        },
+    )
+
+
+def _holds_a_tube(file: str) -> bool:
+    """Whether a file begins like one written by Tube.save."""
+    try:
+        with open(file, encoding="utf-8") as text:
+            return '"schema": "symheli tube"' in text.read(200)
+    except (OSError, ValueError):
+        return False
+
+
+def _tube(file: str) -> tuple[None, str, dict[str, Any]]:
+    """The verdict on the tube in a file, in words and for a program."""
+    from synthesis.tubes import Tube
+
+    progress(f"enclosing the equations of {file} and verifying in rational arithmetic")
+    found = Tube.load(file)
+    verdict = f"proven in exact arithmetic: {found}" if found.proven else f"not proven: {found.why}"
+    return (
+        None,
+        verdict,
+        {
+            "file": file,
+            "kind": "invariant tube",
+            "airspeed": found.airspeed,
+            "gust": found.deviations.gust,
+            "half_widths": found.half_widths.tolist(),
+            "exact": found.proven,
+            "hypotheses": found.hypotheses,
         },
     )
 

@@ -1,9 +1,9 @@
-"""The matrix inequality of an invariant tube, in any arithmetic.
+"""The matrix inequality of an invariant ellipsoid, in any arithmetic.
 
-Deviations e follow de/dt = A e + E w + D s + d, where F = [A E D d] lies in a set: a centre,
-matrices times the symbols of the tube (|z| <= 1) and of the gust (|y| <= 1), and terms left right'
-with a number in [-1, 1] each. If multipliers make `block` positive definite for P and dP/dt, then
-V = e'P e falls wherever V = 1, |w| <= 1 and |s| <= 1 (S-procedure; Petersen's lemma).
+Deviations e follow de/dt = A e + E w + d, where F = [A E d] lies in a set: a centre, matrices times
+the symbols of the ellipsoid (|z| <= 1) and of the gust (|y| <= 1), and terms left right' times a
+number in [-1, 1] each. If multipliers make `block` positive definite, V = e'P e falls wherever V =
+1 and |w| <= 1 (S-procedure; Petersen's lemma).
 """
 
 from __future__ import annotations
@@ -18,14 +18,15 @@ Array = np.ndarray
 
 ROUNDED_UP = 1 + 1e-12
 """Factor on bounds of the remainder that are computed in floating point, of some 20 roundings."""
+ROUNDED = 1e-14
+"""Bound of the rounding of sums of some 20 products, relative to the sum of their sizes."""
 
 
 class Coefficients(NamedTuple):
-    """The set of F (n, q) on a piece of the tube; q = n deviations, 3 gust components, 1 motion of
-    the command (its highest derivative over its limit) and 1 constant.
+    """The set of F (n, q); q = n deviations, 3 gust components and 1 constant.
 
     centre (n, q); tube (n, n, q) and gust (3, n, q), the factors of the symbols; left (k, n) and
-    weights (k, q, q): for each other term, x'F v <= (x'left) sqrt(v' weights v).
+    weights (k, q, q): for each other term, x'F v <= |x'left| sqrt(v' weights v).
     """
 
     centre: Array
@@ -73,49 +74,47 @@ def rank_one(matrices: Array, units: Array) -> tuple[Array, Array, Array]:
         row = U[:, 0] * np.sqrt(s[0]) * units[:n]
         column = V[0] * np.sqrt(s[0]) / units
         left.append(row)
-        weights.append(column[:, None] * column)
-        own = np.abs(row[:, None] * column)
-        rest += (np.abs(matrix - row[:, None] * column) + 1e-15 * own) * ROUNDED_UP
+        # not less than the exact product, in the order of matrices, by Gershgorin's theorem
+        weights.append(column[:, None] * column + (ROUNDED_UP - 1) * np.diag(column**2))
+        product = row[:, None] * column
+        rest += (np.abs(matrix - product) + ROUNDED * np.abs(product)) * ROUNDED_UP
     return np.reshape(left, (-1, n)), np.reshape(weights, (-1, q, q)), rest
 
 
 class Multipliers(NamedTuple):
-    """tube S and gust T (n, n), terms (k, k) diagonal, decay alpha (a number), wind mu and motion
-    nu (1, 1): numbers, rationals or variables of an `AffineProgram`.
+    """tube S and gust T (n, n), terms (k, k) diagonal, wind mu (1, 1), decay alpha (a number):
+    numbers, rationals or variables of an `AffineProgram`.
     """
 
     tube: Any
     gust: Any
     terms: Any
-    decay: Any
     wind: Any
-    motion: Any
+    decay: Any
 
 
-def block(P: Any, moving: Any, over: Coefficients, by: Multipliers, one: Any = 1.0) -> Any:
+def block(P: Any, over: Coefficients, by: Multipliers, one: Any = 1.0) -> Any:
     """The symmetric matrix that must be positive definite.
 
         -M
-        P'   S         M = [P A + A'P + alpha P + dP/dt, P E, P D, P d; -mu I, -nu, mu + nu - alpha]
-        P'       T         + sum H'S H + sum H'T H + sum of terms times weights
+        P'   S         M = [P A + A'P + alpha P, P E, P d; ., -mu I, 0; ., ., mu - alpha]
+        P'       T         + sum of H'S H and H'T H over the symbols + sum of r times weights
         l'P          r
 
-    P (n, n) and `moving` = dP/dt; `one` is the number 1 of the arithmetic.
+    `one` is the number 1 of the arithmetic.
     """
     n, q = over.centre.shape
     tall = _in_corner(P, (q, n))
     product = tall @ over.centre
-    gust, motion, constant = (np.zeros((q, q), dtype=over.centre.dtype) for _ in range(3))
+    gust, constant = (np.zeros((q, q), dtype=over.centre.dtype) for _ in range(2))
     for i in range(n, n + 3):
         gust[i, i] = -one
-    motion[n + 3, n + 3] = -one
-    gust[-1, -1] = motion[-1, -1] = constant[-1, -1] = one
-    M = product + np.swapaxes(product, -1, -2) + by.wind * gust + by.motion * motion
-    M = M + by.decay * (_in_corner(P, (q, q)) + _known(-constant, P)) + _in_corner(moving, (q, q))
+    gust[-1, -1], constant[-1, -1] = one, -one
+    M = product + np.swapaxes(product, -1, -2) + by.wind * gust
+    M = M + by.decay * (_in_corner(P, (q, q)) + _known(constant, P))
     for symbols, multiplier in ((over.tube, by.tube), (over.gust, by.gust)):
         for H in symbols:
-            if np.any(H != 0):
-                M = M + H.T @ multiplier @ H
+            M = M + H.T @ multiplier @ H
     for k, weight in enumerate(over.weights):
         M = M + by.terms[..., k : k + 1, k : k + 1] * weight
     tall_left = np.swapaxes(tall @ over.left.T, -1, -2)
