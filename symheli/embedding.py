@@ -169,7 +169,10 @@ def embed(
     """
     x_names, u_names = signals(states), signals(inputs)
     names = (*x_names, *u_names)
-    ranges = np.array([*states.values(), *inputs.values()], float).reshape(-1, 2)
+    pairs = [*states.values(), *inputs.values()]
+    if any(np.shape(pair) != (2,) for pair in pairs):
+        raise InputError("states and inputs: expected {name: (low, high)}, two numbers a name")
+    ranges = np.array(pairs, float).reshape(-1, 2)
     if np.any(ranges[:, 0] >= ranges[:, 1]) or not np.all(np.isfinite(ranges)):
         raise InputError("states and inputs: expected {name: (low, high)} with low < high, finite")
     whole = _whole(f, len(x_names), len(u_names))

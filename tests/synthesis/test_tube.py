@@ -2,18 +2,15 @@
 
 import json
 
-import casadi
 import numpy as np
 import pytest
 
+from evidence.tubes import flown, worst
 from studies.cli import main
 from symheli import Helicopter
 from symheli.errors import InputError
 from synthesis import Tube, tube
 from synthesis.tubes.inequality import elementwise, rank_one
-
-STEP = 0.005
-"""s; the fastest pole of the loops is near -40 1/s."""
 
 
 @pytest.fixture(scope="module", params=[("xcell60", 0.0, 0.5), ("xcell_kahn_hudson", 8.0, 0.25)])
@@ -22,29 +19,6 @@ def proven(request):
     found = tube(Helicopter.load(name, governor="ideal"), airspeed, gust=gust)
     assert found.proven, found.why
     return found
-
-
-def flown(found, e, gust, steps):
-    """Largest e'P e of nonlinear flights from deviations e (N, n) in gusts gust(k) (N, 3)."""
-    loop, count = found.deviations, len(e)
-    x, u, w = casadi.SX.sym("x", 10), casadi.SX.sym("u", 4), casadi.SX.sym("w", 3)
-    made = loop.heli.dynamics.function("rhs", list(np.array(loop.heli.parameters)))
-    rhs = casadi.Function("rhs", [x, u, w], made.call([x, u, w])).map(count)
-
-    def rate(e, w):
-        x, u = loop.x + e, loop.u + e @ loop.gain.T
-        return np.asarray(rhs(x.T, u.T, w.T)).T
-
-    most = 0.0
-    for k in range(steps):
-        w = gust(k)
-        a = rate(e, w)
-        b = rate(e + STEP / 2 * a, w)
-        c = rate(e + STEP / 2 * b, w)
-        d = rate(e + STEP * c, w)
-        e = e + STEP / 6 * (a + 2 * b + 2 * c + d)
-        most = max(most, np.einsum("ki,ij,kj->k", e, found.P, e).max())
-    return most
 
 
 def test_no_nonlinear_flight_leaves_the_tube(proven):
@@ -67,12 +41,9 @@ def test_no_nonlinear_flight_leaves_the_tube(proven):
     assert most < 1 + 1e-6  # that of the integration
 
 
-def test_a_gust_along_the_worst_direction_fills_a_good_part_of_the_tube(proven):
-    # the tube is not huge: the constant gust that moves most reaches a tenth of V = 1
-    rng = np.random.default_rng(1)
-    w = rng.standard_normal((200, 3))
-    w *= proven.deviations.gust / np.linalg.norm(w, axis=1, keepdims=True)
-    assert flown(proven, np.zeros((200, 10)), lambda _: w, 800) > 0.1
+def test_the_worst_gust_found_fills_a_good_part_of_the_tube(proven):
+    # .4 of its size at least: the tube is not much larger than it must be
+    assert 0.4 < worst(proven) < 1
 
 
 def test_a_saved_tube_is_proven_again_from_its_file(proven, tmp_path, capsys):
