@@ -5,6 +5,6 @@ Every bound is first order in the symbols of the domain, rounding errors include
 
 from symheli.enclosure.domain import Domain
 from symheli.enclosure.enclosure import Enclosure, enclose
-from symheli.enclosure.form import Form
+from symheli.enclosure.form import AffineForm
 
-__all__ = ["Domain", "Enclosure", "Form", "enclose"]
+__all__ = ["AffineForm", "Domain", "Enclosure", "enclose"]

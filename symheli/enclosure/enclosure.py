@@ -12,7 +12,7 @@ import numpy as np
 from symheli.codegen.program import Operation, Program
 from symheli.codegen.translation import operations
 from symheli.enclosure.domain import Domain
-from symheli.enclosure.form import Form, hull, pick
+from symheli.enclosure.form import AffineForm, hull, pick
 from symheli.enclosure.interval import Interval
 from symheli.errors import InputError
 
@@ -31,12 +31,12 @@ FIRST_RADIUS = 1.5
 class Enclosure:
     """Guaranteed bounds of a function over N sets, or over one (without the axis N).
 
-    value : Form (N, n_out)
+    value : AffineForm (N, n_out)
         The outputs, stacked in their order.
-    jacobian : Form (N, n_out, n_in), or None
+    jacobian : AffineForm (N, n_out, n_in), or None
         Derivatives by the inputs asked for, stacked; where the function has a kink, the hull of its
         slopes.
-    roots : Form (N, n_roots)
+    roots : AffineForm (N, n_roots)
         The implicit variables: each is unique within its interval, for every point of the set.
     symbols : int
         Number of symbols of the domains. Those after them, each within [-1, 1] by itself, say where
@@ -45,9 +45,9 @@ class Enclosure:
     Where a set is too large, or a function not defined on all of it, bounds are infinite.
     """
 
-    value: Form
-    jacobian: Form | None
-    roots: Form
+    value: AffineForm
+    jacobian: AffineForm | None
+    roots: AffineForm
     symbols: int
 
     @property
@@ -58,7 +58,7 @@ class Enclosure:
         checks = [np.isfinite(f.rest).reshape(*leading, -1).all(axis=-1) for f in forms]
         return np.logical_and.reduce(checks)
 
-    def segment_average(self) -> Form:
+    def segment_average(self) -> AffineForm:
         """Averages of the Jacobian over segments from the centre of the set to its points.
 
         For every z: f(x(z)) - f(x(0)) = J [x(z) - x(0)] with J in this form, by the mean value
@@ -69,7 +69,7 @@ class Enclosure:
             raise InputError("enclose(..., by=[0, ...]) is needed for averages of the Jacobian")
         j, kinks = self.jacobian, self.jacobian.slopes.shape[-1] - self.symbols
         halves = np.repeat([0.5, 1.0], [self.symbols, kinks])
-        return Form(j.centre, halves * j.slopes, j.rest, j.groups)
+        return AffineForm(j.centre, halves * j.slopes, j.rest, j.groups)
 
 
 def enclose(
@@ -208,7 +208,7 @@ class _Symbols:
             slopes[..., place : place + width] = domain.generators
             row = []
             for i in range(domain.size):
-                value = Form(centre[:, i], slopes[:, i], np.zeros(self.count), self.groups)
+                value = AffineForm(centre[:, i], slopes[:, i], np.zeros(self.count), self.groups)
                 seed = None
                 if position in by:
                     seed = _seed(value, column[position] + i, sum(sizes) + implicit)
@@ -218,26 +218,26 @@ class _Symbols:
         return out
 
     def finished(
-        self, value: Form, slopes: Form | None, roots: Form
-    ) -> tuple[Form, Form | None, Form]:
+        self, value: AffineForm, slopes: AffineForm | None, roots: AffineForm
+    ) -> tuple[AffineForm, AffineForm | None, AffineForm]:
         """The results without symbols of kinks that lie in no set, of one set without the axis."""
         used = [] if slopes is None else np.any(slopes.slopes != 0, axis=(0, 1, 2))[self.own :]
         kept = [*range(self.own), *(self.own + np.flatnonzero(used)).tolist()]
         groups = self.groups[: len(self.groups) - len(used)] + (1,) * (len(kept) - self.own)
 
-        def trimmed(form: Form) -> Form:
-            form = Form(form.centre, form.slopes[..., kept], form.rest, groups, form.interval)
+        def trimmed(form: AffineForm) -> AffineForm:
+            form = AffineForm(form.centre, form.slopes[..., kept], form.rest, groups, form.interval)
             return form if self.many else form[0]
 
         return trimmed(value), None if slopes is None else trimmed(slopes), trimmed(roots)
 
 
-def _seed(value: Form, column: int, seeds: int) -> Form:
+def _seed(value: AffineForm, column: int, seeds: int) -> AffineForm:
     """The derivative of an input by all inputs."""
     centre = np.zeros((len(value.centre), seeds))
     centre[:, column] = 1.0
     slopes = np.zeros((*centre.shape, value.slopes.shape[-1]))
-    return Form(centre, slopes, np.zeros(centre.shape), value.groups)
+    return AffineForm(centre, slopes, np.zeros(centre.shape), value.groups)
 
 
 def _at_centres(start: casadi.Function, symbols: _Symbols) -> Array:
@@ -246,14 +246,16 @@ def _at_centres(start: casadi.Function, symbols: _Symbols) -> Array:
     return np.asarray(start.map(symbols.count)(*columns)).T
 
 
-def _stacked(forms: Sequence[Form], like: Form, tail: tuple[int, ...] = ()) -> Form:
+def _stacked(
+    forms: Sequence[AffineForm], like: AffineForm, tail: tuple[int, ...] = ()
+) -> AffineForm:
     """Forms of one shape side by side on a new second axis."""
     m, count = like.slopes.shape[-1], len(like.centre)
     if not forms:
         empty = np.zeros((count, 0, *tail))
-        return Form(empty, np.zeros((*empty.shape, m)), empty, like.groups)
+        return AffineForm(empty, np.zeros((*empty.shape, m)), empty, like.groups)
     bounds = [f.interval for f in forms]
-    return Form(
+    return AffineForm(
         np.stack([f.centre for f in forms], axis=1),
         np.stack([f.slopes for f in forms], axis=1),
         np.stack([f.rest for f in forms], axis=1),
@@ -271,13 +273,13 @@ def _stacked(forms: Sequence[Form], like: Form, tail: tuple[int, ...] = ()) -> F
 class _Dual:
     """A number (N,) with its derivatives by the inputs (N, seeds); None: all are 0."""
 
-    value: Form
-    slope: Form | None = None
+    value: AffineForm
+    slope: AffineForm | None = None
 
-    def derivative(self, seeds: int) -> Form:
+    def derivative(self, seeds: int) -> AffineForm:
         return _zero(self.value, seeds) if self.slope is None else self.slope
 
-    def chain(self, value: Form, outer: Form | None) -> _Dual:
+    def chain(self, value: AffineForm, outer: AffineForm | None) -> _Dual:
         """A function of this number with the derivative `outer`."""
         return _Dual(value, None if outer is None else _times(outer, self.slope))
 
@@ -302,24 +304,28 @@ class _Dual:
         value = self.value.inverse()
         return self.chain(value, None if self.slope is None else -value.square())
 
-    def absolute(self, kink: Form | None) -> _Dual:
+    def absolute(self, kink: AffineForm | None) -> _Dual:
         """`kink`: the symbol in [-1, 1] of the slope where the sign is open."""
         x = self.value.interval
         if self.slope is None or kink is None:
             return _Dual(self.value.absolute())
-        one = Form.constant(1.0, self.value)
+        one = AffineForm.constant(1.0, self.value)
         sign = pick(x.lower >= 0, one, pick(x.upper <= 0, -one, kink))
         return self.chain(self.value.absolute(), sign)
 
-    def maximum(self, other: _Dual, kink: Form | None) -> _Dual:
+    def maximum(self, other: _Dual, kink: AffineForm | None) -> _Dual:
         a, b = self.value.interval, other.value.interval
         slope = _either(a.lower >= b.upper, b.lower >= a.upper, self.slope, other.slope, kink)
         return _Dual(self.value.maximum(other.value), slope)
 
 
 def _either(
-    first: Array, second: Array, left: Form | None, right: Form | None, kink: Form | None
-) -> Form | None:
+    first: Array,
+    second: Array,
+    left: AffineForm | None,
+    right: AffineForm | None,
+    kink: AffineForm | None,
+) -> AffineForm | None:
     """`left` where `first` holds, `right` where `second` does, else a mean of both: its weights are
     given by the symbol of the kink, the same ones for all derivatives.
     """
@@ -334,28 +340,32 @@ def _either(
     return pick(first[:, None], left, pick(second[:, None], right, both))
 
 
-def _zero(value: Form, seeds: int) -> Form:
+def _zero(value: AffineForm, seeds: int) -> AffineForm:
     centre = np.zeros((len(value.centre), seeds))
-    return Form(centre, np.zeros((*centre.shape, value.slopes.shape[-1])), centre, value.groups)
+    return AffineForm(
+        centre, np.zeros((*centre.shape, value.slopes.shape[-1])), centre, value.groups
+    )
 
 
-def _zero_like(form: Form) -> Form:
-    return Form(
+def _zero_like(form: AffineForm) -> AffineForm:
+    return AffineForm(
         np.zeros(form.shape), np.zeros(form.slopes.shape), np.zeros(form.shape), form.groups
     )
 
 
-def _between(like: Form, lower: float, upper: float) -> Form:
-    return Form.between(Interval(np.full(like.shape, lower), np.full(like.shape, upper)), like)
+def _between(like: AffineForm, lower: float, upper: float) -> AffineForm:
+    return AffineForm.between(
+        Interval(np.full(like.shape, lower), np.full(like.shape, upper)), like
+    )
 
 
-def _sum(a: Form | None, b: Form | None) -> Form | None:
+def _sum(a: AffineForm | None, b: AffineForm | None) -> AffineForm | None:
     if a is None or b is None:
         return b if a is None else a
     return a + b
 
 
-def _times(value: Form, slope: Form | None) -> Form | None:
+def _times(value: AffineForm, slope: AffineForm | None) -> AffineForm | None:
     """A number (N,) times derivatives (N, seeds)."""
     return None if slope is None else value.broadcast(slope.shape) * slope
 
@@ -403,12 +413,12 @@ class _Over:
                 used.update(self.program.operations[k].arguments)
         return sorted(used)
 
-    def _kink(self, position: int, like: Form) -> Form | None:
+    def _kink(self, position: int, like: AffineForm) -> AffineForm | None:
         if position not in self.kinks:
             return None
         slopes = np.zeros(like.slopes.shape)
         slopes[:, self.kinks[position]] = 1.0
-        return Form(np.zeros(like.shape), slopes, np.zeros(like.shape), like.groups)
+        return AffineForm(np.zeros(like.shape), slopes, np.zeros(like.shape), like.groups)
 
     def _apply(self, k: int, values: list[Value], inputs: Sequence[Sequence[_Dual]]) -> Value:
         o = self.program.operations[k]
@@ -474,7 +484,7 @@ class _Over:
                 return d[0].chain(d[0].value.elementary(o.name), outer)
         raise InputError(f"{self.program.name}: the operation {o.name} has no bounds")
 
-    def _select(self, condition: Array, yes: _Dual, no: _Dual, kink: Form | None) -> _Dual:
+    def _select(self, condition: Array, yes: _Dual, no: _Dual, kink: AffineForm | None) -> _Dual:
         """One of two numbers; both where the condition is open."""
         value = pick(condition == 0, no.value, hull(yes.value, no.value))
         value = pick(condition == 1, yes.value, value)
@@ -487,17 +497,17 @@ class _Over:
         return _Dual(value, _endless(slope or _zero(kink, self.seeds), condition < 0))
 
 
-def _endless(slope: Form, where: Array) -> Form:
+def _endless(slope: AffineForm, where: Array) -> AffineForm:
     """Derivatives that are not bounded in some sets."""
-    none = Form(slope.centre, slope.slopes, np.full(slope.shape, np.inf), slope.groups)
+    none = AffineForm(slope.centre, slope.slopes, np.full(slope.shape, np.inf), slope.groups)
     return pick(where[:, None], none, slope)
 
 
-def _dual(value: Value, like: Form) -> _Dual:
-    return value if isinstance(value, _Dual) else _Dual(Form.constant(value, like))
+def _dual(value: Value, like: AffineForm) -> _Dual:
+    return value if isinstance(value, _Dual) else _Dual(AffineForm.constant(value, like))
 
 
-def _compared(name: str, a: Form, b: Form) -> Array:
+def _compared(name: str, a: AffineForm, b: AffineForm) -> Array:
     x = (a - b).interval
     y, z = a.interval, b.interval
     if name in ("eq", "ne"):
@@ -533,7 +543,7 @@ def _square_root(program: Program, o: Operation, values: list[Value], argument: 
     inverse = value.inverse()
     if terms is None:
         return argument.chain(value, inverse.scaled(0.5))
-    slope: Form | None = None
+    slope: AffineForm | None = None
     for position in terms:
         x = values[position]
         if not isinstance(x, _Dual) or x.slope is None:
@@ -607,17 +617,17 @@ def _solve(
     if fixed:
         over.evaluate(fixed, inputs, values)
 
-    def residual(guess: Form) -> _Dual:
+    def residual(guess: AffineForm) -> _Dual:
         """The residual with its derivatives, the implicit variable free."""
         free = [*inputs[:-1], [*inputs[-1], _Dual(guess, _seed(guess, own, over.seeds))]]
         return over.evaluate([position], free, list(values))[0]
 
     with np.errstate(all="ignore"):
-        line = Form.constant(start, like)
+        line = AffineForm.constant(start, like)
         for _ in range(NEWTON_STEPS):
             value, slope, before = *_with_slope(residual(line), own, over.seeds), line
             rate = np.where(slope.centre == 0, np.nan, slope.centre)
-            line = Form(
+            line = AffineForm(
                 np.nan_to_num(line.centre - value.centre / rate),
                 np.nan_to_num(line.slopes - value.slopes / rate[:, None]),
                 np.zeros(like.shape),
@@ -647,7 +657,7 @@ def _solve(
                 break
             radius = np.where(proven, radius, np.minimum(radius * GROWTH, 1e300))
         middle = step.middle
-        value = Form(
+        value = AffineForm(
             line.centre + middle,
             line.slopes,
             step.reach(middle) + np.spacing(np.abs(line.centre) + np.abs(middle)),
@@ -659,15 +669,15 @@ def _solve(
         return _Dual(value, None if derivative is None else _without(derivative, seeds))
 
 
-def _with_slope(found: _Dual, column: int, seeds: int) -> tuple[Form, Form]:
+def _with_slope(found: _Dual, column: int, seeds: int) -> tuple[AffineForm, AffineForm]:
     return found.value, found.derivative(seeds)[:, column]
 
 
-def _without(slope: Form, seeds: int) -> Form:
+def _without(slope: AffineForm, seeds: int) -> AffineForm:
     """Derivatives by the first variables only, those by the others set to 0."""
     kept = np.arange(slope.shape[-1]) < seeds
     bound = slope.interval
-    return Form(
+    return AffineForm(
         np.where(kept, slope.centre, 0.0),
         np.where(kept[:, None], slope.slopes, 0.0),
         np.where(kept, slope.rest, 0.0),

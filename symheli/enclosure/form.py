@@ -26,7 +26,7 @@ UNDERFLOW = 1e-150
 
 
 @dataclass(frozen=True, eq=False)
-class Form:
+class AffineForm:
     """Numbers `centre` + `slopes` z + [-rest, rest] that also lie in `interval`.
 
     `centre`, `rest` and the interval's sides have one shape, (N,) or (N, s); `slopes` has one more
@@ -62,9 +62,9 @@ class Form:
         """Shape of the centre."""
         return self.centre.shape
 
-    def __getitem__(self, index: Any) -> Form:
+    def __getitem__(self, index: Any) -> AffineForm:
         bound = self.bound
-        return Form(
+        return AffineForm(
             self.centre[index],
             self.slopes[index],
             self.rest[index],
@@ -73,13 +73,13 @@ class Form:
         )
 
     @classmethod
-    def constant(cls, value: Any, like: Form) -> Form:
+    def constant(cls, value: Any, like: AffineForm) -> AffineForm:
         """Known numbers, in the shape of another form."""
         centre = np.broadcast_to(np.asarray(value, float), like.shape)
         return cls(centre, np.zeros(like.slopes.shape), np.zeros(like.shape), like.groups)
 
     @classmethod
-    def between(cls, interval: Interval, like: Form) -> Form:
+    def between(cls, interval: Interval, like: AffineForm) -> AffineForm:
         """Numbers of which only an interval is known."""
         middle = interval.middle
         return cls(
@@ -90,7 +90,7 @@ class Form:
             interval,
         )
 
-    def settled(self) -> Form:
+    def settled(self) -> AffineForm:
         """The same numbers by their interval where the form is infinite or the wider one."""
         inside = self.interval
         middle = inside.middle
@@ -105,7 +105,7 @@ class Form:
         lower = np.where(np.isnan(inside.lower), -np.inf, inside.lower)
         upper = np.where(np.isnan(inside.upper), np.inf, inside.upper)
         radius = np.where(np.isnan(radius), np.inf, radius)
-        return Form(
+        return AffineForm(
             np.where(poor, middle, self.centre),
             np.where(poor[..., None], 0.0, self.slopes),
             np.where(poor, radius, self.rest),
@@ -119,24 +119,26 @@ class Form:
         """|g|_1 is at most this times the sum of the norms by group."""
         return max(self.groups, default=1) ** 0.5 * MARGIN
 
-    def __neg__(self) -> Form:
+    def __neg__(self) -> AffineForm:
         bound = None if self.bound is None else -self.bound
-        return Form(-self.centre, -self.slopes, self.rest, self.groups, bound)
+        return AffineForm(-self.centre, -self.slopes, self.rest, self.groups, bound)
 
-    def __add__(self, other: Form | float) -> Form:
-        if not isinstance(other, Form):
-            other = Form.constant(other, self)
+    def __add__(self, other: AffineForm | float) -> AffineForm:
+        if not isinstance(other, AffineForm):
+            other = AffineForm.constant(other, self)
         centre, slopes = self.centre + other.centre, self.slopes + other.slopes
         size = np.abs(self.centre) + np.abs(other.centre)
         size = size + self._spread() * (self.linear + other.linear)
         rest = (self.rest + other.rest + EPS * size) * MARGIN
-        return Form(centre, slopes, rest, self.groups, self.interval + other.interval).settled()
+        return AffineForm(
+            centre, slopes, rest, self.groups, self.interval + other.interval
+        ).settled()
 
-    def __sub__(self, other: Form | float) -> Form:
+    def __sub__(self, other: AffineForm | float) -> AffineForm:
         return self + (-other)
 
-    def __mul__(self, other: Form | float) -> Form:
-        if not isinstance(other, Form):
+    def __mul__(self, other: AffineForm | float) -> AffineForm:
+        if not isinstance(other, AffineForm):
             return self.scaled(other)
         if self.shape != other.shape:
             a, b = np.broadcast_arrays(self.centre, other.centre)
@@ -156,7 +158,7 @@ class Form:
             + (4 + self.slopes.shape[-1]) * EPS * rounding
             + UNDERFLOW
         ) * MARGIN
-        return Form(
+        return AffineForm(
             self.centre * other.centre + middle,
             self.centre[..., None] * other.slopes + other.centre[..., None] * self.slopes,
             rest,
@@ -164,7 +166,7 @@ class Form:
             self.interval * other.interval,
         ).settled()
 
-    def square(self) -> Form:
+    def square(self) -> AffineForm:
         """The numbers squared."""
         half = 0.5 * self.linear**2
         a = np.abs(self.centre)
@@ -175,7 +177,7 @@ class Form:
             + 8 * EPS * rounding
             + UNDERFLOW
         ) * MARGIN
-        return Form(
+        return AffineForm(
             self.centre**2 + half,
             2 * self.centre[..., None] * self.slopes,
             rest,
@@ -183,13 +185,13 @@ class Form:
             self.interval.square(),
         ).settled()
 
-    def scaled(self, factor: float | Array) -> Form:
+    def scaled(self, factor: float | Array) -> AffineForm:
         """The numbers times a known one, a float or an array of the form's shape."""
         factor = np.asarray(factor, float)
         size = np.abs(factor)
         rounding = np.abs(self.centre) + self._spread() * self.linear
         bound = Interval.around(np.broadcast_to(factor, self.shape)) * self.interval
-        return Form(
+        return AffineForm(
             self.centre * factor,
             self.slopes * factor[..., None],
             (size * (self.rest + EPS * rounding) + UNDERFLOW) * MARGIN,
@@ -197,12 +199,12 @@ class Form:
             bound,
         ).settled()
 
-    def broadcast(self, shape: tuple[int, ...]) -> Form:
+    def broadcast(self, shape: tuple[int, ...]) -> AffineForm:
         """The same form in a larger shape; (N,) becomes (N, s) by a new last axis first."""
         form = self[:, None] if len(self.shape) < len(shape) else self
         slopes = np.broadcast_to(form.slopes, (*shape, form.slopes.shape[-1]))
         bound = form.interval
-        return Form(
+        return AffineForm(
             np.broadcast_to(form.centre, shape),
             slopes,
             np.broadcast_to(form.rest, shape),
@@ -212,16 +214,16 @@ class Form:
 
     # --- functions of one variable ---------------------------------------------------------------
 
-    def _line(self, slope: Array, remainder: Interval, bound: Interval) -> Form:
+    def _line(self, slope: Array, remainder: Interval, bound: Interval) -> AffineForm:
         """slope x + remainder, where that encloses the function on the interval of x."""
         middle = remainder.middle
         own = self.scaled(slope)
-        free = Form(own.centre, own.slopes, own.rest, self.groups)
+        free = AffineForm(own.centre, own.slopes, own.rest, self.groups)
         shifted = free.centre + middle
         rest = (free.rest + remainder.reach(middle) + EPS * np.abs(shifted)) * MARGIN
-        return Form(shifted, free.slopes, rest, self.groups, bound).settled()
+        return AffineForm(shifted, free.slopes, rest, self.groups, bound).settled()
 
-    def sqrt(self) -> Form:
+    def sqrt(self) -> AffineForm:
         """Square roots: concave, so that sqrt(x) - s x lies between its ends and 1/(4 s)."""
         x = Interval(np.maximum(self.interval.lower, 0.0), self.interval.upper)
         bound = self.interval.sqrt()
@@ -233,7 +235,7 @@ class Form:
         most = (Interval.around(np.full(self.shape, 4.0)) * s).inverse().upper
         return self._line(slope, Interval(least, most), bound)
 
-    def inverse(self) -> Form:
+    def inverse(self) -> AffineForm:
         """1/x: convex for x > 0, so that 1/x + s x lies between 2 sqrt(s) and its ends; odd."""
         negative = self.interval.upper < 0
         x = Interval(
@@ -254,7 +256,7 @@ class Form:
         )
         return self._line(-slope, remainder, self.interval.inverse())
 
-    def absolute(self) -> Form:
+    def absolute(self) -> AffineForm:
         """|x|: itself, its negative, or a line in between where the sign is open."""
         x = self.interval
         width = x.upper - x.lower
@@ -271,7 +273,7 @@ class Form:
         remainder = Interval(zero, np.where(open_ | endless, most, 0.0))
         return self._line(slope, remainder, x.absolute())
 
-    def maximum(self, other: Form) -> Form:
+    def maximum(self, other: AffineForm) -> AffineForm:
         """The larger of two numbers."""
         difference = self - other
         sum_ = (difference + difference.absolute()).scaled(0.5) + other
@@ -281,11 +283,11 @@ class Form:
         chosen = pick(a.lower >= b.upper, self, chosen)
         return pick(b.lower >= a.upper, other, chosen)
 
-    def minimum(self, other: Form) -> Form:
+    def minimum(self, other: AffineForm) -> AffineForm:
         """The smaller of two numbers."""
         return -((-self).maximum(-other))
 
-    def elementary(self, name: str) -> Form:
+    def elementary(self, name: str) -> AffineForm:
         """sin, cos, exp, asin or atan of the numbers, by the first-order Taylor polynomial about
         the middle of their interval and bounds of the second derivative.
         """
@@ -311,7 +313,7 @@ class Form:
         )
         return self._line(s, remainder, bound)
 
-    def slope_of(self, name: str) -> Form:
+    def slope_of(self, name: str) -> AffineForm:
         """The derivative of an elementary function at the numbers."""
         match name:
             case "sin":
@@ -360,14 +362,14 @@ def _norms(slopes: Array, groups: Sequence[int]) -> Array:
     return np.sqrt(_by_group(slopes * slopes, groups)) * MARGIN + UNDERFLOW
 
 
-def pick(condition: Array, yes: Form, no: Form) -> Form:
+def pick(condition: Array, yes: AffineForm, no: AffineForm) -> AffineForm:
     """`yes` where the condition (N,) or (N, s) holds, else `no`."""
     if np.all(condition):
         return yes
     if not np.any(condition):
         return no
     a, b = yes.interval, no.interval
-    return Form(
+    return AffineForm(
         np.where(condition, yes.centre, no.centre),
         np.where(condition[..., None], yes.slopes, no.slopes),
         np.where(condition, yes.rest, no.rest),
@@ -376,10 +378,10 @@ def pick(condition: Array, yes: Form, no: Form) -> Form:
     )
 
 
-def hull(a: Form, b: Form) -> Form:
+def hull(a: AffineForm, b: AffineForm) -> AffineForm:
     """A form that contains both."""
     centre, slopes = 0.5 * a.centre + 0.5 * b.centre, 0.5 * a.slopes + 0.5 * b.slopes
     apart = np.abs(a.centre - b.centre) + _norms(a.slopes - b.slopes, a.groups).sum(axis=-1)
     size = np.abs(a.centre) + np.abs(b.centre) + a._spread() * (a.linear + b.linear)
     rest = (0.5 * apart + np.maximum(a.rest, b.rest) + 4 * EPS * size) * MARGIN
-    return Form(centre, slopes, rest, a.groups, a.interval.hull(b.interval)).settled()
+    return AffineForm(centre, slopes, rest, a.groups, a.interval.hull(b.interval)).settled()

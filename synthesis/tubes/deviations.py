@@ -9,9 +9,9 @@ import casadi
 import numpy as np
 
 from symheli import Helicopter
-from symheli.enclosure import Domain, Form, enclose
+from symheli.enclosure import AffineForm, Domain, enclose
 from symheli.values.summary import summarized
-from synthesis.tubes.inequality import ROUNDED, ROUNDED_UP, Coefficients, elementwise, rank_one
+from synthesis.tubes.inequality import ROUNDED, ROUNDED_UP, MatrixSet, elementwise, rank_one
 
 Array = np.ndarray
 
@@ -40,7 +40,7 @@ class Deviations:
         function = casadi.Function("deviation", [e, w, lam], list(self.heli.implicit(*at, lam)))
         return function, casadi.Function("inflow", [e, w], [self.heli.inflow(*at)])
 
-    def enclosed(self, factor: Array) -> Coefficients | None:
+    def enclosed(self, factor: Array) -> MatrixSet | None:
         """The set of F for e = factor z, |z| <= 1, and all gusts; None where there is no bound.
 
         f(e, w) - f(0, 0) = J [e; w] with the average J of the Jacobian over the segment to (e, w):
@@ -57,7 +57,9 @@ class Deviations:
         return _coefficients(found.segment_average(), found.symbols, rest, factor)
 
 
-def _coefficients(average: Form, symbols: int, at_rest: Form, factor: Array) -> Coefficients:
+def _coefficients(
+    average: AffineForm, symbols: int, at_rest: AffineForm, factor: Array
+) -> MatrixSet:
     n = len(factor)
     q = n + 4
     units = np.concatenate([np.linalg.norm(factor, axis=1), np.ones(4)])
@@ -78,6 +80,6 @@ def _coefficients(average: Form, symbols: int, at_rest: Form, factor: Array) -> 
     rest[:, wind] += missed.sum(axis=1).max() * np.abs(cross).sum(axis=0)
     left, weights, more = rank_one(slopes[symbols:], units)
     rows, diagonal = elementwise((rest + more) * ROUNDED_UP, units)
-    return Coefficients(
+    return MatrixSet(
         centre, tube, gust, np.vstack([left, rows]), np.concatenate([weights, diagonal])
     )

@@ -22,7 +22,7 @@ ROUNDED = 1e-14
 """Bound of the rounding of sums of some 20 products, relative to the sum of their sizes."""
 
 
-class Coefficients(NamedTuple):
+class MatrixSet(NamedTuple):
     """The set of F (n, q); q = n deviations, 3 gust components and 1 constant.
 
     centre (n, q); tube (n, n, q) and gust (3, n, q), the factors of the symbols; left (k, n) and
@@ -35,12 +35,12 @@ class Coefficients(NamedTuple):
     left: Array
     weights: Array
 
-    def scaled(self, factor: Array) -> Coefficients:
+    def scaled(self, factor: Array) -> MatrixSet:
         """The set in coordinates z, e = factor z."""
         n, q = self.centre.shape
         inverse, right = np.linalg.inv(factor), np.eye(q)
         right[:n, :n] = factor
-        return Coefficients(
+        return MatrixSet(
             inverse @ self.centre @ right,
             inverse @ self.tube @ right,
             inverse @ self.gust @ right,
@@ -93,7 +93,7 @@ class Multipliers(NamedTuple):
     decay: Any
 
 
-def block(P: Any, over: Coefficients, by: Multipliers, one: Any = 1.0) -> Any:
+def block(P: Any, over: MatrixSet, by: Multipliers, one: Any = 1.0) -> Any:
     """The symmetric matrix that must be positive definite.
 
         -M

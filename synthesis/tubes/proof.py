@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from synthesis.polynomial.exact import positive_definite, rational
-from synthesis.tubes.inequality import Coefficients, Multipliers, block
+from synthesis.tubes.inequality import MatrixSet, Multipliers, block
 
 Array = np.ndarray
 
 
-def holds(P: Array, over: Coefficients, factor: Array, by: Multipliers) -> bool:
+def holds(P: Array, over: MatrixSet, factor: Array, by: Multipliers) -> bool:
     """Whether e'P e <= 1 lies within the deviations enclosed, factor' P factor >= I, and the
     inequality holds for all matrices of the set; in rational arithmetic on the doubles given.
     """
@@ -23,5 +23,5 @@ def holds(P: Array, over: Coefficients, factor: Array, by: Multipliers) -> bool:
     own = Multipliers(tube, gust, terms, wind, number(by.decay))
     if own.wind[0, 0] < 0:
         return False
-    matrices = Coefficients(*(exact(part) for part in over))
+    matrices = MatrixSet(*(exact(part) for part in over))
     return positive_definite(block(lyapunov, matrices, own, number(1.0)))

@@ -7,7 +7,7 @@ import numpy as np
 from symheli.lpv import Polynomial
 from synthesis.lpv.affine_program import AffineProgram, BernsteinCell, Variable, from_lower
 from synthesis.program.cone_program import Answer, Solver
-from synthesis.tubes.inequality import Coefficients, Multipliers, block
+from synthesis.tubes.inequality import MatrixSet, Multipliers, block
 
 Array = np.ndarray
 
@@ -17,7 +17,7 @@ CONSTANT = Polynomial(0, 0.0, 1.0)
 
 
 def smallest(
-    over: Coefficients,
+    over: MatrixSet,
     factor: Array,
     sizes: Array,
     decay: float,
@@ -50,7 +50,7 @@ def smallest(
 
 
 def multipliers(
-    P: Array, over: Coefficients, factor: Array, decay: float, solver: Solver
+    P: Array, over: MatrixSet, factor: Array, decay: float, solver: Solver
 ) -> Multipliers | None:
     """The multipliers that leave the inequality most to spare at a given P; None: no solution."""
     program = AffineProgram()
@@ -72,7 +72,7 @@ def multipliers(
     return Multipliers(decay=decay, **own)
 
 
-def _variables(program: AffineProgram, over: Coefficients) -> dict[str, Variable]:
+def _variables(program: AffineProgram, over: MatrixSet) -> dict[str, Variable]:
     n, terms = len(over.centre), np.eye(len(over.left))
     return {
         "tube": program.symmetric(n, CONSTANT),
@@ -85,7 +85,7 @@ def _variables(program: AffineProgram, over: Coefficients) -> dict[str, Variable
 def _impose(
     program: AffineProgram,
     P: Array,
-    over: Coefficients,
+    over: MatrixSet,
     variables: dict[str, Variable],
     decay: float,
     spare: Array,

@@ -71,6 +71,13 @@ class Tube:
     ------
     InputError
         `save` of a tube without a proof, `load` of a file that is damaged or another.
+
+    Examples
+    --------
+    >>> import symheli
+    >>> found = tube(symheli.Helicopter.load("xcell60", governor="ideal"), 3.0, gust=0.1)
+    >>> found.save("tube.json").name, Tube.load("tube.json").proven
+    ('tube.json', True)
     """
 
     deviations: Deviations
@@ -279,6 +286,14 @@ def tube(
     Boyd et al. (1994), Linear Matrix Inequalities in System and Control Theory, section 6.1
     (invariant ellipsoids of unit-peak inputs); Petersen (1987), A stabilization algorithm for a
     class of uncertain linear systems.
+
+    Examples
+    --------
+    >>> import symheli
+    >>> heli = symheli.Helicopter.load("xcell60", governor="ideal")
+    >>> found = tube(heli, 3.0, gust=0.1)
+    >>> found.proven, bool(found.half_widths[0] < 0.02)
+    (True, True)
     """
     if heli.governor != "ideal" or len(heli.states) != 10:
         raise InputError(

@@ -9,7 +9,7 @@ from symheli import Helicopter, trim
 from symheli.codegen.evaluate import evaluate
 from symheli.codegen.translation import operations
 from symheli.enclosure import Domain, enclose, interval
-from symheli.enclosure.form import Form
+from symheli.enclosure.form import AffineForm
 from symheli.enclosure.interval import Interval
 from symheli.errors import InputError
 
@@ -305,4 +305,4 @@ def test_a_million_samples_lie_inside():
 
 def test_constants_and_known_forms_keep_their_shape():
     like = enclose(function(lambda x: x, 2), DISK).value
-    np.testing.assert_allclose(Form.constant(2.0, like).interval.lower, 2.0, rtol=1e-15)
+    np.testing.assert_allclose(AffineForm.constant(2.0, like).interval.lower, 2.0, rtol=1e-15)

@@ -123,6 +123,14 @@ def gains_on_a_narrow_range():
         assert same(shown, value, rel=2e-4)
 
 
+def tube_in_hover():
+    shown = KEPT["tubes.md", "amplitudes"].text.splitlines()[2].split(" | ")
+    found = synthesis.tube(_xcell(), float(shown[1]), gust=float(shown[2]))
+    assert found.proven
+    widths = " ".join(f"{w:.2g}" for w in found.half_widths[6:8])
+    assert shown[4] == widths
+
+
 def faults_of_one_entry(package, entry):
     """As many inputs, no more faults: how many of them are refused is the draw's."""
     code = (
@@ -174,6 +182,7 @@ ROWS = {
     ),
     ("gains.md", "flights"): fastest_of_the_test_flight,
     ("lft.md", "reach"): gains_on_a_narrow_range,
+    ("tubes.md", "amplitudes"): tube_in_hover,
     ("identified.md", "xcell60"): lambda: marks_of_the_worst_seed("xcell60"),
     ("identified.md", "xcell_kahn_hudson"): lambda: marks_of_the_worst_seed(
         "xcell_kahn_hudson", "xcell_kahn_hudson"

@@ -12,7 +12,6 @@ from symheli.errors import InputError
 from synthesis import Tube, tube
 from synthesis.tubes.inequality import elementwise, rank_one
 
-
 CASES = [
     ("xcell60", 0.0, 0.5),
     pytest.param(("xcell_kahn_hudson", 8.0, 0.25), marks=pytest.mark.slow),
