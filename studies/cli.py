@@ -26,6 +26,7 @@ VERBS = (
     "derivatives",
     "envelope",
     "identify",
+    "calibrate",
     "margins",
     "synthesize",
     "certify",

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from symheli.errors import InputError, UnknownNameError
 from symheli.values.units import dimension, to_si, units_of
 
-KEYS = ("value", "unit", "source", "assumed", "unusual", "ref")
+KEYS = ("value", "unit", "deviation", "source", "assumed", "unusual", "ref")
 """Permitted keys of an entry of a data file."""
 
 
@@ -19,6 +19,7 @@ class Quantity(NamedTuple):
     reason), and the name of the entry it is taken from where it has no value of its own.
 
     `unusual`: meant although no other airframe has it. `given`: the unit it was written in.
+    `deviation`: standard deviation of its error, SI; 0 where none is stated.
     """
 
     value: float
@@ -28,6 +29,7 @@ class Quantity(NamedTuple):
     ref: str = ""
     unusual: bool = False
     given: str = ""
+    deviation: float = 0.0
 
 
 def read_quantity(where: str, table: Any, unit: str) -> Quantity:
@@ -62,6 +64,14 @@ def read_quantity(where: str, table: Any, unit: str) -> Quantity:
             wrong.append(_misspelt(str(given), number, unit))
         except InputError as error:
             wrong.append(str(error))
+    deviation = table.get("deviation", 0.0)
+    if isinstance(deviation, bool) or not isinstance(deviation, int | float):
+        deviation = math.nan
+    if not 0.0 <= deviation < math.inf:
+        wrong.append(
+            "expected a standard deviation >= 0 in the unit of the value, got"
+            f" {table['deviation']!r}"
+        )
     for key in ("assumed", "unusual"):
         if not isinstance(table.get(key, False), bool):
             wrong.append(f"{key} must be true or false, got {table[key]!r}")
@@ -79,6 +89,7 @@ def read_quantity(where: str, table: Any, unit: str) -> Quantity:
         bool(table.get("assumed", False)),
         unusual=bool(table.get("unusual", False)),
         given=str(given),
+        deviation=abs(factor) * float(deviation),
     )
 
 

@@ -58,11 +58,17 @@ class Vehicle:
         """Names of the entries that are assumptions."""
         return [name for name, quantity in self.quantities.items() if quantity.assumed]
 
-    def with_values(self, changes: Mapping[str, float], source: str = "set by hand") -> Vehicle:
-        """Return the same airframe with other values (SI), {"body.mass": 9.0}; entries that refer
-        to a changed one follow it. Raises `InputError` for impossible values, warns (`DataWarning`)
-        of implausible ones.
+    def with_values(
+        self,
+        changes: Mapping[str, float],
+        source: str = "set by hand",
+        deviations: Mapping[str, float] | None = None,
+    ) -> Vehicle:
+        """Return the same airframe with other values (SI), {"body.mass": 9.0}, and their standard
+        deviations where known; entries that refer to a changed one follow it. Raises `InputError`
+        for impossible values, warns (`DataWarning`) of implausible ones.
         """
+        stated = deviations or {}
         for name, value in changes.items():
             if name not in self.quantities:
                 raise UnknownNameError("parameter", name, self.quantities)
@@ -74,7 +80,10 @@ class Vehicle:
         changed = self._map(
             lambda name, q: (
                 q._replace(
-                    value=float(changes[name]), source=f"{source}, was {q.value:g}", given=""
+                    value=float(changes[name]),
+                    source=f"{source}, was {q.value:g}",
+                    given="",
+                    deviation=float(stated.get(name, 0.0)),
                 )
                 if name in changes
                 else q
@@ -103,7 +112,9 @@ class Vehicle:
             powers = dimension(q.unit)
             exponent = 3 * powers.get("kg", 0) + powers.get("m", 0) + powers.get("s", 0) / 2
             return q._replace(
-                value=q.value * factor**exponent, source=f"{q.source}; Froude-scaled by {factor:g}"
+                value=q.value * factor**exponent,
+                source=f"{q.source}; Froude-scaled by {factor:g}",
+                deviation=q.deviation * factor**exponent,
             )
 
         copy = replace(self._map(scale), title=f"{self.title}, Froude-scaled by {factor:g}")

@@ -16,9 +16,10 @@ from symheli.values.units import dimension, units_of
 _HEAD = """\
 # A vehicle file: NAME = { value = ..., unit = "...", source = "..." }; above each what it is, its
 # unit, what it must be and plausibly is. Change what is yours, say where each number is from, and
-# load the file by its path. Other units are converted. assumed = true marks what is not published,
-# unusual = true a number that is meant although no helicopter is known to have it, and
-# { ref = "section.entry" } takes the value of another entry.
+# load the file by its path. Other units are converted. deviation = ... is the standard deviation of
+# a number, in its unit. assumed = true marks what is not published, unusual = true a number that is
+# meant although no helicopter is known to have it, and { ref = "section.entry" } takes the value of
+# another entry.
 """
 
 
@@ -115,7 +116,9 @@ def _entry(q: Quantity) -> str:
     if q.ref:
         return f"{{ ref = {_text(q.ref)} }}"
     flags = "".join(f", {name} = true" for name in ("assumed", "unusual") if getattr(q, name))
-    return f"{{ value = {q.value!r}, unit = {_text(q.unit)}{flags}, source = {_text(q.source)} }}"
+    known = f", deviation = {q.deviation!r}" if q.deviation else ""
+    number = f"value = {q.value!r}, unit = {_text(q.unit)}{known}"
+    return f"{{ {number}{flags}, source = {_text(q.source)} }}"
 
 
 def _text(text: str) -> str:

@@ -17,11 +17,12 @@ from symheli.codegen.symbolic import SX, Function, adjoint_product, column, tang
 from symheli.dynamics import Dynamics
 from symheli.helicopter import Helicopter
 
-Which = Literal["rates", "switched_rates", "tangent_rates", "adjoint_rates"]
+Which = Literal["rates", "switched_rates", "tangent_rates", "parameter_rates", "adjoint_rates"]
 VARYING = {
     "rates": (0,),
     "switched_rates": (0,),
     "tangent_rates": (0, 4),
+    "parameter_rates": (0, 4),
     "adjoint_rates": (0, 4),
 }
 """Inputs of each function that change from stage to stage; u, wind, parameters and their changes
@@ -115,14 +116,15 @@ def equations(heli: Helicopter) -> Equations:
 
 def _functions(dynamics: Dynamics) -> dict[str, Function]:
     """(x, u, wind, p) -> xdot, and the same with the switching functions of the parts, which are
-    zero where the equations change their form; (x, u, wind, p, dx, du, dwind) -> xdot, dxdot; (x,
-    u, wind, p, x_bar) -> x_bar' d xdot/d(x, u, wind).
+    zero where the equations change their form; (x, u, wind, p, dx, du, dwind) -> xdot, dxdot; the
+    same with dp; (x, u, wind, p, x_bar) -> x_bar' d xdot/d(x, u, wind).
     """
     sizes = {"x": len(dynamics.flight_states), "u": 4, "wind": 3}
     point, change = (
         [SX.sym(mark + name, size) for name, size in sizes.items()] for mark in ("", "d")
     )
-    p, bar = SX.sym("p", len(dynamics.parameters)), SX.sym("x_bar", sizes["x"])
+    p, dp = (SX.sym(name, len(dynamics.parameters)) for name in ("p", "dp"))
+    bar = SX.sym("x_bar", sizes["x"])
     x, u, wind = point
 
     def form(solver: Callable[..., Any]) -> Any:
@@ -131,10 +133,13 @@ def _functions(dynamics: Dynamics) -> dict[str, Function]:
     xdot, total = form(dynamics.inflow_solver)
     switches = column([*total.switches.values()] or [SX(1.0)])
     tangent = dynamics.derived(form, lambda f: [tangent_product(f, point, change)])
+    moved, moves = [*point, p], [*change, dp]
+    parametric = dynamics.derived(form, lambda f: [tangent_product(f, moved, moves)])
     adjoint = dynamics.derived(form, lambda f: [adjoint_product(f, z, bar) for z in point])
     return {
         "rates": Function("rates", [*point, p], [xdot]),
         "switched_rates": Function("switched_rates", [*point, p], [xdot, switches]),
         "tangent_rates": Function("tangent_rates", [*point, p, *change], [xdot, *tangent]),
+        "parameter_rates": Function("parameter_rates", [*moved, *moves], [xdot, *parametric]),
         "adjoint_rates": Function("adjoint_rates", [*point, p, bar], adjoint),
     }

@@ -18,20 +18,31 @@ from symheli.integrate.trajectory import Trajectory
 from symheli.values.arrays import Array
 
 FUNCTIONS = ("rates", "tangent_rates", "adjoint_rates")
+WITH_PARAMETERS = ("parameter_rates",)
 SIDE_BY_SIDE = Layout(width=8)
 """Directions or functionals at a time; roots and quotients of eight take little longer than those
 of one.
 """
 
 
-def tangent(equations: Equations, flown: Trajectory, dx0: Array, du: Array, dwind: Array) -> Array:
-    """Change of the states (n+1, nx, m) for dx0 (nx, m), du (n, 4, m), dwind (n, 3, m)."""
+def tangent(
+    equations: Equations,
+    flown: Trajectory,
+    dx0: Array,
+    du: Array,
+    dwind: Array,
+    dp: Array | None = None,
+) -> Array:
+    """Change of the states (n+1, nx, m) for dx0 (nx, m), du (n, 4, m), dwind (n, 3, m), and dp
+    (parameters, m) where parameters move.
+    """
     m = dx0.shape[-1]
-    library = equations.machine_code("sensitivity.c", FUNCTIONS, SIDE_BY_SIDE)
+    functions = FUNCTIONS if dp is None else WITH_PARAMETERS
+    library = equations.machine_code("sensitivity.c", functions, SIDE_BY_SIDE)
     if library is None:
-        return _tangent_in_numpy(equations, flown, dx0, du, dwind)
+        return _tangent_in_numpy(equations, flown, dx0, du, dwind, dp)
     dx = np.empty((*flown.states.shape, m))
-    _call(library.tangent, flown, m, dx0=dx0, du=du, dwind=dwind, dx=dx)
+    _call(library.tangent, flown, m, dx0=dx0, du=du, dwind=dwind, dp=dp, dx=dx)
     return dx
 
 
@@ -55,7 +66,7 @@ def adjoint(equations: Equations, flown: Trajectory, weights: Array) -> tuple[Ar
 def _call(function: Callable[..., int], flown: Trajectory, m: int, **arrays: Array) -> None:
     tableau: Tableau = flown.method.tableau
     per_sample = np.asarray(flown.per_sample, ctypes.c_long)
-    members = ("dx0", "du", "dwind", "dx", "weights", "x_bar", "u_bar", "wind_bar")
+    members = ("dx0", "du", "dwind", "dp", "dx", "weights", "x_bar", "u_bar", "wind_bar")
     flight = {
         "states": flown.states,
         "u": flown.inputs,
@@ -115,11 +126,17 @@ def _normalised(change: Array, end: Array) -> Array:
 
 
 def _tangent_in_numpy(
-    equations: Equations, flown: Trajectory, dx0: Array, du: Array, dwind: Array
+    equations: Equations,
+    flown: Trajectory,
+    dx0: Array,
+    du: Array,
+    dwind: Array,
+    dp: Array | None,
 ) -> Array:
     tableau: Tableau = flown.method.tableau
     m = dx0.shape[-1]
-    rates = equations.virtual_machine("tangent_rates", m)
+    rates = equations.virtual_machine("tangent_rates" if dp is None else "parameter_rates", m)
+    moved = () if dp is None else (dp,)
     dx, out, ends = dx0, [dx0], np.cumsum(flown.per_sample)
     for sample, (count, end) in enumerate(zip(flown.per_sample, ends, strict=True)):
         held = [
@@ -144,6 +161,7 @@ def _tangent_in_numpy(
                                     dy,
                                     du[sample],
                                     dwind[sample],
+                                    *moved,
                                 ),
                             )
                         )[1],

@@ -22,19 +22,29 @@ def _sample(equations: Equations, flown: Trajectory) -> casadi.Function:
     return sample_function(equations, float(flown.times[1] - flown.times[0]), flown.method)
 
 
-def tangent(equations: Equations, flown: Trajectory, dx0: Array, du: Array, dwind: Array) -> Array:
-    """Change of the states (n+1, nx, m) for dx0 (nx, m), du (n, 4, m), dwind (n, 3, m)."""
+def tangent(
+    equations: Equations,
+    flown: Trajectory,
+    dx0: Array,
+    du: Array,
+    dwind: Array,
+    dp: Array | None = None,
+) -> Array:
+    """Change of the states (n+1, nx, m) for dx0 (nx, m), du (n, 4, m), dwind (n, 3, m), and dp
+    (parameters, m) where parameters move.
+    """
     names = ["x", "u", "wind", "p"]
     step = _sample(equations, flown).factory(
-        "radau_tangent", [*names, "fwd:x", "fwd:u", "fwd:wind"], ["fwd:x_next"]
+        "radau_tangent", [*names, *(f"fwd:{name}" for name in names)], ["fwd:x_next"]
     )
-    forward, out = Numeric(step), np.empty((*flown.states.shape, dx0.shape[-1]))
+    forward, m = Numeric(step), dx0.shape[-1]
+    moved = np.zeros((len(flown.parameters.array), m)) if dp is None else dp
+    out = np.empty((*flown.states.shape, m))
     out[0] = dx0
     for k in range(len(flown.inputs)):
-        for i in range(dx0.shape[-1]):
-            out[k + 1, :, i] = forward(*_held(flown, k), out[k, :, i], du[k, :, i], dwind[k, :, i])[
-                0
-            ]
+        for i in range(m):
+            changes = out[k, :, i], du[k, :, i], dwind[k, :, i], moved[:, i]
+            out[k + 1, :, i] = forward(*_held(flown, k), *changes)[0]
     return out
 
 

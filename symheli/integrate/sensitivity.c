@@ -1,6 +1,7 @@
 /* Derivatives of a flown trajectory, step by step as it was flown (any explicit tableau), LANES
-   directions or functionals side by side. The generated functions held, rates, tangent_held,
-   tangent_rates, adjoint_held, adjoint_rates come before this text. */
+   directions or functionals side by side. Generated functions come before this text: either held,
+   rates, tangent_held, tangent_rates, adjoint_held, adjoint_rates, or parameter_held and
+   parameter_rates, whose directions move the parameters too. */
 
 struct line {
   /* sample + 1, NX; sample, 4; sample, 3; NP; every step taken */
@@ -11,6 +12,7 @@ struct line {
   long samples, stages, longest, width;
   /* NX, width; sample, 4, width; sample, 3, width */
   const double *dx0, *du, *dwind;
+  const double *dp;                                      /* NP, width; of parameter_rates */
   double *dx;                                            /* sample + 1, NX, width */
   const double *weights;                                 /* sample + 1, NX, width */
   /* NX, width; sample, 4, width; sample, 3, width */
@@ -64,30 +66,49 @@ static void combine(lane *to, const lane *x, double h, const double *weights, la
     }
 }
 
+#ifdef PARAMETER_NK
+enum { NT = PARAMETER_NK };
+#define change_rates parameter_rates
+#else
+enum { NT = TANGENT_NK };
+#define change_rates tangent_rates
+#endif
+
 /* Tangents of `width` directions along the flight; 1 where memory is short. */
 int tangent(const struct line *f)
 {
   lane(*k)[NX] = malloc(2 * f->stages * sizeof *k), (*dk)[NX] = k + f->stages;
-  lane x[NX], dx[NX], y[NX], dy[NX], u[4], du[4], wind[3], dwind[3], p[NP + 1], kept[TANGENT_NK];
+  lane x[NX], dx[NX], y[NX], dy[NX], u[4], du[4], wind[3], dwind[3], p[NP + 1], kept[NT];
+#ifdef PARAMETER_NK
+  lane dp[NP + 1];
+#endif
   if (!k) return 1;
   spread(p, f->p, NP);
   for (long first = 0; first < f->width; first += LANES) {
     const double *h = f->steps;
     load(dx, f->dx0, f, first, NX);
     store(f->dx, (const lane *)dx, f, first, NX);
+#ifdef PARAMETER_NK
+    load(dp, f->dp, f, first, NP);
+#endif
     for (long sample = 0; sample < f->samples; ++sample) {
       spread(x, f->states + sample * NX, NX);
       spread(u, f->u + sample * 4, 4);
       spread(wind, f->wind + sample * 3, 3);
       load(du, f->du + sample * 4 * f->width, f, first, 4);
       load(dwind, f->dwind + sample * 3 * f->width, f, first, 3);
+#ifdef PARAMETER_NK
+      parameter_held((const lane *)u, (const lane *)wind, (const lane *)p, (const lane *)du,
+                     (const lane *)dwind, (const lane *)dp, kept);
+#else
       tangent_held((const lane *)u, (const lane *)wind, (const lane *)p, (const lane *)du,
                    (const lane *)dwind, kept);
+#endif
       for (const double *end = h + f->per_sample[sample]; h < end; ++h) {
         for (long s = 0; s < f->stages; ++s) {
           combine(y, (const lane *)x, *h, f->a + s * f->stages, k, s);
           combine(dy, (const lane *)dx, *h, f->a + s * f->stages, dk, s);
-          tangent_rates((const lane *)y, (const lane *)dy, (const lane *)kept, k[s], dk[s]);
+          change_rates((const lane *)y, (const lane *)dy, (const lane *)kept, k[s], dk[s]);
         }
         combine(x, (const lane *)x, *h, f->b, k, f->stages);
         combine(dx, (const lane *)dx, *h, f->b, dk, f->stages);
@@ -100,6 +121,7 @@ int tangent(const struct line *f)
   return 0;
 }
 
+#ifdef ADJOINT_NK
 /* Gradients of `width` functionals, given their derivatives with respect to the states at the
    samples; 1 where memory is short. */
 int adjoint(const struct line *f)
@@ -170,3 +192,4 @@ int adjoint(const struct line *f)
   free(y);
   return 0;
 }
+#endif

@@ -32,35 +32,49 @@ class Gradient:
 
 
 def tangent(
-    heli: Helicopter, flown: Trajectory, dx0: object = None, du: object = None, dwind: object = None
+    heli: Helicopter,
+    flown: Trajectory,
+    dx0: object = None,
+    du: object = None,
+    dwind: object = None,
+    dp: object = None,
 ) -> Array:
     """Return the first-order change of the states (n+1, nx, m) for m directions: dx0 (nx, m), du
-    (n, 4, m), dwind (n, 3, m); a direction left out is 0.
+    (n, 4, m), dwind (n, 3, m), dp (parameters, m), the last in the order of `heli.parameters`; a
+    direction left out is 0.
 
     Without the last axis one direction, (n+1, nx). `dx0=np.eye(nx)` gives the transition matrices.
     A quaternion stays of unit length, so a change along it vanishes. Inputs made by feedback count
     as given: the derivative is that of the open loop.
     """
     nx, n = len(flown.signals), len(flown.inputs)
-    changes = {"dx0": (dx0, (nx,)), "du": (du, (n, 4)), "dwind": (dwind, (n, 3))}
+    changes = {
+        "dx0": (dx0, (nx,)),
+        "du": (du, (n, 4)),
+        "dwind": (dwind, (n, 3)),
+        "dp": (dp, (len(heli.parameters),)),
+    }
     given = {
         name: _directions(value, name, shape)
         for name, (value, shape) in changes.items()
         if value is not None
     }
     if not given:
-        raise InputError("give at least one of dx0, du, dwind")
+        raise InputError("give at least one of dx0, du, dwind, dp")
     single = all(value.ndim == len(changes[name][1]) for name, value in given.items())
     widths = {
         value.shape[-1] if value.ndim > len(changes[name][1]) else 1
         for name, value in given.items()
     }
     if len(widths) > 1:
-        raise InputError(f"dx0, du and dwind must have as many directions, got {sorted(widths)}")
+        raise InputError(
+            f"dx0, du, dwind and dp must have as many directions, got {sorted(widths)}"
+        )
     m = widths.pop()
     full = [
         np.ascontiguousarray(given.get(name, np.zeros((*shape, m))).reshape(*shape, m))
         for name, (_, shape) in changes.items()
+        if name != "dp" or name in given
     ]
     change = _method(flown).tangent(equations(heli), flown, *full)
     return change[..., 0] if single else change

@@ -157,3 +157,38 @@ def test_what_does_not_fit_is_refused(ideal):
         tangent(ideal, flown, dx0, du[..., :1])
     with pytest.raises(InputError, match="weights: expected"):
         gradient(ideal, flown, np.zeros(3))
+
+
+@pytest.mark.parametrize("method", [RungeKutta4(), Radau()])
+def test_tangents_along_parameters_are_the_limit_of_differences(ideal, method, monkeypatch):
+    flown, _, _ = case(ideal, method, n=4)
+    names = ["body.mass", "main_rotor.bar_lock_number", "tail_rotor.arm"]
+    values = np.array([ideal.parameters[name] for name in names])
+    dp = np.zeros((len(ideal.parameters), 1))
+    for name, value in zip(names, values, strict=True):
+        dp[[str(p) for p in ideal.parameters].index(name)] = value
+    change = tangent(ideal, flown, dp=dp)[..., 0]
+
+    def states(step):
+        moved = dict(zip(names, (values * (1 + step)).tolist(), strict=True))
+        return simulate(
+            ideal.with_parameters(moved),
+            flown.states[0],
+            flown.inputs,
+            flown.wind,
+            dt=0.02,
+            method=method,
+        ).states
+
+    def central(step):
+        return (states(step) - states(-step)) / (2 * step)
+
+    richardson = (4 * central(2e-3) - central(4e-3)) / 3
+    # rounding 1e-14/4e-3 and truncation (4e-3)^4; Radau's equations are solved to 1e-12
+    tolerance = 1e-9 if isinstance(method, Radau) else 1e-10
+    np.testing.assert_allclose(change, richardson, atol=tolerance * np.abs(change).max() + 1e-10)
+    if isinstance(method, RungeKutta4):
+        plain = without_compiler(monkeypatch, ideal)
+        np.testing.assert_allclose(
+            tangent(plain, flown, dp=dp)[..., 0], change, rtol=1e-12, atol=1e-12
+        )

@@ -1,0 +1,612 @@
+"""Calibration: physical parameters of a vehicle from flights, by output error over windows."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
+from pathlib import Path
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from symheli.airframe.written import as_toml
+from symheli.errors import (
+    ConvergenceWarning,
+    DataWarning,
+    InputError,
+    SymheliError,
+    ValidityWarning,
+)
+from symheli.helicopter import Helicopter, require
+from symheli.integrate import RungeKutta4, Trajectory, simulate, tangent
+from symheli.physics.attitude import euler_state, flight_state
+from symheli.progress import task
+from symheli.records import FlightRecord
+from symheli.steady.equilibrium import trim
+from symheli.values.arrays import Array
+from symheli.values.numbers import positive, whole
+from symheli.values.signal import Signal, indices
+from symheli.values.summary import as_table, summarized
+from symheli.values.whole_files import write_text
+
+INPUTS = ("d_lon", "d_lat", "d_col", "d_ped")
+PRIOR = 0.5
+"""Standard deviation of the logarithm of a parameter for which the vehicle file states none: what
+separates two helicopters of one class.
+"""
+
+STAGES = (0.4, 1.2)
+"""Lengths of the windows before the last ones, s: a wrong vehicle stays near the record only for a
+short time.
+"""
+
+CRAMER_RAO_LIMIT = 0.2
+"""Largest relative standard deviation of a parameter that counts as determined (Tischler and Remple
+(2012), Aircraft and Rotorcraft System Identification, sec. 12.3.3).
+"""
+
+INFORMED = 0.5
+"""A parameter counts as determined only if the flights brought its standard deviation below this
+fraction of the prior's.
+"""
+
+TIED = 0.9
+"""Correlation above which two parameters are known only together (ibid.)."""
+
+START_DEVIATION = {"m/s": 10.0, "rad/s": 3.0, "rad": 0.3}
+"""Prior standard deviation of an initial state that is not measured, by its unit; another unit: as
+much as its trim value, at least 1.
+"""
+
+LARGEST_DAMPING = 1e8
+"""Damping, relative to the information, above which no step is tried."""
+
+TINY = 1e-24
+"""Smallest mean square that is divided by, in SI units."""
+
+SETTLED = 0.02
+"""Largest step of a parameter, in its standard deviations, at which the search has converged."""
+
+ROUNDS = 40
+"""Largest number of Gauss-Newton steps at each length of the windows."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Calibration:
+    """The vehicle that explains flights best, and how well they determine its parameters.
+
+    Parameters
+    ----------
+    heli : Helicopter
+        With the calibrated parameters.
+    start : Helicopter
+        From which the search began; its values are the prior's.
+    parameters : tuple of Signal
+        The k parameters that were free.
+    values, deviations : array (k,)
+        Calibrated values and their standard deviations, SI.
+    prior_deviations : array (k,)
+        Those before the flights, SI.
+    correlation : array (k, k)
+        Of the errors of the values.
+    noise : dict of str to float
+        Standard deviation of each output's residual, SI.
+    whiteness : dict of str to float
+        Correlation of each output's residuals from sample to sample: near 0 where the model leaves
+        only white noise.
+    windows, window : int, float
+        How many windows of how many seconds.
+    steps : int
+        Gauss-Newton steps.
+    converged : bool
+        Whether the search ended where its steps were small.
+
+    Examples
+    --------
+    >>> lqr = symheli.flight.gain_scheduled_lqr(heli, 0.0, 8.0, 0.02)
+    >>> schedule = symheli.AirspeedSchedule.transition(0.0, 6.0, acceleration=2.0, hold=1.0)
+    >>> noise = symheli.Excitation({"d_lon": 0.01, "d_lat": 0.01}, "multisine", (0.1, 4.0), seed=1)
+    >>> flight = symheli.fly(heli, schedule, controller=lqr, excitation=noise, noise_db=30.0)
+    >>> wrong = heli.with_parameters({"body.Ixx": 0.25, "body.Iyy": 0.25})
+    >>> found = idn.calibrate(wrong, flight, ["body.Ixx", "body.Iyy"])
+    >>> bool(abs(found.heli.parameters["body.Ixx"] - heli.parameters["body.Ixx"]) < 0.01)
+    True
+    """
+
+    heli: Helicopter
+    start: Helicopter
+    parameters: tuple[Signal, ...]
+    values: Array
+    deviations: Array
+    prior_deviations: Array
+    correlation: Array
+    noise: dict[str, float]
+    whiteness: dict[str, float]
+    windows: int
+    window: float
+    steps: int
+    converged: bool
+
+    __repr__ = summarized
+    _repr_html_ = as_table
+
+    @property
+    def determined(self) -> Array:
+        """Mask (k,) of the parameters that the flights determine: relative standard deviation at
+        most 20 %, and less than half of what it was before.
+        """
+        return (self.deviations <= CRAMER_RAO_LIMIT * np.abs(self.values)) & (
+            self.deviations <= INFORMED * self.prior_deviations
+        )
+
+    @property
+    def tied(self) -> dict[str, str]:
+        """For each parameter that is not determined the one whose error is correlated most with
+        its own, where that is above .9: the flights tell the two only together.
+        """
+        off = np.abs(self.correlation) - np.eye(len(self.parameters))
+        return {
+            str(p): str(self.parameters[int(off[i].argmax())])
+            for i, p in enumerate(self.parameters)
+            if not self.determined[i] and off[i].max(initial=0.0) > TIED
+        }
+
+    def __str__(self) -> str:
+        rows = [("parameter", "before", "calibrated", "deviation", "unit", "")]
+        for i, p in enumerate(self.parameters):
+            word = "determined" if self.determined[i] else "not determined"
+            other = self.tied.get(str(p))
+            rows.append(
+                (
+                    str(p),
+                    f"{self.start.parameters[p]:.4g}",
+                    f"{self.values[i]:.4g}",
+                    f"{self.deviations[i]:.2g}",
+                    p.unit,
+                    word if other is None else f"{word}, only together with {other}",
+                )
+            )
+        widths = [max(len(row[i]) for row in rows) for i in range(5)]
+        lines = [
+            "  ".join([*(c.ljust(w) for c, w in zip(row, widths, strict=False)), row[5]]).rstrip()
+            for row in rows
+        ]
+        residuals = ", ".join(
+            f"{name} {sd:.2g} {Signal(name).unit} ({self.whiteness[name]:+.2f})"
+            for name, sd in self.noise.items()
+        )
+        lines += [
+            "",
+            f"{self.windows} windows of {self.window:g} s; residuals, with their correlation from"
+            f" sample to sample: {residuals}",
+        ]
+        if not self.converged:
+            lines.append("The search had not converged: the deviations may be too small.")
+        return "\n".join(lines)
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the calibrated vehicle file, with the standard deviation of every free parameter;
+        `Helicopter.load` reads it, and another calibration takes the deviations as its prior.
+        """
+        write_text(Path(path), as_toml(self.heli.vehicle))
+        return Path(path)
+
+
+def calibrate(
+    heli: Helicopter,
+    records: FlightRecord | Sequence[FlightRecord],
+    parameters: Sequence[str] | None = None,
+    *,
+    window: float = 3.0,
+    step: float = 0.01,
+    rounds: int = ROUNDS,
+) -> Calibration:
+    """Find the physical parameters of a vehicle with which the nonlinear equations of motion follow
+    flights best.
+
+    The record is cut into windows; in each the equations run free from an initial state that is
+    estimated too. The parameters, initial states and noise levels of largest posterior density are
+    found by Gauss-Newton steps with exact sensitivities; the prior is the vehicle file: its values,
+    with their stated deviations, or else a factor of 1.65. What flights do not tell stays at the
+    prior. The flight may be in closed loop, as long as the deflections of the controls are
+    recorded; wind counts as an error of the model.
+
+    Parameters
+    ----------
+    heli : Helicopter
+        The vehicle as it is known before, with the governor that flew.
+    records : FlightRecord or sequence of them
+        With d_lon, d_lat, d_col, d_ped (deflections, rad) and any of u, v, w, p, q, r, phi, theta
+        (and Om), sampled evenly; NaN marks a missing measurement.
+    parameters : sequence of str, optional
+        Names from `heli.parameters` that are free; default all the flight's equations depend on,
+        but the density of the air, numbers of blades and limits of the controls.
+    window : float
+        Length over which the equations run free, s.
+    step : float
+        Of the integration, s.
+    rounds : int
+        Largest number of Gauss-Newton steps at each of three lengths of windows.
+
+    Returns
+    -------
+    Calibration
+
+    Raises
+    ------
+    InputError
+        An unknown parameter, one that is not positive, a record without inputs or outputs, or
+        shorter than a window.
+    SymheliError
+        The equations leave the range of numbers even over short windows.
+
+    Warns
+    -----
+    ConvergenceWarning
+        The search ended before its steps were small.
+
+    References
+    ----------
+    Jategaonkar (2015), Flight Vehicle System Identification, ch. 4; multiple shooting: Bock (1983).
+
+    Examples
+    --------
+    See `Calibration`.
+    """
+    require(heli, "calibrate(heli, records)")
+    flights = [records] if isinstance(records, FlightRecord) else list(records)
+    positive(window, "window")
+    whole(rounds, "rounds", 1)
+    free = _free(heli, parameters)
+    outputs = _outputs(heli, flights)
+    search = _Search(heli, free, outputs, float(step))
+    theta = np.zeros(len(free))
+    steps, converged = 0, False
+    lengths = [*(s for s in STAGES if s < window), window]
+    with warnings.catch_warnings(), task("calibrating", len(lengths)) as progress:
+        warnings.simplefilter("ignore", DataWarning)  # of vehicles on the way
+        warnings.simplefilter("ignore", ValidityWarning)
+        for length in lengths:
+            search.cut(flights, length, theta)
+            theta, used, converged = search.settle(theta, rounds)
+            steps += used
+            progress.step(f"windows of {length:g} s, {used} steps")
+    if not converged:
+        warnings.warn(
+            f"calibration stopped after {steps} Gauss-Newton steps; allow more rounds, free fewer"
+            " parameters or fly longer",
+            ConvergenceWarning,
+            stacklevel=2,
+        )
+    return search.result(theta, window, steps, converged)
+
+
+def _free(heli: Helicopter, wanted: Sequence[str] | None) -> tuple[Signal, ...]:
+    known = heli.parameters.signals
+    if wanted is not None:
+        chosen = tuple(known[i] for i in indices(wanted, known, "parameter"))
+        for p in chosen:
+            if not heli.parameters[p] > 0:
+                raise InputError(
+                    f"{p} is {heli.parameters[p]:g}: only positive parameters are calibrated; set a"
+                    " first guess with with_parameters"
+                )
+            if p.startswith("controls.") or p == "density":
+                raise InputError(f"{p} is not calibrated: it is no parameter of the airframe")
+        return chosen
+    entries = heli.vehicle.entries
+
+    def counts(name: str) -> bool:
+        section, _, entry = name.partition(".")
+        return entries[section][entry].least is not None
+
+    return tuple(
+        p
+        for p in known
+        if p != "density"
+        and not p.startswith("controls.")
+        and heli.parameters[p] > 0
+        and not counts(p)
+    )
+
+
+def _outputs(heli: Helicopter, flights: Sequence[FlightRecord]) -> tuple[str, ...]:
+    if not flights:
+        raise InputError("no flights: give at least one FlightRecord")
+    able = [str(s) for s in heli.states if s in ("u", "v", "w", "p", "q", "r", "phi", "theta")]
+    if heli.governor == "pi":
+        able.append("Om")
+    for record in flights:
+        if missing := [u for u in INPUTS if u not in record.signals]:
+            raise InputError(
+                f"the record has no {', '.join(missing)}: calibration needs the deflection of every"
+                f" control (rad); it has {', '.join(map(str, record.signals))}"
+            )
+    found = tuple(name for name in able if all(name in r.signals for r in flights))
+    if not found:
+        raise InputError(f"the records share none of the outputs {', '.join(able)}")
+    return found
+
+
+@dataclass
+class _Window:
+    """Measured outputs (n+1, ny), inputs (n, 4), and the initial state (nx,) in Euler form with its
+    prior mean.
+    """
+
+    y: Array
+    u: Array
+    start: Array
+    mean: Array
+
+
+@dataclass(frozen=True)
+class _Linearized:
+    """A window's least-squares problem with its initial state eliminated: information (k, k) and
+    score (k,) of the parameters, and what moves the initial state.
+    """
+
+    information: Array
+    score: Array
+    root: Array
+    own: Array
+    coupling: Array
+
+    def start_change(self, move: Array) -> Array:
+        """Change of the initial state (nx,) that goes with a move of the parameters (k,)."""
+        return solve_triangular(self.root, self.own - self.coupling @ move)
+
+
+class _Search:
+    """Gauss-Newton steps in the logarithms of the parameters, in units of their prior deviations,
+    and in the initial state of every window.
+    """
+
+    def __init__(
+        self, heli: Helicopter, free: tuple[Signal, ...], outputs: tuple[str, ...], step: float
+    ):
+        self.heli, self.free, self.outputs = heli, free, outputs
+        self.method = RungeKutta4(step)
+        self.at = indices(free, heli.parameters.signals, "parameter")
+        self.seen = indices(outputs, heli.states, "state")
+        stated = [heli.vehicle.quantities[str(p)] for p in free]
+        self.spread = np.array([q.deviation / q.value if q.deviation else PRIOR for q in stated])
+        hidden = [s not in outputs for s in heli.states]
+        trimmed = self._trimmed(heli, 0.0)
+        self.weight = np.array(
+            [
+                1 / START_DEVIATION.get(s.unit, max(abs(x), 1.0)) if h else 0.0
+                for s, x, h in zip(heli.states, trimmed, hidden, strict=True)
+            ]
+        )
+        self.windows: list[_Window] = []
+        self.dt = 0.0
+        self.noise = np.zeros(0)
+
+    def at_point(self, theta: Array) -> Helicopter:
+        """The helicopter with the parameters theta (k,)."""
+        values = self.heli.parameters.array[self.at] * np.exp(self.spread * theta)
+        return self.heli.with_parameters(
+            dict(zip(map(str, self.free), values.tolist(), strict=True))
+        )
+
+    # --- windows ---------------------------------------------------------------------------------
+
+    def cut(self, flights: Sequence[FlightRecord], length: float, theta: Array) -> None:
+        """Cut windows of `length` seconds from all unbroken pieces of the flights."""
+        periods = {record.dt for record in flights}
+        if len(periods) > 1:
+            raise InputError(f"the records have sample periods {sorted(periods)} s; resample them")
+        self.dt = periods.pop()
+        samples = max(round(length / self.dt), 1)
+        heli, self.windows = self.at_point(theta), []
+        trims: dict[int, Array] = {}
+        for record in flights:
+            y, u = record.columns(self.outputs), record.columns(INPUTS)
+            for piece in _pieces(record, u):
+                for first in range(piece.start, piece.stop - samples, samples):
+                    part = y[first : first + samples + 1]
+                    if not np.isfinite(part).any(axis=0).all():
+                        continue
+                    mean = self._start(heli, part, trims)
+                    start = mean.copy()
+                    known = np.isfinite(part[0])
+                    start[np.array(self.seen)[known]] = part[0, known]
+                    self.windows.append(_Window(part, u[first : first + samples], start, mean))
+        if not self.windows:
+            raise InputError(
+                f"no unbroken piece of the records is as long as a window of {length:g} s"
+            )
+
+    def _start(self, heli: Helicopter, y: Array, trims: dict[int, Array]) -> Array:
+        """States of level flight near the measured airspeed: where hidden states probably are."""
+        ahead = y[:, self.outputs.index("u")] if "u" in self.outputs else np.zeros(1)
+        airspeed = max(round(float(np.nanmean(ahead))), 0)
+        if airspeed not in trims:
+            trims[airspeed] = self._trimmed(heli, airspeed)
+        return trims[airspeed]
+
+    @staticmethod
+    def _trimmed(heli: Helicopter, airspeed: float) -> Array:
+        found = trim(heli, airspeed=float(airspeed), throw=False).x.array
+        return np.where(np.isfinite(found), found, 0.0)
+
+    # --- one window ------------------------------------------------------------------------------
+
+    def _flown(self, heli: Helicopter, window: _Window, start: Array) -> Trajectory:
+        return simulate(heli, flight_state(start), window.u, dt=self.dt, method=self.method)
+
+    def _residuals(self, window: _Window, flown: Trajectory) -> Array:
+        """Measured minus computed outputs (n+1, ny), 0 where nothing was measured."""
+        r = window.y - euler_state(flown.states)[:, self.seen]
+        return np.where(np.isfinite(window.y), r, 0.0)
+
+    def linearized(self, heli: Helicopter, window: _Window) -> _Linearized:
+        """The window's least-squares problem about its initial state and these parameters."""
+        nx, k = len(window.start), len(self.free)
+        flown = self._flown(heli, window, window.start)
+        dx0 = np.zeros((len(heli.flight_states), nx + k))
+        dx0[:, :nx] = _from_euler(window.start)
+        dp = np.zeros((len(heli.parameters), nx + k))
+        dp[self.at, nx + np.arange(k)] = heli.parameters.array[self.at] * self.spread
+        seen = _to_euler(flown.states, tangent(heli, flown, dx0=dx0, dp=dp))[:, self.seen]
+        seen = np.where(np.isfinite(window.y)[:, :, None], seen, 0.0) / self.noise[:, None]
+        r = self._residuals(window, flown) / self.noise
+        J = seen.reshape(-1, nx + k)
+        A = np.vstack([J[:, :nx], np.diag(self.weight)])
+        b = np.concatenate([r.ravel(), self.weight * (window.mean - window.start)])
+        Q, R = np.linalg.qr(A)
+        P, C, c = J[:, nx:], Q[: len(J)].T @ J[:, nx:], Q.T @ b
+        return _Linearized(P.T @ P - C.T @ C, P.T @ r.ravel() - C.T @ c, R, c, C)
+
+    # --- the search ------------------------------------------------------------------------------
+
+    def settle(self, theta: Array, rounds: int) -> tuple[Array, int, bool]:
+        """Levenberg-Marquardt steps until they are small: parameters, number of steps, and whether
+        they are.
+        """
+        damping, starts = 1.0, [w.start for w in self.windows]
+        cost, self.noise = self.cost(theta, starts)
+        if not np.isfinite(cost):
+            raise SymheliError(
+                f"the equations of {self.heli.vehicle.title} leave the range of numbers within"
+                " short windows of the flights: start from a vehicle nearer to the one flown"
+            )
+        with task("Gauss-Newton steps") as progress:
+            for used in range(1, rounds + 1):
+                problems, H, g = self.normal(theta)
+                lower, move, noise = np.inf, np.zeros_like(theta), self.noise
+                while not lower < cost:
+                    if damping > LARGEST_DAMPING:  # no step of any size is better
+                        return theta, used, True
+                    move = np.linalg.solve(H + damping * np.eye(len(theta)), g)
+                    starts = [
+                        window.start + problem.start_change(move)
+                        for window, problem in zip(self.windows, problems, strict=True)
+                    ]
+                    lower, noise = self.cost(theta + move, starts)
+                    damping *= 0.2 if lower < cost else 5.0
+                theta, cost, self.noise = theta + move, lower, noise
+                for window, start in zip(self.windows, starts, strict=True):
+                    window.start = start
+                largest = float(np.max(np.abs(move) / np.sqrt(np.diag(np.linalg.inv(H)))))
+                progress.step(f"largest step {largest:.2g} standard deviations")
+                if largest < SETTLED and damping < 1.0:
+                    return theta, used, True
+        return theta, rounds, False
+
+    def normal(self, theta: Array) -> tuple[list[_Linearized], Array, Array]:
+        """The windows' problems, and the information (k, k) and score (k,) of the posterior."""
+        heli = self.at_point(theta)
+        problems = [self.linearized(heli, window) for window in self.windows]
+        H = np.eye(len(theta)) + sum(problem.information for problem in problems)
+        return problems, H, sum(problem.score for problem in problems) - theta
+
+    def cost(self, theta: Array, starts: Sequence[Array]) -> tuple[float, Array]:
+        """Minus the logarithm of the posterior density with the likeliest noise levels, and these
+        (ny,); infinite where a flight leaves the range of numbers or a parameter is impossible.
+        """
+        try:
+            every = self._every(theta, starts)
+        except SymheliError:
+            return np.inf, self.noise
+        counts, power = self._counts(), sum((r**2).sum(axis=0) for r in every)
+        noise = np.sqrt(np.maximum(power / counts, TINY))
+        total = float(theta @ theta) + 2.0 * float(counts @ np.log(noise))
+        for window, start in zip(self.windows, starts, strict=True):
+            total += float(np.sum((self.weight * (start - window.mean)) ** 2))
+        return 0.5 * total, noise
+
+    def levels(self, theta: Array) -> tuple[Array, Array]:
+        """Standard deviation (ny,) of each output's residual, and its correlation (ny,) from sample
+        to sample.
+        """
+        every = self._every(theta, [w.start for w in self.windows])
+        counts = self._counts()
+        unknowns = len(theta) + len(self.windows) * len(self.heli.states)
+        left = max(1 - unknowns / counts.sum(), 0.1)
+        power = sum((r**2).sum(axis=0) for r in every)
+        lagged = sum((r[1:] * r[:-1]).sum(axis=0) for r in every)
+        return np.sqrt(np.maximum(power / counts / left, TINY)), lagged / np.maximum(power, TINY)
+
+    def _every(self, theta: Array, starts: Sequence[Array]) -> list[Array]:
+        heli = self.at_point(theta)
+        return [
+            self._residuals(window, self._flown(heli, window, start))
+            for window, start in zip(self.windows, starts, strict=True)
+        ]
+
+    def _counts(self) -> Array:
+        return np.sum([np.isfinite(w.y).sum(axis=0) for w in self.windows], axis=0)
+
+    def result(self, theta: Array, window: float, steps: int, converged: bool) -> Calibration:
+        """The calibrated helicopter and its uncertainty."""
+        self.noise, whiteness = self.levels(theta)
+        problems, H, _ = self.normal(theta)
+        covariance = np.linalg.inv(H)
+        scores = np.array([problem.score for problem in problems])
+        # errors that are correlated within a window, not between windows
+        robust = covariance @ (np.eye(len(theta)) + scores.T @ scores) @ covariance
+        relative = self.spread * np.sqrt(np.maximum(np.diag(covariance), np.diag(robust)))
+        size = np.sqrt(np.diag(covariance))
+        found = self.at_point(theta)
+        values = found.parameters.array[self.at]
+        names = [str(p) for p in self.free]
+        vehicle = self.heli.vehicle.with_values(
+            dict(zip(names, values.tolist(), strict=True)),
+            f"calibrated from {len(self.windows)} windows of {window:g} s",
+            dict(zip(names, (values * relative).tolist(), strict=True)),
+        )
+        return Calibration(
+            heli=replace(self.heli, vehicle=vehicle),
+            start=self.heli,
+            parameters=self.free,
+            values=values,
+            deviations=values * relative,
+            prior_deviations=self.heli.parameters.array[self.at] * self.spread,
+            correlation=covariance / np.outer(size, size),
+            noise=dict(zip(self.outputs, self.noise.tolist(), strict=True)),
+            whiteness=dict(zip(self.outputs, whiteness.tolist(), strict=True)),
+            windows=len(self.windows),
+            window=window,
+            steps=steps,
+            converged=converged,
+        )
+
+
+def _pieces(record: FlightRecord, u: Array) -> Iterator[range]:
+    """Pieces of a record without a gap in time or in the inputs."""
+    whole_rows = np.isfinite(u).all(axis=1)
+    for part in record.segments():
+        for known, group in groupby(range(part.start, part.stop), key=lambda k: whole_rows[k]):
+            rows = list(group)
+            if known:
+                yield range(rows[0], rows[-1] + 1)
+
+
+def _from_euler(x: Array) -> Array:
+    """Derivative (nx + 5, nx) of the quaternion form of a state with respect to its Euler form."""
+    out = np.zeros((len(x) + 5, len(x)))
+    out[:6, :6] = np.eye(6)
+    out[13:, 8:] = np.eye(len(x) - 8)
+    for i in (6, 7):  # each component is linear in sine and cosine of half the angle
+        turned = x.copy()
+        turned[i] += np.pi
+        out[6:10, i] = 0.5 * flight_state(turned)[6:10]
+    return out
+
+
+def _to_euler(states: Array, change: Array) -> Array:
+    """Changes (n, nx, m) in Euler form of changes (n, nx + 5, m) of states in quaternion form."""
+    q0, q1, q2, q3 = (states[:, i, None] for i in range(6, 10))
+    d0, d1, d2, d3 = (change[:, i] for i in range(6, 10))
+    a, b = 2 * (q0 * q1 + q2 * q3), 1 - 2 * (q1**2 + q2**2)
+    da = 2 * (d0 * q1 + q0 * d1 + d2 * q3 + q2 * d3)
+    db = -4 * (q1 * d1 + q2 * d2)
+    phi = (b * da - a * db) / (a**2 + b**2)
+    sine = 2 * (q0 * q2 - q3 * q1)
+    theta = 2 * (d0 * q2 + q0 * d2 - d3 * q1 - q3 * d1) / np.sqrt(np.maximum(1 - sine**2, TINY))
+    return np.concatenate([change[:, :6], phi[:, None], theta[:, None], change[:, 13:]], axis=1)

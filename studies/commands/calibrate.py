@@ -1,0 +1,106 @@
+"""symheli calibrate VEHICLE LOG...: physical parameters of a vehicle file from flights."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from studies.commands import options
+from studies.commands.arguments import option, positional
+from studies.output import Output
+
+if TYPE_CHECKING:
+    from symheli import FlightRecord
+
+HELP = (
+    "calibrate the physical parameters of a vehicle file from flights; what the flights do not tell"
+    " stays as it was"
+)
+
+OUTPUTS = ("u", "v", "w", "p", "q", "r", "phi", "theta", "Om")
+INPUTS = ("d_lon", "d_lat", "d_col", "d_ped")
+
+ARGUMENTS = (
+    positional("vehicle", "packaged vehicle, or a vehicle file", metavar="VEHICLE"),
+    positional(
+        "logs",
+        "flight logs with d_lon, d_lat, d_col, d_ped (deflections) and any of"
+        f" {', '.join(OUTPUTS)}",
+        type=Path,
+        nargs="+",
+        metavar="LOG",
+    ),
+    option(
+        "--map",
+        "FILE",
+        "TOML file that says which column is which signal, in which unit (docs/identify.md)",
+        Path,
+    ),
+    option(
+        "--governor", ("ideal", "pi"), "rotor speed held exactly, or by a governor", default="ideal"
+    ),
+    option("--altitude", "M", "of the flights above sea level, m", options.number, 0.0),
+    option("--parameters", "A,B", "parameters that are free (default: all)", options.names),
+    option("--window", "S", "length over which the equations run free, s", options.positive, 3.0),
+    option("--start", "S", "drop samples before this time, s on the log's clock", options.number),
+    option("--stop", "S", "drop samples after this time, s", options.number),
+    option("--write", "FILE", "write the calibrated vehicle file (.toml)", Path),
+)
+
+
+def run(arguments: argparse.Namespace) -> Output:
+    """Calibrate, and show every free parameter before and after."""
+    import symheli
+    from identification import calibrate
+    from symheli.errors import InputError
+
+    if arguments.write is not None and arguments.write.suffix != ".toml":
+        raise InputError(f"--write: expected a file that ends in .toml, got {arguments.write}")
+    heli = symheli.Helicopter.load(arguments.vehicle, governor=arguments.governor)
+    heli = heli.at_altitude(arguments.altitude) if arguments.altitude else heli
+    records = [_record(arguments, log) for log in arguments.logs]
+    found = calibrate(heli, records, arguments.parameters, window=arguments.window)
+    text = str(found)
+    data = {
+        "vehicle": heli.vehicle.title,
+        "converged": found.converged,
+        "windows": found.windows,
+        "window": {"value": found.window, "unit": "s"},
+        "parameters": {
+            str(p): {
+                "before": heli.parameters[p],
+                "value": float(found.values[i]),
+                "deviation": float(found.deviations[i]),
+                "unit": p.unit,
+                "determined": bool(found.determined[i]),
+                "only_together_with": found.tied.get(str(p)),
+            }
+            for i, p in enumerate(found.parameters)
+        },
+        "residuals": {
+            name: {"deviation": sd, "correlation": found.whiteness[name]}
+            for name, sd in found.noise.items()
+        },
+    }
+    if arguments.write is not None:
+        text = f"{text}\nwrote {found.save(arguments.write)}"
+        data["written"] = arguments.write
+    return Output(text, data)
+
+
+def _record(arguments: argparse.Namespace, log: Path) -> FlightRecord:
+    """The inputs and outputs of a log between --start and --stop."""
+    from studies.log.reading import read
+    from symheli import FlightRecord
+    from symheli.logs.contents import contents_of
+    from symheli.logs.format import format_of
+
+    if arguments.map is not None:
+        record = FlightRecord.from_map(log, arguments.map)
+    else:
+        kind = format_of(log)
+        there = contents_of(log, kind).columns
+        wanted = [*INPUTS, *(name for name in OUTPUTS if name in there)]
+        record = read(log, wanted, format=kind, dt=None, time=None, units={})
+    return record.between(arguments.start, arguments.stop)
