@@ -11,7 +11,6 @@ from identification.design.experiment_design import (
 from identification.design.experiment_design import (
     compare_experiments as compare_experiments,
 )
-from identification.estimators.calibration import Calibration as Calibration
 from identification.estimators.calibration import calibrate as calibrate
 from identification.estimators.estimate import fit as fit
 from identification.estimators.filter_error import FilterError as FilterError

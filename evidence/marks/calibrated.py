@@ -19,7 +19,7 @@ from identification import calibrate
 from studies.campaigns.runners import results, runner
 from studies.known_kinematics.flights import aggressive
 from studies.known_kinematics.models import PAIRS, identified
-from studies.known_kinematics.truth import Truth, frozen_axes
+from studies.known_kinematics.truth import FrozenAxes, Truth, frozen_axes
 from studies.output import as_json, progress
 from studies.transition.flights import autopilot_for
 from symheli import DataWarning, Helicopter
@@ -76,7 +76,10 @@ def of_seed(seed: int, truth: str = "xcell60", black_box: bool = False) -> Marks
     exact = Truth.of(heli)
     true = heli.parameters.array[[heli.parameters.signals.index(p) for p in found.parameters]]
     errors = (found.values - true) / found.deviations
-    models = {"calibrated": Truth.of(found.heli).models, "start": Truth.of(start).models}
+    models: dict[str, FrozenAxes] = {
+        "calibrated": Truth.of(found.heli).models,
+        "start": Truth.of(start).models,
+    }
     if black_box:
         models["black box"] = frozen_axes(identified(flight, other), exact)
     gaps = {

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from scipy.linalg import solve_triangular
 
+from symheli import Helicopter, trim
 from symheli.airframe.written import as_toml
 from symheli.errors import (
     ConvergenceWarning,
@@ -20,12 +21,11 @@ from symheli.errors import (
     SymheliError,
     ValidityWarning,
 )
-from symheli.helicopter import Helicopter, require
+from symheli.helicopter import require
 from symheli.integrate import RungeKutta4, Trajectory, simulate, tangent
 from symheli.physics.attitude import euler_state, flight_state
 from symheli.progress import task
 from symheli.records import FlightRecord
-from symheli.steady.equilibrium import trim
 from symheli.values.arrays import Array
 from symheli.values.numbers import positive, whole
 from symheli.values.signal import Signal, indices
@@ -67,6 +67,9 @@ LARGEST_DAMPING = 1e8
 TINY = 1e-24
 """Smallest mean square that is divided by, in SI units."""
 
+WHITE = 0.3
+"""Correlation of residuals from sample to sample above which the model leaves something out."""
+
 SETTLED = 0.02
 """Largest step of a parameter, in its standard deviations, at which the search has converged."""
 
@@ -103,17 +106,6 @@ class Calibration:
         Gauss-Newton steps.
     converged : bool
         Whether the search ended where its steps were small.
-
-    Examples
-    --------
-    >>> lqr = symheli.flight.gain_scheduled_lqr(heli, 0.0, 8.0, 0.02)
-    >>> schedule = symheli.AirspeedSchedule.transition(0.0, 6.0, acceleration=2.0, hold=1.0)
-    >>> noise = symheli.Excitation({"d_lon": 0.01, "d_lat": 0.01}, "multisine", (0.1, 4.0), seed=1)
-    >>> flight = symheli.fly(heli, schedule, controller=lqr, excitation=noise, noise_db=30.0)
-    >>> wrong = heli.with_parameters({"body.Ixx": 0.25, "body.Iyy": 0.25})
-    >>> found = idn.calibrate(wrong, flight, ["body.Ixx", "body.Iyy"])
-    >>> bool(abs(found.heli.parameters["body.Ixx"] - heli.parameters["body.Ixx"]) < 0.01)
-    True
     """
 
     heli: Helicopter
@@ -141,6 +133,13 @@ class Calibration:
         return (self.deviations <= CRAMER_RAO_LIMIT * np.abs(self.values)) & (
             self.deviations <= INFORMED * self.prior_deviations
         )
+
+    @property
+    def coloured(self) -> tuple[str, ...]:
+        """Outputs whose residuals are no white noise: something acts that the equations leave out,
+        such as wind, servos or a sensor's lag.
+        """
+        return tuple(name for name, r in self.whiteness.items() if abs(r) > WHITE)
 
     @property
     def tied(self) -> dict[str, str]:
@@ -183,9 +182,19 @@ class Calibration:
             f"{self.windows} windows of {self.window:g} s; residuals, with their correlation from"
             f" sample to sample: {residuals}",
         ]
+        if self.coloured:
+            lines.append(f"{self._doubt[0].upper()}{self._doubt[1:]}.")
         if not self.converged:
             lines.append("The search had not converged: the deviations may be too small.")
         return "\n".join(lines)
+
+    @property
+    def _doubt(self) -> str:
+        return (
+            f"the residuals of {', '.join(self.coloured)} are no white noise: wind (gust=...),"
+            " servos, delay or a sensor acts that the equations leave out, and the deviations are"
+            " too small"
+        )
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the calibrated vehicle file, with the standard deviation of every free parameter;
@@ -201,6 +210,7 @@ def calibrate(
     parameters: Sequence[str] | None = None,
     *,
     window: float = 3.0,
+    gust: float = 0.0,
     step: float = 0.01,
     rounds: int = ROUNDS,
 ) -> Calibration:
@@ -212,7 +222,7 @@ def calibrate(
     found by Gauss-Newton steps with exact sensitivities; the prior is the vehicle file: its values,
     with their stated deviations, or else a factor of 1.65. What flights do not tell stays at the
     prior. The flight may be in closed loop, as long as the deflections of the controls are
-    recorded; wind counts as an error of the model.
+    recorded. With `gust` a wind, constant over each window, is estimated too.
 
     Parameters
     ----------
@@ -226,6 +236,8 @@ def calibrate(
         but the density of the air, numbers of blades and limits of the controls.
     window : float
         Length over which the equations run free, s.
+    gust : float
+        Standard deviation of the wind in each direction, m/s; 0: still air.
     step : float
         Of the integration, s.
     rounds : int
@@ -247,6 +259,8 @@ def calibrate(
     -----
     ConvergenceWarning
         The search ended before its steps were small.
+    DataWarning
+        The residuals are no white noise: the equations leave something out.
 
     References
     ----------
@@ -254,7 +268,16 @@ def calibrate(
 
     Examples
     --------
-    See `Calibration`.
+    >>> import symheli
+    >>> heli = symheli.Helicopter.load("xcell60", governor="ideal")
+    >>> lqr = symheli.flight.gain_scheduled_lqr(heli, 0.0, 8.0, 0.02)
+    >>> schedule = symheli.AirspeedSchedule.transition(0.0, 6.0, acceleration=2.0, hold=1.0)
+    >>> shaken = symheli.Excitation({"d_lon": 0.01, "d_lat": 0.01}, "multisine", (0.1, 4.0), seed=1)
+    >>> flight = symheli.fly(heli, schedule, controller=lqr, excitation=shaken, noise_db=30.0)
+    >>> wrong = heli.with_parameters({"body.Ixx": 0.25, "body.Iyy": 0.25})
+    >>> found = idn.calibrate(wrong, flight, ["body.Ixx", "body.Iyy"])
+    >>> bool(abs(found.heli.parameters["body.Ixx"] - heli.parameters["body.Ixx"]) < 0.01)
+    True
     """
     require(heli, "calibrate(heli, records)")
     flights = [records] if isinstance(records, FlightRecord) else list(records)
@@ -262,7 +285,9 @@ def calibrate(
     whole(rounds, "rounds", 1)
     free = _free(heli, parameters)
     outputs = _outputs(heli, flights)
-    search = _Search(heli, free, outputs, float(step))
+    if not 0.0 <= gust < np.inf:
+        raise InputError(f"gust: expected a standard deviation >= 0 in m/s, got {gust!r}")
+    search = _Search(heli, free, outputs, float(step), float(gust))
     theta = np.zeros(len(free))
     steps, converged = 0, False
     lengths = [*(s for s in STAGES if s < window), window]
@@ -281,7 +306,10 @@ def calibrate(
             ConvergenceWarning,
             stacklevel=2,
         )
-    return search.result(theta, window, steps, converged)
+    found = search.result(theta, window, steps, converged)
+    if found.coloured:
+        warnings.warn(found._doubt, DataWarning, stacklevel=2)
+    return found
 
 
 def _free(heli: Helicopter, wanted: Sequence[str] | None) -> tuple[Signal, ...]:
@@ -333,8 +361,8 @@ def _outputs(heli: Helicopter, flights: Sequence[FlightRecord]) -> tuple[str, ..
 
 @dataclass
 class _Window:
-    """Measured outputs (n+1, ny), inputs (n, 4), and the initial state (nx,) in Euler form with its
-    prior mean.
+    """Measured outputs (n+1, ny), inputs (n, 4), and what is estimated of this window alone, with
+    its prior mean: the initial state (nx,) in Euler form, and the wind (3,) where it blows.
     """
 
     y: Array
@@ -345,8 +373,8 @@ class _Window:
 
 @dataclass(frozen=True)
 class _Linearized:
-    """A window's least-squares problem with its initial state eliminated: information (k, k) and
-    score (k,) of the parameters, and what moves the initial state.
+    """A window's least-squares problem with its own unknowns eliminated: information (k, k) and
+    score (k,) of the parameters, and what moves its unknowns.
     """
 
     information: Array
@@ -356,17 +384,22 @@ class _Linearized:
     coupling: Array
 
     def start_change(self, move: Array) -> Array:
-        """Change of the initial state (nx,) that goes with a move of the parameters (k,)."""
+        """Change of the window's own unknowns that goes with a move of the parameters (k,)."""
         return solve_triangular(self.root, self.own - self.coupling @ move)
 
 
 class _Search:
     """Gauss-Newton steps in the logarithms of the parameters, in units of their prior deviations,
-    and in the initial state of every window.
+    and in the unknowns of every window.
     """
 
     def __init__(
-        self, heli: Helicopter, free: tuple[Signal, ...], outputs: tuple[str, ...], step: float
+        self,
+        heli: Helicopter,
+        free: tuple[Signal, ...],
+        outputs: tuple[str, ...],
+        step: float,
+        gust: float,
     ):
         self.heli, self.free, self.outputs = heli, free, outputs
         self.method = RungeKutta4(step)
@@ -376,12 +409,13 @@ class _Search:
         self.spread = np.array([q.deviation / q.value if q.deviation else PRIOR for q in stated])
         hidden = [s not in outputs for s in heli.states]
         trimmed = self._trimmed(heli, 0.0)
-        self.weight = np.array(
-            [
-                1 / START_DEVIATION.get(s.unit, max(abs(x), 1.0)) if h else 0.0
-                for s, x, h in zip(heli.states, trimmed, hidden, strict=True)
-            ]
-        )
+        self.nx = len(heli.states)
+        self.winds = 3 if gust else 0
+        own = [
+            1 / (START_DEVIATION.get(str(s.unit)) or max(abs(x), 1.0)) if h else 0.0
+            for s, x, h in zip(heli.states, trimmed.tolist(), hidden, strict=True)
+        ]
+        self.weight = np.array([*own, *[1 / gust for _ in range(self.winds)]])
         self.windows: list[_Window] = []
         self.dt = 0.0
         self.noise = np.zeros(0)
@@ -427,7 +461,7 @@ class _Search:
         airspeed = max(round(float(np.nanmean(ahead))), 0)
         if airspeed not in trims:
             trims[airspeed] = self._trimmed(heli, airspeed)
-        return trims[airspeed]
+        return np.concatenate([trims[airspeed], np.zeros(self.winds)])
 
     @staticmethod
     def _trimmed(heli: Helicopter, airspeed: float) -> Array:
@@ -437,7 +471,9 @@ class _Search:
     # --- one window ------------------------------------------------------------------------------
 
     def _flown(self, heli: Helicopter, window: _Window, start: Array) -> Trajectory:
-        return simulate(heli, flight_state(start), window.u, dt=self.dt, method=self.method)
+        wind = start[self.nx :] if self.winds else np.zeros(3)
+        x0 = flight_state(start[: self.nx])
+        return simulate(heli, x0, window.u, wind, dt=self.dt, method=self.method)
 
     def _residuals(self, window: _Window, flown: Trajectory) -> Array:
         """Measured minus computed outputs (n+1, ny), 0 where nothing was measured."""
@@ -446,20 +482,23 @@ class _Search:
 
     def linearized(self, heli: Helicopter, window: _Window) -> _Linearized:
         """The window's least-squares problem about its initial state and these parameters."""
-        nx, k = len(window.start), len(self.free)
+        nx, own, k = self.nx, len(window.start), len(self.free)
         flown = self._flown(heli, window, window.start)
-        dx0 = np.zeros((len(heli.flight_states), nx + k))
-        dx0[:, :nx] = _from_euler(window.start)
-        dp = np.zeros((len(heli.parameters), nx + k))
-        dp[self.at, nx + np.arange(k)] = heli.parameters.array[self.at] * self.spread
-        seen = _to_euler(flown.states, tangent(heli, flown, dx0=dx0, dp=dp))[:, self.seen]
+        dx0 = np.zeros((len(heli.flight_states), own + k))
+        dx0[:, :nx] = _from_euler(window.start[:nx])
+        dwind = np.zeros((len(flown.inputs), 3, own + k))
+        dwind[:, : self.winds, nx:own] = np.eye(self.winds)
+        dp = np.zeros((len(heli.parameters), own + k))
+        dp[self.at, own + np.arange(k)] = heli.parameters.array[self.at] * self.spread
+        change = tangent(heli, flown, dx0=dx0, dwind=dwind, dp=dp)
+        seen = _to_euler(flown.states, change)[:, self.seen]
         seen = np.where(np.isfinite(window.y)[:, :, None], seen, 0.0) / self.noise[:, None]
         r = self._residuals(window, flown) / self.noise
-        J = seen.reshape(-1, nx + k)
-        A = np.vstack([J[:, :nx], np.diag(self.weight)])
+        J = seen.reshape(-1, own + k)
+        A = np.vstack([J[:, :own], np.diag(self.weight)])
         b = np.concatenate([r.ravel(), self.weight * (window.mean - window.start)])
         Q, R = np.linalg.qr(A)
-        P, C, c = J[:, nx:], Q[: len(J)].T @ J[:, nx:], Q.T @ b
+        P, C, c = J[:, own:], Q[: len(J)].T @ J[:, own:], Q.T @ b
         return _Linearized(P.T @ P - C.T @ C, P.T @ r.ravel() - C.T @ c, R, c, C)
 
     # --- the search ------------------------------------------------------------------------------
@@ -526,7 +565,7 @@ class _Search:
         """
         every = self._every(theta, [w.start for w in self.windows])
         counts = self._counts()
-        unknowns = len(theta) + len(self.windows) * len(self.heli.states)
+        unknowns = len(theta) + len(self.windows) * len(self.weight)
         left = max(1 - unknowns / counts.sum(), 0.1)
         power = sum((r**2).sum(axis=0) for r in every)
         lagged = sum((r[1:] * r[:-1]).sum(axis=0) for r in every)
@@ -579,7 +618,7 @@ class _Search:
 
 def _pieces(record: FlightRecord, u: Array) -> Iterator[range]:
     """Pieces of a record without a gap in time or in the inputs."""
-    whole_rows = np.isfinite(u).all(axis=1)
+    whole_rows: list[bool] = np.isfinite(u).all(axis=1).tolist()  # type: ignore[assignment]
     for part in record.segments():
         for known, group in groupby(range(part.start, part.stop), key=lambda k: whole_rows[k]):
             rows = list(group)

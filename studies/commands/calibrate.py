@@ -43,6 +43,13 @@ ARGUMENTS = (
     option("--altitude", "M", "of the flights above sea level, m", options.number, 0.0),
     option("--parameters", "A,B", "parameters that are free (default: all)", options.names),
     option("--window", "S", "length over which the equations run free, s", options.positive, 3.0),
+    option(
+        "--gust",
+        "M/S",
+        "standard deviation of a wind that is estimated in each window (default: still air)",
+        options.number,
+        0.0,
+    ),
     option("--start", "S", "drop samples before this time, s on the log's clock", options.number),
     option("--stop", "S", "drop samples after this time, s", options.number),
     option("--write", "FILE", "write the calibrated vehicle file (.toml)", Path),
@@ -60,7 +67,9 @@ def run(arguments: argparse.Namespace) -> Output:
     heli = symheli.Helicopter.load(arguments.vehicle, governor=arguments.governor)
     heli = heli.at_altitude(arguments.altitude) if arguments.altitude else heli
     records = [_record(arguments, log) for log in arguments.logs]
-    found = calibrate(heli, records, arguments.parameters, window=arguments.window)
+    found = calibrate(
+        heli, records, arguments.parameters, window=arguments.window, gust=arguments.gust
+    )
     text = str(found)
     data = {
         "vehicle": heli.vehicle.title,

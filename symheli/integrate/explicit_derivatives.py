@@ -63,7 +63,7 @@ def adjoint(equations: Equations, flown: Trajectory, weights: Array) -> tuple[Ar
     return bars
 
 
-def _call(function: Callable[..., int], flown: Trajectory, m: int, **arrays: Array) -> None:
+def _call(function: Callable[..., int], flown: Trajectory, m: int, **arrays: Array | None) -> None:
     tableau: Tableau = flown.method.tableau
     per_sample = np.asarray(flown.per_sample, ctypes.c_long)
     members = ("dx0", "du", "dwind", "dp", "dx", "weights", "x_bar", "u_bar", "wind_bar")

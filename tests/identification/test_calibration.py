@@ -103,8 +103,31 @@ def test_wind_leaves_residuals_that_are_not_white(ideal, flown):
     lqr = symheli.flight.gain_scheduled_lqr(ideal, 0.0, 8.0, 0.02)
     air = symheli.Wind((0, 0, 0), turbulence=symheli.Dryden(8.0, 30.0), seed=1)
     gusty = symheli.fly(ideal, schedule, controller=lqr, wind=air, noise_db=30.0)
-    found = idn.calibrate(ideal, gusty, KNOWN[:1])
+    with pytest.warns(symheli.DataWarning, match="no white noise: wind"):
+        found = idn.calibrate(ideal, gusty, KNOWN[:1])
     assert max(found.whiteness.values()) > 0.5
+    assert "The residuals of" in str(found)
+
+
+def test_a_steady_wind_is_estimated_beside_the_parameters(ideal, wrong):
+    """3 m/s from ahead: without the wind the residuals tell, with it they are white and the
+    parameters right.
+    """
+    schedule = symheli.AirspeedSchedule.transition(2.0, 6.0, acceleration=2.0, hold=2.0)
+    lqr = symheli.flight.gain_scheduled_lqr(ideal, 0.0, 8.0, 0.02)
+    shaken = symheli.Excitation({"d_lon": 0.015, "d_lat": 0.01}, "multisine", (0.1, 4.0), 1)
+    flight = symheli.fly(
+        ideal,
+        schedule,
+        controller=lqr,
+        excitation=shaken,
+        wind=symheli.Wind((-3.0, 0.0, 0.0)),
+        noise_db=30.0,
+    )
+    found = idn.calibrate(wrong, flight, KNOWN, gust=3.0)
+    errors = found.values - [ideal.parameters[name] for name in KNOWN]
+    assert np.all(np.abs(errors) < 4 * found.deviations)
+    assert not found.coloured
 
 
 @pytest.mark.parametrize(
@@ -116,6 +139,7 @@ def test_wind_leaves_residuals_that_are_not_white(ideal, flown):
         ({"window": 0.0}, "window"),
         ({"window": 1e4}, "as long as a window"),
         ({"rounds": 0}, "rounds"),
+        ({"gust": -1.0}, "gust"),
     ],
 )
 def test_bad_arguments_are_refused(ideal, flown, change, message):
@@ -138,7 +162,10 @@ def test_bad_records_are_refused(ideal, flown):
 
 
 def test_a_search_that_is_cut_short_says_so(wrong, flown):
-    with pytest.warns(symheli.ConvergenceWarning, match="allow more rounds"):
+    with (
+        pytest.warns(symheli.ConvergenceWarning, match="allow more rounds"),
+        pytest.warns(symheli.DataWarning, match="no white noise"),
+    ):
         found = idn.calibrate(wrong, flown["noisy"], KNOWN, rounds=1)
     assert "had not converged" in str(found)
 
