@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.signal import csd, get_window
+from scipy.signal import get_window
+from scipy.stats import f as fisher
 
 from identification.structure.regressors import as_records, units_of
 from symheli.errors import ExcitationError, InputError
@@ -21,6 +23,17 @@ from symheli.values.summary import as_table, summarized
 if TYPE_CHECKING:
     import pandas
     from matplotlib.axes import Axes
+
+
+PERIODS = 16.0
+"""Periods that the shortest window chosen for a frequency holds, where several are given: its
+resolution is then an eighth of the frequency, less than the width of a mode of damping .15.
+"""
+
+USABLE = 0.2
+"""Largest normalised standard deviation of |G| at which a response is used (Tischler and Remple
+(2012), sec. 7.5).
+"""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -38,8 +51,10 @@ class FrequencyResponse:
         left of an input.
     multiple : array (n, ny)
         Share of each output that all inputs explain.
-    random_error : array (n, ny, nu)
-        Normalised standard deviation of |G|.
+    deviation : array (n, ny, nu)
+        Standard deviation of the complex G, the root of the mean square of its error's modulus.
+    freedom : array (n,)
+        Degrees of freedom of the noise level that `deviation` rests on.
     outputs, inputs : tuple of Signal
         ny and nu of them.
 
@@ -55,12 +70,33 @@ class FrequencyResponse:
     G: Array
     coherence: Array
     multiple: Array
-    random_error: Array
+    deviation: Array
+    freedom: Array
     outputs: tuple[Signal, ...]
     inputs: tuple[Signal, ...]
 
     __repr__ = summarized
     _repr_html_ = as_table
+
+    @property
+    def random_error(self) -> Array:
+        """Normalised standard deviation (n, ny, nu) of |G|."""
+        size = np.maximum(np.abs(self.G), np.finfo(float).tiny)
+        return self.deviation / (np.sqrt(2.0) * size)
+
+    @property
+    def usable(self) -> Array:
+        """Mask (n, ny, nu) of the responses whose random error is at most .2."""
+        return self.random_error <= USABLE
+
+    def radius(self, probability: float = 0.95) -> Array:
+        """Radius (n, ny, nu) of the disk about G in the complex plane that holds the response with
+        this probability, each by itself.
+        """
+        if not 0.0 < probability < 1.0:
+            raise InputError(f"probability: expected a number in (0, 1), got {probability!r}")
+        quantile = fisher.ppf(probability, 2, 2 * self.freedom)
+        return self.deviation * np.sqrt(quantile)[:, None, None]
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Magnitude of every response over frequency (rad/s), shaded by its random error; returns
@@ -117,15 +153,20 @@ def frequency_response(
     outputs: Sequence[str],
     inputs: Sequence[str],
     *,
-    window: float,
+    window: float | Sequence[float],
     band: tuple[float, float] | None = None,
+    references: Sequence[str] = (),
 ) -> FrequencyResponse:
-    """Return the spectral estimate G = Gyu Guu^-1 from one record or several: Hann windows, half
-    overlapping, averaged.
+    """Return the response of outputs to inputs, each with the effect of the other inputs removed,
+    from one record or several: Hann windows, half overlapping, averaged.
 
     A long window resolves low frequencies, a short one averages more: about five windows a record
-    are the least. Windows that a gap or a missing sample touches are left out. Feedback biases G
-    where noise is fed back: excite well.
+    are the least. Of several windows the shortest that holds sixteen periods is taken at each
+    frequency (composite windows). Windows that a gap or a missing sample touches are left out.
+
+    With a controller on, noise is fed back to the inputs and biases G = Gyu Guu^-1. `references`
+    are signals that the noise does not reach, such as the recorded excitation or the pilot's
+    commands, at least as many as inputs: then G = Gyr Gur^-1 is free of that bias.
 
     Parameters
     ----------
@@ -133,27 +174,30 @@ def frequency_response(
         Of one sample period.
     outputs, inputs : sequence of str
         ny and nu signals.
-    window : float
+    window : float or sequence of float
         Length of a window, s.
     band : (float, float), optional
         rad/s; default 2 pi/`window` .. half the sampling frequency.
+    references : sequence of str
+        Instruments for flights in closed loop; none: the inputs themselves.
 
     Returns
     -------
     FrequencyResponse
-        With coherences and random errors.
+        With coherences and standard deviations.
 
     Raises
     ------
     InputError
-        A window of less than eight samples, a band that holds no frequency of it.
+        A window of less than eight samples, a band that holds no frequency of it, fewer references
+        than inputs.
     ExcitationError
-        The inputs move together, or too few windows remain.
+        The inputs or references move together, or too few windows remain.
 
     References
     ----------
     Bendat and Piersol (2010), Random Data, ch. 7 and 9; Tischler and Remple (2012), Aircraft and
-    Rotorcraft System Identification, ch. 7 to 9.
+    Rotorcraft System Identification, ch. 7 to 10; references: Wellstead (1981), Automatica 17.
 
     Examples
     --------
@@ -163,66 +207,126 @@ def frequency_response(
     """
     records = as_records(records)
     outputs, inputs = units_of(outputs, records), units_of(inputs, records)
+    references = units_of(references, records)
     if not (outputs and inputs):
         raise InputError("outputs, inputs: name at least one of each")
-    omega, pieces = windows(records, (*inputs, *outputs), window, band)
-    mean = np.mean([S for S, _ in pieces], axis=0)
-    return response_of(omega, mean, len(pieces), outputs, inputs, window)
+    if references and len(references) < len(inputs):
+        raise InputError(
+            f"references: {len(references)} are too few for {len(inputs)} inputs; give as many at"
+            " least, each moving by itself"
+        )
+    names = (*inputs, *outputs, *references)
+    parts = []
+    for length, part in _bands(window, band, records[0].dt):
+        found = windows(records, names, length, part)
+        parts.append(response_of(found, outputs, inputs, length))
+    stacked = {
+        name: np.concatenate([getattr(part, name) for part in parts])
+        for name in ("omega", "G", "coherence", "multiple", "deviation", "freedom")
+    }
+    return FrequencyResponse(**stacked, outputs=outputs, inputs=inputs)
+
+
+def _bands(
+    window: float | Sequence[float], band: tuple[float, float] | None, dt: float
+) -> list[tuple[float, tuple[float, float] | None]]:
+    """Each window (s) with the frequencies (rad/s) it is for."""
+    if isinstance(window, int | float):
+        return [(float(window), band)]
+    lengths = sorted({float(length) for length in window}, reverse=True)
+    if not lengths:
+        raise InputError("window: give at least one length (s)")
+    low, high = band or (2 * np.pi / lengths[0], np.pi / dt)
+    edges = [low, *(max(low, 2 * np.pi * PERIODS / length) for length in lengths[1:]), high]
+    return [
+        (length, (first, last if last == high else last * (1 - 1e-6)))
+        for length, (first, last) in zip(lengths, pairwise(edges), strict=True)
+        if first < min(last, high) and (last - first) * length > 2 * np.pi
+    ]
 
 
 def response_of(
-    omega: Array,
-    S: Array,
-    count: int,
-    outputs: tuple[Signal, ...],
-    inputs: tuple[Signal, ...],
-    window: float,
+    found: Windows, outputs: tuple[Signal, ...], inputs: tuple[Signal, ...], window: float
 ) -> FrequencyResponse:
-    """From the mean cross spectra S (n, nu + ny, nu + ny) of `count` windows (s), inputs first."""
-    nu = len(inputs)
+    """From windows (s) of the signals (inputs, outputs, references); without references the inputs
+    are their own.
+    """
+    nu, ny = len(inputs), len(outputs)
+    count = len(found.transforms)
     if count < nu + 1:
         raise ExcitationError(
             f"{count} unbroken windows of {window} s are too few for {nu} inputs; record longer or"
             " shorten the window"
         )
-    Suu, Syu, Syy = S[:, :nu, :nu], S[:, nu:, :nu], S[:, nu:, nu:]
-    size = np.sqrt(np.einsum("kii->ki", Suu).real)
-    if np.any(size == 0) or np.linalg.cond(Suu / (size[:, :, None] * size[:, None, :])).max() > 1e8:
-        raise ExcitationError(
-            f"the inputs {', '.join(inputs)} move together, or not at all, at some frequency of the"
-            " band; excite each by itself"
-        )
-    G = np.swapaxes(np.linalg.solve(np.swapaxes(Suu, 1, 2), np.swapaxes(Syu, 1, 2)), 1, 2)
-    power = np.einsum("kii->ki", Syy).real
-    explained = np.einsum("kij,kjl,kil->ki", G, Suu, np.conj(G)).real
+    U, Y, R = np.split(found.transforms, [nu, nu + ny], axis=2)
+    R = R if R.shape[2] else U
+
+    def crossed(a: Array, b: Array) -> Array:
+        return np.einsum("kfi,kfj->fij", a, np.conj(b)) / count
+
+    Srr, Sur, Syr = crossed(R, R), crossed(U, R), crossed(Y, R)
+    _refuse_dependent(Srr, inputs if R is U else "references")
+    # inputs as far as the references explain them: U itself where they are their own
+    told = np.linalg.solve(Srr, np.swapaxes(np.conj(Sur), 1, 2))  # (f, r, u)
+    Suu, Syu = Sur @ told, Syr @ told
+    _refuse_dependent(Suu, inputs)
+    inverse = np.linalg.inv(Suu)
+    G = Syu @ inverse
+    left = Y - np.einsum("fij,kfj->kfi", G, U)
+    power = np.mean(np.abs(Y) ** 2, axis=0)
+    noise = np.mean(np.abs(left) ** 2, axis=0)
+    independent = count**2 / np.sum(found.overlap**2)
+    freedom = max(independent - nu, 1.0)
     tiny = np.finfo(float).tiny
-    multiple = np.clip(explained / np.maximum(power, tiny), 0.0, 1.0)
-    # what is left of input j without the others is 1/(Suu^-1)_jj; of the output, what the others do
-    # not explain
-    alone = 1 / np.einsum("kjj->kj", np.linalg.inv(Suu)).real
-    own = np.abs(G) ** 2 * alone[:, None, :]
-    noise = np.maximum(power - explained, 0.0)
+    own = np.abs(G) ** 2 / np.maximum(np.einsum("fjj->fj", inverse).real, tiny)[:, None, :]
     coherence = own / np.maximum(own + noise[:, :, None], tiny)
-    # half overlapping Hann windows are worth 0.55 of their number as independent averages (Tischler
-    # and Remple, sec. 7.5)
-    with np.errstate(divide="ignore"):
-        random_error = np.sqrt(
-            0.55 * (1 - coherence) / np.maximum(coherence, tiny) / (2 * max(independent(count), 1))
-        )
+    # the error of G is sum_k left_k Z_k^H, and neighbouring windows share noise by their overlap
+    Z = np.einsum("kfr,fru->kfu", np.conj(R), told @ inverse) / count
+    shared = np.einsum("kfu,kl,lfu->fu", np.conj(Z), found.overlap, Z).real
+    level = noise * independent / freedom
     return FrequencyResponse(
-        omega=omega,
+        omega=found.omega,
         G=G,
         coherence=coherence,
-        multiple=multiple,
-        random_error=random_error,
+        multiple=np.clip(1.0 - noise / np.maximum(power, tiny), 0.0, 1.0),
+        deviation=np.sqrt(level[:, :, None] * np.maximum(shared, 0.0)[:, None, :]),
+        freedom=np.full(len(found.omega), freedom),
         outputs=outputs,
         inputs=inputs,
     )
 
 
+def _refuse_dependent(S: Array, names: tuple[Signal, ...] | str) -> None:
+    size = np.sqrt(np.maximum(np.einsum("kii->ki", S).real, 0.0))
+    if np.any(size == 0) or np.linalg.cond(S / (size[:, :, None] * size[:, None, :])).max() > 1e8:
+        told = names if isinstance(names, str) else f"inputs {', '.join(names)}"
+        raise ExcitationError(
+            f"the {told} move together, or not at all, at some frequency of the band; excite each"
+            " by itself"
+        )
+
+
 def independent(windows: int) -> float:
     """Number of windows that do not overlap in as much data."""
     return (windows + 1) / 2
+
+
+@dataclass(frozen=True, eq=False)
+class Windows:
+    """Fourier transforms (K, n, m) of m signals in K windows at `omega` (n,; rad/s), scaled so that
+    their squares are one-sided densities; means (K, others) of further signals; and how much of
+    its data each window shares with each other, `overlap` (K, K), 1 on the diagonal.
+    """
+
+    omega: Array
+    transforms: Array
+    means: Array
+    overlap: Array
+
+    @property
+    def spectra(self) -> Array:
+        """Cross spectral densities (K, n, m, m), [..., a, b] of a with the conjugate of b."""
+        return self.transforms[..., :, None] * np.conj(self.transforms)[..., None, :]
 
 
 def windows(
@@ -231,9 +335,9 @@ def windows(
     window: float,
     band: tuple[float, float] | None,
     also: tuple[str, ...] = (),
-) -> tuple[Array, list[tuple[Array, Array]]]:
-    """Frequencies (rad/s) of the band, and of each unbroken window (s) the cross spectral densities
-    (nf, m, m), S[:, a, b] of a with the conjugate of b, beside the means of the signals `also`.
+) -> Windows:
+    """Return every unbroken window (s) of the records, half overlapping, with the means of the
+    signals `also`.
 
     Raises `InputError` for a window or a band that holds nothing, `ExcitationError` where no window
     is unbroken.
@@ -257,32 +361,28 @@ def windows(
         raise InputError(
             f"band: no frequency of a {window} s window lies between {low} and {high} rad/s"
         )
-    m, hop, found = len(names), n // 2, []
     taper: Any = np.asarray(get_window("hann", n))
-    untouched: Any = False
-    for record in records:
+    scale = np.sqrt(2.0 * dt / np.sum(taper**2))
+    transforms, means, places = [], [], []
+    for number, record in enumerate(records):
         values, others = record.columns(names), record.columns(also)
         for part in record.segments():
-            for start in range(part.start, part.stop - n + 1, hop):
+            for start in range(part.start, part.stop - n + 1, n // 2):
                 rows = slice(start, start + n)
                 piece = values[rows]
                 if not (np.isfinite(piece).all() and np.isfinite(others[rows]).all()):
                     continue
-                piece = piece - piece.mean(axis=0)
-                a, b = np.meshgrid(np.arange(m), np.arange(m), indexing="ij")
-                # csd(x, y) averages conj(X) Y
-                S = csd(
-                    piece.T[b],
-                    piece.T[a],
-                    fs=1 / record.dt,
-                    window=taper,
-                    nperseg=n,
-                    detrend=untouched,
-                    axis=-1,
-                )[1]
-                found.append((np.moveaxis(S, -1, 0)[keep], others[rows].mean(axis=0)))
-    if not found:
+                piece = (piece - piece.mean(axis=0)) * taper[:, None]
+                # phases from the start of the record: overlapping windows see the same noise
+                turned = np.exp(-1j * omega[keep] * dt * start)[:, None]
+                transforms.append(scale * np.fft.rfft(piece, axis=0)[keep] * turned)
+                means.append(others[rows].mean(axis=0))
+                places.append((number, start))
+    if not transforms:
         raise ExcitationError(
             f"no unbroken stretch of {n} samples; shorten the window or resample the record"
         )
-    return omega[keep], found
+    number, start = np.array(places).T
+    apart = np.where(number[:, None] == number, np.minimum(np.abs(start[:, None] - start), n), n)
+    shared = np.array([taper[d:] @ taper[: n - d] for d in range(n)] + [0.0]) / (taper @ taper)
+    return Windows(omega[keep], np.array(transforms), np.array(means), shared[apart])

@@ -76,14 +76,13 @@ def response_match(
     records = as_records(records)
     outputs_, inputs_ = units_of(outputs, records), units_of(inputs, records)
     nu, ny = len(inputs_), len(outputs_)
-    omega, pieces = windows_of(records, (*inputs_, *outputs_), window, band, tuple(scheduling))
+    found = windows_of(records, (*inputs_, *outputs_), window, band, tuple(scheduling))
+    omega, pieces = found.omega, list(zip(found.spectra, found.means, strict=True))
     if independent(len(pieces)) < WINDOWS * nu:
         raise ExcitationError(
             f"{len(pieces)} windows of {window:g} s are too few for {nu} inputs: record longer"
         )
-    measured = response_of(
-        omega, np.mean([S for S, _ in pieces], axis=0), len(pieces), outputs_, inputs_, window
-    )
+    measured = response_of(found, outputs_, inputs_, window)
     power = sum(S[:, :nu, :nu] for S, _ in pieces)
     crossed = np.zeros((len(omega), ny, nu), complex)
     left = np.zeros((len(omega), ny))  # power of what the model leaves of an output
