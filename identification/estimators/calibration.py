@@ -67,6 +67,9 @@ LARGEST_DAMPING = 1e8
 TINY = 1e-24
 """Smallest mean square that is divided by, in SI units."""
 
+DRAWS_TRIED = 50
+"""Number of draws tried for each that is asked."""
+
 WHITE = 0.3
 """Correlation of residuals from sample to sample above which the model leaves something out."""
 
@@ -132,6 +135,34 @@ class Calibration:
         """
         return (self.deviations <= CRAMER_RAO_LIMIT * np.abs(self.values)) & (
             self.deviations <= INFORMED * self.prior_deviations
+        )
+
+    def draws(self, count: int, seed: int = 0) -> list[Helicopter]:
+        """`count` helicopters whose parameters are drawn from the distribution of the errors: what
+        the truth may be. Logarithms of the parameters are normally distributed; bodies that cannot
+        be are left out.
+        """
+        relative = self.deviations / self.values
+        covariance = self.correlation * np.outer(relative, relative)
+        sizes, vectors = np.linalg.eigh(covariance)
+        root = vectors * np.sqrt(np.maximum(sizes, 0.0))
+        rng = np.random.default_rng(seed)
+        names = [str(p) for p in self.parameters]
+        drawn: list[Helicopter] = []
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DataWarning)
+            for z in rng.standard_normal((DRAWS_TRIED * whole(count, "count", 1), len(names))):
+                values = self.values * np.exp(root @ z)
+                try:
+                    changes = dict(zip(names, values.tolist(), strict=True))
+                    drawn.append(self.heli.with_parameters(changes))
+                except InputError:  # no such body, as one with Izz > Ixx + Iyy
+                    continue
+                if len(drawn) == count:
+                    return drawn
+        raise InputError(
+            "nearly all helicopters within these deviations are impossible: free fewer parameters,"
+            " or state deviations in the vehicle file"
         )
 
     @property

@@ -1,5 +1,6 @@
 """Closed-loop flights of the nonlinear model."""
 
+from symheli.flight.ardupilot import HelicopterLoops, Pilot, RateController
 from symheli.flight.autopilot import Autopilot, gain_scheduled_lqr
 from symheli.flight.batch import FlightBatch, fly_batch
 from symheli.flight.campaign import fly_campaign
@@ -25,8 +26,11 @@ __all__ = [
     "FlightBatch",
     "FlightDataset",
     "FlightPlan",
+    "HelicopterLoops",
     "ParameterMonitor",
+    "Pilot",
     "PureController",
+    "RateController",
     "ScheduledController",
     "Sensor",
     "Servo",

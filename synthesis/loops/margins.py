@@ -53,16 +53,18 @@ class Margins:
 UNSTABLE = Margins(False, (1.0, 1.0), 0.0, 0.0, 0.0, ())
 
 
-def loop(plant: LinearModel, feedback: Mapping[tuple[str, str], float], at: str) -> LinearModel:
+def loop(
+    plant: LinearModel, feedback: Mapping[tuple[str, str], float] | LinearModel, at: str
+) -> LinearModel:
     """Return the loop of u = feedback y broken at one input, as L of 1 + L (negative feedback).
 
     Parameters
     ----------
     plant : LinearModel
         The model, nx states.
-    feedback : mapping
-        {(input, output): gain} as in `LinearModel.feedback`; gains in units of the input per unit
-        of the output.
+    feedback : mapping or LinearModel
+        {(input, output): gain} as in `LinearModel.feedback`, gains in units of the input per unit
+        of the output; or a controller from outputs of the plant to inputs of it, u = K y.
     at : str
         The input at which the loop is broken; the others stay closed.
 
@@ -74,7 +76,7 @@ def loop(plant: LinearModel, feedback: Mapping[tuple[str, str], float], at: str)
     Raises
     ------
     InputError
-        Where an output that is fed back has feedthrough.
+        Where an output that is fed back has feedthrough, or a controller another sample period.
     UnknownNameError
         For an input that the plant does not have.
 
@@ -87,6 +89,8 @@ def loop(plant: LinearModel, feedback: Mapping[tuple[str, str], float], at: str)
     2.0
     """
     (i,) = indices([at], plant.inputs, "input")
+    if isinstance(feedback, LinearModel):
+        return _dynamic_loop(plant, feedback, at)
     row = feedback_matrix(
         {pair: gain for pair, gain in feedback.items() if pair[0] == at},
         plant.inputs,
@@ -107,6 +111,40 @@ def loop(plant: LinearModel, feedback: Mapping[tuple[str, str], float], at: str)
         plant.states,
         signal,
         signal,
+        plant.dt,
+    )
+
+
+def _dynamic_loop(plant: LinearModel, controller: LinearModel, at: str) -> LinearModel:
+    """L of a loop with dynamics, broken at one output of the controller."""
+    controls = controller.outputs
+    (k,) = indices([at], controls, "control")
+    if plant.dt != controller.dt:
+        raise InputError(
+            f"the plant has dt = {plant.dt} and the controller dt = {controller.dt}; discretize or"
+            " sample one like the other"
+        )
+    P = plant.select(inputs=controls, outputs=controller.inputs)
+    if np.abs(P.D).max(initial=0.0) > 0:
+        raise InputError(
+            "an output that is fed back depends on an input directly; put an actuator or a delay"
+            " between"
+        )
+    n, m = len(P.A), len(controller.A)
+    A = np.block([[P.A, np.zeros((n, m))], [controller.B @ P.C, controller.A]])
+    B, C = (
+        np.vstack([P.B, np.zeros((m, len(controls)))]),
+        np.hstack([controller.D @ P.C, controller.C]),
+    )
+    others = [j for j in range(len(controls)) if j != k]
+    return LinearModel(
+        A + B[:, others] @ C[others],
+        B[:, [k]],
+        -C[[k]],
+        np.zeros((1, 1)),
+        (*P.states, *controller.states),
+        (controls[k],),
+        (controls[k],),
         plant.dt,
     )
 
