@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from symheli.logs.format import OWN_CLOCKS
 from symheli.logs.meaning import CONTROLS, Guess
-from symheli.logs.survey import OWN_CLOCKS, Survey
+from symheli.logs.survey import Survey
 
 AXES = (
     ("lon", ("q", "theta")),

@@ -8,7 +8,8 @@ from typing import Any
 
 from studies.log.suggestion import Suggestion
 from studies.output import columns
-from symheli.logs.survey import OWN_CLOCKS, Survey
+from symheli.logs.format import OWN_CLOCKS
+from symheli.logs.survey import Survey
 from symheli.values.units import to_si
 
 MOST = 12

@@ -10,6 +10,7 @@ import numpy as np
 
 from symheli.logs.column import Column, forward
 from symheli.logs.contents import Contents
+from symheli.logs.format import OWN_CLOCKS
 from symheli.logs.meaning import Guess, guesses, moves, plain_name
 from symheli.logs.stretches import Stretch, longest, stretches
 from symheli.values.sample_period import JITTER, USUAL
@@ -23,9 +24,6 @@ CLOCKS = ("t", "time", "timestamp", "timeus", "timems", "timestampus", "timestam
 
 WINDOW = 25
 """Rows over which an angle is held against its rate: the noise of the rate averages out."""
-
-OWN_CLOCKS = ("ulog", "dataflash")
-"""Formats in which every topic or message has its own rate, read by a map."""
 
 
 @dataclass(frozen=True)
