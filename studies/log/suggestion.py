@@ -6,8 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from studies.log.flown import COARSE, SERVING, UNRESOLVED
 from symheli.logs.format import OWN_CLOCKS
 from symheli.logs.meaning import CONTROLS, Guess
+from symheli.logs.segments import MIN_DURATION
 from symheli.logs.survey import Survey
 
 AXES = (
@@ -23,10 +25,8 @@ SLOW = 0.03
 then reach over what a helicopter does, not over noise.
 """
 
-COARSE = 1.5
-"""Times that step: an output sampled more seldom would be made of samples that are still to come,
-and is left out.
-"""
+SLOWEST = 0.2
+"""s: an input that is logged more seldom, and moves faster than that shows, tells nothing."""
 
 
 @dataclass(frozen=True)
@@ -65,17 +65,24 @@ def suggestion(
     )
     step = dt or (found.clock.step if found.clock else found.step) or 0.0
     by_map, means = found.format in OWN_CLOCKS, SLOW
+    if by_map and not found.serving and found.segments:
+        why = f"flight: no segment of {MIN_DURATION:g} s in the air; --segments all overrides"
+        return Suggestion((*missing, why))
     if by_map:
         steps = {n: found.motions[there[n].column].step or 0.0 for n in (*outputs, control)}
         step = dt or float(f"{steps[outputs[0]]:.2g}")
-        means = max(SLOW, steps[control])
-        late = [y for y in outputs[1:] if steps[y] > COARSE * max(means, step)]
+        means = max(SLOW, step)
+        fast = [n for n in steps if found.unresolved[there[n].column] > UNRESOLVED]
+        if control in fast and steps[control] > COARSE * means:
+            if steps[control] > SLOWEST:
+                return Suggestion((*missing, f"{control} more often: {_too_slow(control, steps)}"))
+            means = steps[control]
+            missing += (
+                f"{control} more often: {_too_slow(control, steps)}; the model gets its steps",
+            )
+        late = [y for y in outputs[1:] if y in fast and steps[y] > COARSE * means]
         outputs = [y for y in outputs if y not in late]
-        missing += tuple(
-            f"{y} more often: {1 / steps[y]:.2g} Hz tells less than the input's"
-            f" {1 / max(means, step):.2g} Hz, it is left out"
-            for y in late
-        )
+        missing += tuple(f"{y} more often: {_too_slow(y, steps)}; it is left out" for y in late)
     used = [there[name] for name in (*outputs, control, *scheduling)]
     named = {g.signal: g.signal if by_map else g.column for g in used}
     command = ["symheli", "identify", str(found.log)]
@@ -94,18 +101,15 @@ def suggestion(
         command += ["--scheduling-from", ",".join(named[s] for s in scheduling)]
     else:
         command += ["--degree", "0"]
-    if found.flight is not None:
-        start = _beginning(found, used) if by_map else 0.0
-        command += ["--start", f"{max(found.flight.start - start, 0.0):.4g}"]
-        command += ["--stop", f"{found.flight.stop - start:.4g}"]
+    if not by_map and 0 < len(found.serving) < len(found.segments):
+        command += ["--segments", SERVING]
     if (together := int(means / step + 0.01)) > 1:
         command += ["--decimate", str(together)]
     return Suggestion(missing, content, tuple(command))
 
 
-def _beginning(found: Survey, used: list[Guess]) -> float:
-    """Return the instant from which all columns with clocks of their own are known."""
-    return max(found.motions[guess.column].start or 0.0 for guess in used)
+def _too_slow(name: str, steps: Mapping[str, float]) -> str:
+    return f"it moves faster than its {1 / steps[name]:.2g} Hz resolve"
 
 
 def _reading(found: Survey, used: list[Guess], dt: float | None) -> list[str]:

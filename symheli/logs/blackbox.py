@@ -1,5 +1,4 @@
-"""Blackbox logs of Betaflight, Rotorflight, INAV and Cleanflight (.bbl, .bfl, .txt), of version 2 of
-the format.
+"""Blackbox logs of Betaflight, Rotorflight, INAV and Cleanflight (.bbl, .bfl, .txt), version 2.
 
 A file holds one or more logs, each with a header in words and frames of bytes: I frames whole, P
 frames as differences to a prediction, S (slow) and G (GPS) frames between them. Columns are called
@@ -17,6 +16,7 @@ from __future__ import annotations
 
 import os
 import struct
+from array import array
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
@@ -24,8 +24,8 @@ import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.logs.column import Column, on_one_axis
-from symheli.logs.format import BLACKBOX
 from symheli.logs.files import Table, bounded, positive, warn_of_damage
+from symheli.logs.format import BLACKBOX
 from symheli.values.units import to_si
 
 MAX_BYTES = 64 * 2**20
@@ -74,7 +74,9 @@ class _Header(NamedTuple):
     body: int
 
 
-def read_blackbox(path: str | os.PathLike[str], fields: Mapping[str, tuple[str, str]], dt: float) -> Table:
+def read_blackbox(
+    path: str | os.PathLike[str], fields: Mapping[str, tuple[str, str]], dt: float
+) -> Table:
     """{signal: (column, unit)}, interpolated to steps of `dt` (s) over their common time as
     `symheli.logs.column.on_one_axis` does.
 
@@ -289,15 +291,15 @@ def _extended(value: int, bits: int) -> int:
     return value - (1 << bits) if value >> (bits - 1) else value
 
 
-_Rows = dict[str, list[list[float]]]
-"""Frames by kind, the instant (us) at the front of each."""
+_Rows = dict[str, array]
+"""Numbers of the frames by kind, one frame after the other, the instant (us) before each."""
 
 
 def _frames(data: bytes, header: _Header) -> tuple[_Rows, bool]:
     """Frames of one log, I and P together under "I", and whether some were damaged."""
     stream, kinds = _Bytes(data, header.body), header.kinds
     index = kinds["I"].names.index("time")
-    rows: _Rows = {"I": [], "S": [], "G": []}
+    rows: _Rows = {letter: array("d") for letter in "ISG"}
     before: list[int] | None = None
     earlier, home, lost, size = before, [0, 0], False, len(data)
     constants = _constants(header)
@@ -323,7 +325,7 @@ def _frames(data: bytes, header: _Header) -> tuple[_Rows, bool]:
                 if before is not None and not 0 <= values[index] - now <= MAX_JUMP:
                     raise _Damaged
                 earlier, before = (values if letter == "I" else before), values
-                rows["I"].append([values[index], *values])
+                rows["I"].extend([values[index], *values])
                 continue
             _predict(values, kind.predictors, [], [], {**constants, 10: now, 7: 0})
             if letter == "H":
@@ -332,7 +334,7 @@ def _frames(data: bytes, header: _Header) -> tuple[_Rows, bool]:
                 for i, where in enumerate(i for i, p in enumerate(kind.predictors) if p == 7):
                     values[where] += home[i % 2]
             if letter in rows:
-                rows[letter].append([now, *values])
+                rows[letter].extend([now, *values])
         except (_Damaged, IndexError):
             lost |= stream.at < size or letter in "IP"
             after = data.find(b"I", begin + 1)
@@ -396,22 +398,20 @@ def _predict(
             values[i] += constants.get(predictor, 0)
 
 
-def _columns(
-    rows: _Rows, header: _Header, number: int
-) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+def _columns(rows: _Rows, header: _Header, number: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Instants (s) and values of each column of one log."""
     out: dict[str, tuple[np.ndarray, np.ndarray]] = {}
     for letter, found in rows.items():
         if not found:
             continue
-        table = np.array(found, float)
+        table = np.array(found).reshape(-1, 1 + len(header.kinds[letter].names))
         time = 1e-6 * table[:, 0]
         for i, name in enumerate(header.kinds[letter].names):
             if name not in ("time", "loopIteration"):
                 out.setdefault(name, (time, _scale(name, header) * table[:, i + 1]))
     if not rows["I"]:
         return {}
-    time = 1e-6 * np.array([row[0] for row in rows["I"]], float)
+    time = 1e-6 * np.array(rows["I"])[:: 1 + len(header.kinds["I"].names)]
     for axis in range(3):
         terms = [out[name][1] for term in TERMS if (name := f"{term}[{axis}]") in out]
         if terms:

@@ -1,7 +1,7 @@
 """A TOML file that says where a log keeps which signal, in which unit: written once for an
 aircraft, used for every flight of it.
 
-    format = "csv"          # csv, mat, xplane, ulog, dataflash or blackbox; by its content where left out
+    format = "csv"          # csv, mat, xplane, ulog, dataflash, blackbox; default: by its content
     time = "time_us"        # time column of csv and mat
     time_unit = "us"
     dt = 0.02               # s: resample to (needed for autopilots, and without a clock)
@@ -11,9 +11,10 @@ aircraft, used for every flight of it.
     airspeed = { column = "pitot", unit = "km/h", offset = 0.4 }
 
 A signal is (scale * column + offset) in `unit`. Columns of a ulog are "topic.field" or
-"topic.1.field", those of a dataflash log "message.field" or "message[1].field", those of a blackbox log as in its
-header ("gyroADC[0]"; both need no unit where the log declares it), those of a MATLAB file may reach into a struct ("log.theta"), those of
-X-Plane are the names of `symheli.logs.xplane` and need no unit.
+"topic.1.field", those of a dataflash log "message.field" or "message[1].field", those of a blackbox
+log as in its header ("gyroADC[0]"); the last two need no unit where the log declares it. Those of a
+MATLAB file may reach into a struct ("log.theta"), those of X-Plane are the names of
+`symheli.logs.xplane` and need no unit.
 """
 
 from __future__ import annotations

@@ -317,14 +317,14 @@ def test_ground_and_flight_of_an_old_log_are_told_apart_and_the_flight_is_sugges
     pytest.importorskip("pymavlink", reason="needs pymavlink: pip install 'symheli[logs]'")
     monkeypatch.chdir(tmp_path)
     seen, text = look(before_2015(tmp_path / "log171.bin"))
-    words = [one["what"] for one in seen["stretches"]]
+    words = [one["what"] for one in seen["segments"]]
     assert words == [
         "disarmed, on the ground, at rest",
         "armed, on the ground, at rest",
         "armed, airborne",
         "armed, on the ground, at rest",
     ]
-    flown = seen["stretches"][2]
+    flown = seen["segments"][2]
     assert (flown["start"], flown["stop"]) == (pytest.approx(80, abs=2), pytest.approx(98, abs=2))
     assert re.search(r"\n  80\.?\d* +98\.?\d* +armed, airborne +suggested\n", text)
     found = runs(seen, answer)
@@ -340,7 +340,7 @@ def test_what_is_behind_a_crash_is_no_flight(look, answer, tmp_path, monkeypatch
     monkeypatch.chdir(tmp_path)
     seen, text = look(before_2015(tmp_path / "log.bin", crash=True))
     assert "crashed" in text
-    (flown,) = (one for one in seen["stretches"] if one["flown"])
+    (flown,) = (one for one in seen["segments"] if one["flown"])
     assert (flown["start"], flown["stop"]) == (80.0, pytest.approx(60 + 0.02 * 1600))
     assert runs(seen, answer)["read"]["stop"] <= 32.0
 
@@ -358,7 +358,7 @@ def test_armed_and_modes_of_px4(look, tmp_path):
     path = tmp_path / "log.ulg"
     path.write_bytes(ulog({("sensor_gyro", 0): gyro, ("vehicle_status", 0): status}))
     seen, _ = look(path)
-    assert [(one["what"], one["flown"]) for one in seen["stretches"]] == [
+    assert [(one["what"], one["flown"]) for one in seen["segments"]] == [
         ("disarmed, mode 0", False),
         ("armed, mode 0", True),
         ("armed, mode 2", True),
