@@ -318,7 +318,7 @@ def _frames(data: bytes, header: _Header) -> tuple[_Rows, bool]:
             values = stream.fields(kind.groups)
             if stream.at < size and data[stream.at] not in b"IPSGHE":
                 raise _Damaged
-            now = before[index] if before is not None else 0
+            now = before[index] if before is not None else 0  # of the first, filled in later
             if letter in "IP":
                 base = before or []
                 _predict(values, kind.predictors, base, earlier or base, constants)
@@ -405,7 +405,7 @@ def _columns(rows: _Rows, header: _Header, number: int) -> dict[str, tuple[np.nd
         if not found:
             continue
         table = np.array(found).reshape(-1, 1 + len(header.kinds[letter].names))
-        time = 1e-6 * table[:, 0]
+        time = 1e-6 * np.maximum(table[:, 0], rows["I"][0] if rows["I"] else 0.0)
         for i, name in enumerate(header.kinds[letter].names):
             if name not in ("time", "loopIteration"):
                 out.setdefault(name, (time, _scale(name, header) * table[:, i + 1]))

@@ -6,6 +6,7 @@ import os
 import re
 from typing import Literal, get_args
 
+from symheli.errors import InputError
 from symheli.logs.files import existing
 
 Format = Literal["xplane", "csv", "mat", "ulog", "dataflash", "blackbox"]
@@ -24,11 +25,16 @@ HDF5 = b"\x89HDF\r\n\x1a\n"
 """At the beginning, or behind the 512 bytes that MATLAB writes about itself."""
 
 
+PARAMETER = re.compile(rb"[A-Z][A-Z0-9_]{1,15}(,| +|\t)-?[0-9.]+(e[+-]?\d+)?\s*")
+"""A line of a file of parameters: ArduPilot's name and value."""
+
+
 def format_of(path: str | os.PathLike[str]) -> Format:
     """A MATLAB file, a PX4 ULog, an ArduPilot DataFlash log (binary or text), a Blackbox log, an
     X-Plane log ("name,unit |" in its first line), else a table.
 
-    Raises `InputError` for a file that is not there or empty.
+    Raises `InputError` for a file that is not there, is empty, or holds the parameters of an
+    autopilot.
     """
     with existing(path).open("rb") as file:
         head = file.read(LOOKED_AT)
@@ -40,6 +46,11 @@ def format_of(path: str | os.PathLike[str]) -> Format:
         return "dataflash"
     if BLACKBOX in head:
         return "blackbox"
+    if sum(PARAMETER.fullmatch(line) is not None for line in head.splitlines()[:20]) > 10:
+        raise InputError(
+            f"{path}: these are parameters of an autopilot, not a log; give the log, which holds"
+            " them too"
+        )
     first = next((line for line in head.splitlines() if line.strip()), b"")
     return "xplane" if b"|" in first and b"," in first.split(b"|")[0] else "csv"
 

@@ -165,6 +165,8 @@ def _change(before: Mapping[str, float], now: Mapping[str, float]) -> str:
     }
     for name, words in ends.items():
         value = now.get(name, np.nan)
+        if name == "crashed" and value == 0.0:
+            continue  # what follows is another flight
         if np.isfinite(value) and value != before.get(name, np.nan):
             return words[bool(value)].format(value)
     return "what follows is unknown"
