@@ -1,5 +1,4 @@
-"""`python -m evidence.logs --folder DIR`: public flight logs, fetched and identified, or refused with
-the reason.
+"""`python -m evidence.logs --folder DIR`: public flight logs, fetched, and identified or refused.
 
 The files are taken from `--folder` where they are there, else fetched from their repositories; each
 is held against its checksum. None of them belongs to this project: licences are in the table.
