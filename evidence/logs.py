@@ -16,8 +16,8 @@ import tempfile
 import urllib.error
 import urllib.parse
 import urllib.request
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -205,14 +205,14 @@ LOGS = (
 @dataclass(frozen=True)
 class Verdict:
     """What became of a log: the reason where it was refused, else what was used and the fits on the
-    part held out, in percent.
+    part held out, in percent, by model: one step, 1 s ahead, free run.
     """
 
     reason: str = ""
     used: float = 0.0
     airspeed: tuple[float, float] | None = None
     output: str = ""
-    fits: tuple[float, ...] = ()
+    fits: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
     @property
     def identified(self) -> bool:
@@ -264,19 +264,17 @@ def judged(file: Path) -> Verdict:
             if isinstance(seen, str):
                 raise InputError(f"{file.name}: the suggested command failed: {seen}")
         elif "models" not in seen:
-            return Verdict(reason="; ".join(seen["missing"]))
-    read, best = seen["read"], seen["models"][list(seen["models"])[-1]]["fit_percent"]["held_out"]
-    output = next(iter(next(iter(best.values()))))
-    fits = tuple(
-        max(float(model["fit_percent"]["held_out"][h][output]) for model in seen["models"].values())
-        for h in best
-    )
-    moves = read["scheduling"] != "constant"
+            return Verdict(reason=seen["refused"])
+    read = seen["read"]
+    held = {label: model["fit_percent"]["held_out"] for label, model in seen["models"].items()}
+    output = next(iter(next(iter(next(iter(held.values())).values()))))
     return Verdict(
         used=read["dt"] * read["samples"],
-        airspeed=tuple(read["scheduling_range"]) if moves else None,
+        airspeed=tuple(read["scheduling_range"]) if read["scheduling"] != "constant" else None,
         output=output,
-        fits=fits,
+        fits={
+            label: tuple(float(f[output]) for f in fits.values()) for label, fits in held.items()
+        },
     )
 
 
@@ -303,28 +301,23 @@ def rows(folder: Path) -> Iterator[tuple[PublicLog, Verdict]]:
 
 def table(found: list[tuple[PublicLog, Verdict]]) -> str:
     """The table in Markdown."""
-    head = [
-        "log",
-        "writer, licence",
-        "used",
-        "held out: one step, 1 s, free run",
-        "refused because",
+    head = ["log", "writer", "licence", "used", "held out: one step, 1 s, free run; else why not"]
+    return markdown(head, [[*_about(log), _used(v), _score(v)] for log, v in found])
+
+
+def _about(log: PublicLog) -> list[str]:
+    return [
+        f"`{log.path.rsplit('/', 1)[-1]}` of {log.repository}",
+        log.writer,
+        log.licence,
     ]
-    return markdown(
-        head,
-        [
-            [
-                f"`{log.path.rsplit('/', 1)[-1]}` of {log.repository}",
-                f"{log.writer}, {log.licence}",
-                _used(verdict),
-                f"{verdict.output}: {', '.join(percent(f) for f in verdict.fits)}"
-                if verdict.identified
-                else "",
-                verdict.reason,
-            ]
-            for log, verdict in found
-        ],
-    )
+
+
+def _score(verdict: Verdict) -> str:
+    if not verdict.identified:
+        return f"refused: {verdict.reason}"
+    fits = (f"{label} {' / '.join(map(percent, f))}" for label, f in verdict.fits.items())
+    return f"{verdict.output}: {'; '.join(fits)}"
 
 
 def _used(verdict: Verdict) -> str:

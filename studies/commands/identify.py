@@ -333,7 +333,8 @@ def _survey(arguments: argparse.Namespace, seen: Contents) -> Output:
     found = _surveyed(arguments, arguments.log, seen)
     hint = suggestion(found, dt=arguments.dt, signal_map=arguments.map)
     if hint.command is not None and (why := _refused(hint)):
-        hint = Suggestion((*hint.missing, f"the obvious command ends in: {why}"))
+        why = f"the obvious command ends in: {why}"
+        hint = Suggestion((*hint.missing, why), refused=why)
     return Output(survey_report.text(found, hint), survey_report.data(found, hint))
 
 

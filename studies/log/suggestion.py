@@ -32,12 +32,14 @@ SLOWEST = 0.2
 @dataclass(frozen=True)
 class Suggestion:
     """Sentences on what is `missing`; the words of a `command`, and the signal `map` it needs, None
-    where nothing can be suggested or no map is needed.
+    where nothing can be suggested or no map is needed; `refused`: which of the sentences is why
+    there is no command.
     """
 
     missing: tuple[str, ...]
     map: str | None = None
     command: tuple[str, ...] | None = None
+    refused: str = ""
 
 
 def suggestion(
@@ -58,7 +60,9 @@ def suggestion(
     )
     timed = found.clock or found.step or found.format in OWN_CLOCKS
     if axis is None or not timed:
-        return Suggestion(missing)
+        least = ("a clock", "an input") if set(CONTROLS) & there.keys() == set() else ("a clock",)
+        why = next((m for m in missing if m.startswith((*least, "angular rates"))), "")
+        return Suggestion(missing, refused=why or "no output that an input drives moves")
     control, outputs = axis
     scheduling = (
         ["airspeed"] if "airspeed" in there else ["u", "v"] if {"u", "v"} <= there.keys() else []
@@ -67,7 +71,7 @@ def suggestion(
     by_map, means = found.format in OWN_CLOCKS, SLOW
     if by_map and not found.serving and found.segments:
         why = f"flight: no segment of {MIN_DURATION:g} s in the air; --segments all overrides"
-        return Suggestion((*missing, why))
+        return Suggestion((*missing, why), refused=why)
     if by_map:
         steps = {n: found.motions[there[n].column].step or 0.0 for n in (*outputs, control)}
         step = dt or float(f"{steps[outputs[0]]:.2g}")
@@ -75,7 +79,8 @@ def suggestion(
         fast = [n for n in steps if found.unresolved[there[n].column] > UNRESOLVED]
         if control in fast and steps[control] > COARSE * means:
             if steps[control] > SLOWEST:
-                return Suggestion((*missing, f"{control} more often: {_too_slow(control, steps)}"))
+                why = f"{control} more often: {_too_slow(control, steps)}"
+                return Suggestion((*missing, why), refused=why)
             means = steps[control]
             missing += (
                 f"{control} more often: {_too_slow(control, steps)}; the model gets its steps",

@@ -74,6 +74,7 @@ def data(found: Survey, hint: Suggestion) -> dict[str, Any]:
         ],
         "segments": [{**asdict(s), "serves": s in found.serving} for s in found.segments],
         "missing": list(hint.missing),
+        "refused": hint.refused,
         "suggested_map": hint.map,
         "suggested_command": None if hint.command is None else list(hint.command),
     }
