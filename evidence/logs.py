@@ -64,7 +64,7 @@ LOGS = (
         "log171.bin",
         "a4a3883fa13f28d55878c041cb4cc14deb3e5335aad6b9091f235c9b4e0d95f0",
         "CC BY-SA 3.0",
-        "ArduCopter 3.2, DataFlash",
+        "ArduPilot DataFlash, copter, 2014",
         identified=True,
     ),
     PublicLog(
@@ -75,7 +75,7 @@ LOGS = (
         "log_0036_mechanical_failure.bin",
         "d9464b12aaed79a5ea7f7c626bd96d83037db37018deff5c2399d078a9d155fe",
         "MIT (by its badge)",
-        "ArduCopter, DataFlash",
+        "ArduPilot DataFlash, copter",
         identified=True,
     ),
     PublicLog(
@@ -85,7 +85,7 @@ LOGS = (
         "sample.bin",
         "33c535f6f0edb143bb85909901be52bd73542206e3116ae9ddf22b1c42606cfb",
         "MIT (by its badge)",
-        "ArduCopter, DataFlash with units",
+        "ArduPilot DataFlash, copter, with units",
         identified=True,
     ),
     PublicLog(
@@ -95,7 +95,7 @@ LOGS = (
         "tests/test.BIN",
         "a51f040b2ad7f55185c1da5705f226f51469b86562c4ff76d05c99e0e52c2bf4",
         "LGPL-3.0",
-        "ArduPilot, DataFlash",
+        "ArduPilot DataFlash",
         identified=False,
     ),
     PublicLog(
@@ -105,7 +105,7 @@ LOGS = (
         "2014-10-18 20-04-24.bin",
         "314ce5d710663e277c0dc7700c8f76c4bac7bab01be5445eaeef268b92442059",
         "none stated",
-        "ArduCopter 3.1, DataFlash",
+        "ArduPilot DataFlash, copter, 2014",
         identified=False,
     ),
     PublicLog(
@@ -115,7 +115,7 @@ LOGS = (
         "test/sample.ulg",
         "81952e6059bc095717e7911c010e07f85749d6b04d332a5ffc51575a3fd0a558",
         "BSD-3-Clause",
-        "PX4, ULog",
+        "PX4 ULog",
         identified=False,
     ),
     PublicLog(
@@ -125,7 +125,7 @@ LOGS = (
         "test/sample_logging_tagged_and_default_params.ulg",
         "32f564608d46caf5a4cbb1cb0cd0dc839fb9512b06c6d1384fb96ec3d6c9173d",
         "BSD-3-Clause",
-        "PX4, ULog",
+        "PX4 ULog",
         identified=False,
     ),
     PublicLog(
@@ -135,7 +135,7 @@ LOGS = (
         "sample_ulogs/1KHz/S250/flight3/log1.ulg",
         "bba1e4c1bcfab2a48ce81ad551fe3af162bd4fa1ada9359a5aca26846aec2ef4",
         "GPL-3.0",
-        "PX4, ULog",
+        "PX4 ULog",
         identified=False,
     ),
     PublicLog(
@@ -145,7 +145,7 @@ LOGS = (
         "data/logs/flight_logs/sess005/log001.px4log",
         "1af12b74feabed319e89aafc88639ed11d4948644f398905c69bac00573c51c1",
         "MIT",
-        "PX4, sdlog2",
+        "PX4 sdlog2",
         identified=True,
     ),
     PublicLog(
@@ -155,7 +155,7 @@ LOGS = (
         "data/flight_data/raw/Forward.txt",
         "c6bf9f3a9d92fe28e5baa53e9433529941c9f50a7472d671a256bf6e162a1059",
         "MIT",
-        "X-Plane (simulated)",
+        "X-Plane, simulated helicopter",
         identified=True,
     ),
     PublicLog(
@@ -165,7 +165,7 @@ LOGS = (
         "data/flight_data/raw/Data.txt",
         "a9ca459f50f3a42eccad9664e425e034aafabaf767d69ffbe36eec2eb361a8a5",
         "MIT",
-        "X-Plane (simulated)",
+        "X-Plane, simulated helicopter",
         identified=True,
     ),
     PublicLog(
@@ -175,7 +175,7 @@ LOGS = (
         "src/test-data/btfl_002.bbl",
         "601784ddf8653166a95a7ac762e422535ab201b0859a40279b205f15c244bd70",
         "MIT or Apache-2.0",
-        "Betaflight 4.2.8, Blackbox",
+        "Betaflight Blackbox, 4.2.8",
         identified=True,
     ),
     PublicLog(
@@ -185,7 +185,7 @@ LOGS = (
         "test/btfl_001.bbl",
         "e2467d76e314d54d01b5eb5faac3c1a2538fe5161e20fd5428f4422d6c317520",
         "GPL-3.0-or-later",
-        "Betaflight 4.2.9, Blackbox",
+        "Betaflight Blackbox, 4.2.9",
         identified=True,
     ),
     PublicLog(
@@ -195,11 +195,11 @@ LOGS = (
         "samples/sample-clean-tuned.bbl",
         "ddf647472fc324f3f3f8088f6b37671929c84e8c3c5659ccb80b6ee4f8169023",
         "MIT",
-        "generated, in Rotorflight's form, Blackbox",
+        "Rotorflight Blackbox, generated, not flown",
         identified=True,
     ),
 )
-"""Of five kinds of writers: ArduPilot, PX4 before and since ULog, X-Plane, Betaflight."""
+"""A writer is what stands before the first comma."""
 
 
 @dataclass(frozen=True)
