@@ -266,7 +266,8 @@ def judged(file: Path) -> Verdict:
         elif "models" not in seen:
             return Verdict(reason=seen["refused"])
     read = seen["read"]
-    held = {label: model["fit_percent"]["held_out"] for label, model in seen["models"].items()}
+    judged_models = [(label, seen["models"][label]) for label in seen["judged"]]
+    held = {label: model["fit_percent"]["held_out"] for label, model in judged_models}
     output = next(iter(next(iter(next(iter(held.values())).values()))))
     return Verdict(
         used=read["dt"] * read["samples"],
