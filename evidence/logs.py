@@ -119,6 +119,16 @@ LOGS = (
         identified=False,
     ),
     PublicLog(
+        "px4-events.ulg",
+        "PX4/pyulog",
+        "3cf17793f14709713ab297d3743314c658874068",
+        "test/sample_px4_events.ulg",
+        "4b43a23a7b7f649004facba5c7835d800bbc8cc13e71cbc96678d971451e3d7e",
+        "BSD-3-Clause",
+        "PX4 ULog, simulated",
+        identified=True,
+    ),
+    PublicLog(
         "px4-tagged.ulg",
         "PX4/pyulog",
         "3cf17793f14709713ab297d3743314c658874068",

@@ -191,7 +191,7 @@ def _read(found: dict[str, Any]) -> list[str]:
             f" {found['rows_outside_start_stop']} of them outside the segments,"
             " --start and --stop"
         ),
-        *(f"  segment: {a:.5g} to {b:.5g} s, {what}" for a, b, what in found["used"][:8]),
+        *(f"  segment: {a:.2f} to {b:.2f} s, {what}" for a, b, what in found["used"][:8]),
         *(f"  {name}: logged every {step:.2g} s, interpolated" for name, step in late),
         (
             f"  used: {found['samples']} samples, dt {found['dt']:.5g} s, from {found['start']:.5g}"

@@ -126,8 +126,8 @@ def _segments(found: Survey) -> list[str]:
     rows = [
         [
             str(number),
-            f"{one.start:.5g}",
-            f"{one.stop:.5g}",
+            f"{one.start:.2f}",
+            f"{one.stop:.2f}",
             one.what,
             one.ends,
             "yes" if one in found.serving else "no",

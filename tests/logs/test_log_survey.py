@@ -377,7 +377,9 @@ def test_a_log_without_a_flight_is_refused_unless_it_is_asked_for_as_it_is(
     command = ["identify", str(log), "--map", "m.toml", "--outputs", "q", "--inputs", "lon"]
     command += ["--degree", "0"]
     assert cli.main(command) == 1
-    assert "no segment is flight of at least 5 s: 0 to 17.98 s disarmed" in capsys.readouterr().err
+    assert (
+        "no segment is flight of at least 5 s: 0.00 to 17.98 s disarmed" in capsys.readouterr().err
+    )
     assert cli.main([*command, "--segments", "7"]) == 1
     assert "expected serving, all or numbers from 1 to 1" in capsys.readouterr().err
     assert cli.main([*command, "--segments", "all"]) == 0
