@@ -1,7 +1,8 @@
 """Public logs: identified, or refused with a reason, as the table expects.
 
 They belong to others and are not kept here: `python -m evidence.logs --folder DIR --fetch-only`
-fetches them, and SYMHELI_PUBLIC_LOGS=DIR names the folder; without it these tests are skipped.
+fetches them, and SYMHELI_PUBLIC_LOGS=DIR names the folder; of the others the
+tests are skipped.
 """
 
 import os
@@ -13,7 +14,8 @@ from evidence import logs
 from evidence.logs import LOGS, PublicLog, Verdict, fetched, judged, table
 from symheli.errors import InputError
 
-FOLDER = Path(os.environ.get("SYMHELI_PUBLIC_LOGS", "no folder of public logs"))
+BESIDE = Path(__file__).resolve().parents[3] / "shared" / "data" / "xplane"
+FOLDER = Path(os.environ.get("SYMHELI_PUBLIC_LOGS", BESIDE))
 QUICK = ("ardupilot-bench.bin", "Data.txt")
 """One that is refused and one that is identified, small ones."""
 
