@@ -17,7 +17,7 @@ from __future__ import annotations
 import os
 import struct
 from array import array
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +26,7 @@ from symheli.errors import InputError, UnknownNameError
 from symheli.logs.column import Column, on_one_axis
 from symheli.logs.files import Table, bounded, positive, warn_of_damage
 from symheli.logs.format import BLACKBOX
+from symheli.progress import task
 from symheli.values.units import to_si
 
 MAX_BYTES = 64 * 2**20
@@ -36,6 +37,9 @@ MAX_LOGS, MAX_FIELDS = 1000, 512
 
 MAX_JUMP = 10_000_000
 """us: a frame that is later than the one before it by more is damaged."""
+
+TOLD = 2**16
+"""Bytes after which progress is told."""
 
 GAP = 10.0
 """s between two logs of which the second begins at an earlier time than the first ends."""
@@ -108,21 +112,26 @@ def blackbox_columns(path: str | os.PathLike[str]) -> dict[str, Column]:
     parts: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
     units: dict[str, str] = {}
     late, offset, lost = -np.inf, 0.0, False
-    for number, (start, stop) in enumerate(zip(starts, [*starts[1:], len(data)], strict=True), 1):
-        header = _header(data[start:stop], file)
-        frames, damaged = _frames(data[start:stop], header)
-        lost |= damaged
-        columns = _columns(frames, header, number)
-        if not columns:
-            continue
-        first = min(time[0] for time, _ in columns.values())
-        last = max(time[-1] for time, _ in columns.values())
-        if first + offset <= late:
-            offset = late + GAP - first
-        late = last + offset
-        for name, (time, values) in columns.items():
-            parts.setdefault(name, []).append((time + offset, values))
-        units |= _units(header)
+    with task("reading a Blackbox log", len(data), percent=True) as reading:
+        for number, (start, stop) in enumerate(
+            zip(starts, [*starts[1:], len(data)], strict=True), 1
+        ):
+            header = _header(data[start:stop], file)
+            frames, damaged = _frames(
+                data[start:stop], header, lambda at, start=start: reading.to(start + at)
+            )
+            lost |= damaged
+            columns = _columns(frames, header, number)
+            if not columns:
+                continue
+            first = min(time[0] for time, _ in columns.values())
+            last = max(time[-1] for time, _ in columns.values())
+            if first + offset <= late:
+                offset = late + GAP - first
+            late = last + offset
+            for name, (time, values) in columns.items():
+                parts.setdefault(name, []).append((time + offset, values))
+            units |= _units(header)
     if not parts:
         raise InputError(
             f"{file}: {len(starts)} log{'s'[: len(starts) > 1]} without a whole frame; was the"
@@ -295,16 +304,22 @@ _Rows = dict[str, array]
 """Numbers of the frames by kind, one frame after the other, the instant (us) before each."""
 
 
-def _frames(data: bytes, header: _Header) -> tuple[_Rows, bool]:
-    """Frames of one log, I and P together under "I", and whether some were damaged."""
+def _frames(data: bytes, header: _Header, reached: Callable[[int], None]) -> tuple[_Rows, bool]:
+    """Frames of one log, I and P together under "I", and whether some were damaged; tells which
+    byte it has `reached`.
+    """
     stream, kinds = _Bytes(data, header.body), header.kinds
     index = kinds["I"].names.index("time")
     rows: _Rows = {letter: array("d") for letter in "ISG"}
     before: list[int] | None = None
     earlier, home, lost, size = before, [0, 0], False, len(data)
     constants = _constants(header)
+    told = 0
     while stream.at < size:
         begin = stream.at
+        if begin >= told:
+            reached(begin)
+            told = begin + TOLD
         letter = chr(data[begin])
         stream.at += 1
         try:
