@@ -326,7 +326,7 @@ def _about(log: PublicLog) -> list[str]:
 
 def _score(verdict: Verdict) -> str:
     if not verdict.identified:
-        return f"refused: {verdict.reason}"
+        return f"refused, missing: {verdict.reason}"
     fits = (f"{label} {' / '.join(map(percent, f))}" for label, f in verdict.fits.items())
     return f"{verdict.output}: {'; '.join(fits)}"
 

@@ -85,4 +85,4 @@ def test_a_row_of_the_table_has_the_fits_or_the_reason():
         ]
     )
     assert "q: LTI 50.0 / 1.0 / diverges" in rows
-    assert "refused: nothing moves" in rows
+    assert "refused, missing: nothing moves" in rows
