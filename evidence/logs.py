@@ -348,7 +348,10 @@ def main() -> None:
     os.environ.setdefault("SYMHELI_PROGRESS", "0")
     if given.fetch_only:
         for log in LOGS:
-            print(fetched(log, given.folder), log.licence, flush=True)
+            try:
+                print(fetched(log, given.folder), log.licence, flush=True)
+            except InputError as error:
+                parser.exit(1, f"{error}\n")
         return
     found = []
     for log, verdict in rows(given.folder):
