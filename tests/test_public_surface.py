@@ -247,7 +247,7 @@ def test_the_rooms_import_one_way(room):
     ("room", "below"),
     [
         ("values", ()),
-        ("logs", ("symheli.values",)),
+        ("logs", ("symheli.values", "symheli.progress")),
         ("records", ("symheli.values", "symheli.logs")),
         ("lpv", ("symheli.values",)),
     ],

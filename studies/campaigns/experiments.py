@@ -16,8 +16,9 @@ from studies.transition.axes import Axis
 from studies.transition.flights import AMPLITUDE, TOP, autopilot_for
 from symheli import AirspeedSchedule, Excitation, FlightRecord, Helicopter, SymheliError, fly
 from symheli.flight import Autopilot
+from symheli.flight.excitation import Kind
 
-KINDS = ("multisine", "prbs", "chirp")
+KINDS: tuple[Kind, ...] = ("multisine", "prbs", "chirp")
 ACCELERATIONS = (1.0, 3.0)
 BANDS = ((0.1, 2.0), (0.1, 5.0))
 AMPLITUDES = (0.5, 1.0, 1.5)
@@ -30,7 +31,7 @@ class Candidate:
     (m/s^2).
     """
 
-    kind: str
+    kind: Kind
     band: tuple[float, float]
     amplitude: float
     acceleration: float
@@ -43,16 +44,20 @@ class Candidate:
             f" {self.acceleration:g} m/s^2"
         )
 
-    def fly(self, heli: Helicopter, axis: Axis, autopilot: Autopilot, seed: int) -> FlightRecord:
-        """Hover to the top of the range and back, only the axis's inputs excited."""
+    @property
+    def schedule(self) -> AirspeedSchedule:
+        """Hover to the top of the range and back."""
+        return AirspeedSchedule.transition(0.0, TOP, self.acceleration, hold=2.0)
+
+    def excitation(self, axis: Axis, seed: int = 0) -> Excitation:
+        """Of the axis's inputs alone."""
         amplitude = {name: self.amplitude * AMPLITUDE[name] for name in axis.inputs}
-        excitation = Excitation(amplitude, self.kind, self.band, seed)  # type: ignore[arg-type]
-        return fly(
-            heli,
-            AirspeedSchedule.transition(0.0, TOP, self.acceleration, hold=2.0),
-            excitation=excitation,
-            controller=autopilot,
-        )
+        return Excitation(amplitude, self.kind, self.band, seed)
+
+    def fly(self, heli: Helicopter, axis: Axis, autopilot: Autopilot, seed: int) -> FlightRecord:
+        """The simulated flight."""
+        excitation = self.excitation(axis, seed)
+        return fly(heli, self.schedule, excitation=excitation, controller=autopilot)
 
 
 @dataclass(frozen=True)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from studies.commands import options
-from studies.commands.arguments import option
+from studies.commands.arguments import flag, option
 from studies.output import Output
+from symheli.errors import InputError
 
 HELP = (
     "design an experiment, not a controller (symheli synthesize does that): compare excitations and"
@@ -26,6 +28,24 @@ ARGUMENTS = (
         "--attitude-deg", "DEG", "largest roll and pitch (default: 28.6)", options.positive, 28.6
     ),
     option("--rate", "RAD/S", "largest roll and pitch rate (default: 2)", options.positive, 2.0),
+    option(
+        "--write",
+        "DIR",
+        "write what is flown: tables (CSV), sweeps for ArduPilot's SystemID mode (.param), a"
+        " player, and plan.json",
+        Path,
+    ),
+    option(
+        "--flown",
+        "LOG",
+        "after the flight: are these records enough? .npz, or by --map; with --plan, which holds"
+        " everything else",
+        Path,
+        nargs="+",
+    ),
+    option("--plan", "FILE", "the plan.json that --write wrote, for --flown", Path),
+    flag("--sweeps", "with --flown: hold the records against the sweeps of the plan"),
+    option("--map", "FILE", "signal map of the logs of --flown (docs/identify.md)", Path),
 )
 
 
@@ -34,9 +54,11 @@ def run(arguments: argparse.Namespace) -> Output:
     import math
 
     from studies.campaigns import experiments
-    from studies.transition.axes import ALL, LATERAL, LONGITUDINAL
+    from studies.campaigns.flyable import AXES, write
 
-    axis = {"longitudinal": LONGITUDINAL, "lateral": LATERAL, "all": ALL}[arguments.axis]
+    if arguments.flown or arguments.plan:
+        return _flown(arguments)
+    axis = AXES[arguments.axis]
     attitude = math.radians(arguments.attitude_deg)
     limits = {"phi": attitude, "theta": attitude, "p": arguments.rate, "q": arguments.rate}
     found = experiments.design(arguments.vehicle, axis, arguments.flights, limits)
@@ -55,4 +77,36 @@ def run(arguments: argparse.Namespace) -> Output:
             for e in found.experiments
         ],
     }
-    return Output(f"{axis.name}, order 3, degree 2\n{found.table()}", data)
+    text = f"{axis.name}, order 3, degree 2\n{found.table()}"
+    if arguments.write:
+        written, words = write(arguments.write, arguments.vehicle, axis, found, limits)
+        data["written"] = written
+        text = "\n".join([text, "", words, *(f"wrote {path}" for path in written)])
+    return Output(text, data)
+
+
+def _flown(arguments: argparse.Namespace) -> Output:
+    """Hold records against a plan."""
+    from studies.campaigns.flyable import flown
+    from symheli import FlightRecord
+
+    if not (arguments.flown and arguments.plan):
+        raise InputError("give --flown LOG together with --plan plan.json")
+    records = [
+        FlightRecord.load(log)
+        if log.suffix == ".npz"
+        else FlightRecord.from_map(log, arguments.map)
+        if arguments.map
+        else FlightRecord.from_csv(log)
+        for log in arguments.flown
+    ]
+    found = flown(arguments.plan, records, sweeps=arguments.sweeps)
+    data = {
+        "enough": found.enough,
+        "median_ratio": found.median,
+        "ratios": dict(zip(found.names, found.ratio, strict=True)),
+        "seconds": found.seconds,
+        "airspeed": list(found.covered),
+        "airspeed_planned": list(found.planned),
+    }
+    return Output(str(found), data)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 import tempfile
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -16,13 +17,15 @@ from studies.commands import options
 from studies.commands.arguments import add, flag, option, positional
 from studies.output import Output
 from symheli.errors import InputError, SymheliError
-from symheli.logs.format import FORMATS, Format, format_of
+from symheli.logs.format import FORMATS, OWN_CLOCKS, Format, format_of
 from symheli.values.whole_files import write_text
 
 if TYPE_CHECKING:
     from identification import LPVARX
     from studies.log.suggestion import Suggestion
     from symheli.logs.contents import Contents
+    from symheli.logs.segments import Segment
+    from symheli.logs.survey import Survey
     from symheli.records import FlightRecord, KinematicCheck
 
 METHODS = ("ls", "rls", "ridge", "lasso", "iv", "riv", "oe")
@@ -116,6 +119,12 @@ ARGUMENTS = (
     ),
     option("--start", "S", "drop samples before this time, s on the log's clock", options.number),
     option("--stop", "S", "drop samples after this time, s", options.number),
+    option(
+        "--segments",
+        "WHICH",
+        "of the log: serving (in the air; default for an autopilot's log without --start, --stop),"
+        " all, or numbers of the survey, such as 2,3",
+    ),
     option("--decimate", "N", "average over N samples", options.at_least_one, 1),
     option(
         "--train",
@@ -169,7 +178,7 @@ def run(arguments: argparse.Namespace) -> Output:
         )
     kind = "mapped" if arguments.map else _format(arguments)
     if not any(getattr(arguments, name) for name in FIT_OPTIONS):
-        seen = _contents(arguments, kind)
+        seen = _contents(arguments, arguments.log)
         if not _at_once(arguments, kind, seen):
             return _survey(arguments, seen)
     structure, training, test, prepared = _requested(arguments, kind)
@@ -204,6 +213,8 @@ def run(arguments: argparse.Namespace) -> Output:
         prepared.samples - prepared.kept,
         result,
         arguments.test,
+        prepared.used,
+        prepared.slower,
     )
     check = prepared.kinematics
     text, data = report.text(facts, result, check), report.data(facts, result, check)
@@ -262,17 +273,49 @@ def _format(arguments: argparse.Namespace) -> Format:
     return format_of(arguments.log) if arguments.format == "auto" else arguments.format
 
 
-def _contents(arguments: argparse.Namespace, kind: str) -> Contents:
-    """Return all columns of the log, or the signals of the map."""
+def _log_format(arguments: argparse.Namespace, log: Path) -> Format:
+    """Return the format of a log: the map's, the given one, or that of its content."""
+    from symheli.logs.signal_map import SignalMap
+
+    given = SignalMap.load(arguments.map).format if arguments.map else None
+    if given is None and arguments.format != "auto":
+        given = arguments.format
+    return given or format_of(log)
+
+
+def _contents(arguments: argparse.Namespace, log: Path) -> Contents:
+    """Return all columns of a log, or of a table the signals of the map."""
     from symheli.logs.column import Column
-    from symheli.logs.contents import Contents, contents_of
+    from symheli.logs.contents import Contents
     from symheli.records import FlightRecord
 
-    if kind != "mapped":
-        return contents_of(arguments.log, _format(arguments))
-    record = FlightRecord.from_map(arguments.log, arguments.map)
+    kind = _log_format(arguments, log)
+    if not arguments.map or kind in OWN_CLOCKS:
+        told = log.stat() if log.is_file() else None
+        return _all_of(log, kind, *((told.st_mtime_ns, told.st_size) if told else (0, 0)))
+    record = FlightRecord.from_map(log, arguments.map)
     columns = {str(s): Column(record.time, record[s], s.unit) for s in record.signals}
     return Contents("mapped", columns)
+
+
+@lru_cache(maxsize=1)
+def _all_of(log: Path, kind: Format, _modified: int, _size: int) -> Contents:
+    """Return the content of a file, read once while it does not change."""
+    from symheli.logs.contents import contents_of
+
+    return contents_of(log, kind)
+
+
+def _surveyed(arguments: argparse.Namespace, log: Path, seen: Contents) -> Survey:
+    from symheli.logs.survey import survey
+
+    return survey(
+        log,
+        seen,
+        time=arguments.time,
+        time_unit=arguments.time_unit or "s",
+        dt=arguments.dt,
+    )
 
 
 def _at_once(arguments: argparse.Namespace, kind: str, seen: Contents) -> bool:
@@ -286,18 +329,12 @@ def _survey(arguments: argparse.Namespace, seen: Contents) -> Output:
     """Return the content of the log, and a command that would identify a model."""
     from studies.log import survey_report
     from studies.log.suggestion import Suggestion, suggestion
-    from symheli.logs.survey import survey
 
-    found = survey(
-        arguments.log,
-        seen,
-        time=arguments.time,
-        time_unit=arguments.time_unit or "s",
-        dt=arguments.dt,
-    )
+    found = _surveyed(arguments, arguments.log, seen)
     hint = suggestion(found, dt=arguments.dt, signal_map=arguments.map)
     if hint.command is not None and (why := _refused(hint)):
-        hint = Suggestion((*hint.missing, f"the obvious command ends in: {why}"))
+        why = f"the obvious command ends in: {why}"
+        hint = Suggestion((*hint.missing, why), refused=why)
     return Output(survey_report.text(found, hint), survey_report.data(found, hint))
 
 
@@ -336,7 +373,8 @@ class _Signals(NamedTuple):
 
 class _Prepared(NamedTuple):
     """A record ready to fit, the name of its scheduling signal, how many samples were read and
-    `kept` between start and stop, and whether attitude and rates agree where the log has them.
+    `kept` in the segments and between start and stop, whether attitude and rates agree where the
+    log has them, the segments `used` (empty: all), and signals logged more seldom (their steps, s).
     """
 
     record: FlightRecord
@@ -344,6 +382,8 @@ class _Prepared(NamedTuple):
     samples: int
     kept: int
     kinematics: KinematicCheck | None
+    used: tuple[Segment, ...]
+    slower: Mapping[str, float]
 
 
 def _method(name: str, instruments: tuple[str, ...]) -> Any:
@@ -364,7 +404,9 @@ def _prepared(
     """Read `log` and do to it what the options say, in the order of docs/identify.md; start and
     stop only where it is to be `cut`.
     """
+    from studies.log import flown
     from studies.log.reading import COMBINED, read
+    from symheli.logs.signal_map import SignalMap
     from symheli.records import FlightRecord, conditioning
     from symheli.records.kinematics import lacking
 
@@ -388,7 +430,17 @@ def _prepared(
             units=dict(arguments.units),
             time_unit=arguments.time_unit,
         )
-    samples = len(record)
+    samples, used, seen = len(record), (), None
+    if _log_format(arguments, log) in OWN_CLOCKS or arguments.segments:
+        seen = _contents(arguments, log)
+        segments = _surveyed(arguments, log, seen).segments
+        cut_by_hand = cut and (arguments.start is not None or arguments.stop is not None)
+        which = arguments.segments or (flown.ALL if cut_by_hand else flown.SERVING)
+        if not cut and which not in (flown.SERVING, flown.ALL):
+            which = flown.SERVING  # numbers are those of LOG
+        used = flown.chosen(segments, which, log)
+        if used:
+            record = flown.within(record, used, log)
     if combined:
         record, scheduling = conditioning.with_norm(record, combined, COMBINED), COMBINED
     if not scheduling:
@@ -404,8 +456,14 @@ def _prepared(
     kept = len(record)
     if arguments.smooth_scheduling:
         record = conditioning.smooth(record, scheduling, arguments.smooth_scheduling)
-    slower = conditioning.decimate(record, arguments.decimate)
-    return _Prepared(slower, scheduling, samples, kept, check)
+    shorter = conditioning.decimate(record, arguments.decimate)
+    late: dict[str, float] = {}
+    if seen is not None and arguments.map:
+        sources = SignalMap.load(arguments.map).signals.items()
+        columns = {n: seen.columns[s.column] for n, s in sources if s.column in seen.columns}
+        flown.refuse_what_is_invented(columns, (*signals.outputs, *signals.inputs), shorter.dt, log)
+        late = flown.slower(columns, shorter.dt)
+    return _Prepared(shorter, scheduling, samples, kept, check, used, late)
 
 
 def _write(arguments: argparse.Namespace, result: Any) -> Iterator[Path]:

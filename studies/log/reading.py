@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
-from symheli.logs.format import Format
+from symheli.logs.format import OWN_CLOCKS, Format
 from symheli.logs.separated import SEPARATORS, SeparatedTable
 from symheli.records import FlightRecord
 from symheli.records.kinematics import COMPARED
@@ -43,7 +43,7 @@ def read(
     """
     if format == "xplane":
         return FlightRecord.from_xplane(path, dt)
-    if format in ("ulog", "dataflash"):
+    if format in OWN_CLOCKS:
         raise InputError(
             f"{path}: the columns of an autopilot's log are named in a signal map, --map FILE.toml;"
             " symheli identify with the log alone suggests one"

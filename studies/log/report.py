@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from math import inf
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,7 @@ from identification.judge.against_constant import HORIZONS, PAYS
 from identification.judge.scores import Scores, percent
 from identification.model.lpvarx_model import LEAST_SQUARES
 from studies.output import columns
+from symheli.logs.segments import Segment
 from symheli.records import FlightRecord, KinematicCheck, SensorCheck
 
 FIT = (
@@ -34,9 +37,12 @@ def facts(
     outside: int,
     result: AgainstConstant,
     test_log: Path | None = None,
+    used: Sequence[Segment] = (),
+    slower: Mapping[str, float] = MappingProxyType({}),
 ) -> dict[str, Any]:
-    """What was read and used: `rows` in the file, `outside` --start and --stop, and what became of
-    the rest; a log held out, if any.
+    """What was read and used: `rows` in the file, `outside` the segments, --start and --stop, and
+    what became of the rest; a log held out, if any; the segments that were `used`, and the steps
+    (s) of signals logged more seldom than the model's.
     """
     model, test = result.scheduled, result.test
     scheduling = model.parameters[0]
@@ -46,6 +52,8 @@ def facts(
     return {
         "log": log.name,
         "test_log": None if test_log is None else test_log.name,
+        "used": [[one.start, one.stop, one.what] for one in used],
+        "logged_every": dict(slower),
         "resampled": record.resampled,
         "format": kind,
         "rows_read": rows,
@@ -174,20 +182,23 @@ def _coefficients(model: LPVARXModel) -> dict[str, Any]:
 
 
 def _read(found: dict[str, Any]) -> list[str]:
-    parts = found["segments"]
+    parts, late = found["segments"], found["logged_every"].items()
     lengths = ", ".join(map(str, parts[:8])) + (", ..." if len(parts) > 8 else "")
     units = ", ".join(f"{name} [{unit}]" for name, unit in found["signals"].items())
     return [
         (
             f"{found['log']} ({found['format']}): {found['rows_read']} rows,"
-            f" {found['rows_outside_start_stop']} of them outside --start/--stop"
+            f" {found['rows_outside_start_stop']} of them outside the segments,"
+            " --start and --stop"
         ),
+        *(f"  segment: {a:.2f} to {b:.2f} s, {what}" for a, b, what in found["used"][:8]),
+        *(f"  {name}: logged every {step:.2g} s, interpolated" for name, step in late),
         (
             f"  used: {found['samples']} samples, dt {found['dt']:.5g} s, from {found['start']:.5g}"
             f" to {found['stop']:.5g} s"
         ),
         (
-            f"  segments: {len(parts)}, of {lengths} samples;"
+            f"  parts without a gap: {len(parts)}, of {lengths} samples;"
             f" {found['samples_with_missing_values']} samples with missing values"
         ),
         f"  signals: {units}",

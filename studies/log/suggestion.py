@@ -6,8 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from studies.log.flown import COARSE, SERVING, UNRESOLVED
+from symheli.logs.format import OWN_CLOCKS
 from symheli.logs.meaning import CONTROLS, Guess
-from symheli.logs.survey import OWN_CLOCKS, Survey
+from symheli.logs.segments import MIN_DURATION
+from symheli.logs.survey import Survey
 
 AXES = (
     ("lon", ("q", "theta")),
@@ -22,21 +25,21 @@ SLOW = 0.03
 then reach over what a helicopter does, not over noise.
 """
 
-COARSE = 1.5
-"""Times that step: an output sampled more seldom would be made of samples that are still to come,
-and is left out.
-"""
+SLOWEST = 0.2
+"""s: an input that is logged more seldom, and moves faster than that shows, tells nothing."""
 
 
 @dataclass(frozen=True)
 class Suggestion:
     """Sentences on what is `missing`; the words of a `command`, and the signal `map` it needs, None
-    where nothing can be suggested or no map is needed.
+    where nothing can be suggested or no map is needed; `refused`: which of the sentences is why
+    there is no command.
     """
 
     missing: tuple[str, ...]
     map: str | None = None
     command: tuple[str, ...] | None = None
+    refused: str = ""
 
 
 def suggestion(
@@ -57,24 +60,34 @@ def suggestion(
     )
     timed = found.clock or found.step or found.format in OWN_CLOCKS
     if axis is None or not timed:
-        return Suggestion(missing)
+        least = ("a clock", "an input") if set(CONTROLS) & there.keys() == set() else ("a clock",)
+        why = next((m for m in missing if m.startswith((*least, "angular rates"))), "")
+        return Suggestion(missing, refused=why or "no output that an input drives moves")
     control, outputs = axis
     scheduling = (
         ["airspeed"] if "airspeed" in there else ["u", "v"] if {"u", "v"} <= there.keys() else []
     )
     step = dt or (found.clock.step if found.clock else found.step) or 0.0
     by_map, means = found.format in OWN_CLOCKS, SLOW
+    if by_map and not found.serving and found.segments:
+        why = f"flight: no segment of {MIN_DURATION:g} s in the air; --segments all overrides"
+        return Suggestion((*missing, why), refused=why)
     if by_map:
         steps = {n: found.motions[there[n].column].step or 0.0 for n in (*outputs, control)}
         step = dt or float(f"{steps[outputs[0]]:.2g}")
-        means = max(SLOW, steps[control])
-        late = [y for y in outputs[1:] if steps[y] > COARSE * max(means, step)]
+        means = max(SLOW, step)
+        fast = [n for n in steps if found.unresolved[there[n].column] > UNRESOLVED]
+        if control in fast and steps[control] > COARSE * means:
+            if steps[control] > SLOWEST:
+                why = f"{control} more often: {_too_slow(control, steps)}"
+                return Suggestion((*missing, why), refused=why)
+            means = steps[control]
+            missing += (
+                f"{control} more often: {_too_slow(control, steps)}; the model gets its steps",
+            )
+        late = [y for y in outputs[1:] if y in fast and steps[y] > COARSE * means]
         outputs = [y for y in outputs if y not in late]
-        missing += tuple(
-            f"{y} more often: {1 / steps[y]:.2g} Hz tells less than the input's"
-            f" {1 / max(means, step):.2g} Hz, it is left out"
-            for y in late
-        )
+        missing += tuple(f"{y} more often: {_too_slow(y, steps)}; it is left out" for y in late)
     used = [there[name] for name in (*outputs, control, *scheduling)]
     named = {g.signal: g.signal if by_map else g.column for g in used}
     command = ["symheli", "identify", str(found.log)]
@@ -93,18 +106,15 @@ def suggestion(
         command += ["--scheduling-from", ",".join(named[s] for s in scheduling)]
     else:
         command += ["--degree", "0"]
-    if found.flight is not None:
-        start = _beginning(found, used) if by_map else 0.0
-        command += ["--start", f"{max(found.flight.start - start, 0.0):.4g}"]
-        command += ["--stop", f"{found.flight.stop - start:.4g}"]
+    if not by_map and 0 < len(found.serving) < len(found.segments):
+        command += ["--segments", SERVING]
     if (together := int(means / step + 0.01)) > 1:
         command += ["--decimate", str(together)]
     return Suggestion(missing, content, tuple(command))
 
 
-def _beginning(found: Survey, used: list[Guess]) -> float:
-    """Return the instant from which all columns with clocks of their own are known."""
-    return max(found.motions[guess.column].start or 0.0 for guess in used)
+def _too_slow(name: str, steps: Mapping[str, float]) -> str:
+    return f"it moves faster than its {1 / steps[name]:.2g} Hz resolve"
 
 
 def _reading(found: Survey, used: list[Guess], dt: float | None) -> list[str]:

@@ -8,11 +8,12 @@ from typing import Any
 
 from studies.log.suggestion import Suggestion
 from studies.output import columns
-from symheli.logs.survey import OWN_CLOCKS, Survey
+from symheli.logs.format import OWN_CLOCKS
+from symheli.logs.survey import Survey
 from symheli.values.units import to_si
 
 MOST = 12
-"""Stretches that are printed."""
+"""Segments that are printed."""
 
 LISTED = 60
 """Names of other columns that are printed."""
@@ -38,8 +39,8 @@ def text(found: Survey, hint: Suggestion) -> str:
         ]
     else:
         parts.append("no column has a name that says what it is")
-    if len(found.stretches) > 1:
-        parts += ["", "from when to when (s on the log's clock):", *_stretches(found)]
+    if len(found.segments) > 1:
+        parts += ["", "segments (s on the log's clock):", *_segments(found)]
     if others:
         parts += ["", f"other columns that move: {_listed(others)}"]
     if still:
@@ -71,8 +72,9 @@ def data(found: Survey, hint: Suggestion) -> dict[str, Any]:
             }
             for name, motion in found.motions.items()
         ],
-        "stretches": [asdict(one) for one in found.stretches],
+        "segments": [{**asdict(s), "serves": s in found.serving} for s in found.segments],
         "missing": list(hint.missing),
+        "refused": hint.refused,
         "suggested_map": hint.map,
         "suggested_command": None if hint.command is None else list(hint.command),
     }
@@ -118,21 +120,24 @@ def _table(found: Survey) -> str:
     return "\n".join(f"  {line}" for line in columns(rows, left=4).splitlines())
 
 
-def _stretches(found: Survey) -> list[str]:
-    """Return the longest stretches, in order of time, with a mark at the suggested one."""
-    kept = sorted(found.stretches, key=lambda one: one.start - one.stop)[:MOST]
+def _segments(found: Survey) -> list[str]:
+    """Return the longest segments, in order of time, with a mark at those that serve."""
+    kept = sorted(found.segments, key=lambda one: one.start - one.stop)[:MOST]
     rows = [
         [
-            f"{one.start:.5g}",
-            f"{one.stop:.5g}",
+            str(number),
+            f"{one.start:.2f}",
+            f"{one.stop:.2f}",
             one.what,
-            "suggested" if one is found.flight else "",
+            one.ends,
+            "yes" if one in found.serving else "no",
         ]
-        for one in found.stretches
+        for number, one in enumerate(found.segments, 1)
         if one in kept
     ]
-    more = len(found.stretches) - len(rows)
-    lines = [f"  {line.rstrip()}" for line in columns(rows, left=4).splitlines()]
+    more = len(found.segments) - len(rows)
+    head = ["", "from", "to", "state", "ends:", "serves"]
+    lines = [f"  {line.rstrip()}" for line in columns([head, *rows], left=6).splitlines()]
     return lines + ([f"  and {more} shorter ones (--json)"] if more else [])
 
 

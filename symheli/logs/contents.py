@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from symheli.logs.blackbox import blackbox_columns
 from symheli.logs.column import Column
 from symheli.logs.csv import csv_columns
 from symheli.logs.dataflash import dataflash_columns
@@ -40,6 +41,8 @@ def contents_of(path: str | os.PathLike[str], format: Format | None = None) -> C
             return Contents(kind, ulog_columns(path))
         case "dataflash":
             return Contents(kind, dataflash_columns(path))
+        case "blackbox":
+            return Contents(kind, blackbox_columns(path))
         case "mat":
             return Contents(kind, mat_columns(path))
     return Contents(kind, csv_columns(path))

@@ -12,9 +12,12 @@ the latest message TIME.
 from __future__ import annotations
 
 import contextlib
+import mmap
 import os
 import re
+from array import array
 from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,7 +25,7 @@ import numpy as np
 from symheli.errors import InputError, UnknownNameError
 from symheli.extras import extra
 from symheli.logs.column import Column, continuous, on_one_axis
-from symheli.logs.files import Table, error_text, existing, positive, quiet, warn_of_damage
+from symheli.logs.files import Table, bounded, error_text, positive, quiet, warn_of_damage
 from symheli.values.units import to_si
 
 LABELS = {
@@ -67,6 +70,9 @@ BESIDE_THE_WEEK = "T"
 """Field of a GPS message with the autopilot's clock, in ms, where TimeMS beside it counts from the
 beginning of the GPS week (until the end of 2014).
 """
+
+FORMAT_HEAD = b"\xa3\x95\x80"
+"""First bytes of a message FMT; the type it declares, its size and its name follow."""
 
 HEADING = "degheading"
 
@@ -131,11 +137,13 @@ def _read(path: str | os.PathLike[str], wanted: Iterable[str] | None) -> _Found:
             DFReader_binary,
             DFReader_text,
         )
-    file = existing(path)
+    file = bounded(path)
     with file.open("rb") as opened:
         reader = DFReader_binary if opened.read(2) == b"\xa3\x95" else DFReader_text
-    rows: dict[tuple[str, str], list[_Row]] = {}
-    now: float | None = None
+    if reader is DFReader_binary:
+        _refuse_empty_messages(file)
+    rows: dict[tuple[str, str], _Rows] = {}
+    now = np.nan
     try:
         with quiet() as said, _closing(reader) as log:
             log.__init__(str(file))
@@ -151,10 +159,12 @@ def _read(path: str | os.PathLike[str], wanted: Iterable[str] | None) -> _Found:
                         continue
                 field = next((f for f, ids in known.items() if ids.unit == INSTANCE), None)
                 key = "" if field is None else str(getattr(message, field))
-                rows.setdefault((name, key), []).append(_Row(message, now))
+                if (name, key) not in rows:
+                    rows[name, key] = _Rows(message.fmt)
+                rows[name, key].append(message, now)
             out: _Found = {}
             for (name, key), found in rows.items():
-                known = declared.get(found[0].message.fmt.type, {})
+                known = declared.get(found.form.type, {})
                 out.setdefault(name, {})[key] = _columns(found, known)
     except Exception as error:
         raise InputError(
@@ -172,6 +182,21 @@ def _read(path: str | os.PathLike[str], wanted: Iterable[str] | None) -> _Found:
         if name not in out:
             raise UnknownNameError(f"message in {file.name}", name, sorted(out) or present)
     return out
+
+
+def _refuse_empty_messages(file: Path) -> None:
+    """Raise `InputError` where the log declares a message shorter than its own head: readers would
+    stand still in front of it.
+    """
+    with file.open("rb") as opened, mmap.mmap(opened.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        at = data.find(FORMAT_HEAD)
+        while at >= 0 and at + 9 <= len(data):
+            if data[at + 4] < len(FORMAT_HEAD) and data[at + 5 : at + 9].strip(b"\0").isalnum():
+                raise InputError(
+                    f"{file}: damaged: it declares messages of {data[at + 4]} bytes; download it"
+                    " once more"
+                )
+            at = data.find(FORMAT_HEAD, at + 1)
 
 
 @contextlib.contextmanager
@@ -237,31 +262,43 @@ def _declared(log: Any) -> dict[int, dict[str, _FieldUnit]]:
     }
 
 
-class _Row(NamedTuple):
-    """A message, and the time of the batch it stands in (s), if the log writes one."""
+class _Rows:
+    """Messages of one kind: the instants (s) of the batches they stand in (NaN: none), and their
+    fields of numbers, eight bytes each.
+    """
 
-    message: Any
-    now: float | None
+    def __init__(self, form: Any) -> None:
+        self.form, self.now = form, array("d")
+        self.fields = {
+            name: array("d")
+            for name, kind, letter in zip(form.columns, form.msg_types, form.msg_fmts, strict=False)
+            if kind in (int, float) and letter != MODE
+        }
+
+    def append(self, message: Any, now: float) -> None:
+        if message.fmt.columns != self.form.columns:
+            return  # its format was declared anew
+        self.now.append(now)
+        for name, values in self.fields.items():
+            values.append(float(getattr(message, name)))
 
 
-def _columns(rows: list[_Row], known: Mapping[str, _FieldUnit]) -> dict[str, Column]:
+def _columns(rows: _Rows, known: Mapping[str, _FieldUnit]) -> dict[str, Column]:
     """The fields of numbers of messages of one kind."""
-    form = rows[0].message.fmt
-    clock = next((name for name in CLOCKS if name in form.columns), None)
+    clock = next((name for name in CLOCKS if name in rows.fields), None)
     factor = CLOCKS.get(clock or "", 1.0)
-    if clock == "TimeMS" and form.name.startswith("GPS") and BESIDE_THE_WEEK in form.columns:
+    if clock == "TimeMS" and rows.form.name.startswith("GPS") and BESIDE_THE_WEEK in rows.fields:
         clock = BESIDE_THE_WEEK
-    time = None
+    now, time, keep = np.array(rows.now), None, np.ones(len(rows.now), bool)
     if clock is not None:
-        time = factor * np.array([float(getattr(row.message, clock)) for row in rows])
-    elif any(row.now is not None for row in rows):
-        rows = [row for row in rows if row.now is not None]
-        time = np.array([row.now for row in rows], float)
-    messages, out = [row.message for row in rows], {}
-    for name, kind, letter in zip(form.columns, form.msg_types, form.msg_fmts, strict=False):
-        if name in (*CLOCKS, clock) or kind not in (int, float) or letter == MODE:
+        time = factor * np.array(rows.fields[clock])
+    elif (told := np.isfinite(now)).any():
+        time, keep = now[told], told
+    out = {}
+    for name, field in rows.fields.items():
+        if name in (*CLOCKS, clock):
             continue
-        values = np.array([float(getattr(m, name)) for m in messages])
+        values = np.array(field)[keep]
         said = known.get(name)
         if said is None or said.factor is None or said.label not in LABELS:
             out[name] = Column(time, values)

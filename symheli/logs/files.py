@@ -14,6 +14,9 @@ import numpy as np
 from symheli.errors import DataWarning, InputError
 from symheli.values.units import to_si
 
+MAX_BYTES = 256 * 2**20
+"""Largest log that is read: in memory it takes up to about twenty times as much."""
+
 Table = tuple[np.ndarray, dict[str, np.ndarray], dict[str, str]]
 """time (n,) in s, columns by name, unit of each column."""
 
@@ -28,9 +31,20 @@ def existing(path: str | os.PathLike[str]) -> Path:
     return file
 
 
+def bounded(path: str | os.PathLike[str], most: int = MAX_BYTES) -> Path:
+    """Return the path of an existing file of at most `most` bytes; raise `InputError` otherwise."""
+    file = existing(path)
+    if (size := file.stat().st_size) > most:
+        raise InputError(
+            f"{file}: {size / 2**20:.0f} MiB; at most {most / 2**20:.0f} MiB of such a log are"
+            " read, so that it fits in memory: log fewer messages, or cut the log to the flight"
+        )
+    return file
+
+
 def text(path: str | os.PathLike[str]) -> str:
     """The content of a text file; raises `InputError` for a binary one."""
-    file = existing(path)
+    file = bounded(path)
     data = file.read_bytes()
     if b"\0" in data:
         raise InputError(

@@ -12,9 +12,9 @@ import numpy as np
 from symheli.errors import InputError, UnknownNameError
 from symheli.extras import extra
 from symheli.logs.column import Column
-from symheli.logs.files import Table, error_text, existing, seconds_in
+from symheli.logs.files import Table, bounded, error_text, seconds_in
 from symheli.logs.format import is_hdf5
-from symheli.logs.mat5 import check_mat5
+from symheli.logs.mat5 import MAX_INFLATED, check_mat5
 
 NUMBERS = {
     *("double", "single", "logical"),
@@ -31,7 +31,7 @@ def read_mat(
     "log.theta" reaches into a struct. Raises `InputError` for a file that is not a MATLAB file
     or is truncated, for -v7.3 without h5py, and for variables that are not vectors of equal length.
     """
-    file, factor = existing(path), seconds_in(time_unit)
+    file, factor = bounded(path), seconds_in(time_unit)
     content = _content(file)
     vectors = {name: _vector(content, name, file) for name in (time, *units)}
     n = len(vectors[time])
@@ -45,7 +45,7 @@ def read_mat(
 
 def mat_columns(path: str | os.PathLike[str]) -> dict[str, Column]:
     """Every vector of two numbers or more by its name; none has a clock of its own."""
-    file = existing(path)
+    file = bounded(path)
     return {
         name: Column(None, vector)
         for name, value in _leaves(_content(file))
@@ -87,6 +87,8 @@ def _hdf5(file: Path) -> Mapping[str, Any]:
                 out[name] = f"a {kind}"
             elif item.attrs.get("MATLAB_empty"):
                 out[name] = np.zeros(0)
+            elif item.nbytes > MAX_INFLATED:  # it may take no space in the file
+                raise ValueError(f"{name!r} of more than {MAX_INFLATED / 2**20:.0f} MiB")
             else:
                 out[name] = item[()].T  # MATLAB writes columns first
         return out

@@ -25,10 +25,24 @@ COMPLEX = 0x800
 HEADER = 128
 MAX_DEPTH = 50
 """Largest nesting depth of structs and cells; SciPy is recursive."""
+MAX_INFLATED = 2**29
+"""Most bytes of a variable that was compressed."""
+
 MAX_EMPTY = 1_000_000
 """Largest number of structs without fields, or of spaces of a text, which take memory but no bytes
 of the file.
 """
+
+
+def _inflated(content: memoryview) -> bytes:
+    """What was compressed, at most `MAX_INFLATED` bytes: a small file may claim any amount."""
+    stream = zlib.decompressobj()
+    out = stream.decompress(content, MAX_INFLATED)
+    if stream.unconsumed_tail:
+        raise ValueError(f"a variable of more than {MAX_INFLATED / 2**20:.0f} MiB")
+    if not stream.eof:
+        raise ValueError("a compressed variable that was cut")
+    return out
 
 
 class _Element(NamedTuple):
@@ -61,7 +75,7 @@ class _Reader:
         while at < len(data):
             kind, content, at = self.element(data, at, padded=False)
             if kind == COMPRESSED:
-                kind, content, _ = self.element(memoryview(zlib.decompress(content)), 0, False)
+                kind, content, _ = self.element(memoryview(_inflated(content)), 0, False)
             if kind != MATRIX:
                 raise ValueError(f"expected a variable, found an element of type {kind}")
             self.matrix(content, MAX_DEPTH)

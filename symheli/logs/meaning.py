@@ -127,6 +127,22 @@ ULOG = {
 }
 """Columns of PX4 (the messages of github.com/PX4/PX4-Autopilot/tree/main/msg), the best first."""
 
+BLACKBOX = {
+    **{
+        signal: ((f"gyroADC[{i}]", "deg/s"), (f"gyroRAW[{i}]", "deg/s"))
+        for i, signal in enumerate(RATES)
+    },
+    "airspeed": (("GPS_speed", "m/s"),),
+    **{
+        signal: ((f"mixer[{i}]", "1"), (f"pidSum[{i}]", "1"), (f"rcCommand[{i}]", "1"))
+        for i, signal in enumerate(("lat", "lon", "ped"))
+    },
+    "col": (("mixer[3]", "1"), ("setpoint[3]", "1"), ("rcCommand[3]", "1")),
+}
+"""Columns of Betaflight and Rotorflight, the best first: what goes to the mixer before what the
+pilot commands.
+"""
+
 XPLANE = {
     **{name: ((name, UNITS[name]),) for name in (*RATES, *ANGLES, *SPEEDS)},
     **{name: ((f"stick_{name}", "1"),) for name in ("lon", "lat", "ped")},
@@ -140,7 +156,12 @@ def guesses(columns: Mapping[str, Column], format: str) -> dict[str, Guess]:
     controls lon lat col ped; what moves before what stays where it is.
     """
     older = "ATT.RollRate" in columns
-    tables = {"dataflash": SDLOG2 if older else DATAFLASH, "ulog": ULOG, "xplane": XPLANE}
+    tables = {
+        "dataflash": SDLOG2 if older else DATAFLASH,
+        "ulog": ULOG,
+        "blackbox": BLACKBOX,
+        "xplane": XPLANE,
+    }
     if format in tables:
         found = {
             signal: [Guess(signal, name, unit, "name") for name, unit in named if name in columns]

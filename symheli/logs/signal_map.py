@@ -1,19 +1,20 @@
 """A TOML file that says where a log keeps which signal, in which unit: written once for an
 aircraft, used for every flight of it.
 
-    format = "csv"          # csv, mat, xplane, ulog or dataflash; by its content where left out
+    format = "csv"          # csv, mat, xplane, ulog, dataflash, blackbox; default: by its content
     time = "time_us"        # time column of csv and mat
     time_unit = "us"
-    dt = 0.02               # s: resample to (needed for ulog and dataflash, and without a clock)
+    dt = 0.02               # s: resample to (needed for autopilots, and without a clock)
 
     [signals]
     q = { column = "gyro_y", unit = "deg/s", scale = -1 }
     airspeed = { column = "pitot", unit = "km/h", offset = 0.4 }
 
 A signal is (scale * column + offset) in `unit`. Columns of a ulog are "topic.field" or
-"topic.1.field", those of a dataflash log "message.field" or "message[1].field" (which need no unit
-where the log declares it), those of a MATLAB file may reach into a struct ("log.theta"), those of
-X-Plane are the names of `symheli.logs.xplane` and need no unit.
+"topic.1.field", those of a dataflash log "message.field" or "message[1].field", those of a blackbox
+log as in its header ("gyroADC[0]"); the last two need no unit where the log declares it. Those of a
+MATLAB file may reach into a struct ("log.theta"), those of X-Plane are the names of
+`symheli.logs.xplane` and need no unit.
 """
 
 from __future__ import annotations
@@ -25,10 +26,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from symheli.errors import InputError, UnknownNameError
+from symheli.logs.blackbox import read_blackbox
 from symheli.logs.csv import read_csv
 from symheli.logs.dataflash import read_dataflash
 from symheli.logs.files import Table, text
-from symheli.logs.format import FORMATS, Format, format_of
+from symheli.logs.format import FORMATS, OWN_CLOCKS, Format, format_of
 from symheli.logs.mat import read_mat
 from symheli.logs.ulog import read_ulog, split_column, unit_of
 from symheli.logs.xplane import read_xplane
@@ -107,7 +109,7 @@ class SignalMap:
 
     def resampled(self, log: str | os.PathLike[str]) -> str:
         """How the samples that `read` gives were made of others; empty where they were not."""
-        own_clocks = self._kind(log) in ("ulog", "dataflash")
+        own_clocks = self._kind(log) in OWN_CLOCKS
         return f"columns interpolated to {self.dt:g} s" if own_clocks else ""
 
     def _kind(self, log: str | os.PathLike[str]) -> Format:
@@ -133,6 +135,12 @@ class SignalMap:
                     {column: column for column in given},
                     self._needed_step(log),
                     {column: unit for column, unit in given.items() if unit},
+                )
+            case "blackbox":
+                return read_blackbox(
+                    log,
+                    {column: (column, unit or "") for column, unit in given.items()},
+                    self._needed_step(log),
                 )
             case "mat":
                 if self.time is None:

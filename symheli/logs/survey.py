@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from symheli.logs.column import Column, forward
+from symheli.logs.column import Column, forward, unresolved
 from symheli.logs.contents import Contents
+from symheli.logs.format import OWN_CLOCKS
 from symheli.logs.meaning import Guess, guesses, moves, plain_name
-from symheli.logs.stretches import Stretch, longest, stretches
+from symheli.logs.segments import Segment, segments, serving
 from symheli.values.sample_period import JITTER, USUAL
 from symheli.values.units import to_si
 
@@ -23,9 +24,6 @@ CLOCKS = ("t", "time", "timestamp", "timeus", "timems", "timestampus", "timestam
 
 WINDOW = 25
 """Rows over which an angle is held against its rate: the noise of the rate averages out."""
-
-OWN_CLOCKS = ("ulog", "dataflash")
-"""Formats in which every topic or message has its own rate, read by a map."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +44,7 @@ class Clock:
 @dataclass(frozen=True)
 class Motion:
     """Motion of a column: samples and those missing, range, mean and standard deviation in its
-    guessed or declared unit, its own median step and first instant (s).
+    guessed or declared unit, its own median step (s).
     """
 
     samples: int
@@ -57,13 +55,13 @@ class Motion:
     deviation: float
     moves: bool
     step: float | None
-    start: float | None
 
 
 @dataclass(frozen=True)
 class Survey:
     """What was found; `step` is the sample period that is suggested where the log has no clock,
-    `stretches` what the log is from when to when, on its own clock.
+    `segments` what the log is from when to when, on its own clock, `unresolved` the part of the
+    variance of a guessed column that its own rate does not resolve.
     """
 
     log: Path
@@ -73,12 +71,13 @@ class Survey:
     motions: Mapping[str, Motion]
     units: Mapping[str, str | None]
     guesses: Mapping[str, Guess]
-    stretches: tuple[Stretch, ...] = ()
+    segments: tuple[Segment, ...] = ()
+    unresolved: Mapping[str, float] = field(default_factory=dict)
 
     @property
-    def flight(self) -> Stretch | None:
-        """The longest stretch of flight, None where all is flight, or nothing long enough."""
-        return longest(self.stretches)
+    def serving(self) -> tuple[Segment, ...]:
+        """The segments to identify from; none where nothing is flight of some seconds."""
+        return serving(self.segments)
 
     @property
     def moving(self) -> dict[str, Guess]:
@@ -124,7 +123,8 @@ def survey(
         {n: _motion(c) for n, c in held.items()},
         {n: c.unit for n, c in held.items()},
         guessed,
-        stretches(held, guessed),
+        segments(held, guessed),
+        {g.column: unresolved(held[g.column]) for g in guessed.values()},
     )
 
 
@@ -163,10 +163,10 @@ def _clock(name: str, unit: str, stamps: np.ndarray) -> Clock:
 
 def _motion(column: Column) -> Motion:
     known = column.values[np.isfinite(column.values)]
-    step = start = None
+    step = None
     if column.time is not None and np.sum(forward(column.time)) > 1:
         time = column.time[forward(column.time)]
-        step, start = float(np.median(np.diff(time))), float(time[0])
+        step = float(np.median(np.diff(time)))
     shown = known if len(known) else np.array([np.nan])
     return Motion(
         samples=len(column.values),
@@ -177,7 +177,6 @@ def _motion(column: Column) -> Motion:
         deviation=float(shown.std()),
         moves=moves(column.values),
         step=step,
-        start=start,
     )
 
 

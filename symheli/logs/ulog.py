@@ -9,7 +9,9 @@ axes.
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,10 +19,22 @@ import numpy as np
 from symheli.errors import InputError, UnknownNameError
 from symheli.extras import extra
 from symheli.logs.column import Column, continuous, on_one_axis
-from symheli.logs.files import Table, error_text, existing, positive, quiet, warn_of_damage
+from symheli.logs.files import Table, bounded, error_text, positive, quiet, warn_of_damage
 
 QUATERNION = tuple(f"q[{i}]" for i in range(4))
 ANGLES = ("phi", "theta", "psi")
+
+HEADER = 16
+"""Bytes before the first message."""
+
+FIELD = re.compile(r"\s*(\w+)(?:\[(\d+)\])?\s+\w+;?")
+"""Type of a field, and how many it has."""
+
+MAX_FIELDS = 2**16
+"""A message has at most so many bytes, and a topic no more fields."""
+
+MAX_NESTED = 50
+"""Most topics within each other."""
 
 
 class _Instance(NamedTuple):
@@ -90,11 +104,49 @@ def unit_of(field: str) -> str:
     return "rad" if field in ANGLES else "1"
 
 
+def _refuse_endless_formats(file: Path) -> None:
+    """Raise `InputError` where a topic is declared with more fields than a message can hold, or as
+    a part of itself: a reader would list them all.
+    """
+    parts: dict[str, list[tuple[str, float]]] = {}
+    with file.open("rb") as opened:
+        opened.seek(HEADER)
+        while len(head := opened.read(3)) == 3:
+            size, kind = int.from_bytes(head[:2], "little"), head[2:]
+            if kind in b"AD":  # what is declared stands before what is logged
+                break
+            content = opened.read(size)
+            if kind == b"F":
+                name, _, fields = content.decode("latin-1").partition(":")
+                parts[name] = [(m[1], float(m[2] or 1)) for m in FIELD.finditer(fields)]
+    counts: dict[str, float] = {}
+
+    def count(name: str, above: tuple[str, ...] = ()) -> float:
+        if name in above or len(above) > MAX_NESTED:
+            return np.inf
+        if name not in counts:
+            inside = parts.get(name)
+            counts[name] = (
+                1.0
+                if inside is None
+                else sum(n * count(kind, (*above, name)) for kind, n in inside)
+            )
+        return counts[name]
+
+    for name in parts:
+        if count(name) > MAX_FIELDS:
+            raise InputError(
+                f"{file}: damaged: topic {name!r} is declared with {count(name):.0f} fields, a"
+                f" message holds at most {MAX_FIELDS}; copy it from the aircraft once more"
+            )
+
+
 def _topics(path: str | os.PathLike[str]) -> dict[str, list[_Instance]]:
     """The instances of each topic, by number."""
     with extra("logs", "reading a ULog file"):
         from pyulog import ULog  # type: ignore[import-not-found]
-    file = existing(path)
+    file = bounded(path)
+    _refuse_endless_formats(file)
     try:
         with file.open("rb") as opened, quiet():
             log = ULog(opened)

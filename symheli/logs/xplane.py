@@ -120,7 +120,8 @@ def xplane_columns(path: str | os.PathLike[str]) -> tuple[dict[str, Column], flo
 
 def _segments(path: str | os.PathLike[str]) -> list[Segment]:
     """Header by header; raises `InputError` with the line where a row does not fit its header."""
-    lines = [(i, line) for i, line in enumerate(text(path).splitlines(), start=1) if line.strip()]
+    numbered = enumerate(text(path).splitlines(), start=1)
+    lines = [(i, line) for i, line in numbered if line.strip(" \t,|")]  # spreadsheets leave commas
     headers = [j for j, (_, line) in enumerate(lines) if _is_header(line)]
     if not headers or headers[0] > 0:
         raise InputError(
@@ -146,7 +147,7 @@ def _is_header(line: str) -> bool:
 
 
 def _fields(line: str) -> list[str]:
-    fields = [field.strip(" \t,") for field in line.split("|")]  # spreadsheets leave commas
+    fields = [field.strip(' \t,"') for field in line.split("|")]  # spreadsheets leave commas
     return fields[:-1] if fields[-1] == "" else fields
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.signal import butter, sosfilt, sosfilt_zi, sosfiltfilt
 
 from symheli.errors import InputError
-from symheli.records.flight_record import FlightRecord
+from symheli.records.flight_record import GAP, FlightRecord
 from symheli.values.arrays import Array
 
 
@@ -233,6 +233,12 @@ def decimate(record: FlightRecord, n: int) -> FlightRecord:
     )
 
 
+def _without_gaps(steps: Array) -> Array:
+    """The steps, those over a gap as long as the median."""
+    usual = np.median(steps)
+    return np.where(steps > GAP * usual, usual, steps)
+
+
 def split(record: FlightRecord, fraction: float) -> tuple[FlightRecord, FlightRecord | None]:
     """The first part of a record to fit, and the rest held out.
 
@@ -241,7 +247,7 @@ def split(record: FlightRecord, fraction: float) -> tuple[FlightRecord, FlightRe
     record : FlightRecord
         Any.
     fraction : float
-        Of its time.
+        Of its time, without gaps.
 
     Returns
     -------
@@ -261,8 +267,10 @@ def split(record: FlightRecord, fraction: float) -> tuple[FlightRecord, FlightRe
     >>> len(training), len(test)
     (350, 150)
     """
-    edge = record.time[0] + fraction * (record.time[-1] - record.time[0])
-    early = record.time <= edge
+    steps = np.diff(record.time)
+    flown = record.time[0] + np.concatenate([[0.0], np.cumsum(_without_gaps(steps))])
+    elapsed = flown if np.any(steps > GAP * np.median(steps)) else record.time
+    early = elapsed <= elapsed[0] + fraction * (elapsed[-1] - elapsed[0])
     if fraction >= 1 or early.all():
         return record, None
     if early.sum() < 2 or (~early).sum() < 2:

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import pytest
 
 import synthesis
+from evidence import logs
 from evidence.bracket.measured import GAINS, bracket
 from evidence.jerk.measured import TransitionPlan, fastest
 from evidence.marks import guarantee, measured
@@ -130,6 +131,23 @@ def tube_in_hover():
     assert attitude == " ".join(f"{w:.2g}" for w in found.half_widths[6:8])
 
 
+def one_public_log():
+    folder = Path(os.environ.get("SYMHELI_PUBLIC_LOGS", ROOT.parent / "shared" / "data" / "xplane"))
+    log = next(log for log in logs.LOGS if log.name == "Data.txt")
+    if not (folder / log.name).is_file():
+        pytest.skip(f"{log.name} is not here: python -m evidence.logs --folder DIR --fetch-only")
+    *_, row = logs.table([(log, logs.judged(logs.fetched(log, folder.resolve())))]).splitlines()
+    (shown,) = (
+        line
+        for line in KEPT["identify.md", "public logs"].text.splitlines()
+        if log.path[-8:] in line
+    )
+    number = re.compile(r"-?\d+\.\d+")
+    assert number.sub("", row) == number.sub("", shown)
+    for now, then in zip(number.findall(row), number.findall(shown), strict=True):
+        assert same(then, float(now), rel=0.01)
+
+
 def faults_of_one_entry(package, entry):
     """As many inputs, no more faults: how many of them are refused is the draw's."""
     code = (
@@ -182,6 +200,7 @@ ROWS = {
     ("gains.md", "flights"): fastest_of_the_test_flight,
     ("lft.md", "reach"): gains_on_a_narrow_range,
     ("tubes.md", "amplitudes"): tube_in_hover,
+    ("identify.md", "public logs"): one_public_log,
     ("identified.md", "xcell60"): lambda: marks_of_the_worst_seed("xcell60"),
     ("identified.md", "xcell_kahn_hudson"): lambda: marks_of_the_worst_seed(
         "xcell_kahn_hudson", "xcell_kahn_hudson"

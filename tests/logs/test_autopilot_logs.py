@@ -29,7 +29,8 @@ def test_columns_of_different_rates_meet_on_one_axis_and_silence_is_missing():
     fast = np.arange(0, 3, 0.004)
     slow = np.delete(np.arange(0, 3, 0.1), slice(12, 20)) + 0.04  # silent from 1.14 to 2.04 s
     time, got = on_one_axis({"a": Column(fast, fast), "b": Column(slow, 2 * slow)}, 0.02, "log")
-    instants = time + 0.04  # time counts from the first common instant
+    instants = time
+    assert time[0] == 0.04  # the first common instant, on the log's clock
     np.testing.assert_allclose(got["a"], instants, atol=1e-12)
     silent = (instants > 1.141) & (instants < 2.039)
     np.testing.assert_allclose(got["b"][~silent], 2 * instants[~silent], atol=1e-12)
@@ -48,10 +49,17 @@ def test_columns_that_never_overlap_are_named():
         on_one_axis({"early": early, "late": late}, 0.5, "log")
 
 
-def test_a_damaged_clock_is_refused_before_memory_runs_out():
-    wild = Column(np.array([0.0, 0.1, 0.2, 1e12]), np.zeros(4))
-    with pytest.raises(InputError, match="a clock of the log is damaged"):
-        on_one_axis({"a": wild}, 0.1, "log")
+def test_an_instant_far_away_is_behind_a_hole_in_which_no_samples_are_made():
+    """A damaged clock must not cost memory: what lies between is never made."""
+    wild = Column(np.array([0.0, 0.1, 0.2, 0.3, 1e12]), np.zeros(5))
+    time, _ = on_one_axis({"a": wild}, 0.1, "log")
+    assert time.tolist() == pytest.approx([0.0, 0.1, 0.2, 0.3, 1e12])
+
+
+def test_a_step_far_finer_than_the_log_is_refused_before_memory_runs_out():
+    slow = Column(np.arange(0.0, 100.0, 4.0), np.zeros(25))
+    with pytest.raises(InputError, match="dt is in seconds, or a clock of the log is damaged"):
+        on_one_axis({"a": slow}, 1e-5, "log")
 
 
 # --- PX4 -----------------------------------------------------------------------------------------
@@ -177,7 +185,7 @@ def test_units_are_those_of_the_log_and_headings_go_on_past_north(ardupilot):
     record = FlightRecord.from_dataflash(log, {**fields, "v": "RATE.POut"}, dt=0.02)
     assert [s.unit for s in record.signals] == ["rad/s", "rad/s", "rad", "rad", "m/s"]
     assert record.resampled == "messages interpolated to 0.02 s"
-    k = record.time / 0.02
+    k = (record.time - 1.0) / 0.02
     np.testing.assert_allclose(record["q"], 0.001 * k, atol=1e-7)
     np.testing.assert_array_equal(record["q2"], 1.0)
     np.testing.assert_allclose(record["theta"], np.radians(0.1 * k), atol=1e-9)
@@ -216,7 +224,7 @@ def test_a_signal_map_names_messages_and_needs_no_units(ardupilot, tmp_path):
         'q2 = { column = "IMU[1].GyrY", unit = "rad/s" }\n'
     )
     record = FlightRecord.from_map(ardupilot(), signal_map)
-    np.testing.assert_allclose(record["theta"], -np.radians(5 * record.time), atol=1e-9)
+    np.testing.assert_allclose(record["theta"], -np.radians(5 * (record.time - 1.0)), atol=1e-9)
     np.testing.assert_array_equal(record["q2"], 1.0)
 
 

@@ -351,3 +351,15 @@ def test_columns_may_be_separated_by_bars(tmp_path, end):
     np.testing.assert_array_equal(
         FlightRecord.from_csv(path, "t", {"u": "m/s"})["u"], np.arange(6.0) ** 2
     )
+
+
+def test_an_xplane_table_that_went_through_a_spreadsheet_is_read(tmp_path):
+    """Commas beside the bars, quoted names, and rows of nothing but commas."""
+    log = tmp_path / "Forward.csv"
+    rows = [f"{0.1 * k:.1f},|,{0.01 * k:.2f},|" for k in range(5)]
+    log.write_text(
+        "\n".join(
+            ["totl,_time,|,____Q,rad/s,|".replace("totl,_time", "totl,time"), *rows, ",,,,|", ",,,"]
+        )
+    )
+    assert len(FlightRecord.from_xplane(log)) == 5

@@ -317,16 +317,24 @@ def test_ground_and_flight_of_an_old_log_are_told_apart_and_the_flight_is_sugges
     pytest.importorskip("pymavlink", reason="needs pymavlink: pip install 'symheli[logs]'")
     monkeypatch.chdir(tmp_path)
     seen, text = look(before_2015(tmp_path / "log171.bin"))
-    words = [one["what"] for one in seen["stretches"]]
+    words = [one["what"] for one in seen["segments"]]
     assert words == [
         "disarmed, on the ground, at rest",
         "armed, on the ground, at rest",
         "armed, airborne",
         "armed, on the ground, at rest",
     ]
-    flown = seen["stretches"][2]
+    flown = seen["segments"][2]
     assert (flown["start"], flown["stop"]) == (pytest.approx(80, abs=2), pytest.approx(98, abs=2))
-    assert re.search(r"\n  80\.?\d* +98\.?\d* +armed, airborne +suggested\n", text)
+    assert [one["serves"] for one in seen["segments"]] == [False, False, True, False]
+    assert re.search(r"\n  3 +80\.?\d* +98\.?\d* +armed, airborne +landed +yes\n", text)
+    assert [one["ends"] for one in seen["segments"]] == [
+        "armed",
+        "took off",
+        "landed",
+        "the log ends",
+    ]
+    assert "--start" not in seen["suggested_command"]  # what serves is taken without a word
     found = runs(seen, answer)
     assert 16 < found["read"]["stop"] - found["read"]["start"] < 19
     assert found["read"]["scheduling_range"] == [
@@ -340,9 +348,115 @@ def test_what_is_behind_a_crash_is_no_flight(look, answer, tmp_path, monkeypatch
     monkeypatch.chdir(tmp_path)
     seen, text = look(before_2015(tmp_path / "log.bin", crash=True))
     assert "crashed" in text
-    (flown,) = (one for one in seen["stretches"] if one["flown"])
+    (flown,) = (one for one in seen["segments"] if one["flown"])
     assert (flown["start"], flown["stop"]) == (80.0, pytest.approx(60 + 0.02 * 1600))
-    assert runs(seen, answer)["read"]["stop"] <= 32.0
+    assert flown["ends"] == "crash"
+    assert runs(seen, answer)["read"]["stop"] <= 60 + 0.02 * 1600
+
+
+def test_a_log_without_a_flight_is_refused_unless_it_is_asked_for_as_it_is(
+    look, tmp_path, monkeypatch, capsys
+):
+    """On the ground, moved by hand; --segments all takes it."""
+    pytest.importorskip("pymavlink", reason="needs pymavlink: pip install 'symheli[logs]'")
+    monkeypatch.chdir(tmp_path)
+    f, rows = flight(), [("EV", (0, 11))]
+    for k in range(900):
+        now = 20 * k
+        rows.append(("IMU", (now, 0.0, f["q"][k], 0.0)))
+        rows.append(("RATE", (now, f["lon"][k])))
+    log = tmp_path / "bench.bin"
+    log.write_bytes(dataflash(rows, formats=BEFORE_2015))
+    seen, text = look(log)
+    assert seen["suggested_command"] is None
+    assert "no segment of 5 s in the air" in text
+    Path("m.toml").write_text(
+        'dt = 0.02\n[signals]\nq = { column = "IMU.GyrY", unit = "rad/s" }\n'
+        'lon = { column = "RATE.POut", unit = "1" }\n'
+    )
+    command = ["identify", str(log), "--map", "m.toml", "--outputs", "q", "--inputs", "lon"]
+    command += ["--degree", "0"]
+    assert cli.main(command) == 1
+    assert (
+        "no segment is flight of at least 5 s: 0.00 to 17.98 s disarmed" in capsys.readouterr().err
+    )
+    assert cli.main([*command, "--segments", "7"]) == 1
+    assert "expected serving, all or numbers from 1 to 1" in capsys.readouterr().err
+    assert cli.main([*command, "--segments", "all"]) == 0
+    assert cli.main([*command, "--segments", "1"]) == 0
+
+
+def test_flights_of_one_file_are_told_apart_by_the_hole_between_them_and_both_are_used(
+    look, answer, tmp_path, monkeypatch
+):
+    pytest.importorskip("pymavlink", reason="needs pymavlink: pip install 'symheli[logs]'")
+    monkeypatch.chdir(tmp_path)
+    f, rows = flight(), []
+    for k in range(900):
+        now = 20 * k + (600_000 if k >= 450 else 0)
+        rows.append(("IMU", (now, 0.0, f["q"][k], 0.0)))
+        rows.append(("RATE", (now, f["lon"][k])))
+    log = tmp_path / "two.bin"
+    log.write_bytes(dataflash(rows, formats=BEFORE_2015))
+    seen, _ = look(log)
+    assert [(one["serves"], one["ends"]) for one in seen["segments"]] == [
+        (True, "a hole of 600 s"),
+        (True, "the log ends"),
+    ]
+    found = runs(seen, answer)["read"]
+    # all samples, none between; the last 0.3 of the time flown are held out, not of the clock
+    assert found["rows_read"] == 900
+    assert found["held_out_samples"] == pytest.approx(0.3 * found["samples"], abs=2)
+
+
+def test_a_rate_that_is_exceeded_in_flight_is_no_crash(look, tmp_path):
+    """A flip: 13 rad/s a minute before the log ends."""
+    pytest.importorskip("pymavlink", reason="needs pymavlink: pip install 'symheli[logs]'")
+    q = np.tile(flight()["q"], 4)[:3600]
+    q[500:510] = 13.0
+    rows = [("IMU", (20 * k, 0.0, value, 0.0)) for k, value in enumerate(q)]
+    (tmp_path / "flip.bin").write_bytes(dataflash(rows, formats=BEFORE_2015))
+    seen, text = look(tmp_path / "flip.bin")
+    assert "crash" not in text
+    assert all(one["flown"] for one in seen["segments"])
+
+
+def test_an_input_faster_than_its_rate_sets_the_step_and_a_finer_one_is_refused(
+    look, tmp_path, monkeypatch, capsys
+):
+    """Input drawn anew at 10 Hz, gyro at 50 Hz: between its samples nothing is known."""
+    pytest.importorskip("pymavlink", reason="needs pymavlink: pip install 'symheli[logs]'")
+    monkeypatch.chdir(tmp_path)
+    f, rows, rng = flight(), [], np.random.default_rng(0)
+    for k in range(900):
+        rows.append(("IMU", (20 * k, 0.0, f["q"][k], 0.0)))
+        rows += [("RATE", (20 * k, rng.standard_normal()))] if k % 5 == 0 else []
+    log = tmp_path / "log.bin"
+    log.write_bytes(dataflash(rows, formats=BEFORE_2015))
+    seen, text = look(log)
+    assert "lon more often: it moves faster than its 10 Hz resolve" in text
+    assert seen["suggested_command"][-2:] == ["--decimate", "5"]
+    Path("aircraft.toml").write_text(seen["suggested_map"])
+    assert cli.main(seen["suggested_command"][1:-2]) == 1  # at 50 Hz
+    assert "lon was logged every 0.1 s" in capsys.readouterr().err
+
+
+def test_an_input_slower_than_its_rate_is_interpolated_and_named(
+    look, answer, tmp_path, monkeypatch
+):
+    """An input of 0.5 Hz at 10 Hz: the model gets the steps of the gyro's means."""
+    pytest.importorskip("pymavlink", reason="needs pymavlink: pip install 'symheli[logs]'")
+    monkeypatch.chdir(tmp_path)
+    f, rows = flight(), []
+    for k in range(900):
+        rows.append(("IMU", (20 * k, 0.0, f["q"][k], 0.0)))
+        rows += [("RATE", (20 * k, np.sin(np.pi * 0.02 * k)))] if k % 5 == 0 else []
+    log = tmp_path / "log.bin"
+    log.write_bytes(dataflash(rows, formats=BEFORE_2015))
+    seen, _ = look(log)
+    found = runs(seen, answer)["read"]
+    assert found["dt"] == pytest.approx(0.02)
+    assert found["logged_every"] == {"lon": pytest.approx(0.1)}
 
 
 def test_armed_and_modes_of_px4(look, tmp_path):
@@ -358,7 +472,7 @@ def test_armed_and_modes_of_px4(look, tmp_path):
     path = tmp_path / "log.ulg"
     path.write_bytes(ulog({("sensor_gyro", 0): gyro, ("vehicle_status", 0): status}))
     seen, _ = look(path)
-    assert [(one["what"], one["flown"]) for one in seen["stretches"]] == [
+    assert [(one["what"], one["flown"]) for one in seen["segments"]] == [
         ("disarmed, mode 0", False),
         ("armed, mode 0", True),
         ("armed, mode 2", True),

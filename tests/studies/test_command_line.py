@@ -391,7 +391,7 @@ def test_an_xplane_log_needs_one_short_line(run):
         pytest.skip(f"{log} is not here")
     status, out, _ = run("identify", log, "--dt", 0.1)
     assert status == 0
-    assert "segments: 2, of 4, 935" in out
+    assert "parts without a gap: 2, of 4, 935" in out
     assert "does NOT pay" in out
 
 
