@@ -27,6 +27,7 @@ VERBS = (
     "envelope",
     "identify",
     "calibrate",
+    "tune",
     "margins",
     "synthesize",
     "certify",

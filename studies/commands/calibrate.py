@@ -66,7 +66,7 @@ def run(arguments: argparse.Namespace) -> Output:
         raise InputError(f"--write: expected a file that ends in .toml, got {arguments.write}")
     heli = symheli.Helicopter.load(arguments.vehicle, governor=arguments.governor)
     heli = heli.at_altitude(arguments.altitude) if arguments.altitude else heli
-    records = [_record(arguments, log) for log in arguments.logs]
+    records = [record_of(arguments, log) for log in arguments.logs]
     found = calibrate(
         heli, records, arguments.parameters, window=arguments.window, gust=arguments.gust
     )
@@ -98,7 +98,7 @@ def run(arguments: argparse.Namespace) -> Output:
     return Output(text, data)
 
 
-def _record(arguments: argparse.Namespace, log: Path) -> FlightRecord:
+def record_of(arguments: argparse.Namespace, log: Path) -> FlightRecord:
     """The inputs and outputs of a log between --start and --stop."""
     from studies.log.reading import read
     from symheli import FlightRecord

@@ -107,6 +107,14 @@ def unit(text: str) -> tuple[str, str]:
     return name, value
 
 
+def assignment(text: str) -> tuple[str, float]:
+    """name=number"""
+    name, sign, value = text.partition("=")
+    if not (name and sign and value):
+        raise argparse.ArgumentTypeError(f"expected NAME=NUMBER, got {text!r}")
+    return name.strip(), number(value)
+
+
 def feedback(text: str) -> tuple[tuple[str, str], float]:
     """input=output:gain"""
     pair, colon, gain = text.rpartition(":")
