@@ -5,6 +5,7 @@ from the numbers of another.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,6 +24,7 @@ from studies.known_kinematics.truth import FrozenAxes, Truth, frozen_axes
 from studies.output import as_json, progress
 from studies.transition.flights import autopilot_for
 from symheli import DataWarning, Helicopter
+from symheli.errors import TrimError
 from symheli.values.arrays import Array
 
 ELSEWHERE = 0.3
@@ -37,8 +39,8 @@ LIMITS = {"nu-gap": 0.03, "within": 0.95}
 @dataclass(frozen=True, kw_only=True)
 class Marks:
     """Of one seed. `gaps`, `black_box`, `before`: worst nu-gap by axis of the calibrated vehicle,
-    of the identified model of the same flight, and of the start; `errors`: of the determined
-    parameters, in their standard deviations.
+    of the identified model of the same flight, and of the start (1 where it cannot hover);
+    `errors`: of the determined parameters, in their standard deviations.
     """
 
     seed: int
@@ -76,10 +78,9 @@ def of_seed(seed: int, truth: str = "xcell60", black_box: bool = False) -> Marks
     exact = Truth.of(heli)
     true = heli.parameters.array[[heli.parameters.signals.index(p) for p in found.parameters]]
     errors = (found.values - true) / found.deviations
-    models: dict[str, FrozenAxes] = {
-        "calibrated": Truth.of(found.heli).models,
-        "start": Truth.of(start).models,
-    }
+    models: dict[str, FrozenAxes] = {"calibrated": Truth.of(found.heli).models}
+    with contextlib.suppress(TrimError):  # some starts do not even hover
+        models["start"] = Truth.of(start).models
     if black_box:
         models["black box"] = frozen_axes(identified(flight, other), exact)
     gaps = {
@@ -89,7 +90,7 @@ def of_seed(seed: int, truth: str = "xcell60", black_box: bool = False) -> Marks
     return Marks(
         seed=seed,
         gaps=gaps["calibrated"],
-        before=gaps["start"],
+        before=gaps.get("start", dict.fromkeys(gaps["calibrated"], 1.0)),
         black_box=gaps.get("black box", {}),
         errors=errors[found.determined],
         steps=found.steps,

@@ -32,6 +32,7 @@ def test_the_loop_over_airspeed_and_acceleration_is_the_loop(lateral):
             )
 
 
+@pytest.mark.slow
 def test_a_bounded_jerk_proves_less_gain_and_an_unbounded_one_no_more(lateral):
     """Two segments: coarse, and quick."""
     knots = Knots((2, 1), 2)

@@ -31,6 +31,7 @@ def test_the_table_counts_every_flight_once():
     assert rows[3] == ["all", "4", "2", "1", "0", "1", "2", "1", "0.25", "0.10"]
 
 
+@pytest.mark.slow
 def test_least_squares_never_says_that_a_model_is_fit():
     found = outcome("xcell60", "short", "ls", 1)
     assert found.verdict in ("not known", "not fit")

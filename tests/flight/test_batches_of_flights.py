@@ -78,6 +78,7 @@ def test_the_level_of_instructions_changes_no_bit(pi, monkeypatch):
         np.testing.assert_array_equal(first.values, second.values)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("governor", ["ideal", pytest.param("pi", marks=pytest.mark.slow)])
 def test_without_a_compiler_a_long_flight_is_the_same_to_its_promise(governor, monkeypatch):
     heli = symheli.Helicopter.load("xcell60", governor=governor)

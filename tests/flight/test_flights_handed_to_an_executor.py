@@ -56,6 +56,7 @@ def test_a_flight_has_the_same_bits_wherever_its_chunk_was_flown(campaign, tmp_p
     np.testing.assert_array_equal(there.lost, here.lost)
 
 
+@pytest.mark.slow
 def test_what_is_there_is_not_handed_out_again(campaign, tmp_path):
     path, first = tmp_path / "flights.zarr", Copying()
     whole = campaign(path, workers=first)["q"]

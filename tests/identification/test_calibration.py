@@ -98,6 +98,7 @@ def test_hidden_rotor_states_are_estimated_too(pi):
     assert found.values[0] == pytest.approx(pi.parameters["body.Ixx"], rel=0.03)
 
 
+@pytest.mark.slow
 def test_wind_leaves_residuals_that_are_not_white(ideal, flown):
     schedule = symheli.AirspeedSchedule.transition(2.0, 6.0, acceleration=2.0, hold=2.0)
     lqr = symheli.flight.gain_scheduled_lqr(ideal, 0.0, 8.0, 0.02)

@@ -119,6 +119,7 @@ def test_closed_loop_noise_is_kept_out_of_the_refinement_by_the_external_excitat
     assert worst["riv"] < worst["iv"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("at", ["lag", pytest.param("now", marks=pytest.mark.slow)])
 def test_refined_instruments_identify_a_plant_that_is_unstable_in_open_loop(at):
     """Unstable at high p, so that no free run is bounded: an observer driven by what the excitation

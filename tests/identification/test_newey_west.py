@@ -19,6 +19,7 @@ def test_it_is_the_sum_of_tapered_products_however_the_rows_come(cuts):
     np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-11)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flights", [8, pytest.param(40, marks=pytest.mark.slow)])
 def test_instruments_know_the_scatter_of_their_coefficients(flights):
     """Flights with noisy sensors: the errors, in standard errors, have the size of one."""

@@ -167,6 +167,7 @@ def test_coefficients_are_those_of_the_weighted_rows_with_what_keeps_them_awake(
 
 @settings(max_examples=12, deadline=None, derandomize=True)
 @given(experiments(small=True), st.sampled_from(["directional", "directional, loud or not"]))
+@pytest.mark.slow
 def test_directional_forgetting_is_its_information_in_fifty_digits(experiment, way):
     compare(*experiment, WAYS[way], checks=3)
 

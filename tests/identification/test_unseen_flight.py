@@ -46,6 +46,7 @@ def test_louder_sensors_and_another_vehicle_are_not(vehicle, model):
         found.require()
 
 
+@pytest.mark.slow
 def test_noise_of_its_own_size_in_every_flight_is_no_other_vehicle(vehicle):
     """Noise so many decibels below the signals is louder in a livelier flight: two flights pooled
     to one level made every third unlikely.

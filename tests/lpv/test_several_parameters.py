@@ -107,6 +107,7 @@ def test_a_sampled_model_is_the_frozen_one_held_and_knows_its_misfit():
     )
 
 
+@pytest.mark.slow
 def test_simulation_along_a_flight_converges_to_the_differential_equation():
     def p(t):
         return np.array([6 + 5 * np.sin(0.5 * t), 2.5 * np.cos(0.5 * t)])

@@ -217,6 +217,7 @@ def test_a_heading_that_starts_anew_at_north_is_one_heading():
     assert check_kinematics(wrapped)["psi"].verdict == "consistent"
 
 
+@pytest.mark.slow
 def test_gaps_and_missing_samples_are_left_out():
     record = analytic(n=1500)
     values = record.values.copy()
@@ -230,6 +231,7 @@ def test_gaps_and_missing_samples_are_left_out():
     assert found.windows == 11
 
 
+@pytest.mark.slow
 def test_another_column_is_no_rate_of_roll():
     record = analytic(n=1000)
     found = check_kinematics(changed(record, p=np.random.default_rng(1).permutation(record["p"])))

@@ -18,6 +18,7 @@ from symheli.errors import InputError
 SMALL, LARGE = Candidate("prbs", (0.1, 5.0), 0.25, 3.0), Candidate("prbs", (0.1, 5.0), 0.75, 3.0)
 
 
+@pytest.mark.slow
 def test_a_larger_excitation_teaches_in_proportion_until_it_exceeds_a_limit_or_is_lost():
     wild = Candidate("multisine", (0.1, 0.5), 40.0, 3.0)
     found = design("xcell60", LONGITUDINAL, 1, {"q": 2.0}, [SMALL, LARGE, wild])

@@ -47,6 +47,7 @@ def test_the_open_region_is_shaded_only_where_no_test_proves_a_gain():
         plt.close(ax.figure)
 
 
+@pytest.mark.slow
 def test_the_table_shows_every_form_and_what_a_jumping_airspeed_costs():
     lpv = LPVStateSpace.polynomial(
         [[[-2.0]], [[1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], Scheduling("p", "1", 0.0, 1.0)
@@ -65,6 +66,7 @@ def test_the_table_shows_every_form_and_what_a_jumping_airspeed_costs():
     assert curve.jumping["LFT D/G"] == pytest.approx(1.0, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_a_proof_of_a_model_that_the_exact_one_exceeds_is_said_not_to_hold_for_the_helicopter():
     def lag(gain):
         return LPVStateSpace.polynomial(

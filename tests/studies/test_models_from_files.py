@@ -109,6 +109,7 @@ def test_a_family_becomes_a_matlab_file(answer, family_file, tmp_path):
     np.testing.assert_array_equal(content["A"][:, :, 2], family.A[2])
 
 
+@pytest.mark.slow
 def test_many_certificates_are_verified_at_once(answer, run, tmp_path):
     proven, not_proven = tmp_path / "proven.json", tmp_path / "not.json"
     assert answer("certify", "--rate", 0, "--airspeeds", 4, 9, "--save", proven)["proof"] == str(

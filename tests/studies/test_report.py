@@ -98,6 +98,7 @@ def test_figures_are_drawn_without_any_stage(full, tmp_path, unpainted, name):
     assert text.count("<figure") == len(drawn) > 5
 
 
+@pytest.mark.slow
 def test_a_vehicle_whose_entries_are_all_fitted_gets_its_report(full, tmp_path, unpainted):
     baseline = full.baseline
     smooth = replace(

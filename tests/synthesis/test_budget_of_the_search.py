@@ -54,6 +54,7 @@ def test_a_search_that_was_not_made_is_not_claimed():
         assert "at most 60 s: a longer" in cert.details
 
 
+@pytest.mark.slow
 def test_more_time_is_never_worse_and_no_time_still_a_bound():
     bounds = [
         lower_bound(lateral(), 0.3, search=Search(seconds=s, evaluations=10, starts=1)).gain

@@ -77,6 +77,7 @@ def test_the_input_along_the_worst_trajectory_shows_the_gain(lpv, rate):
 
 @common
 @given(lpv=models, rate=rates, options=st.sampled_from(OPTIONS))
+@pytest.mark.slow
 def test_no_input_has_less_than_the_claim_along_the_trajectory_of_a_certificate(lpv, rate, options):
     cert = l2_gain(lpv, rate, **options, search=QUICK)
     if cert.worst is None or math.isinf(cert.lower):
@@ -101,6 +102,7 @@ def test_no_input_has_less_than_the_claim_along_the_trajectory_of_a_certificate(
 
 @common
 @given(lpv=models, rate=rates)
+@pytest.mark.slow
 def test_the_repeated_cycle_shows_the_peak_and_the_decay(lpv, rate):
     peak = generalized_h2(lpv, rate, **SOS, search=QUICK)
     if peak.worst is not None and math.isfinite(peak.lower):

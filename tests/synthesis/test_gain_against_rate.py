@@ -35,6 +35,7 @@ def curve(loop):
     )
 
 
+@pytest.mark.slow
 def test_the_curve_is_that_of_the_single_gains(loop, curve):
     assert sorted(curve.lower) == [0.0, 0.2, 1.0, math.inf]
     for rate in (0.0, 0.2, 1.0):

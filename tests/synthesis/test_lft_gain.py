@@ -271,6 +271,7 @@ def test_growth_along_a_diagonal_of_two_parameters_is_found():
     np.testing.assert_allclose(cert.worst.p[:, 1], 2 + 2 * cert.worst.p[:, 0], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_an_lft_and_its_polynomial_model_have_the_same_lower_bound():
     quick, lpv = (
         Search(levels=4, dwells=4, starts=1, nodes=16, evaluations=4, steps=40, samples=2000),

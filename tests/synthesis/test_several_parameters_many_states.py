@@ -17,7 +17,9 @@ def over_two(own, rate):
     return LPVStateSpace.polynomial(*({(0, 0): M} for M in own.model), parameters)
 
 
-@pytest.mark.parametrize("seed", MANY)
+@pytest.mark.parametrize(
+    "seed", [MANY[1], *(pytest.param(s, marks=pytest.mark.slow) for s in MANY if s != MANY[1])]
+)
 def test_the_gain_of_a_constant_loop_over_two_parameters_is_its_norm(seed):
     own = loop(seed)
     assert len(own.model.A) > 9

@@ -163,6 +163,7 @@ def test_they_prove_a_spring_at_a_rate_at_which_a_quadratic_does_not(form):
     assert proof.verify(rigorous=True)
 
 
+@pytest.mark.slow
 def test_memory_brings_the_gain_nearer_to_its_lower_bound():
     search = Search(levels=4, dwells=5, starts=1, nodes=40, evaluations=12, steps=80, samples=5000)
     below = lower_bound(spring(), 0.2, search=search).gain

@@ -45,6 +45,7 @@ def gains():
     return [l2_gain(tied(jerk), form=BOTH, search=None) for jerk in JERKS]
 
 
+@pytest.mark.slow
 def test_the_gain_does_not_increase_as_the_jerk_falls(gains):
     found = [cert.gamma for cert in gains]
     assert all(cert.verified for cert in gains)
@@ -93,6 +94,7 @@ def test_a_cycle_along_which_the_state_grows_is_shown_as_it_moves():
     np.testing.assert_allclose(p[:, 0] - p[0, 0], moved, atol=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flip", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_a_helicopter_that_brakes_less_than_it_accelerates_is_searched_as_hard_as_it_brakes(flip):
     V = Scheduling("V", "m/s", 0.0, 1.0, rate="a")

@@ -169,6 +169,7 @@ def test_corners_reach_the_fastest_pumping_of_a_spring_exactly():
     assert gradient(lpv, found, math.inf, GROWTH, 0.2)[0] == pytest.approx(best, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_bound_by_jumps_is_flown_as_it_is_reported():
     from test_order_of_bounds import response
 

@@ -37,6 +37,7 @@ def test_the_adjoint_has_the_transposed_responses_and_its_adjoint_is_the_model(l
         np.testing.assert_array_equal(one, other)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dt", [None, pytest.param(0.05, marks=pytest.mark.slow)])
 def test_the_gain_of_the_adjoint_is_that_of_the_loop(loop, dt):
     """Both bounds enclose the same number: rich forms of P come within a percent of one another,

@@ -113,6 +113,7 @@ def test_of_a_constant_plant_the_gain_is_known():
     )
 
 
+@pytest.mark.slow
 def test_a_sampled_estimator_is_proven():
     made = estimator(heave(-1.0).sampled(0.1))
     proof = made.certify(search=None)

@@ -21,6 +21,7 @@ def test_the_lft_of_the_loop_proves_what_the_inequalities_promise():
     assert lft_gain(loop).gamma <= made.promised * 1.02
 
 
+@pytest.mark.slow
 def test_jumps_cost_more_than_rates_and_no_less_than_standing_still():
     jumps = lft_feedback(spring())
     assert jumps.optimum == pytest.approx(output_feedback(spring(), math.inf).optimum, rel=1e-9)

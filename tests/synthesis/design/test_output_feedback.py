@@ -192,6 +192,7 @@ def test_a_sampled_first_order_plant(a):
     assert least(plant) == pytest.approx(hinf(sampled, controls, measured).optimum, rel=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", [0.0, pytest.param(0.5, marks=pytest.mark.slow)])
 def test_a_sampled_design_is_proven_and_tends_to_the_continuous_one(rate):
     """The performance and the noise of a sampled plant are sampled too: what differs is of first
@@ -212,6 +213,7 @@ def test_a_sampled_design_is_proven_and_tends_to_the_continuous_one(rate):
 # --- both sides moving, asked for by hand ---------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_both_sides_move_where_that_is_asked_and_the_rate_is_neglected():
     """As the default does where one side is not enough; the loop is proven without that neglect."""
     made = output_feedback(spring(), 0.05, X=2, Y=2, back_off=BACK_OFF)
@@ -225,6 +227,7 @@ def test_both_sides_move_where_that_is_asked_and_the_rate_is_neglected():
     assert proof.gamma <= made.promised * PROVEN
 
 
+@pytest.mark.slow
 def test_where_neglecting_the_rate_keeps_no_gamma_it_is_said_what_to_write(monkeypatch):
     monkeypatch.setattr("synthesis.lpv.search.MAX_RATE_LOSS", 0.5)
     with pytest.raises(
@@ -236,6 +239,7 @@ def test_where_neglecting_the_rate_keeps_no_gamma_it_is_said_what_to_write(monke
 # --- a parameter seen through a lag --------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_both_sides_move_with_a_lagged_parameter():
     """Better than either alone, over the same parameters; the controller knows how X and Y move."""
     slow = spring(1.0).lagged(0.2)

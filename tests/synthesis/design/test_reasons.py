@@ -39,6 +39,7 @@ def test_a_mode_that_the_controls_do_not_reach_is_named():
     assert "d_col cannot stabilise it" in str(error.value)
 
 
+@pytest.mark.slow
 def test_a_mode_that_the_measurements_do_not_show_is_named():
     for design in (output_feedback, estimator):
         with pytest.raises(SynthesisError) as error:
@@ -101,6 +102,7 @@ def test_a_gamma_that_is_the_gain_of_a_weight_says_so():
     assert nothing[0] in str(made)
 
 
+@pytest.mark.slow
 def test_nothing_is_said_of_a_gamma_that_a_controller_earns():
     for made in (output_feedback(arm(0.1)), output_feedback(spring())):
         assert made.reasons == ()

@@ -43,6 +43,7 @@ def extended(made, turned):
     return replace(made, model=model)
 
 
+@pytest.mark.slow
 def test_states_that_nothing_moves_are_left_out_exactly(made):
     """The transfer function stays what it was, in whatever coordinates."""
     turned = np.random.default_rng(0).standard_normal((3, 3))
@@ -59,6 +60,7 @@ def test_states_that_nothing_moves_are_left_out_exactly(made):
         )
 
 
+@pytest.mark.slow
 def test_a_state_that_matters_little_may_go():
     """Gusts of 20 rad/s bring a third state; two do about as well, frozen."""
     gusts = LinearModel([[-20.0]], [[20.0]], [[1.0]], [[0.0]], ("x",), ("in",), ("out",))

@@ -22,6 +22,7 @@ def made():
     return output_feedback(spring())
 
 
+@pytest.mark.slow
 def test_sampling_by_tustin_keeps_the_norm_at_every_condition(made):
     """The rule maps the imaginary axis onto the unit circle: the H-infinity norm of what is sampled
     is that of what was continuous, but for the functions of p fitted to it.
@@ -121,6 +122,7 @@ def test_a_sampled_controller_is_certified_and_says_that_the_loop_is_sampled(mad
         assert norm(*loop, 0.02)[0] <= proof.gamma * (1 + 1e-5)
 
 
+@pytest.mark.slow
 def test_a_sampled_controller_may_be_reduced(made):
     assert made.discretize(0.02).reduce(1).certify(search=None).verified
 
@@ -178,6 +180,7 @@ def test_a_sampled_controller_flies(ideal, roll):
     np.testing.assert_allclose(record["d_lat"], expected, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_design_against_a_reference_flies_as_it_is(ideal, roll):
     """`phi_error` of the plant is reference minus phi; a flight subtracts the other way round."""
     own = roll.plant.with_reference(["phi"]).with_noise({"p": 0.02, "phi_error": 0.02})

@@ -39,7 +39,9 @@ def test_what_no_spline_serves_comes_to_an_end():
     assert cut_to_serve(peak, P, lambda fit, p: np.zeros(len(p), bool)) is None
 
 
-@pytest.mark.parametrize("seed", [1, 7, 29])
+@pytest.mark.parametrize(
+    "seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (7, 29))]
+)
 def test_a_narrow_peak_of_the_frozen_optimum_is_found(seed):
     """The plants were drawn with more values of p, and one where B2 or C2 passes zero."""
     drawn = random_plant(seed)
@@ -48,6 +50,7 @@ def test_a_narrow_peak_of_the_frozen_optimum_is_found(seed):
     assert found.level <= drawn.worst * (1 + 2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, 3])
 def test_central_controllers_keep_their_level_between_the_points(seed):
     """Frozen gain recomputed where nothing was fitted or judged."""

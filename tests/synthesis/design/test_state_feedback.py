@@ -56,6 +56,7 @@ def test_a_richer_storage_function_is_never_worse():
         assert least == pytest.approx(on_grids, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_standing_still_it_is_the_worst_of_the_frozen_optima():
     """Riccati equations at every p against one inequality for all."""
     plant = spring(0.0, states=True)
@@ -78,6 +79,7 @@ def _full_information(plant, p):
     return 2 * out[1] - out[0]
 
 
+@pytest.mark.slow
 def test_state_feedback_is_no_worse_than_output_feedback():
     from synthesis import output_feedback
 
@@ -108,6 +110,7 @@ def test_the_states_must_be_measured_at_the_ends_of_the_range_too():
         state_feedback(of(blind, ["u"], ["y"]))
 
 
+@pytest.mark.slow
 def test_a_sampled_gain_keeps_its_level():
     """Discrete time: certified by an analysis that knows nothing of the design."""
     plant = spring(states=True).sampled(0.05)

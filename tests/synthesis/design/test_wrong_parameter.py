@@ -119,6 +119,7 @@ def test_every_divided_difference_is_within_the_slopes(basis, error):
         assert np.abs(wanted - along @ m).max() < 1e-9 * np.abs(slope).max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("basis", "error"),
     [
