@@ -31,6 +31,8 @@ gain is proven: the closer to it, the more knots are needed.
 """
 MIN_SEGMENTS, MAX_SEGMENTS = 8, 1024
 """Least number of segments to begin with, and largest number."""
+MAX_STATES = 24
+"""Number of states up to which the centres take less time than a program over the range."""
 MIN_FRACTION = 1e-4
 """Least width of a segment, as a fraction of the range."""
 MAX_SIZE = 10.0
@@ -47,8 +49,11 @@ CENTRED = 1e-4
 
 def of_frozen_models(problem: ScaledProblem, level: float) -> SplineLyapunov | None:
     """Return P, in the scaled units, of storage functions at this level of the gain in the unit of
-    the channel; None where a frozen model has none, p moves too fast, or the knots are too many.
+    the channel; None where a frozen model has none, p moves too fast, or states or knots are too
+    many.
     """
+    if len(problem.lpv.states) > MAX_STATES:
+        return None
     ends = [problem.pieces[0].low, *(piece.high for piece in problem.pieces)]
     parts = -(-MIN_SEGMENTS // (len(ends) - 1))
     knots = np.interp(
@@ -62,6 +67,8 @@ def of_frozen_models(problem: ScaledProblem, level: float) -> SplineLyapunov | N
                 return None
             first.append(P)
         bound = MAX_SIZE * max(float(linalg.eigvalsh(P)[-1]) for P in first)
+        if _too_fast(problem, level, bound, knots, first):
+            return None
         found: dict[float, Array] = {}
         starts: dict[float, list[Array]] = {
             float(p): [P] for p, P in zip(knots, first, strict=True)
@@ -79,7 +86,7 @@ def of_frozen_models(problem: ScaledProblem, level: float) -> SplineLyapunov | N
             if not between:
                 return P
             # the value at a knot holds for a p at rest, whatever lies between
-            if (at_knots and round_ > 1) or len(knots) + len(between) > MAX_SEGMENTS:
+            if (at_knots and round_ > 0) or len(knots) + len(between) > MAX_SEGMENTS:
                 return None
             starts = {
                 0.5 * float(knots[j] + knots[j + 1]): [P.at(0.5 * (knots[j] + knots[j + 1])), *ends]
@@ -87,6 +94,27 @@ def of_frozen_models(problem: ScaledProblem, level: float) -> SplineLyapunov | N
                 for ends in [P.coefficients[j : j + 2]]
             }
     return None
+
+
+def _too_fast(
+    problem: ScaledProblem, level: float, bound: float, knots: Array, starts: list[Array]
+) -> bool:
+    """Whether p moves too fast between two knots in the middle: a look before the whole range."""
+    if problem.rate == 0:
+        return False
+    k = len(knots) // 2 - 1
+    ends = [_central(problem, float(knots[j]), level, bound, [starts[j]]) for j in (k, k + 1)]
+    if ends[0] is None or ends[1] is None:
+        return True
+    drift = problem.scaled_rate * (ends[1] - ends[0]) / (knots[k + 1] - knots[k])
+    for p, P in zip(knots[k : k + 2], ends, strict=True):
+        A, B, C, D = _frozen(problem, float(p))
+        g = level**2 * np.eye(B.shape[1])
+        for nu in (-drift, drift):
+            top, side = P @ A + A.T @ P + C.T @ C + nu, P @ B + C.T @ D
+            if not _definite(-np.block([[top, side], [side.T, D.T @ D - g]])):
+                return True
+    return False
 
 
 def _frozen(problem: ScaledProblem, p: float) -> Matrices:

@@ -186,11 +186,8 @@ class OneParameter(Ladder):
         discrete time, around a block, and where the user set the form of P.
         """
         form, scaled, best = self.problem.form, self.dissipating, Found(math.inf)
-        given = (
-            not isinstance(form, Spline)
-            or form.degree == 0
-            or (form.segments is not None and len(form.segments) == 1)
-        )
+        tried = form.segments_tried(1)
+        given = not isinstance(form, Spline) or form.degree == 0 or (tried and len(tried) == 1)
         if given or scaled is None or scaled.lpv.dt is not None or math.isinf(scaled.rate):
             return best
         start = time.perf_counter()
