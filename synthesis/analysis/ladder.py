@@ -17,7 +17,6 @@ from symheli.progress import task
 from synthesis.analysis.problem import Problem
 from synthesis.certificate import Attempt, Proof
 from synthesis.program.cone_program import Answer
-from synthesis.program.lyapunov_program import MANY_STATES
 from synthesis.program.scaling import in_its_own_scale
 
 INFLATION = 1e-6
@@ -123,6 +122,9 @@ class Ladder(ABC):
         """Return a bound on the gain proven without a program."""
         return Found(math.inf)
 
+    many_states = False
+    """Whether there are so many states that a program takes minutes."""
+
     def of_frozen_models(self, limit: float) -> Found:
         """Return a bound on the gain proven by storage functions of frozen models, whose worst gain
         is `limit`.
@@ -198,8 +200,7 @@ class Ladder(ABC):
             still = self._margins(self.constant(), Found(math.inf))
             if still.proof is not None and still.bound <= (1 + CLOSE_TO_LOWER) * limit:
                 return still
-        many = self.problem.model.sizes[0] > MANY_STATES
-        if gains and many:
+        if gains and self.many_states:
             # before programs that take minutes
             best = best.or_better(self.of_frozen_models(limit), 1.0)
             if best.proof is not None and best.bound <= MAX_FROZEN_RATIO * limit:
@@ -210,7 +211,7 @@ class Ladder(ABC):
                 break
         if still is None and best.proof is None and any(map(self.varies, shapes)):
             still = self._margins(self.constant(), Found(math.nan))
-        if gains and not many and not best.bound <= near * limit:
+        if gains and not self.many_states and not best.bound <= near * limit:
             best = best.or_better(self.of_frozen_models(limit), 1.0)
         if still is not None:
             # "no P exists" refers to the form requested, of which a constant P is a special case

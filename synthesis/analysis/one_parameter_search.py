@@ -27,7 +27,7 @@ from synthesis.impose import Bernstein
 from synthesis.lyapunov.spline import Lyapunov, SplineLyapunov
 from synthesis.program import interior_point
 from synthesis.program.cone_program import LYAPUNOV, Answer, Candidate, solve
-from synthesis.program.lyapunov_program import LyapunovProgram
+from synthesis.program.lyapunov_program import MANY_STATES, LyapunovProgram
 from synthesis.program.scaling import dissipative
 from synthesis.worst.frozen import norm
 
@@ -180,6 +180,11 @@ class OneParameter(Ladder):
                     break
         self.spent[2] += time.perf_counter() - start
         return best
+
+    @property
+    def many_states(self) -> bool:  # type: ignore[override]
+        """Whether there are so many states that a program takes minutes."""
+        return len(self.scaled.lpv.states) > MANY_STATES
 
     def of_frozen_models(self, limit: float) -> Found:
         """Return the gain proven by P linear between storage functions of frozen models; nothing in
