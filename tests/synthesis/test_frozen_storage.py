@@ -75,6 +75,7 @@ def test_a_resting_or_slow_parameter_costs_a_fiftieth(rate):
     own, frozen = search(rate)
     found = own.of_frozen_models(frozen)
     assert frozen < found.bound <= 1.02 * (1 + 1e-6) * frozen
+    assert found.proof is not None
     assert found.proof.evidence.exact(found.proof.lyapunov, found.bound)
 
 
