@@ -99,7 +99,9 @@ class Spline(_InP):
         each an integer or a tuple of one a parameter. By default 16 and 32, in discrete time 8 and
         16; 4 and 8 with more than 12 states, in the general analysis of one parameter and of one
         whose rate is another, 1 of several. A constant P has no knots, but its LMIs are cut there
-        (8).
+        (8). Where not a single number is given, P linear between storage functions of frozen models
+        is tried too for a gain over one slow parameter: at first with more than 12 states, else
+        where the others prove no bound within `accept`.
     grading : float, optional
         Knots at low + (high - low)(k/K)^grading; by default 2 for one parameter and for one whose
         rate is another, 1 for several.

@@ -7,17 +7,16 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv import LFT, LPVStateSpace, Scheduling, UncertainStateSpace
-from synthesis.analysis.apart import apart, fine_sampling
+from synthesis.analysis.apart import apart
 from synthesis.analysis.general_search import General
 from synthesis.analysis.hypotheses import VERIFIED, hypotheses
-from synthesis.analysis.ladder import CLOSE_TO_LOWER, Found, Ladder
+from synthesis.analysis.ladder import Found, Ladder
 from synthesis.analysis.one_parameter_search import OneParameter
 from synthesis.analysis.problem import Problem
 from synthesis.certificate import Certificate, Seconds, Status
@@ -231,14 +230,4 @@ class Report:
         """Sentences on the causes of a gap between the bounds of a gain."""
         if "gamma" not in bounds or ladder is None:
             return ()
-        cause = apart(bounds["gamma"], bounds["lower"], ladder.rounding, best.answer)
-        # numbers that suffice for the frozen model suffice for its sample period
-        return cause if ladder.rounding <= CLOSE_TO_LOWER else (*cause, *self._sampling(bounds))
-
-    def _sampling(self, bounds: dict[str, float]) -> tuple[str, ...]:
-        if "gamma" not in bounds:
-            return ()
-        points = 41 if len(self.problem.model.parameters) == 1 else 3
-        grid = product(*(np.linspace(s.low, s.high, points) for s in self.problem.model.parameters))
-        A = self.problem.model.at(np.array(list(grid))).A
-        return fine_sampling(A, self.problem.model.dt, bounds["gamma"], bounds["lower"])
+        return apart(bounds["gamma"], bounds["lower"], ladder.rounding, best.answer)

@@ -72,7 +72,7 @@ class General(Ladder):
         other = dissipative(scale, frozen, bound) if kind == "l2 gain" else None
         if other is not None:
             self.choices.insert(0, other)
-        self.rounding = math.inf
+        self.rounding = math.nan
         return self._in_units(self.choices[-1])
 
     def settle(self) -> float:
@@ -322,6 +322,10 @@ class General(Ladder):
             if least is None:
                 return nothing
             P, bound = least
+            if gains:
+                bound *= math.sqrt(1 + self.sampling_error)
+            if not self.believed(Proof(self.evidence, P), bound):
+                return nothing
         proof = Proof(self.evidence, P)
         return Found(bound, proof, candidate.answer, self.evidence.conditioning(P))
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,6 +33,14 @@ more accurate.
 """
 CLOSE_TO_LOWER = 1e-3
 """A bound within this fraction of the lower bound is not improved further by a constant P."""
+MAX_FROZEN_RATIO = 1.05
+"""Ratio to the worst frozen gain up to which a bound by storage functions of frozen models ends the
+search where there are many states.
+"""
+MAX_SAMPLING_ERROR = 1e-7
+"""Fraction of gamma^2 that rounding may take in discrete time above which a proof in floating point
+is not believed, and the exact one decides at once.
+"""
 DECAY_TOLERANCE = 2e-3
 """Tolerance of a decay rate, relative to the frozen one."""
 
@@ -71,6 +80,28 @@ class Ladder(ABC):
         """
         self.unit = self.expect(1.0)
 
+    @cached_property
+    def sampling_error(self) -> float:
+        """Fraction of gamma^2 that rounding of A may take where it is nearly I, as of a model that
+        is sampled finely: the inequality is as large as the decay in one sample; 0 in continuous
+        time.
+        """
+        model = self.problem.model
+        if model.dt is None:
+            return 0.0
+        low, high = np.array([(s.low, s.high) for s in model.parameters]).T
+        A = model.at(low + np.linspace(0.0, 1.0, 9)[:, None] * (high - low)).A
+        decay = 1.0 - float(np.abs(np.linalg.eigvals(A)).max(initial=0.0))
+        return 4.0 * len(A[0]) * float(np.finfo(float).eps) / max(decay, np.finfo(float).eps)
+
+    def believed(self, proof: Proof, bound: float) -> bool:
+        """Whether floating point suffices to believe a proof that it has verified; else decide
+        exactly.
+        """
+        return self.sampling_error <= MAX_SAMPLING_ERROR or proof.evidence.exact(
+            proof.lyapunov, bound
+        )
+
     @property
     def found_by(self) -> str:
         """Name of the relaxation used in the search."""
@@ -89,6 +120,15 @@ class Ladder(ABC):
 
     def proposed(self) -> Found:
         """Return a bound on the gain proven without a program."""
+        return Found(math.inf)
+
+    many_states = False
+    """Whether there are so many states that a program takes minutes."""
+
+    def of_frozen_models(self, limit: float) -> Found:
+        """Return a bound on the gain proven by storage functions of frozen models, whose worst gain
+        is `limit`.
+        """
         return Found(math.inf)
 
     def settle(self) -> float:
@@ -160,12 +200,19 @@ class Ladder(ABC):
             still = self._margins(self.constant(), Found(math.inf))
             if still.proof is not None and still.bound <= (1 + CLOSE_TO_LOWER) * limit:
                 return still
+        if gains and self.many_states:
+            # before programs that take minutes
+            best = best.or_better(self.of_frozen_models(limit), 1.0)
+            if best.proof is not None and best.bound <= MAX_FROZEN_RATIO * limit:
+                return best
         for shape in shapes:
             best = self._margins(shape, best)
             if best.proof is not None and not best.bound > near * limit:
                 break
         if still is None and best.proof is None and any(map(self.varies, shapes)):
             still = self._margins(self.constant(), Found(math.nan))
+        if gains and not self.many_states and not best.bound <= near * limit:
+            best = best.or_better(self.of_frozen_models(limit), 1.0)
         if still is not None:
             # "no P exists" refers to the form requested, of which a constant P is a special case
             answer, best = best.answer, best.or_better(still, 1.0)
@@ -219,8 +266,10 @@ class Ladder(ABC):
             trial = 0.5 * (low + high)
 
 
-def inflated(least: float, channel: float) -> float:
+def inflated(least: float, channel: float, error: float = 0.0) -> float:
     """Return the gain to be verified where a proof admits `least` in floating point, `channel` the
-    unit of gains; NaN stays NaN.
+    unit of gains and `error` the fraction of gamma^2 that rounding may take; NaN stays NaN.
     """
-    return least if math.isnan(least) else max(least, MIN_GAIN * channel) * math.sqrt(1 + INFLATION)
+    if math.isnan(least):
+        return least
+    return max(least, MIN_GAIN * channel) * math.sqrt(1 + max(INFLATION, error))

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from synthesis.analysis.frozen_storage import LEVELS, of_frozen_models
 from synthesis.analysis.ladder import CLOSE_TO_LOWER, NO_MARGIN, Found, Ladder, inflated
 from synthesis.assemble.bounded_real import assemble
 from synthesis.assemble.unknowns import (
@@ -21,11 +22,12 @@ from synthesis.assemble.unknowns import (
     unknowns,
 )
 from synthesis.certificate import Attempt, Proof
+from synthesis.forms import Spline
 from synthesis.impose import Bernstein
 from synthesis.lyapunov.spline import Lyapunov, SplineLyapunov
 from synthesis.program import interior_point
 from synthesis.program.cone_program import LYAPUNOV, Answer, Candidate, solve
-from synthesis.program.lyapunov_program import LyapunovProgram
+from synthesis.program.lyapunov_program import MANY_STATES, LyapunovProgram
 from synthesis.program.scaling import dissipative
 from synthesis.worst.frozen import norm
 
@@ -56,7 +58,7 @@ class OneParameter(Ladder):
         )
         self.scaled = scaled_problem(model, rate, bound, with_gain=self.problem.gains)
         self.dissipating: ScaledProblem | None = None
-        self.rounding = math.inf
+        self.rounding = math.nan
         lpv, units = self.scaled.lpv, self.scaled.units
         if self.problem.gains and self.scaled.block is None:
             other = dissipative(units, lpv.at(lpv.scheduling.middle), bound)
@@ -179,6 +181,33 @@ class OneParameter(Ladder):
         self.spent[2] += time.perf_counter() - start
         return best
 
+    @property
+    def many_states(self) -> bool:  # type: ignore[override]
+        """Whether there are so many states that a program takes minutes."""
+        return len(self.scaled.lpv.states) > MANY_STATES
+
+    def of_frozen_models(self, limit: float) -> Found:
+        """Return the gain proven by P linear between storage functions of frozen models; nothing in
+        discrete time, around a block, and where the user set the form of P.
+        """
+        form, scaled, best = self.problem.form, self.dissipating, Found(math.inf)
+        tried = form.segments_tried(1)
+        given = not isinstance(form, Spline) or form.degree == 0 or (tried and len(tried) == 1)
+        if given or scaled is None or scaled.lpv.dt is not None or math.isinf(scaled.rate):
+            return best
+        start = time.perf_counter()
+        for level in LEVELS:
+            P = of_frozen_models(scaled, level * limit / scaled.units.channel)
+            best = best if P is None else self._proven(scaled, P, Answer.SOLVED)
+            if P is not None and best.proof is not None:
+                words = f"storage functions of frozen models, verified, gamma {best.bound:.6g}"
+                program = f"{P.segments} segments of degree {P.degree}"
+                self.attempts.append(Attempt(program, 0.0, words, best.bound))
+                self.unit = scaled.units.channel
+                break
+        self.spent[1] += time.perf_counter() - start
+        return best
+
     def settle(self) -> float:
         """Choose the first units in which the gain of the model frozen at mid-range is found
         accurately: this shows whether rounding limits a bound.
@@ -232,7 +261,7 @@ class OneParameter(Ladder):
         units, evidence = scaled.units, scaled.evidence(self.elevation)
         P = P.in_units(units.left, units.channel**2, 1.0 / units.time, units.multiplier)
         least, conditioning = evidence.least_gain(P)
-        gamma = inflated(least, units.channel)
-        if math.isinf(least) or not evidence.floating(P, gamma):
+        gamma, proof = inflated(least, units.channel, self.sampling_error), Proof(evidence, P)
+        if math.isinf(least) or not evidence.floating(P, gamma) or not self.believed(proof, gamma):
             return Found(math.inf, None, answer)
-        return Found(gamma, Proof(evidence, P), answer, conditioning)
+        return Found(gamma, proof, answer, conditioning)

@@ -72,6 +72,9 @@ def test_a_bound_far_above_what_trajectories_show_names_its_cause():
         (math.inf, Answer.SOLVED, "rounding limits the bound"),
         (1e-4, Answer.FAILED, "the search did not converge"),
         (1e-4, Answer.SOLVED, "P of a higher degree"),
+        # where no frozen model was solved it is not blamed
+        (math.nan, Answer.FAILED, "the search did not converge"),
+        (math.nan, Answer.SOLVED, "P of a higher degree"),
     ],
 )
 def test_the_causes_are_told_apart(rounding, answer, cause):

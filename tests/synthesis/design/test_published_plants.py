@@ -54,3 +54,13 @@ def test_the_loop_of_two_parameters_that_jump_is_proven_near_what_its_design_pro
     certificate = made.certify(search=None)
     assert certificate.frozen <= certificate.gamma <= 1.05 * made.gamma
     assert certificate.verify()
+
+
+@pytest.mark.slow
+def test_the_loop_of_the_turned_actuators_at_rest_is_proven_near_what_its_design_promised():
+    """16 states, of which every storage function turns with the angle."""
+    made = output_feedback(wu_1996(0.0))
+    assert made.promised <= 1.05 * made.optimum
+    certificate = made.certify(0.0, search=None)
+    assert certificate.frozen <= certificate.gamma <= 1.05 * made.promised
+    assert certificate.verify()
