@@ -11,6 +11,7 @@ from identification.design.experiment_design import (
 from identification.design.experiment_design import (
     compare_experiments as compare_experiments,
 )
+from identification.estimators.actuators import Actuators as Actuators
 from identification.estimators.calibration import calibrate as calibrate
 from identification.estimators.estimate import fit as fit
 from identification.estimators.filter_error import FilterError as FilterError

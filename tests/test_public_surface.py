@@ -58,6 +58,8 @@ NONLINEAR = (
 
 EQUATIONS = (
     "symheli.Helicopter",
+    "symheli.flight.Servo",
+    "symheli.flight.ServoBank",
     "symheli.helicopter.require",
     "symheli.trim",
     "symheli.airframe.written.as_toml",

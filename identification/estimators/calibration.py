@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from scipy.linalg import solve_triangular
 
+from identification.estimators.actuators import Actuators
 from symheli import Helicopter, trim
 from symheli.airframe.written import as_toml
 from symheli.errors import (
@@ -20,6 +21,7 @@ from symheli.errors import (
     InputError,
     SymheliError,
 )
+from symheli.flight import ServoBank
 from symheli.helicopter import require
 from symheli.integrate import RungeKutta4, Trajectory, simulate, tangent
 from symheli.physics.attitude import euler_state, flight_state
@@ -70,6 +72,9 @@ TINY = 1e-24
 DRAWS_TRIED = 50
 """Number of draws tried for each that is asked."""
 
+SETTLING = 0.5
+"""Time that servos need to forget where a record began, s."""
+
 WHITE = 0.3
 """Correlation of residuals from sample to sample above which the model leaves something out."""
 
@@ -100,6 +105,9 @@ class Calibration:
         Those before the flights, SI.
     correlation : array (k, k)
         Of the errors of the values.
+    actuators : dict of str to (float, float)
+        Value and standard deviation of the "delay" (s) and of the factor of the servos'
+        "bandwidth", where they were estimated.
     noise : dict of str to float
         Standard deviation of each output's residual, SI.
     whiteness : dict of str to float
@@ -120,6 +128,7 @@ class Calibration:
     deviations: Array
     prior_deviations: Array
     correlation: Array
+    actuators: dict[str, tuple[float, float]]
     noise: dict[str, float]
     whiteness: dict[str, float]
     windows: int
@@ -206,6 +215,11 @@ class Calibration:
             "  ".join([*(c.ljust(w) for c, w in zip(row, widths, strict=False)), row[5]]).rstrip()
             for row in rows
         ]
+        units = {"delay": " s", "bandwidth": " times the given one"}
+        lines += [
+            f"{name} of the actuators: {value:.4g} +- {deviation:.2g}{units[name]}"
+            for name, (value, deviation) in self.actuators.items()
+        ]
         residuals = ", ".join(
             f"{name} {sd:.2g} {Signal(name).unit} ({self.whiteness[name]:+.2f})"
             for name, sd in self.noise.items()
@@ -244,6 +258,7 @@ def calibrate(
     *,
     window: float = 3.0,
     gust: float = 0.0,
+    actuators: Actuators | None = None,
     step: float = 0.01,
     rounds: int = ROUNDS,
 ) -> Calibration:
@@ -271,6 +286,9 @@ def calibrate(
         Length over which the equations run free, s.
     gust : float
         Standard deviation of the wind in each direction, m/s; 0: still air.
+    actuators : Actuators, optional
+        Delay and servos, known or not quite; the record then holds commands, as d_lon_command, ...
+        (or d_lon, ...), in place of deflections.
     step : float
         Of the integration, s.
     rounds : int
@@ -317,14 +335,14 @@ def calibrate(
     positive(window, "window")
     whole(rounds, "rounds", 1)
     free = _free(heli, parameters)
-    outputs = _outputs(heli, flights)
+    outputs = _outputs(heli, flights, actuators)
     if not 0.0 <= gust < np.inf:
         raise InputError(f"gust: expected a standard deviation >= 0 in m/s, got {gust!r}")
-    search = _Search(heli, free, outputs, float(step), float(gust))
+    search = _Search(heli, free, outputs, float(step), float(gust), actuators)
     found, cost = None, np.inf
     for stages in STAGES:
         lengths = [*(s for s in stages if s < window), window]
-        theta, steps, converged = np.zeros(len(free)), 0, False
+        theta, steps, converged = np.zeros(search.size), 0, False
         with warnings.catch_warnings(), task("calibrating", len(lengths)) as progress:
             warnings.simplefilter("ignore", DataWarning)  # of vehicles on the way
             for length in lengths:
@@ -379,14 +397,23 @@ def _free(heli: Helicopter, wanted: Sequence[str] | None) -> tuple[Signal, ...]:
     )
 
 
-def _outputs(heli: Helicopter, flights: Sequence[FlightRecord]) -> tuple[str, ...]:
+def _inputs(record: FlightRecord, actuators: Actuators | None) -> list[str]:
+    """Deflections, or commands where actuators follow."""
+    if actuators is None:
+        return list(INPUTS)
+    return [f"{u}_command" if f"{u}_command" in record.signals else u for u in INPUTS]
+
+
+def _outputs(
+    heli: Helicopter, flights: Sequence[FlightRecord], actuators: Actuators | None
+) -> tuple[str, ...]:
     if not flights:
         raise InputError("no flights: give at least one FlightRecord")
     able = [str(s) for s in heli.states if s in ("u", "v", "w", "p", "q", "r", "phi", "theta")]
     if heli.governor == "pi":
         able.append("Om")
     for record in flights:
-        if missing := [u for u in INPUTS if u not in record.signals]:
+        if missing := [u for u in _inputs(record, actuators) if u not in record.signals]:
             raise InputError(
                 f"the record has no {', '.join(missing)}: calibration needs the deflection of every"
                 f" control (rad); it has {', '.join(map(str, record.signals))}"
@@ -399,12 +426,14 @@ def _outputs(heli: Helicopter, flights: Sequence[FlightRecord]) -> tuple[str, ..
 
 @dataclass
 class _Window:
-    """Measured outputs (n+1, ny), inputs (n, 4), and what is estimated of this window alone, with
-    its prior mean: the initial state (nx,) in Euler form, and the wind (3,) where it blows.
+    """Measured outputs (n+1, ny), which rows of which piece its inputs are, and what is estimated
+    of this window alone, with its prior mean: the initial state (nx,) in Euler form, and the wind
+    (3,) where it blows.
     """
 
     y: Array
-    u: Array
+    piece: int
+    rows: slice
     start: Array
     mean: Array
 
@@ -438,6 +467,7 @@ class _Search:
         outputs: tuple[str, ...],
         step: float,
         gust: float,
+        actuators: Actuators | None,
     ):
         self.heli, self.free, self.outputs = heli, free, outputs
         self.method = RungeKutta4(step)
@@ -454,13 +484,36 @@ class _Search:
             for s, x, h in zip(heli.states, trimmed.tolist(), hidden, strict=True)
         ]
         self.weight = np.array([*own, *[1 / gust for _ in range(self.winds)]])
+        self.actuators = actuators
+        self.k = len(free)
+        self.size = self.k + len(actuators.unknown if actuators else ())
+        self.commands: list[Array] = []
         self.windows: list[_Window] = []
         self.dt = 0.0
         self.noise = np.zeros(0)
 
+    def inputs_at(self, theta: Array) -> list[Array]:
+        """Deflections (n, 4) of every piece, at the actuators' part of theta."""
+        if self.actuators is None:
+            return self.commands
+        point = self.actuators.point(theta[self.k :].tolist())
+        return [self.actuators.deflections(c, self.dt, **point) for c in self.commands]
+
+    def input_changes(self, theta: Array) -> list[Array]:
+        """Derivative (n, 4, unknown) of the deflections of every piece: they are smooth in both."""
+        changes = []
+        for i in range(self.k, self.size):
+            step = np.zeros(self.size)
+            step[i] = 1e-3
+            both = [self.inputs_at(theta + sign * step) for sign in (1, -1)]
+            changes.append([(a - b) / 2e-3 for a, b in zip(*both, strict=True)])
+        if not changes:
+            return [np.zeros((*c.shape, 0)) for c in self.commands]
+        return [np.stack(piece, axis=-1) for piece in zip(*changes, strict=True)]
+
     def at_point(self, theta: Array) -> Helicopter:
-        """The helicopter with the parameters theta (k,)."""
-        values = self.heli.parameters.array[self.at] * np.exp(self.spread * theta)
+        """The helicopter with the parameters theta (k,), and what follows them left out."""
+        values = self.heli.parameters.array[self.at] * np.exp(self.spread * theta[: self.k])
         return self.heli.with_parameters(
             dict(zip(map(str, self.free), values.tolist(), strict=True))
         )
@@ -474,12 +527,15 @@ class _Search:
             raise InputError(f"the records have sample periods {sorted(periods)} s; resample them")
         self.dt = periods.pop()
         samples = max(round(length / self.dt), 1)
-        heli, self.windows = self.at_point(theta), []
+        heli, self.windows, self.commands = self.at_point(theta), [], []
+        settled = round(SETTLING / self.dt) if self.actuators else 0
         trims: dict[int, Array] = {}
         for record in flights:
-            y, u = record.columns(self.outputs), record.columns(INPUTS)
+            y = record.columns(self.outputs)
+            u = record.columns(_inputs(record, self.actuators))
             for piece in _pieces(record, u):
-                for first in range(piece.start, piece.stop - samples, samples):
+                self.commands.append(self._followed(u[piece.start : piece.stop]))
+                for first in range(piece.start + settled, piece.stop - samples, samples):
                     part = y[first : first + samples + 1]
                     if not np.isfinite(part).any(axis=0).all():
                         continue
@@ -487,11 +543,19 @@ class _Search:
                     start = mean.copy()
                     known = np.isfinite(part[0])
                     start[np.array(self.seen)[known]] = part[0, known]
-                    self.windows.append(_Window(part, u[first : first + samples], start, mean))
+                    rows = slice(first - piece.start, first - piece.start + samples)
+                    self.windows.append(_Window(part, len(self.commands) - 1, rows, start, mean))
         if not self.windows:
             raise InputError(
                 f"no unbroken piece of the records is as long as a window of {length:g} s"
             )
+
+    def _followed(self, commands: Array) -> Array:
+        """Commands as servos follow them: limited, quantised, no faster than they are."""
+        if self.actuators is None:
+            return commands
+        bank = ServoBank(self.actuators.servos, INPUTS, self.heli.travel, self.dt)
+        return bank.follow(commands)
 
     def _start(self, heli: Helicopter, y: Array, trims: dict[int, Array]) -> Array:
         """States of level flight near the measured airspeed: where hidden states probably are."""
@@ -508,27 +572,34 @@ class _Search:
 
     # --- one window ------------------------------------------------------------------------------
 
-    def _flown(self, heli: Helicopter, window: _Window, start: Array) -> Trajectory:
+    def _flown(
+        self, heli: Helicopter, window: _Window, start: Array, inputs: list[Array]
+    ) -> Trajectory:
         wind = start[self.nx :] if self.winds else np.zeros(3)
         x0 = flight_state(start[: self.nx])
-        return simulate(heli, x0, window.u, wind, dt=self.dt, method=self.method)
+        u = inputs[window.piece][window.rows]
+        return simulate(heli, x0, u, wind, dt=self.dt, method=self.method)
 
     def _residuals(self, window: _Window, flown: Trajectory) -> Array:
         """Measured minus computed outputs (n+1, ny), 0 where nothing was measured."""
         r = window.y - euler_state(flown.states)[:, self.seen]
         return np.where(np.isfinite(window.y), r, 0.0)
 
-    def linearized(self, heli: Helicopter, window: _Window) -> _Linearized:
+    def linearized(
+        self, heli: Helicopter, window: _Window, inputs: list[Array], changes: list[Array]
+    ) -> _Linearized:
         """The window's least-squares problem about its initial state and these parameters."""
-        nx, own, k = self.nx, len(window.start), len(self.free)
-        flown = self._flown(heli, window, window.start)
+        nx, own, k = self.nx, len(window.start), self.size
+        flown = self._flown(heli, window, window.start, inputs)
         dx0 = np.zeros((len(heli.flight_states), own + k))
         dx0[:, :nx] = _from_euler(window.start[:nx])
         dwind = np.zeros((len(flown.inputs), 3, own + k))
         dwind[:, : self.winds, nx:own] = np.eye(self.winds)
         dp = np.zeros((len(heli.parameters), own + k))
-        dp[self.at, own + np.arange(k)] = heli.parameters.array[self.at] * self.spread
-        change = tangent(heli, flown, dx0=dx0, dwind=dwind, dp=dp)
+        dp[self.at, own + np.arange(self.k)] = heli.parameters.array[self.at] * self.spread
+        du = np.zeros((len(flown.inputs), 4, own + k))
+        du[:, :, own + self.k :] = changes[window.piece][window.rows]
+        change = tangent(heli, flown, dx0=dx0, du=du, dwind=dwind, dp=dp)
         seen = _to_euler(flown.states, change)[:, self.seen]
         seen = np.where(np.isfinite(window.y)[:, :, None], seen, 0.0) / self.noise[:, None]
         r = self._residuals(window, flown) / self.noise
@@ -578,8 +649,9 @@ class _Search:
 
     def normal(self, theta: Array) -> tuple[list[_Linearized], Array, Array]:
         """The windows' problems, and the information (k, k) and score (k,) of the posterior."""
-        heli = self.at_point(theta)
-        problems = [self.linearized(heli, window) for window in self.windows]
+        heli, inputs = self.at_point(theta), self.inputs_at(theta)
+        changes = self.input_changes(theta)
+        problems = [self.linearized(heli, window, inputs, changes) for window in self.windows]
         H = np.eye(len(theta)) + sum(problem.information for problem in problems)
         return problems, H, sum(problem.score for problem in problems) - theta
 
@@ -611,14 +683,28 @@ class _Search:
         return np.sqrt(np.maximum(power / counts / left, TINY)), lagged / np.maximum(power, TINY)
 
     def _every(self, theta: Array, starts: Sequence[Array]) -> list[Array]:
-        heli = self.at_point(theta)
+        heli, inputs = self.at_point(theta), self.inputs_at(theta)
         return [
-            self._residuals(window, self._flown(heli, window, start))
+            self._residuals(window, self._flown(heli, window, start, inputs))
             for window, start in zip(self.windows, starts, strict=True)
         ]
 
     def _counts(self) -> Array:
         return np.sum([np.isfinite(w.y).sum(axis=0) for w in self.windows], axis=0)
+
+    def _actuators(self, theta: Array, deviations: Array) -> dict[str, tuple[float, float]]:
+        """Value and standard deviation of what is estimated of the actuators."""
+        if self.actuators is None:
+            return {}
+        point = self.actuators.point(theta[self.k :].tolist())
+        own = {
+            "bandwidth": self.actuators.bandwidth_deviation * point["bandwidth"],
+            "delay": self.actuators.delay_deviation,
+        }
+        return {
+            name: (point[name], own[name] * float(deviations[self.k + i]))
+            for i, name in enumerate(self.actuators.unknown)
+        }
 
     def result(self, theta: Array, window: float, steps: int, converged: bool) -> Calibration:
         """The calibrated helicopter and its uncertainty."""
@@ -628,8 +714,8 @@ class _Search:
         scores = np.array([problem.score for problem in problems])
         # errors that are correlated within a window, not between windows
         robust = covariance @ (np.eye(len(theta)) + scores.T @ scores) @ covariance
-        relative = self.spread * np.sqrt(np.maximum(np.diag(covariance), np.diag(robust)))
-        size = np.sqrt(np.diag(covariance))
+        every = np.sqrt(np.maximum(np.diag(covariance), np.diag(robust)))
+        relative, size = self.spread * every[: self.k], np.sqrt(np.diag(covariance))[: self.k]
         found = self.at_point(theta)
         values = found.parameters.array[self.at]
         names = [str(p) for p in self.free]
@@ -645,7 +731,8 @@ class _Search:
             values=values,
             deviations=values * relative,
             prior_deviations=self.heli.parameters.array[self.at] * self.spread,
-            correlation=covariance / np.outer(size, size),
+            correlation=covariance[: self.k, : self.k] / np.outer(size, size),
+            actuators=self._actuators(theta, every),
             noise=dict(zip(self.outputs, self.noise.tolist(), strict=True)),
             whiteness=dict(zip(self.outputs, whiteness.tolist(), strict=True)),
             windows=len(self.windows),

@@ -91,7 +91,7 @@ def run(arguments: argparse.Namespace) -> Output:
         calibration = calibrate(heli, record_of(arguments, arguments.log))
         drawn = [calibration.heli, *calibration.draws(arguments.draws)]
     servos = (
-        {str(u): symheli.Servo(arguments.servo, 0.7) for u in heli.inputs}
+        {str(u): symheli.Servo(natural_frequency=arguments.servo, damping=0.7) for u in heli.inputs}
         if arguments.servo
         else None
     )

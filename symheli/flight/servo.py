@@ -172,14 +172,27 @@ class ServoBank:
         """The state after `dt` and the deflections (n,), rad, reached then, limited to the
         travel.
         """
+        followed = self._followed(state.followed, command)
+        x = np.einsum("nij,nj->ni", self.A, state.x) + self.B * followed[:, None]
+        moved = ServoState(x, followed)
+        return moved, self.deflection(moved)
+
+    def follow(self, commands: np.ndarray) -> np.ndarray:
+        """What the linear parts follow (k, n), rad, of commands (k, n): limited, quantised, and no
+        faster than the servos.
+        """
+        out = np.empty_like(commands)
+        last = commands[0]
+        for k, command in enumerate(commands):
+            out[k] = last = self._followed(last, command)
+        return out
+
+    def _followed(self, last: np.ndarray, command: np.ndarray) -> np.ndarray:
         wanted = np.clip(command, -self.travel, self.travel)
         coarse = self.resolution > 0
         grain = self.resolution[coarse]
         wanted[coarse] = np.round(wanted[coarse] / grain) * grain
-        followed = state.followed + np.clip(wanted - state.followed, -self.change, self.change)
-        x = np.einsum("nij,nj->ni", self.A, state.x) + self.B * followed[:, None]
-        moved = ServoState(x, followed)
-        return moved, self.deflection(moved)
+        return last + np.clip(wanted - last, -self.change, self.change)
 
     def deflection(self, state: ServoState) -> np.ndarray:
         """Deflections (n,), rad."""
