@@ -50,6 +50,19 @@ ARGUMENTS = (
         options.number,
         0.0,
     ),
+    option(
+        "--servo",
+        "RAD/S",
+        "bandwidth of the servos, to 30 %%: the log holds commands, not deflections",
+        options.positive,
+    ),
+    option(
+        "--delay",
+        "S",
+        "from command to servo, to 20 ms, with --servo (default: 0.02)",
+        options.number,
+        0.02,
+    ),
     option("--start", "S", "drop samples before this time, s on the log's clock", options.number),
     option("--stop", "S", "drop samples after this time, s", options.number),
     option("--write", "FILE", "write the calibrated vehicle file (.toml)", Path),
@@ -59,7 +72,7 @@ ARGUMENTS = (
 def run(arguments: argparse.Namespace) -> Output:
     """Calibrate, and show every free parameter before and after."""
     import symheli
-    from identification import calibrate
+    from identification import Actuators, calibrate
     from symheli.errors import InputError
 
     if arguments.write is not None and arguments.write.suffix != ".toml":
@@ -67,8 +80,22 @@ def run(arguments: argparse.Namespace) -> Output:
     heli = symheli.Helicopter.load(arguments.vehicle, governor=arguments.governor)
     heli = heli.at_altitude(arguments.altitude) if arguments.altitude else heli
     records = [record_of(arguments, log) for log in arguments.logs]
+    actuators = None
+    if arguments.servo:
+        servo = symheli.Servo(natural_frequency=arguments.servo, damping=0.7)
+        actuators = Actuators(
+            dict.fromkeys(INPUTS, servo),
+            delay=arguments.delay,
+            bandwidth_deviation=0.3,
+            delay_deviation=0.02,
+        )
     found = calibrate(
-        heli, records, arguments.parameters, window=arguments.window, gust=arguments.gust
+        heli,
+        records,
+        arguments.parameters,
+        window=arguments.window,
+        gust=arguments.gust,
+        actuators=actuators,
     )
     text = str(found)
     data = {
@@ -86,6 +113,10 @@ def run(arguments: argparse.Namespace) -> Output:
                 "only_together_with": found.tied.get(str(p)),
             }
             for i, p in enumerate(found.parameters)
+        },
+        "actuators": {
+            name: {"value": value, "deviation": deviation}
+            for name, (value, deviation) in found.actuators.items()
         },
         "residuals": {
             name: {"deviation": sd, "correlation": found.whiteness[name]}
