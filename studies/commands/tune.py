@@ -61,7 +61,12 @@ ARGUMENTS = (
         "--airspeeds", "A,B", "where margins are computed, m/s (default: 0,4,8,12)", options.names
     ),
     option("--delay", "S", "from command to servo, s", options.number, 0.0),
-    option("--servo", "RAD/S", "bandwidth of the servos (default: none)", options.positive),
+    option(
+        "--servo",
+        "RAD/S",
+        "natural frequency of the servos, damping 0.7 (default: at once)",
+        options.positive,
+    ),
     option("--draws", "N", "helicopters drawn from the uncertainty", options.at_least_one, 20),
     option("--start", "S", "drop samples before this time, s on the log's clock", options.number),
     option("--stop", "S", "drop samples after this time, s", options.number),
@@ -90,11 +95,10 @@ def run(arguments: argparse.Namespace) -> Output:
     if not arguments.as_it_is:
         calibration = calibrate(heli, record_of(arguments, arguments.log))
         drawn = [calibration.heli, *calibration.draws(arguments.draws)]
-    servos = (
-        {str(u): symheli.Servo(arguments.servo, 0.7) for u in heli.inputs}
-        if arguments.servo
-        else None
-    )
+    servos = None
+    if arguments.servo:
+        servo = symheli.Servo(natural_frequency=arguments.servo, damping=0.7)
+        servos = dict.fromkeys(map(str, heli.inputs), servo)
     airspeeds = [options.number(v) for v in arguments.airspeeds or ("0", "4", "8", "12")]
     both = [
         loop_margins(drawn, loops, airspeeds, servos=servos, delay=arguments.delay)

@@ -1,6 +1,6 @@
 """Closed-loop flights of the nonlinear model."""
 
-from symheli.flight.ardupilot import HelicopterLoops, PIDTerms, Pilot, RateController
+from symheli.flight.ardupilot import HelicopterLoops, Pilot, RateController
 from symheli.flight.autopilot import Autopilot, gain_scheduled_lqr
 from symheli.flight.batch import FlightBatch, fly_batch
 from symheli.flight.campaign import fly_campaign
@@ -27,7 +27,6 @@ __all__ = [
     "FlightDataset",
     "FlightPlan",
     "HelicopterLoops",
-    "PIDTerms",
     "ParameterMonitor",
     "Pilot",
     "PureController",

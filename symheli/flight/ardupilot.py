@@ -75,10 +75,8 @@ class _Memory(NamedTuple):
     integrator: Array
 
 
-class PIDTerms(NamedTuple):
-    """Terms of a rate controller's output, their sum before its limit: in parts of the full
-    output.
-    """
+class _Terms(NamedTuple):
+    """Of a rate controller's output, their sum before its limit: in parts of the full output."""
 
     P: Array
     I: Array
@@ -246,7 +244,7 @@ class HelicopterLoops:
         self, memory: _Memory, rate: Array, target: Array, *, limited: bool
     ) -> tuple[Array, _Memory]:
         """Output (3,) before the throw, and what is kept, from rates and their targets (3,)."""
-        n, gyro = self._numbers, memory.gyro.copy()
+        gyro = memory.gyro.copy()
         for k, (b0, b1, b2, _, a1, a2) in enumerate(self._sections):  # transposed direct form II
             passed = b0 * rate + gyro[k, 0]
             gyro[k] = b1 * rate - a1 * passed + gyro[k, 1], b2 * rate - a2 * passed
@@ -257,7 +255,7 @@ class HelicopterLoops:
 
     def _pid(
         self, memory: _Memory, rate: Array, target: Array, *, limited: bool
-    ) -> tuple[PIDTerms, _Memory]:
+    ) -> tuple[_Terms, _Memory]:
         """Terms (3,) of the three axes from filtered rates and targets (3,), and what is kept."""
         n = self._numbers
         filtered = memory.target + n["FLTT"] * (target - memory.target)
@@ -269,10 +267,10 @@ class HelicopterLoops:
             integrator = np.clip(integrator, -n["IMAX"], n["IMAX"])
             beyond = np.sign(integrator) * np.maximum(np.abs(integrator) - n["ILMI"], 0.0)
             integrator = integrator - LEAK * beyond
-        terms = PIDTerms(n["P"] * error, integrator, n["D"] * derivative, n["FF"] * filtered)
+        terms = _Terms(n["P"] * error, integrator, n["D"] * derivative, n["FF"] * filtered)
         return terms, _Memory(memory.gyro, filtered, error, derivative, integrator)
 
-    def replay(self, axis: str, target: Array, measured: Array) -> PIDTerms:
+    def replay(self, axis: str, target: Array, measured: Array) -> dict[str, Array]:
         """What the controller of one axis makes of logged targets and rates, to compare with the
         outputs that the autopilot logged.
 
@@ -287,8 +285,8 @@ class HelicopterLoops:
 
         Returns
         -------
-        PIDTerms
-            P, I, D and FF, (n,) each, in parts of the full output.
+        dict of (n,) arrays
+            P, I, D and FF in parts of the full output; their sum is the output before its limit.
 
         Raises
         ------
@@ -301,8 +299,8 @@ class HelicopterLoops:
         >>> axis = symheli.flight.RateController(**gains, FLTT=0, FLTE=0, FLTD=0)
         >>> loops = symheli.flight.HelicopterLoops(dict.fromkeys(("RLL", "PIT", "YAW"), axis), 0.01)
         >>> terms = loops.replay("RLL", np.full(100, 1.0), np.zeros(100))
-        >>> print(f"P {terms.P[-1]:.3f}, I {terms.I[-1]:.3f}, FF {terms.FF[-1]:.3f}")
-        P 0.050, I 0.100, FF 0.100
+        >>> ", ".join(f"{name} {term[-1]:.3f}" for name, term in terms.items())
+        'P 0.050, I 0.100, D 0.000, FF 0.100'
         """
         if axis not in AXES:
             raise UnknownNameError("axis", axis, AXES)
@@ -318,7 +316,7 @@ class HelicopterLoops:
         for i, (wanted, rate) in enumerate(zip(target, measured, strict=True)):
             terms, memory = self._pid(memory, np.full(3, rate), np.full(3, wanted), limited=True)
             out[:, i] = [term[k] for term in terms]
-        return PIDTerms(*out)
+        return dict(zip(_Terms._fields, out, strict=True))
 
     def init(self) -> _Memory:
         """Memory of loops at rest."""

@@ -36,7 +36,7 @@ def flown(loops, samples):
     state, zero = loops.init(), np.zeros(len(ALL))
     reference, out = NamedVector(ALL, zero), []
     for row in samples:
-        values = dict.fromkeys(ALL, 0.0) | dict(zip(("p", "q", "r", "phi", "theta"), row))
+        values = dict.fromkeys(ALL, 0.0) | dict(zip(SEEN[3:], row, strict=True))
         measured = NamedVector(ALL, [values[name] for name in ALL])
         u, state = loops.step(state, measured, reference, NamedVector(["airspeed"], [0.0]))
         out.append([u[1], u[0], u[3]])
@@ -77,7 +77,7 @@ def test_a_first_order_filter_has_the_step_response_of_its_corner(filtered):
     loops = one(dt, **{entry: 1.0, filtered: corner})
     n, zero = np.arange(1, 201), np.zeros(200)
     target = dt * n if filtered == "FLTD" else np.ones(200)  # of a ramp the derivative steps
-    got = getattr(loops.replay("PIT", target, zero), entry)
+    got = loops.replay("PIT", target, zero)[entry]
     w = 2 * np.pi * corner
     np.testing.assert_allclose(got, 1 - (1 + w * dt) ** -n, rtol=1e-11)
     assert got[round(1 / (w * dt)) - 1] == pytest.approx(1 - np.exp(-1), abs=w * dt)
@@ -109,15 +109,19 @@ def test_the_integrator_stops_at_its_limit_and_leaks_towards_its_level():
     leaks each step, by hand.
     """
     error, zero = np.ones(5), np.zeros(5)
-    held = one(I=0.1, IMAX=0.003).replay("RLL", error, zero).I
+    held = one(I=0.1, IMAX=0.003).replay("RLL", error, zero)["I"]
     np.testing.assert_allclose(held, [0.001, 0.002, 0.003, 0.003, 0.003], rtol=1e-12)
     leaking = one(I=0.1, IMAX=0.003, ILMI=0.002)
     third, fourth = 0.003 - 0.02 * 0.001, 0.003 - 0.02 * 0.001  # limited first: 0.00298 + 0.001
     expected = [0.001, 0.002, third, fourth]
-    np.testing.assert_allclose(leaking.replay("RLL", error[:4], zero[:4]).I, expected, rtol=1e-12)
-    stopped = leaking.replay("RLL", np.array([1.0, 1.0, 1.0, *zero]), np.zeros(8)).I
+    np.testing.assert_allclose(
+        leaking.replay("RLL", error[:4], zero[:4])["I"], expected, rtol=1e-12
+    )
+    stopped = leaking.replay("RLL", np.array([1.0, 1.0, 1.0, *zero]), np.zeros(8))["I"]
     np.testing.assert_allclose(stopped[2:] - 0.002, 0.98e-3 * 0.98 ** np.arange(6), rtol=1e-9)
-    assert np.all(leaking.replay("YAW", -error, zero).I == -leaking.replay("YAW", error, zero).I)
+    assert np.all(
+        leaking.replay("YAW", -error, zero)["I"] == -leaking.replay("YAW", error, zero)["I"]
+    )
 
 
 def test_outputs_are_limited_to_full_deflection():
@@ -211,7 +215,9 @@ def test_the_replayed_terms_are_those_of_the_loops():
     loops = one(P=0.1, I=0.2, D=0.003, FF=0.05, FLTT=10.0, FLTE=8.0, FLTD=6.0, attitude=4.0)
     samples = 0.05 * np.random.default_rng(2).standard_normal((60, 5))
     terms = loops.replay("PIT", -4.0 * samples[:, 4], samples[:, 1])
-    np.testing.assert_allclose(sum(terms) * np.pi / 4, flown(loops, samples)[:, 1], atol=1e-15)
+    np.testing.assert_allclose(
+        sum(terms.values()) * np.pi / 4, flown(loops, samples)[:, 1], atol=1e-15
+    )
 
 
 @pytest.mark.parametrize(
@@ -267,11 +273,11 @@ def test_outputs_of_a_public_copter_log_are_replayed_from_its_targets_and_rates(
         fine = np.arange(start, stop, dt)
         wanted, got = (np.interp(fine, c.time, np.radians(c.values)) for c in (target, rate))
         here = (output.time > start) & (output.time < fine[-1])
-        out = output.values[here]
 
-        def error(**entries):
-            loops = one(dt, **(found | none | entries))
-            replayed = np.interp(output.time[here], fine, sum(loops.replay(axis, wanted, got)))
+        def error(wanted=wanted, got=got, fine=fine, here=here, **entries):
+            terms = one(dt, **(found | none | entries)).replay(axis, wanted, got)
+            replayed = np.interp(output.time[here], fine, sum(terms.values()))
+            out = output.values[here]
             return np.sqrt(np.mean((replayed - out) ** 2)) / np.ptp(out)
 
         as_set = error(FLTE=corner)

@@ -26,7 +26,7 @@ def read(tmp_path, content):
 )
 def test_a_name_and_a_value_a_line(tmp_path, line):
     if "=" in line:
-        with pytest.raises(InputError, match="line 1: expected NAME,VALUE, got 'A_B1=0.15'"):
+        with pytest.raises(InputError, match=r"line 1: expected NAME,VALUE, got 'A_B1=0\.15'"):
             read(tmp_path, line)
     else:
         assert read(tmp_path, line) == {"A_B1": 0.15}
@@ -64,7 +64,7 @@ def test_a_long_line_is_cut_in_the_message(tmp_path):
 
 
 def test_files_too_large_for_parameters_are_refused(tmp_path):
-    with pytest.raises(InputError, match="are too many for a .param file"):
+    with pytest.raises(InputError, match=r"are too many for a \.param file"):
         read(tmp_path, b"#" * (LARGEST_FILE + 1))
     many = "".join(f"P{k},0\n" for k in range(LARGEST_COUNT + 1))
     with pytest.raises(InputError, match="more than 20000 parameters"):
@@ -88,9 +88,9 @@ def test_the_last_values_of_a_dataflash_log_count(tmp_path, text):
 def test_a_dataflash_log_without_parameters_or_damaged_is_refused(tmp_path):
     pytest.importorskip("pymavlink")
     log = dataflash([("ATT", (150, 100, 9000))], units=False, formats=WITH_PARAMETERS)
-    with pytest.raises(InputError, match="the log holds no parameters; give a .param file"):
+    with pytest.raises(InputError, match=r"the log holds no parameters; give a \.param file"):
         read(tmp_path, log)
-    with pytest.raises(InputError, match="damaged|no parameters"):
+    with pytest.raises(InputError, match=r"damaged|no parameters"):
         read(tmp_path, log[:40])
 
 
