@@ -70,6 +70,15 @@ ARGUMENTS = (
     option("--draws", "N", "helicopters drawn from the uncertainty", options.at_least_one, 20),
     option("--start", "S", "drop samples before this time, s on the log's clock", options.number),
     option("--stop", "S", "drop samples after this time, s", options.number),
+    option(
+        "--gust",
+        "M/S",
+        "standard deviation of a wind that the calibration estimates in each window (default:"
+        " still air)",
+        options.number,
+        0.0,
+    ),
+    option("--window", "S", "length over which the equations run free, s", options.positive, 3.0),
     flag("--as-it-is", "take the vehicle file as calibrated: bands are the least"),
     option("--write", "FILE", "write the changed parameters (.param)", Path),
 )
@@ -93,7 +102,8 @@ def run(arguments: argparse.Namespace) -> Output:
     drawn = [heli]
     calibration = None
     if not arguments.as_it_is:
-        calibration = calibrate(heli, record_of(arguments, arguments.log))
+        record = record_of(arguments, arguments.log)
+        calibration = calibrate(heli, record, window=arguments.window, gust=arguments.gust)
         drawn = [calibration.heli, *calibration.draws(arguments.draws)]
     servos = None
     if arguments.servo:

@@ -172,6 +172,19 @@ def test_what_is_missing_or_unknown_is_refused(refusal, folder):
     assert "expected NAME,VALUE" in refusal("--set", DOUBLED, parameters="flight.csv")
 
 
+def test_wind_and_windows_are_those_of_the_calibration(refusal, monkeypatch):
+    """What the command hands on; what it does is tested with `calibrate`."""
+    given = {}
+
+    def calibrate(heli, record, **options):
+        given.update(options)
+        raise InputError("far enough")
+
+    monkeypatch.setattr("identification.calibrate", calibrate)
+    assert "far enough" in refusal("--set", DOUBLED, "--gust", "2", "--window", "0.5")
+    assert given == {"gust": 2.0, "window": 0.5}
+
+
 @pytest.mark.slow
 def test_a_calibrated_flight_leaves_the_true_margins_in_the_bands(tune, ideal, loops):
     """From inertias 40 % wrong, all parameters free."""
