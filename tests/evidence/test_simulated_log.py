@@ -79,11 +79,10 @@ def test_the_truth_is_that_of_the_vehicle_file_beside_it(folder):
 
 
 def test_wind_and_noise_are_in_the_log(folder, flown):
-    """At hover in the air the wind carries it along north; velocities differ from sample to sample by
+    """At hover in the air the wind carries it along; velocities differ from sample to sample by
     their noise.
     """
     assert flown["u"][:20].mean() == pytest.approx(simulated_log.WIND[0], abs=0.5)
-    steps = np.diff(flown["u"], 2) / np.sqrt(
-        6
-    )  # white noise is left; of 280 samples, 4 % and what gusts add
+    # a second difference leaves white noise; of 280 samples, 4 %, and what gusts add
+    steps = np.diff(flown["u"], 2) / np.sqrt(6)
     assert steps.std() == pytest.approx(simulated_log.NOISE["u"], rel=0.3)
