@@ -227,8 +227,7 @@ class HelicopterLoops:
         """Second-order sections (k, 6) of the gyro."""
         found = []
         if self.gyro:
-            b, a = butter(2, self.gyro, fs=1 / self.dt)
-            found.append([*b, *a])
+            found.append(np.asarray(butter(2, self.gyro, fs=1 / self.dt, output="sos"))[0])
         if self.notch is not None:
             center, width, attenuation = self.notch
             A = 10.0 ** (-attenuation / 40.0)
@@ -250,7 +249,7 @@ class HelicopterLoops:
             gyro[k] = b1 * rate - a1 * passed + gyro[k, 1], b2 * rate - a2 * passed
             rate = passed
         terms, memory = self._pid(memory._replace(gyro=gyro), rate, target, limited=limited)
-        out = sum(terms)
+        out = terms.P + terms.I + terms.D + terms.FF
         return (np.clip(out, -1.0, 1.0) if limited else out), memory
 
     def _pid(
