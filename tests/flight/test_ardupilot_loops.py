@@ -243,7 +243,9 @@ the 2.5 Hz of the yaw's filter, but a part only of what passes the 20 Hz of roll
 """
 
 
-@pytest.mark.parametrize("axis", WITHIN)
+@pytest.mark.parametrize(
+    "axis", ["YAW", *(pytest.param(axis, marks=pytest.mark.slow) for axis in ("RLL", "PIT"))]
+)
 def test_outputs_of_a_public_copter_log_are_replayed_from_its_targets_and_rates(axis):
     """What a helicopter shares with a copter: P, I, D and the filter of the error. Of this firmware
     one corner frequency, FILT, filters the error; nothing leaks. In yaw every number and the filter
