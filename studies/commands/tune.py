@@ -61,10 +61,24 @@ ARGUMENTS = (
         "--airspeeds", "A,B", "where margins are computed, m/s (default: 0,4,8,12)", options.names
     ),
     option("--delay", "S", "from command to servo, s", options.number, 0.0),
-    option("--servo", "RAD/S", "bandwidth of the servos (default: none)", options.positive),
+    option(
+        "--servo",
+        "RAD/S",
+        "natural frequency of the servos, damping 0.7 (default: at once)",
+        options.positive,
+    ),
     option("--draws", "N", "helicopters drawn from the uncertainty", options.at_least_one, 20),
     option("--start", "S", "drop samples before this time, s on the log's clock", options.number),
     option("--stop", "S", "drop samples after this time, s", options.number),
+    option(
+        "--gust",
+        "M/S",
+        "standard deviation of a wind that the calibration estimates in each window (default:"
+        " still air)",
+        options.number,
+        0.0,
+    ),
+    option("--window", "S", "length over which the equations run free, s", options.positive, 3.0),
     flag("--as-it-is", "take the vehicle file as calibrated: bands are the least"),
     option("--write", "FILE", "write the changed parameters (.param)", Path),
 )
@@ -88,13 +102,13 @@ def run(arguments: argparse.Namespace) -> Output:
     drawn = [heli]
     calibration = None
     if not arguments.as_it_is:
-        calibration = calibrate(heli, record_of(arguments, arguments.log))
+        record = record_of(arguments, arguments.log)
+        calibration = calibrate(heli, record, window=arguments.window, gust=arguments.gust)
         drawn = [calibration.heli, *calibration.draws(arguments.draws)]
-    servos = (
-        {str(u): symheli.Servo(natural_frequency=arguments.servo, damping=0.7) for u in heli.inputs}
-        if arguments.servo
-        else None
-    )
+    servos = None
+    if arguments.servo:
+        servo = symheli.Servo(natural_frequency=arguments.servo, damping=0.7)
+        servos = dict.fromkeys(map(str, heli.inputs), servo)
     airspeeds = [options.number(v) for v in arguments.airspeeds or ("0", "4", "8", "12")]
     both = [
         loop_margins(drawn, loops, airspeeds, servos=servos, delay=arguments.delay)

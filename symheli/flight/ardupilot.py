@@ -75,13 +75,22 @@ class _Memory(NamedTuple):
     integrator: Array
 
 
+class _Terms(NamedTuple):
+    """Of a rate controller's output, their sum before its limit: in parts of the full output."""
+
+    P: Array
+    I: Array
+    D: Array
+    FF: Array
+
+
 @dataclass(frozen=True)
 class HelicopterLoops:
     """The loops of three axes, each sample: the gyro is filtered, the attitude error times a gain
     is the target of the rate, and a PID with feedforward and filters makes the output.
 
     Written after ArduPilot's documentation of its parameters and of its rate controller; what a log
-    confirms of it says `replay`. Left out: input shaping, the square root beyond small attitude
+    confirms of it shows `replay`. Left out: input shaping, the square root beyond small attitude
     errors, piro compensation, notches that follow the rotor speed.
 
     Parameters
@@ -147,7 +156,7 @@ class HelicopterLoops:
         throw: Mapping[str, float] | None = None,
         pilot: Pilot | None = None,
     ) -> HelicopterLoops:
-        """The loops of a `.param` file or log (`symheli.logs.read_parameters`).
+        """The loops of a `.param` file or log (`symheli.logs.parameters.read_parameters`).
 
         Raises `InputError` with the names of all parameters that are missing, or set to what is not
         modelled.
@@ -218,8 +227,7 @@ class HelicopterLoops:
         """Second-order sections (k, 6) of the gyro."""
         found = []
         if self.gyro:
-            b, a = butter(2, self.gyro, fs=1 / self.dt)
-            found.append([*b, *a])
+            found.append(np.asarray(butter(2, self.gyro, fs=1 / self.dt, output="sos"))[0])
         if self.notch is not None:
             center, width, attenuation = self.notch
             A = 10.0 ** (-attenuation / 40.0)
@@ -235,11 +243,20 @@ class HelicopterLoops:
         self, memory: _Memory, rate: Array, target: Array, *, limited: bool
     ) -> tuple[Array, _Memory]:
         """Output (3,) before the throw, and what is kept, from rates and their targets (3,)."""
-        n, gyro = self._numbers, memory.gyro.copy()
+        gyro = memory.gyro.copy()
         for k, (b0, b1, b2, _, a1, a2) in enumerate(self._sections):  # transposed direct form II
             passed = b0 * rate + gyro[k, 0]
             gyro[k] = b1 * rate - a1 * passed + gyro[k, 1], b2 * rate - a2 * passed
             rate = passed
+        terms, memory = self._pid(memory._replace(gyro=gyro), rate, target, limited=limited)
+        out = terms.P + terms.I + terms.D + terms.FF
+        return (np.clip(out, -1.0, 1.0) if limited else out), memory
+
+    def _pid(
+        self, memory: _Memory, rate: Array, target: Array, *, limited: bool
+    ) -> tuple[_Terms, _Memory]:
+        """Terms (3,) of the three axes from filtered rates and targets (3,), and what is kept."""
+        n = self._numbers
         filtered = memory.target + n["FLTT"] * (target - memory.target)
         error = memory.error + n["FLTE"] * (filtered - rate - memory.error)
         slope = (error - memory.error) / self.dt
@@ -249,9 +266,56 @@ class HelicopterLoops:
             integrator = np.clip(integrator, -n["IMAX"], n["IMAX"])
             beyond = np.sign(integrator) * np.maximum(np.abs(integrator) - n["ILMI"], 0.0)
             integrator = integrator - LEAK * beyond
-        out = n["P"] * error + integrator + n["D"] * derivative + n["FF"] * filtered
-        out = np.clip(out, -1.0, 1.0) if limited else out
-        return out, _Memory(gyro, filtered, error, derivative, integrator)
+        terms = _Terms(n["P"] * error, integrator, n["D"] * derivative, n["FF"] * filtered)
+        return terms, _Memory(memory.gyro, filtered, error, derivative, integrator)
+
+    def replay(self, axis: str, target: Array, measured: Array) -> dict[str, Array]:
+        """What the controller of one axis makes of logged targets and rates, to compare with the
+        outputs that the autopilot logged.
+
+        Parameters
+        ----------
+        axis : str
+            "RLL", "PIT" or "YAW".
+        target, measured : (n,) arrays
+            Rates (rad/s) at the period of the loops from rest on: of a DataFlash log PIDR.Tar and
+            PIDR.Act, where the gyro is filtered already. Of slower messages P and FF hold (without
+            filters sample by sample), I nearly, D not.
+
+        Returns
+        -------
+        dict of (n,) arrays
+            P, I, D and FF in parts of the full output; their sum is the output before its limit.
+
+        Raises
+        ------
+        InputError
+            Where the arrays differ in length, or hold what is no number.
+
+        Examples
+        --------
+        >>> gains = {"P": 0.05, "I": 0.1, "D": 0.0, "FF": 0.1, "IMAX": 0.3, "ILMI": 0.3}
+        >>> axis = symheli.flight.RateController(**gains, FLTT=0, FLTE=0, FLTD=0)
+        >>> loops = symheli.flight.HelicopterLoops(dict.fromkeys(("RLL", "PIT", "YAW"), axis), 0.01)
+        >>> terms = loops.replay("RLL", np.full(100, 1.0), np.zeros(100))
+        >>> ", ".join(f"{name} {term[-1]:.3f}" for name, term in terms.items())
+        'P 0.050, I 0.100, D 0.000, FF 0.100'
+        """
+        if axis not in AXES:
+            raise UnknownNameError("axis", axis, AXES)
+        target, measured = (np.asarray(a, float) for a in (target, measured))
+        if target.shape != measured.shape or target.ndim != 1:
+            raise InputError(
+                f"replay: expected targets and rates of one length, got {target.shape} and"
+                f" {measured.shape}"
+            )
+        if not (np.isfinite(target).all() and np.isfinite(measured).all()):
+            raise InputError("replay: targets or rates are missing; cut the log to where both are")
+        k, memory, out = list(AXES).index(axis), self.init(), np.zeros((4, len(target)))
+        for i, (wanted, rate) in enumerate(zip(target, measured, strict=True)):
+            terms, memory = self._pid(memory, np.full(3, rate), np.full(3, wanted), limited=True)
+            out[:, i] = [term[k] for term in terms]
+        return dict(zip(_Terms._fields, out, strict=True))
 
     def init(self) -> _Memory:
         """Memory of loops at rest."""

@@ -12,6 +12,7 @@ the latest message TIME.
 from __future__ import annotations
 
 import contextlib
+import io
 import mmap
 import os
 import re
@@ -132,6 +133,51 @@ _Found = dict[str, dict[str, dict[str, Column]]]
 
 def _read(path: str | os.PathLike[str], wanted: Iterable[str] | None) -> _Found:
     """Return these messages, or all; raise `UnknownNameError` for one that the log lacks."""
+    rows: dict[tuple[str, str], _Rows] = {}
+    now = np.nan
+    with _opened(path) as (log, said):
+        declared = _declared(log)
+        names = dict.fromkeys(form.name for form in log.formats.values())
+        present = [name for name in names if name not in ABOUT_THE_LOG]
+        asked = present if wanted is None else wanted
+        for message in _messages(log, {*asked, BATCH[0]}):
+            name, known = message.get_type(), declared.get(message.fmt.type, {})
+            if name == BATCH[0]:
+                now = BATCH[2] * float(getattr(message, BATCH[1], np.nan))
+                if name not in asked:
+                    continue
+            field = next((f for f, ids in known.items() if ids.unit == INSTANCE), None)
+            key = "" if field is None else str(getattr(message, field))
+            if (name, key) not in rows:
+                rows[name, key] = _Rows(message.fmt)
+            rows[name, key].append(message, now)
+        out: _Found = {}
+        for (name, key), found in rows.items():
+            known = declared.get(found.form.type, {})
+            out.setdefault(name, {})[key] = _columns(found, known)
+    if not present:
+        raise InputError(
+            f"{path}: no readable message; an ArduPilot log begins with the formats of its"
+            " messages, and this one may lack its beginning"
+        )
+    if said.getvalue():
+        warn_of_damage(path)
+    for name in wanted or ():
+        if name not in out:
+            raise UnknownNameError(f"message in {Path(path).name}", name, sorted(out) or present)
+    return out
+
+
+def dataflash_parameters(path: str | os.PathLike[str]) -> dict[str, float]:
+    """The last value of every parameter in the log that is a finite number."""
+    with _opened(path) as (log, _):
+        found = {str(m.Name): float(m.Value) for m in _messages(log, {"PARM"})}
+    return {name: value for name, value in found.items() if np.isfinite(value)}
+
+
+@contextlib.contextmanager
+def _opened(path: str | os.PathLike[str]) -> Iterator[tuple[Any, io.StringIO]]:
+    """The log, binary or text, and what its reader says of damage."""
     with extra("logs", "reading an ArduPilot log"):
         from pymavlink.DFReader import (  # type: ignore[import-not-found]
             DFReader_binary,
@@ -142,46 +188,15 @@ def _read(path: str | os.PathLike[str], wanted: Iterable[str] | None) -> _Found:
         reader = DFReader_binary if opened.read(2) == b"\xa3\x95" else DFReader_text
     if reader is DFReader_binary:
         _refuse_empty_messages(file)
-    rows: dict[tuple[str, str], _Rows] = {}
-    now = np.nan
     try:
         with quiet() as said, _closing(reader) as log:
             log.__init__(str(file))
-            declared = _declared(log)
-            names = dict.fromkeys(form.name for form in log.formats.values())
-            present = [name for name in names if name not in ABOUT_THE_LOG]
-            asked = present if wanted is None else wanted
-            for message in _messages(log, {*asked, BATCH[0]}):
-                name, known = message.get_type(), declared.get(message.fmt.type, {})
-                if name == BATCH[0]:
-                    now = BATCH[2] * float(getattr(message, BATCH[1], np.nan))
-                    if name not in asked:
-                        continue
-                field = next((f for f, ids in known.items() if ids.unit == INSTANCE), None)
-                key = "" if field is None else str(getattr(message, field))
-                if (name, key) not in rows:
-                    rows[name, key] = _Rows(message.fmt)
-                rows[name, key].append(message, now)
-            out: _Found = {}
-            for (name, key), found in rows.items():
-                known = declared.get(found.form.type, {})
-                out.setdefault(name, {})[key] = _columns(found, known)
+            yield log, said
     except Exception as error:
         raise InputError(
-            f"{file}: not an ArduPilot log, or one that was damaged"
-            f" ({error_text(error)}); download it once more"
+            f"{file}: not an ArduPilot log, or one that was damaged ({error_text(error)}); download"
+            " it once more"
         ) from error
-    if not present:
-        raise InputError(
-            f"{file}: no readable message; an ArduPilot log begins with the formats of its"
-            " messages, and this one may lack its beginning"
-        )
-    if said.getvalue():
-        warn_of_damage(file)
-    for name in wanted or ():
-        if name not in out:
-            raise UnknownNameError(f"message in {file.name}", name, sorted(out) or present)
-    return out
 
 
 def _refuse_empty_messages(file: Path) -> None:

@@ -7,7 +7,7 @@ import os
 import re
 
 from symheli.errors import InputError
-from symheli.extras import extra
+from symheli.logs.dataflash import dataflash_parameters
 from symheli.logs.files import existing
 
 LARGEST_FILE = 10_000_000
@@ -28,9 +28,12 @@ def read_parameters(path: str | os.PathLike[str]) -> dict[str, float]:
     """
     file = existing(path)
     with file.open("rb") as opened:
-        head = opened.read(2)
-    if head == b"\xa3\x95":
-        return _from_dataflash(file)
+        head = opened.read(4)
+    if head.startswith(b"\xa3\x95") or head == b"FMT,":
+        found = {n: v for n, v in dataflash_parameters(file).items() if NAME.fullmatch(n)}
+        if not found:
+            raise InputError(f"{path}: the log holds no parameters; give a .param file")
+        return found
     if file.stat().st_size > LARGEST_FILE:
         raise InputError(f"{path}: {file.stat().st_size} bytes are too many for a .param file")
     try:
@@ -61,20 +64,3 @@ def number_of(text: str, where: str) -> float:
     if not math.isfinite(value):
         raise InputError(f"{where}: expected a finite number, got {text!r:.40}")
     return value
-
-
-def _from_dataflash(path: os.PathLike[str]) -> dict[str, float]:
-    with extra("logs", "parameters from a DataFlash log"):
-        from pymavlink import DFReader
-    try:
-        log = DFReader.DFReader_binary(os.fspath(path))
-        found: dict[str, float] = {}
-        while (message := log.recv_match(type=["PARM"])) is not None:
-            name = str(message.Name)
-            if NAME.fullmatch(name) and math.isfinite(message.Value):
-                found[name] = float(message.Value)
-    except Exception as error:
-        raise InputError(f"{path}: damaged DataFlash log ({error})") from error
-    if not found:
-        raise InputError(f"{path}: the log holds no parameters; give a .param file")
-    return found

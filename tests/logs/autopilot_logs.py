@@ -1,37 +1,13 @@
-"""Small logs as autopilots write them, byte by byte from the formats' specifications: PX4 ULog
-(docs.px4.io/main/en/dev_log/ulog_file_format.html) and ArduPilot DataFlash
-(AP_Logger/LogStructure.h).
-"""
+"""Small logs as autopilots write them: messages of the tests, and their writers."""
 
 from __future__ import annotations
 
-import struct
-
 import numpy as np
 
+from evidence.written_logs import FMT, FMTU, MULT, UNIT, ulog
+from evidence.written_logs import dataflash as _dataflash
 
-def ulog(topics):
-    """Bytes of a ULog of {(topic, instance): {field: values}}, "timestamp" in us among the fields;
-    samples of all topics in order of time.
-    """
-
-    def message(kind, payload):
-        return struct.pack("<HB", len(payload), ord(kind)) + payload
-
-    out = [b"ULog\x01\x12\x35\x01", struct.pack("<Q", 0)]
-    for topic, fields in {name: f for (name, _), f in topics.items()}.items():
-        names = ";".join(
-            ["uint64_t timestamp", *(f"float {field}" for field in fields if field != "timestamp")]
-        )
-        out.append(message("F", f"{topic}:{names};".encode()))
-    samples = []
-    for number, ((topic, instance), fields) in enumerate(topics.items()):
-        out.append(message("A", struct.pack("<BH", instance, number) + topic.encode()))
-        rest = [values for field, values in fields.items() if field != "timestamp"]
-        for row in zip(fields["timestamp"], *rest, strict=True):
-            data = struct.pack(f"<HQ{len(rest)}f", number, int(row[0]), *row[1:])
-            samples.append((row[0], message("D", data)))
-    return b"".join([*out, *(data for _, data in sorted(samples, key=lambda s: s[0]))])
+__all__ = ["BEFORE_2015", "DECLARED", "FORMATS", "SDLOG2", "dataflash", "quaternions", "ulog"]
 
 
 def quaternions(topic_fields):
@@ -46,10 +22,10 @@ def quaternions(topic_fields):
 
 
 FORMATS = {
-    "FMT": (128, "BBnNZ", "Type,Length,Name,Format,Columns"),
-    "UNIT": (177, "QbZ", "TimeUS,Id,Label"),
-    "FMTU": (178, "QBNN", "TimeUS,FmtType,UnitIds,MultIds"),
-    "MULT": (179, "Qbd", "TimeUS,Id,Mult"),
+    "FMT": FMT,
+    "UNIT": UNIT,
+    "FMTU": FMTU,
+    "MULT": MULT,
     "IMU": (140, "QBff", "TimeUS,I,GyrY,T"),
     "ATT": (141, "QcC", "TimeUS,Pitch,Yaw"),
     "RATE": (142, "Qh", "TimeUS,POut"),
@@ -57,36 +33,8 @@ FORMATS = {
 }
 """Type, letters of the fields and their names, by message."""
 
-UNITS = {
-    "s": "s",
-    "E": "rad/s",
-    "O": "degC",
-    "d": "deg",
-    "h": "degheading",
-    "n": "m/s",
-    "#": "inst",
-}
-MULTIPLIERS = {"F": 1e-6, "0": 1.0, "B": 1e-2, "-": 0.0}
 DECLARED = {"IMU": ("s#EO", "F---"), "ATT": ("sdh", "FBB"), "RATE": ("sn", "FB")}
 """Letters of unit and multiplier for each field."""
-
-TYPES = {
-    "Q": "Q",
-    "I": "I",
-    "B": "B",
-    "b": "b",
-    "f": "f",
-    "c": "h",
-    "C": "H",
-    "H": "H",
-    "h": "h",
-    "d": "d",
-} | {
-    "n": "4s",
-    "N": "16s",
-    "Z": "64s",
-}
-
 
 SDLOG2 = {
     "FMT": FORMATS["FMT"],
@@ -115,26 +63,5 @@ def dataflash(rows, *, text=False, units=True, formats=FORMATS):
     """A DataFlash log of [(message, (field, ...)), ...], values as the log stores them (an angle of
     type c in 1/100 degrees); `units`: with the messages that declare them.
     """
-    messages, units = [], units and "UNIT" in formats
-    write = _line if text else _packet
-    for kind, (number, letters, names) in formats.items():
-        size = 3 + struct.calcsize("<" + "".join(TYPES[c] for c in letters))
-        messages.append(("FMT", (number, size, kind, letters, names)))
-    if units:
-        messages += [("UNIT", (0, ord(key), label)) for key, label in UNITS.items()]
-        messages += [("MULT", (0, ord(key), value)) for key, value in MULTIPLIERS.items()]
-        messages += [("FMTU", (0, FORMATS[kind][0], *ids)) for kind, ids in DECLARED.items()]
-    return b"".join(write(formats[kind], kind, values) for kind, values in [*messages, *rows])
-
-
-def _packet(form, _, values):
-    number, letters, _ = form
-    values = [v.encode() if isinstance(v, str) else v for v in values]
-    form = "<" + "".join(TYPES[c] for c in letters)
-    return struct.pack("<BBB", 0xA3, 0x95, number) + struct.pack(form, *values)
-
-
-def _line(form, kind, values):
-    letters = form[1]
-    shown = (v / 100 if c in "cC" else v for c, v in zip(letters, values, strict=True))
-    return (", ".join([kind, *map(str, shown)]) + "\n").encode()
+    declared = DECLARED if units and "UNIT" in formats else None
+    return _dataflash(rows, formats, declared, text=text)

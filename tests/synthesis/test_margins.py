@@ -183,3 +183,44 @@ def test_what_has_no_margin_is_refused():
     direct = LinearModel.from_control(control.ss([[-1.0]], [[1.0]], [[1.0]], [[1.0]]))
     with pytest.raises(InputError, match="directly"):
         loop(direct, {(str(direct.inputs[0]), str(direct.outputs[0])): -1.0}, str(direct.inputs[0]))
+
+
+def test_a_controller_that_is_a_gain_makes_the_loop_of_these_gains():
+    """Two inputs, random plant: L broken at each, the other closed, by both routes."""
+    rng = np.random.default_rng(0)
+    A = rng.standard_normal((4, 4)) - 3 * np.eye(4)
+    B, C, D = rng.standard_normal((4, 3)), rng.standard_normal((3, 4)), np.zeros((3, 3))
+    plant = LinearModel(A, B, C, D, list("abcd"), list("uvw"), list("xyz"))
+    K = rng.standard_normal((2, 2))
+    gains = {(u, y): K[i, j] for i, u in enumerate("vu") for j, y in enumerate("zx")}
+    empty = np.zeros((0, 0)), np.zeros((0, 2)), np.zeros((2, 0))
+    controller = LinearModel(*empty, K, [], list("zx"), list("vu"))
+    omega = np.geomspace(0.1, 30, 7)
+    for at in "uv":
+        got, static = loop(plant, controller, at), loop(plant, gains, at)
+        expected = static.frequency_response(omega)
+        np.testing.assert_allclose(got.frequency_response(omega), expected, rtol=1e-9)
+
+
+def test_a_loop_through_a_lag_has_its_closed_form():
+    """1/s behind -k/(s T + 1): phase margin 90 deg - atan(w T) where w sqrt(1 + w^2 T^2) = k."""
+    k, T = 3.0, 0.2
+    plant = LinearModel([[0.0]], [[1.0]], [[1.0]], [[0.0]], ["y"], ["u"], ["y"])
+    lag = LinearModel([[-1 / T]], [[1 / T]], [[-k]], [[0.0]], ["l"], ["y"], ["u"])
+    w = math.sqrt((math.sqrt(1 + 4 * (k * T) ** 2) - 1) / (2 * T**2))
+    m = margins(loop(plant, lag, "u"))
+    assert m.crossover == pytest.approx((w,))
+    assert m.phase == pytest.approx(math.pi / 2 - math.atan(w * T))
+    assert m.gain == (0.0, math.inf)
+
+
+def test_a_dynamic_controller_that_does_not_fit_is_refused():
+    plant = LinearModel([[0.5]], [[1.0]], [[1.0]], [[0.0]], ["y"], ["u"], ["y"], dt=0.02)
+    lag = LinearModel([[0.5]], [[1.0]], [[1.0]], [[0.0]], ["l"], ["y"], ["u"], dt=0.01)
+    with pytest.raises(InputError, match=r"plant has dt = 0.02 and the controller dt = 0.01"):
+        loop(plant, lag, "u")
+    direct = LinearModel([[0.5]], [[1.0]], [[1.0]], [[0.1]], ["y"], ["u"], ["y"], dt=0.01)
+    with pytest.raises(InputError, match="directly"):
+        loop(direct, lag, "u")
+    with pytest.raises(UnknownNameError):
+        loop(plant, lag, "v")
