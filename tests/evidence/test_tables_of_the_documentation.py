@@ -13,10 +13,10 @@ from typing import NamedTuple
 import pytest
 
 import synthesis
-from evidence import logs
+from evidence import logs, responses, tuning
 from evidence.bracket.measured import GAINS, bracket
 from evidence.jerk.measured import TransitionPlan, fastest
-from evidence.marks import guarantee, measured
+from evidence.marks import calibrated, guarantee, measured
 from evidence.reach.measured import gains
 from evidence.tables import DOCS
 from studies.loops.exact_lateral import ExactLateral
@@ -88,6 +88,28 @@ def guarantee_of_the_worst_seed():
     found = guarantee.of_seed("xcell60", guarantee.PAIRS["xcell60"], seed, exact)
     assert same(shown, found.ratio)
     assert found.verdict == "holds"
+
+
+def calibrated_vehicle_of_the_worst_seed():
+    shown, seed = worst(KEPT["identified.md", "xcell60 calibrated"].cells("all axes")[2])
+    assert same(shown, calibrated.of_seed(seed).gaps["all axes"], rel=1e-3)
+
+
+def bands_of_ten_seeds():
+    """Of the row of 8 m/s: ten of its hundred seeds are within two percent of them all."""
+    shown = KEPT["identified.md", "frequency responses"].cells("8 m/s")[0]
+    found = [responses.of_seed(8.0, seed) for seed in range(10)]
+    held, usable = (
+        sum(getattr(c, kind)["references"].sum() for c in found) for kind in ("inside", "usable")
+    )
+    assert abs(held / usable - float(shown.rstrip("%")) / 100) < 0.02
+
+
+def margins_of_the_first_flight():
+    assert KEPT["identified.md", "changed gains"].cells("all true margins in their bands")
+    found = tuning.of_seed(0)
+    assert found.inside
+    assert found.called in (found.stable, None)
 
 
 def proven_by_p_alone(section, loop):
@@ -209,6 +231,9 @@ ROWS = {
         "xcell60 in turbulence", turbulent=True
     ),
     ("identified.md", "guarantee xcell60"): guarantee_of_the_worst_seed,
+    ("identified.md", "xcell60 calibrated"): calibrated_vehicle_of_the_worst_seed,
+    ("identified.md", "frequency responses"): bands_of_ten_seeds,
+    ("identified.md", "changed gains"): margins_of_the_first_flight,
     ("checks.md", "fuzzing symheli"): lambda: faults_of_one_entry("symheli", "symheli.Scheduling"),
     ("checks.md", "fuzzing identification"): lambda: faults_of_one_entry(
         "identification", "identification.theil"
