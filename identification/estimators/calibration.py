@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from identification.estimators.actuators import Actuators
+from identification.estimators.actuators import CONTROLS, Actuators
 from symheli import Helicopter, trim
 from symheli.airframe.written import as_toml
 from symheli.errors import (
@@ -33,7 +33,6 @@ from symheli.values.signal import Signal, indices
 from symheli.values.summary import as_table, summarized
 from symheli.values.whole_files import write_text
 
-INPUTS = ("d_lon", "d_lat", "d_col", "d_ped")
 PRIOR = 0.5
 """Standard deviation of the logarithm of a parameter for which the vehicle file states none: what
 separates two helicopters of one class.
@@ -400,8 +399,8 @@ def _free(heli: Helicopter, wanted: Sequence[str] | None) -> tuple[Signal, ...]:
 def _inputs(record: FlightRecord, actuators: Actuators | None) -> list[str]:
     """Deflections, or commands where actuators follow."""
     if actuators is None:
-        return list(INPUTS)
-    return [f"{u}_command" if f"{u}_command" in record.signals else u for u in INPUTS]
+        return list(CONTROLS)
+    return [f"{u}_command" if f"{u}_command" in record.signals else u for u in CONTROLS]
 
 
 def _outputs(
@@ -554,7 +553,7 @@ class _Search:
         """Commands as servos follow them: limited, quantised, no faster than they are."""
         if self.actuators is None:
             return commands
-        bank = ServoBank(self.actuators.servos, INPUTS, self.heli.travel, self.dt)
+        bank = ServoBank(self.actuators.servos, CONTROLS, self.heli.travel, self.dt)
         return bank.follow(commands)
 
     def _start(self, heli: Helicopter, y: Array, trims: dict[int, Array]) -> Array:

@@ -14,6 +14,7 @@ import symheli
 from symheli import Helicopter, Servo
 from symheli.errors import InputError, TrimError
 from symheli.flight import HelicopterLoops
+from symheli.lpv import sample_delay
 from symheli.progress import tracked
 from symheli.values.arrays import Array
 from synthesis.loops.margins import loop, margins
@@ -96,8 +97,10 @@ def _at(
     if servos:
         model = model.driven_by({u: servos[u].linear(u) for u in model.inputs})
     plant = model.discretize(loops.dt)
-    for k in range(late):
-        plant = _later(plant, k)
+    if late:
+        plant = plant.driven_by(
+            {str(u): sample_delay(str(u), late, loops.dt) for u in plant.inputs}
+        )
     out = []
     for control in CONTROLS:
         found = margins(loop(plant, loops.linear, control))
@@ -106,22 +109,6 @@ def _at(
         phase = min(math.degrees(found.phase), 180.0)
         out.append((float(found.stable), gain, phase, max(found.crossover, default=0.0)))
     return out
-
-
-def _later(plant: symheli.LinearModel, number: int) -> symheli.LinearModel:
-    """The plant with every input one sample later."""
-    nx, nu = plant.B.shape
-    states = tuple(symheli.Signal(f"{u}_{number}", u.unit) for u in plant.inputs)
-    return symheli.LinearModel(
-        np.block([[plant.A, plant.B], [np.zeros((nu, nx + nu))]]),
-        np.vstack([np.zeros((nx, nu)), np.eye(nu)]),
-        np.hstack([plant.C, np.zeros((len(plant.C), nu))]),
-        np.zeros_like(plant.D),
-        (*plant.states, *states),
-        plant.inputs,
-        plant.outputs,
-        dt=plant.dt,
-    )
 
 
 def _row(airspeed: float, control: str, found: Array) -> LoopMargins:
