@@ -1,5 +1,5 @@
-"""Predicted margins after a change of gains beside the true ones: simulated flights of an X-Cell
-under ArduPilot-like loops, calibrated from the log of the flight.
+"""Predicted margins and responses after a change of gains beside the true ones: simulated flights
+of an X-Cell under ArduPilot-like loops, calibrated from the log of the flight.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from evidence.tables import DOCS, keep, markdown, parsed
 from identification import calibrate
 from studies.campaigns.runners import results, runner
 from studies.known_kinematics.models import PAIRS
-from studies.loops.tuned import LoopMargins, loop_margins
+from studies.loops.tuned import QUANTITIES, LoopMargins, loop_margins
 from studies.output import as_json, progress
 from symheli import AirspeedSchedule, Excitation, Helicopter
 from symheli.flight import HelicopterLoops
@@ -96,11 +96,18 @@ class Prediction:
     @property
     def inside(self) -> bool:
         """Whether all true margins of loops that are stable lie in their bands."""
-        return all(
-            abs(p.gain - t.gain) <= p.gain_band and abs(p.phase - t.phase) <= p.phase_band
-            for p, t in self.pairs
-            if t.stable and p.stable
-        )
+        return all(self.held("gain")) and all(self.held("phase"))
+
+    def held(self, name: str) -> list[bool]:
+        """Of one of `QUANTITIES`, whether each true value of a loop that is stable, and called so,
+        lies in its band.
+        """
+        found = []
+        for predicted, true in self.pairs:
+            if predicted.stable and true.stable:
+                value, band = predicted.banded(name)
+                found.append(abs(value - true.banded(name)[0]) <= band)
+        return found
 
     @property
     def enough(self) -> bool:
@@ -171,6 +178,12 @@ def table(found: Sequence[Prediction]) -> str:
         ),
     ]
     head = ("", "measured", "mark", "")
+    pooled = []
+    for name, quantity in QUANTITIES.items():
+        held = [h for p in found for h in p.held(name)]
+        half = np.median([r.banded(name)[1] for p in found for r in p.predicted if r.stable])
+        words = f"{half:.2g} {quantity.unit}"
+        pooled.append((name.replace("_", " "), f"{sum(held)} of {len(held)}", words))
     return "\n".join(
         [
             f"Flights of {TRUTH} under loops as ArduPilot's, start of the calibration"
@@ -179,6 +192,10 @@ def table(found: Sequence[Prediction]) -> str:
             f" three loops at {', '.join(f'{v:g}' for v in AIRSPEEDS)} m/s.",
             "",
             markdown(head, rows),
+            "",
+            "Each quantity, pooled over flights, loops and airspeeds:",
+            "",
+            markdown(("", "true values in their bands", "half width, median"), pooled),
         ]
     )
 

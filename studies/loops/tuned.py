@@ -1,5 +1,5 @@
-"""Margins of an autopilot's loops around a calibrated helicopter over airspeed, with their bands,
-before and after a change of gains.
+"""Margins and responses of an autopilot's loops around a calibrated helicopter over airspeed, with
+their bands, before and after a change of gains.
 """
 
 from __future__ import annotations
@@ -7,19 +7,22 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 import symheli
-from symheli import Helicopter, Servo
+from studies.loops.responses import Responses, closed_loops, responses
+from symheli import Helicopter, LinearModel, Servo
 from symheli.errors import InputError, TrimError
 from symheli.flight import HelicopterLoops
+from symheli.flight.ardupilot import AXES, COMMANDS
 from symheli.lpv import sample_delay
 from symheli.progress import tracked
 from symheli.values.arrays import Array
 from synthesis.loops.margins import loop, margins
 
-CONTROLS = ("d_lat", "d_lon", "d_ped")
+CONTROLS = tuple(control for _, _, control in AXES.values())
 
 LARGEST = 40.0
 """Margin, dB, above which a loop has as much as anyone asks for: larger ones are shown as this."""
@@ -27,24 +30,70 @@ LARGEST = 40.0
 DEVIATIONS = 3.0
 """Half width of a band in standard deviations of the drawn helicopters."""
 
-LEAST = (0.1, 0.5)
-"""Smallest half width of a band, dB and degrees: what rounding and trims leave."""
+
+class Quantity(NamedTuple):
+    """Unit of a quantity, and the smallest half width of its band: what rounding, trims and a
+    period of the loops leave.
+    """
+
+    unit: str
+    least: float
+
+
+QUANTITIES = {
+    "gain": Quantity("dB", 0.1),
+    "phase": Quantity("deg", 0.5),
+    "bandwidth": Quantity("rad/s", 0.02),
+    "peak": Quantity("dB", 0.1),
+    "rejection": Quantity("rad/s", 0.02),
+    "rejection_peak": Quantity("dB", 0.1),
+    "overshoot": Quantity("%", 1.0),
+    "rise": Quantity("s", 0.02),
+    "settling": Quantity("s", 0.02),
+}
+"""What has a band: two margins, then `Responses`."""
+
+RESPOND = {
+    control: (attitude or rate, command, f"{attitude or rate}_disturbance")
+    for (rate, attitude, control), command in zip(AXES.values(), COMMANDS, strict=True)
+}
+"""Output of each loop, its command and its disturbance."""
 
 
 @dataclass(frozen=True)
 class LoopMargins:
-    """The loop broken at `control`, the others closed, at `airspeed` (m/s): margins (dB, deg) and
-    half widths of their bands. `stable`: of all drawn helicopters; None: of some.
+    """The loop of `control` at `airspeed` (m/s), the others closed: margins of the loop broken at
+    the control (dB, deg), `Responses` to the command of its attitude (of d_ped: of the yaw rate),
+    and half widths of their bands. `stable`: of all drawn helicopters; None: of some. Responses of
+    an unstable loop are NaN.
     """
 
     airspeed: float
     control: str
     stable: bool | None
+    crossover: float
     gain: float
     gain_band: float
     phase: float
     phase_band: float
-    crossover: float
+    bandwidth: float
+    bandwidth_band: float
+    peak: float
+    peak_band: float
+    rejection: float
+    rejection_band: float
+    rejection_peak: float
+    rejection_peak_band: float
+    overshoot: float
+    overshoot_band: float
+    rise: float
+    rise_band: float
+    settling: float
+    settling_band: float
+
+    def banded(self, name: str) -> tuple[float, float]:
+        """Value and half width of the band of one of `QUANTITIES`."""
+        return getattr(self, name), getattr(self, f"{name}_band")
 
 
 def loop_margins(
@@ -55,21 +104,17 @@ def loop_margins(
     servos: Mapping[str, Servo] | None = None,
     delay: float = 0.0,
 ) -> list[LoopMargins]:
-    """Return the margins of every loop at every airspeed: those of the first helicopter, with bands
-    from the others, which are drawn from its uncertainty; without others the bands are their least.
-    A drawn helicopter without a trim is left out: the one that flew has one.
+    """Return margins and responses of every loop at every airspeed: those of the first helicopter,
+    with bands from the others, which are drawn from its uncertainty; without others the bands are
+    their least. A drawn helicopter without a trim is left out: the one that flew has one.
 
     `delay` (s) is from command to servo, in whole periods of the loops. Raises `InputError` where
     it is not.
     """
-    late = delay / loops.dt
-    if not (late >= 0 and abs(late - round(late)) < 1e-6):
-        raise InputError(
-            f"delay: expected a multiple of the loops' period of {loops.dt:g} s, got {delay:g} s"
-        )
+    late = periods(delay, loops)
     rows = []
     for airspeed in tracked("margins", airspeeds):
-        each = [_at(h, loops, airspeed, servos, round(late)) for h in helicopters]
+        each = [_at(h, loops, airspeed, servos, late) for h in helicopters]
         if each[0] is None:
             raise InputError(
                 f"the helicopter has no trim at {airspeed:g} m/s: leave this airspeed out"
@@ -80,49 +125,63 @@ def loop_margins(
     return rows
 
 
+def periods(delay: float, loops: HelicopterLoops) -> int:
+    """A delay (s) in periods of the loops; `InputError` where it is no whole number of them."""
+    late = delay / loops.dt
+    if not (late >= 0 and abs(late - round(late)) < 1e-6):
+        raise InputError(
+            f"delay: expected a multiple of the loops' period of {loops.dt:g} s, got {delay:g} s"
+        )
+    return round(late)
+
+
+def sampled_plant(
+    model: LinearModel, dt: float, servos: Mapping[str, Servo] | None, late: int
+) -> LinearModel:
+    """A continuous model behind servos, sampled, behind a delay of `late` periods."""
+    if servos:
+        model = model.driven_by({u: servos[u].linear(u) for u in model.inputs})
+    plant = model.discretize(dt)
+    if not late:
+        return plant
+    return plant.driven_by({str(u): sample_delay(str(u), late, dt) for u in plant.inputs})
+
+
 def _at(
     heli: Helicopter,
     loops: HelicopterLoops,
     airspeed: float,
     servos: Mapping[str, Servo] | None,
     late: int,
-) -> list[tuple[float, float, float, float]] | None:
-    """Of each control: 1 where stable, gain margin (dB), phase margin (deg), crossover (rad/s);
-    None without a trim.
+) -> list[list[float]] | None:
+    """Of each control: 1 where stable, crossover (rad/s), then `QUANTITIES`; None without a
+    trim.
     """
     try:
         model = symheli.linearize(heli, symheli.trim(heli, airspeed=float(airspeed)))
     except TrimError:
         return None
-    if servos:
-        model = model.driven_by({u: servos[u].linear(u) for u in model.inputs})
-    plant = model.discretize(loops.dt)
-    if late:
-        plant = plant.driven_by(
-            {str(u): sample_delay(str(u), late, loops.dt) for u in plant.inputs}
-        )
+    plant = sampled_plant(model, loops.dt, servos, late)
+    closed = closed_loops(plant, loops)
+    unknown = Responses(*[math.nan] * len(Responses._fields))
+    felt = responses(closed, RESPOND) if closed.is_stable() else dict.fromkeys(CONTROLS, unknown)
     out = []
     for control in CONTROLS:
         found = margins(loop(plant, loops.linear, control))
         decibels = [abs(20 * math.log10(g)) if g > 0 else math.inf for g in found.gain]
         gain = min(*decibels, LARGEST) if found.stable else 0.0
         phase = min(math.degrees(found.phase), 180.0)
-        out.append((float(found.stable), gain, phase, max(found.crossover, default=0.0)))
+        crossover = max(found.crossover, default=0.0)
+        out.append([float(found.stable), crossover, gain, phase, *felt[control]])
     return out
 
 
 def _row(airspeed: float, control: str, found: Array) -> LoopMargins:
-    """`found` (helicopters, 4): stable, gain, phase, crossover."""
-    first, others = found[0], found[1:]
-    spread = others.std(axis=0) if len(others) else np.zeros(4)
-    stable = bool(first[0]) if np.all(found[:, 0] == first[0]) else None
-    return LoopMargins(
-        airspeed=airspeed,
-        control=control,
-        stable=stable,
-        gain=float(first[1]),
-        gain_band=max(DEVIATIONS * float(spread[1]), LEAST[0]),
-        phase=float(first[2]),
-        phase_band=max(DEVIATIONS * float(spread[2]), LEAST[1]),
-        crossover=float(first[3]),
-    )
+    """`found` (helicopters, 11): stable, crossover, quantities."""
+    stable = bool(found[0, 0]) if np.all(found[:, 0] == found[0, 0]) else None
+    spread = found[1:, 2:].std(axis=0) if len(found) > 1 else np.zeros(len(QUANTITIES))
+    banded: dict[str, float] = {}
+    for name, value, sd in zip(QUANTITIES, found[0, 2:], spread, strict=True):
+        banded[name] = float(value)
+        banded[f"{name}_band"] = max(DEVIATIONS * float(sd), QUANTITIES[name].least)
+    return LoopMargins(airspeed, control, stable, float(found[0, 1]), **banded)

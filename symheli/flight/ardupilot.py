@@ -24,6 +24,12 @@ from symheli.values.signal import signals
 AXES = {"RLL": ("p", "phi", "d_lat"), "PIT": ("q", "theta", "d_lon"), "YAW": ("r", "", "d_ped")}
 """Rate, attitude and control of each axis; in yaw the rate is commanded."""
 
+MEASURED = ("p", "q", "r", "phi", "theta")
+"""What the loops feed back: rates (rad/s) and attitudes (rad)."""
+
+COMMANDS = {"phi_command": "rad", "theta_command": "rad", "r_command": "rad/s"}
+"""What the pilot commands, with units, in the order of `AXES`."""
+
 LEAK = 0.02
 """Part of the integrator beyond its lower limit that leaks away at every step."""
 
@@ -347,17 +353,26 @@ class HelicopterLoops:
         """Deflections d_lat, d_lon, d_ped (rad) from p, q, r (rad/s), phi, theta (rad) within the
         limits of outputs and integrators, nothing leaking: discrete, at the period of the loops.
         """
+        return self.commanded.select(inputs=MEASURED)
+
+    @cached_property
+    def commanded(self) -> LinearModel:
+        """The model `linear` with the commands of the pilot as further inputs: phi_command,
+        theta_command (rad) and r_command (rad/s).
+        """
         rest = self.init()
         sizes = [np.size(part) for part in rest]
         nx, n = sum(sizes), self._numbers
-        A, B = np.zeros((nx, nx)), np.zeros((nx, 5))
-        C, D = np.zeros((3, nx)), np.zeros((3, 5))
-        for k in range(nx + 5):
-            x, y = np.zeros(nx), np.zeros(5)
+        nu = len(MEASURED) + len(COMMANDS)
+        A, B = np.zeros((nx, nx)), np.zeros((nx, nu))
+        C, D = np.zeros((3, nx)), np.zeros((3, nu))
+        for k in range(nx + nu):
+            x, y = np.zeros(nx), np.zeros(nu)
             (x if k < nx else y)[k if k < nx else k - nx] = 1.0
             parts = np.split(x, np.cumsum(sizes)[:-1])
             memory = _Memory(*(a.reshape(b.shape) for a, b in zip(parts, rest, strict=True)))
-            target = -n["attitude"] * np.array([y[3], y[4], 0.0])
+            target = n["attitude"] * np.array([y[5] - y[3], y[6] - y[4], 0.0])
+            target[2] = y[7]
             out, later = self._advance(memory, y[:3], target, limited=False)
             column = np.concatenate([np.ravel(part) for part in later])
             if k < nx:
@@ -365,8 +380,8 @@ class HelicopterLoops:
             else:
                 B[:, k - nx], D[:, k - nx] = column, n["throw"] * out
         names = [f"loops_{k}" for k in range(nx)]
-        measured = signals(("p", "q", "r", "phi", "theta"))
-        return LinearModel(A, B, C, D, signals(names), measured, signals(self._controls), self.dt)
+        inputs = signals((*MEASURED, *COMMANDS), COMMANDS)
+        return LinearModel(A, B, C, D, signals(names), inputs, signals(self._controls), self.dt)
 
     def with_parameters(self, changes: Mapping[str, float]) -> HelicopterLoops:
         """The loops after a change of parameters, {"ATC_RAT_RLL_P": 0.15}.
