@@ -1,5 +1,5 @@
 """symheli tune LOG --vehicle FILE --set NAME=VALUE: what a change of an autopilot's gains does to
-the margins of its loops, over airspeed.
+the margins and responses of its loops, over airspeed.
 """
 
 from __future__ import annotations
@@ -16,17 +16,34 @@ from symheli.errors import InputError
 from symheli.values.whole_files import write_text
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from studies.loops.between import Between
     from studies.loops.tuned import LoopMargins
 
 HELP = (
-    "margins of an ArduPilot helicopter's loops before and after a change of gains, over airspeed,"
-    " with bands from a flight"
+    "margins and responses of an ArduPilot helicopter's loops before and after a change of gains,"
+    " over airspeed, with bands from a flight"
 )
 
 LEGEND = """\
 gain (dB), phase (deg): by how much the loop broken at this control may change, the others closed,
   before it is unstable, and half the width of the band that the flight's uncertainty leaves;
   40.0: 40 dB or more; crossover: largest frequency of unit gain, rad/s"""
+
+RESPONSES = ("bandwidth", "peak", "rejection", "rejection_peak")
+RESPONSE_LEGEND = """\
+bandwidth, peak: of the attitude (d_ped: the yaw rate) after its command: up to where it follows
+  within -3 dB, and its largest gain; rejection, rejection peak: up to where a disturbance of it is
+  attenuated by 3 dB, and by how much one is amplified at most; from 0.1 rad/s on"""
+
+STEP = ("overshoot", "rise", "settling")
+STEP_LEGEND = """\
+after a step of the command: by how much it is exceeded, from 10 to 90 %, until 5 % is not left any
+  more; 10.00 s: 10 s or more"""
+
+DECIMALS = {"dB": 1, "%": 0}
+"""Shown, by unit; else two."""
 
 ARGUMENTS = (
     positional("log", "flight log of deflections and motion", type=Path, metavar="LOG"),
@@ -79,6 +96,16 @@ ARGUMENTS = (
         0.0,
     ),
     option("--window", "S", "length over which the equations run free, s", options.positive, 3.0),
+    option(
+        "--prove",
+        "N",
+        "prove that the changed loops are stable while the airspeed moves between the first and the"
+        " last of --airspeeds: the calibrated helicopter and N - 1 drawn ones, about half a minute"
+        " each",
+        options.at_least_one,
+    ),
+    option("--rate", "M/S^2", "largest |dV/dt| of --prove", options.rate, 1.0),
+    option("--out", "DIR", "folder for tune.csv and, with matplotlib, tune.svg", Path),
     flag("--as-it-is", "take the vehicle file as calibrated: bands are the least"),
     option("--write", "FILE", "write the changed parameters (.param)", Path),
 )
@@ -88,7 +115,7 @@ def run(arguments: argparse.Namespace) -> Output:
     """Calibrate, compute the margins before and after, and say what the change does."""
     import symheli
     from identification import calibrate
-    from studies.loops.tuned import CONTROLS, loop_margins
+    from studies.loops.tuned import CONTROLS, QUANTITIES, loop_margins
     from symheli.flight import HelicopterLoops
     from symheli.logs.parameters import read_parameters
 
@@ -120,6 +147,19 @@ def run(arguments: argparse.Namespace) -> Output:
         *(_row(old, new) for old, new in zip(*both, strict=True)),
     ]
     verdict = _verdict(both[1])
+    between = None
+    if arguments.prove is not None:
+        from studies.loops.between import stable_between
+
+        between = stable_between(
+            drawn[: arguments.prove],
+            after,
+            min(airspeeds),
+            max(airspeeds),
+            arguments.rate,
+            servos=servos,
+            delay=arguments.delay,
+        )
     lines = [
         f"{', '.join(f'{n} {parameters.get(n, 0.0):g} -> {v:g}' for n, v in change.items())}",
         "",
@@ -127,9 +167,17 @@ def run(arguments: argparse.Namespace) -> Output:
         "",
         LEGEND,
         "",
+        _quantities(both[0], both[1], RESPONSES),
+        "",
+        RESPONSE_LEGEND,
+        "",
+        _quantities(both[0], both[1], STEP),
+        "",
+        STEP_LEGEND,
+        "",
         verdict,
     ]
-    hypotheses = _hypotheses(arguments, calibration)
+    hypotheses = _hypotheses(arguments, calibration, between)
     lines += ["", *hypotheses]
     data: dict[str, Any] = {
         "change": change,
@@ -138,8 +186,28 @@ def run(arguments: argparse.Namespace) -> Output:
         "after": [vars(row) for row in both[1]],
         "verdict": verdict,
         "hypotheses": hypotheses,
-        "units": {"airspeed": "m/s", "gain": "dB", "phase": "deg", "crossover": "rad/s"},
+        "units": {
+            "airspeed": "m/s",
+            "crossover": "rad/s",
+            **{name: quantity.unit for name, quantity in QUANTITIES.items()},
+        },
     }
+    if between is not None:
+        data["between"] = {
+            "proven": between.exact,
+            "status": between.certificate.status.value,
+            "rate": {"value": between.rate, "unit": "m/s^2"},
+            "airspeeds": between.airspeeds.tolist(),
+            "unstable_half_way": between.unstable,
+            "drawn": between.drawn,
+            "drawn_proven": between.proven,
+        }
+    if arguments.out is not None:
+        from studies.commands.table_and_figure import write
+        from studies.loops.tuned_plot import csv, plot
+
+        data["figures"] = write(arguments.out, "tune", csv(*both), lambda: plot(*both))
+        lines += ["", *(f"wrote {path}" for path in data["figures"])]
     if arguments.write is not None:
         head = ["Changed by symheli tune. Load these by hand, and only if all this is so:"]
         text = [f"# {line}" for line in (*head, *hypotheses, verdict)]
@@ -170,6 +238,27 @@ def _row(old: LoopMargins, new: LoopMargins) -> list[str]:
     ]
 
 
+def _quantities(before: list[LoopMargins], after: list[LoopMargins], names: Sequence[str]) -> str:
+    """A table of quantities before and after the change."""
+    from studies.loops.tuned import QUANTITIES
+
+    def cell(row: LoopMargins, name: str) -> str:
+        value, band = row.banded(name)
+        if row.stable is not True:
+            return "unstable" if row.stable is False else "not known"
+        digits = DECIMALS.get(QUANTITIES[name].unit, 2)
+        return f"{value:.{digits}f} +-{band:.{digits}f}"
+
+    table = [
+        ["V", "loop", *(word for name in names for word in (name.replace("_", " "), "after"))],
+        ["m/s", "", *(QUANTITIES[name].unit for name in names for _ in range(2))],
+    ]
+    for old, new in zip(before, after, strict=True):
+        cells = [cell(row, name) for name in names for row in (old, new)]
+        table.append([f"{new.airspeed:g}", new.control, *cells])
+    return columns(table, left=2)
+
+
 def _verdict(rows: list[LoopMargins]) -> str:
     unstable = sorted({row.airspeed for row in rows if row.stable is False})
     unknown = sorted({row.airspeed for row in rows if row.stable is None})
@@ -193,18 +282,21 @@ def _listed(values: list[float]) -> str:
     return ", ".join(f"{v:g}" for v in values)
 
 
-def _hypotheses(arguments: argparse.Namespace, calibration: Any) -> list[str]:
-    """What the margins suppose."""
+def _hypotheses(
+    arguments: argparse.Namespace, calibration: Any, between: Between | None
+) -> list[str]:
+    """What the numbers suppose, and what is proven between the airspeeds."""
     throws = dict(arguments.throw)
     lines = [
-        "Margins suppose: the equations of motion of the vehicle file; ArduPilot's rate"
-        " controllers, attitude gains, gyro low-pass and static notch as documented, without input"
-        " shaping and"
-        f" within limits; delay {arguments.delay:g} s; servos"
+        "Margins and responses suppose: the equations of motion of the vehicle file; ArduPilot's"
+        " rate controllers, attitude gains, gyro low-pass and static notch as documented, without"
+        f" input shaping and within limits; delay {arguments.delay:g} s; servos"
         f" {f'{arguments.servo:g} rad/s' if arguments.servo else 'without dynamics'}; deflection at"
         " full output"
         f" {', '.join(f'{u} {v:g} rad' for u, v in throws.items()) or '45 deg, not measured'}.",
-        "They hold at the airspeeds listed; nothing is proven between them.",
+        "They hold at the airspeeds listed; nothing is proven between them (--prove)."
+        if between is None
+        else f"They hold at the airspeeds listed. {between}",
     ]
     if calibration is not None and calibration.coloured:
         lines.append(
