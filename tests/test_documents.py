@@ -108,6 +108,28 @@ def test_a_page_is_run_in_a_folder_of_its_own_and_from_top_to_bottom(page, tmp_p
     assert [path.name for path in tmp_path.iterdir()] == ["page.md"]
 
 
+def test_a_block_on_public_logs_is_skipped_where_there_are_none(
+    page, tmp_path, monkeypatch, capsys
+):
+    """And run, and compared, where a folder is named."""
+    own = page("```sh\n", "```sh with public logs\ncat logs/said.txt\n")
+    text = own.read_text().replace("```python not run", "```text\nhello\n```\n\n```python not run")
+    own.write_text(text.replace(', "xcell60" in Path("vehicles.txt").read_text()', ", True"))
+    monkeypatch.delenv("SYMHELI_PUBLIC_LOGS", raising=False)
+    check(own)
+    assert "line 20: skipped, SYMHELI_PUBLIC_LOGS names no folder" in capsys.readouterr().err
+    folder = tmp_path / "public"
+    folder.mkdir()
+    monkeypatch.setenv("SYMHELI_PUBLIC_LOGS", str(folder))
+    for said in ("hello", "good-bye"):
+        (folder / "said.txt").write_text(said)
+        if said == "hello":
+            check(own)
+        else:
+            with pytest.raises(PageError, match="prints  good-bye"):
+                check(own)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [

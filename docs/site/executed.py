@@ -2,7 +2,9 @@
 
 A fence `python` or `sh` runs, from top to bottom, in a folder of its own; the `text` that follows
 one is compared with what it printed. A fence that says `not run` behind its language is shown
-only. The tests and the build of the site both go through here.
+only; one that says `with public logs` runs where SYMHELI_PUBLIC_LOGS names the folder that
+`evidence.logs` fills, which is `logs` to the page, and elsewhere it is skipped. The tests and the
+build of the site both go through here.
 
     python docs/site/executed.py docs/plant.md              run a page, say where it differs
     python docs/site/executed.py --write docs/plant.md      write what it prints into it
@@ -32,7 +34,8 @@ FENCE = re.compile(
     r"^(?P<fence>`{3,})(?P<info>[^\n`]*)\n(?P<code>.*?)^(?P=fence)[ \t]*$", re.MULTILINE | re.DOTALL
 )
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
-RUNS = ("python", "sh")
+PUBLIC = " with public logs"
+RUNS = ("python", "sh", f"sh{PUBLIC}")
 
 
 class PageError(Exception):
@@ -65,7 +68,7 @@ def blocks(page):
 def printed(page, name):
     """For each block that runs: it, what it printed, and the block of text that follows it or None.
 
-    What a compiler would print is None where there is none.
+    What a compiler would print is None where there is none, and so is what public logs would say.
     """
     from symheli.errors import CompilerWarning
 
@@ -85,8 +88,10 @@ def printed(page, name):
                     code = "\n" * (block.line - 1) + block.code
                     exec(compile(code, name, "exec", dont_inherit=True), vars(module))
                 else:
+                    if block.kind.endswith(PUBLIC):
+                        _link_public_logs(f"{name}, line {block.line}")
                     _shell(block.code)
-        except _NoCompiler:
+        except _Skipped:
             yield block, None, None
             continue
         except Exception:
@@ -96,8 +101,18 @@ def printed(page, name):
         yield block, out.getvalue(), after if after is not None and after.kind == "text" else None
 
 
-class _NoCompiler(Exception):
-    """A line asks for a C compiler, and there is none."""
+class _Skipped(Exception):
+    """A line asks for a C compiler or for public logs, and there are none."""
+
+
+def _link_public_logs(where):
+    """Makes the folder of public logs `logs` in the working folder."""
+    folder = os.environ.get("SYMHELI_PUBLIC_LOGS")
+    if not folder:
+        print(f"{where}: skipped, SYMHELI_PUBLIC_LOGS names no folder", file=sys.stderr)
+        raise _Skipped
+    if not Path("logs").exists():
+        Path("logs").symlink_to(Path(folder).resolve(), target_is_directory=True)
 
 
 def _shell(code):
@@ -119,7 +134,7 @@ def _shell(code):
                 raise PageError(f"{line}: ended with {status}")
             continue
         if "cc" in words and shutil.which("cc") is None:
-            raise _NoCompiler
+            raise _Skipped
         done = subprocess.run(line, shell=True, capture_output=True, text=True)
         if done.returncode:
             raise PageError(f"{line}: ended with {done.returncode}\n{done.stdout}{done.stderr}")

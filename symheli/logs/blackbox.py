@@ -84,8 +84,11 @@ def read_blackbox(
     """{signal: (column, unit)}, interpolated to steps of `dt` (s) over their common time as
     `symheli.logs.column.on_one_axis` does.
 
-    Raises `InputError` for a file that is no such log, `UnknownNameError` for a column it lacks.
+    Raises `InputError` without a signal and for a file that is no such log, `UnknownNameError` for
+    a column it lacks.
     """
+    if not fields:
+        raise InputError('fields: expected at least one signal, such as {"p": "gyroADC[0]"}')
     dt, found = positive(dt), blackbox_columns(path)
     for column, _ in fields.values():
         if column not in found:

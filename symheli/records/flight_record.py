@@ -13,6 +13,7 @@ import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.extras import extra
+from symheli.logs.blackbox import read_blackbox
 from symheli.logs.csv import read_csv, with_units
 from symheli.logs.dataflash import read_dataflash
 from symheli.logs.files import seconds_in
@@ -245,6 +246,30 @@ class FlightRecord:
         return replace(
             cls._from_table(*read_dataflash(path, fields, dt, units), path),
             resampled=f"messages interpolated to {dt:g} s",
+        )
+
+    @classmethod
+    def from_blackbox(
+        cls,
+        path: str | os.PathLike[str],
+        fields: Mapping[str, str],
+        dt: float,
+        units: Mapping[str, str] | None = None,
+    ) -> FlightRecord:
+        """Read a Blackbox log of Betaflight, Rotorflight or INAV (.bbl, .bfl, .txt): {signal:
+        column}, such as "gyroADC[0]", resampled to `dt` (s) as in `symheli.logs.column`; signs are
+        the firmware's.
+
+        Units are those that the log declares; `units` gives those it does not, "1" else.
+        """
+        units = units or {}
+        for name in units:
+            if name not in fields:
+                raise UnknownNameError("signal in units", name, fields)
+        asked = {name: (column, units.get(name, "")) for name, column in fields.items()}
+        return replace(
+            cls._from_table(*read_blackbox(path, asked, dt), path),
+            resampled=f"frames interpolated to {dt:g} s",
         )
 
     @classmethod

@@ -185,6 +185,13 @@ def test_a_map_reads_it_and_contradicting_units_are_refused(tmp_path):
     written.write_text('dt = 0.002\n[signals]\np = { column = "gyroADC[0]" }\n')
     record = FlightRecord.from_map(path, written)
     np.testing.assert_allclose(record["p"], np.radians(rows[:, 12]), atol=1e-9)
+    direct = FlightRecord.from_blackbox(path, {"p": "gyroADC[0]", "lat": "axisP[0]"}, dt=0.002)
+    np.testing.assert_array_equal(direct["p"], record["p"])
+    assert [str(s.unit) for s in direct.signals] == ["rad/s", "1"]
+    with pytest.raises(UnknownNameError, match="signal in units"):
+        FlightRecord.from_blackbox(path, {"p": "gyroADC[0]"}, 0.002, units={"q": "deg/s"})
+    with pytest.raises(InputError, match="expected at least one signal"):
+        FlightRecord.from_blackbox(path, {}, dt=0.002)
     written.write_text('dt = 0.002\n[signals]\np = { column = "gyroADC[0]", unit = "rad/s" }\n')
     with pytest.raises(InputError, match=r"the log says that gyroADC\[0\] is in deg/s, not rad/s"):
         FlightRecord.from_map(path, written)

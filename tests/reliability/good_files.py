@@ -93,6 +93,12 @@ def _logs(folder: Path) -> list[Reader]:
         Reader("MAT", mat, lambda p: symheli.FlightRecord.from_mat(p, time="t", units=units), True),
         Reader("X-Plane", xplane, lambda p: symheli.FlightRecord.from_xplane(p, dt=0.1)),
     ]
+    blackbox = folder / "log.bbl"
+    blackbox.write_bytes(blackbox_of(t))
+    gyro = {"q": "gyroADC[1]"}
+    found.append(
+        Reader("Blackbox", blackbox, lambda p: symheli.FlightRecord.from_blackbox(p, gyro, dt=0.02))
+    )
     if importlib.util.find_spec("pyulog"):
         ulog = folder / "log.ulg"
         ulog.write_bytes(ulog_of(t))
@@ -101,6 +107,28 @@ def _logs(folder: Path) -> list[Reader]:
             Reader("ULog", ulog, lambda p: symheli.FlightRecord.from_ulog(p, topics, dt=0.02))
         )
     return found
+
+
+def blackbox_of(t: np.ndarray) -> bytes:
+    """A log of whole frames of three numbers, from the description of the format."""
+
+    def unsigned(value: int) -> bytes:
+        low, rest = value & 0x7F, value >> 7
+        return bytes([low | 0x80]) + unsigned(rest) if rest else bytes([low])
+
+    lines = ["Product:Blackbox flight data recorder by Nicholas Sherlock", "Data version:2"]
+    for kind in "IP":
+        lines += [
+            f"Field {kind} name:loopIteration,time,gyroADC[1]",
+            f"Field {kind} predictor:0,0,0",
+            f"Field {kind} encoding:1,1,0",
+        ]
+    out = "".join(f"H {line}\n" for line in [*lines, "gyro_scale:0x3f800000"]).encode()
+    for k, time in enumerate(t):
+        rate = round(50 * float(np.sin(time)))
+        zigzag = 2 * rate if rate >= 0 else -2 * rate - 1
+        out += b"I" + unsigned(k) + unsigned(1 + int(1e6 * time)) + unsigned(zigzag)
+    return out + b"E\xffEnd of log\x00"
 
 
 def ulog_of(t: np.ndarray) -> bytes:

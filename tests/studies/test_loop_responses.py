@@ -77,10 +77,10 @@ def test_the_closed_loops_are_those_of_a_simulation(ideal, loops):
 
 
 def test_bands_shrink_with_the_spread_of_the_helicopters(ideal, loops):
-    """Inertias drawn a tenth as widely leave bands about a tenth as wide, down to the least."""
+    """Parameters drawn a tenth as widely leave bands about a tenth as wide, down to the least."""
     rng = np.random.default_rng(0)
-    z = rng.standard_normal((6, 2))
-    names = ("body.Ixx", "body.Iyy")
+    z = rng.standard_normal((6, 3))
+    names = ("body.Ixx", "body.Iyy", "main_rotor.bar_lock_number")
 
     def bands(deviation):
         drawn = [
@@ -95,10 +95,10 @@ def test_bands_shrink_with_the_spread_of_the_helicopters(ideal, loops):
         return loop_margins([ideal, *drawn], loops, [6.0])[0]
 
     wide, narrow = bands(0.1), bands(0.01)
-    for name in ("gain", "phase", "rejection_peak"):
+    for name in ("gain", "bandwidth", "rejection"):
         ratio = narrow.banded(name)[1] / wide.banded(name)[1]
         at_least = QUANTITIES[name].least / wide.banded(name)[1]
-        # a tenth, up to the curvature over +-20 % of inertia, or the least band
+        # a tenth, up to the curvature over +-20 %, or the least band
         assert max(0.07, at_least) * 0.99 <= ratio <= max(0.13, at_least) * 1.01, name
         assert ratio < 1.0, name
 
