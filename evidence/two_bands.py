@@ -5,6 +5,7 @@ same flights with the controller on: which are narrower, and which hold the exac
 from __future__ import annotations
 
 import argparse
+import io
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,7 +20,8 @@ from evidence.marks.calibrated import start_of
 from evidence.marks.measured import seeds_of
 from evidence.responses import BAND, INPUTS, ON_AXIS, OUTPUTS, WINDOWS, flights_at
 from evidence.tables import DOCS, keep, markdown, parsed
-from identification import FrequencyResponse, calibrate, frequency_response
+from identification import calibrate, frequency_response
+from identification.judge.frequency_response import FrequencyResponse
 from studies.campaigns.runners import results, runner
 from studies.known_kinematics.models import PAIRS
 from studies.loops.tuned import DEVIATIONS
@@ -28,7 +30,7 @@ from symheli import Helicopter
 from symheli.errors import TrimError
 from symheli.values.arrays import Array
 from symheli.values.drawing import plain
-from symheli.values.whole_files import written_whole
+from symheli.values.whole_files import write_bytes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -187,8 +189,9 @@ def main() -> None:
     shares = [{"seed": b.seed, **{k: float(v.mean()) for k, v in b.held.items()}} for b in found]
     print(as_json(shares) if options.json else text)
     if options.figure:
-        with written_whole(options.figure) as path:
-            figure(found[0]).savefig(path, format=options.figure.suffix.lstrip("."))
+        picture = io.BytesIO()
+        figure(found[0]).savefig(picture, format=options.figure.suffix.lstrip("."))
+        write_bytes(options.figure, picture.getvalue())
     if options.write:
         keep(DOCS / "identified.md", "two bands", text)
 
