@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
-from symheli.logs.column import Column, on_one_axis
+from symheli.logs.column import GAP, Column, on_one_axis
 from symheli.logs.files import Table, bounded, positive, warn_of_damage
 from symheli.logs.format import BLACKBOX
 from symheli.progress import task
@@ -40,9 +40,6 @@ MAX_JUMP = 10_000_000
 
 TOLD = 2**16
 """Bytes after which progress is told."""
-
-GAP = 10.0
-"""s between two logs of which the second begins at an earlier time than the first ends."""
 
 TERMS = ("axisP", "axisI", "axisD", "axisF", "axisS", "axisB", "axisO")
 """Terms of the controller, of which a firmware has some."""

@@ -42,6 +42,13 @@ class Column:
     unit: str | None = None
 
 
+RESTART = 10.0
+"""A clock that goes back by more, s, began again."""
+
+GAP = 10.0
+"""s between two logs of a file, of which the second begins earlier than the first ends."""
+
+
 def forward(time: np.ndarray) -> np.ndarray:
     """Return the mask of the samples whose instant is later than all before: repeats and steps back
     are dropped.

@@ -25,7 +25,7 @@ import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.extras import extra
-from symheli.logs.column import Column, continuous, on_one_axis
+from symheli.logs.column import GAP, RESTART, Column, continuous, on_one_axis
 from symheli.logs.files import Table, bounded, error_text, positive, quiet, warn_of_damage
 from symheli.values.units import to_si
 
@@ -105,7 +105,7 @@ def read_dataflash(
         if name not in fields:
             raise UnknownNameError("signal in units", name, fields)
     split = {name: _split(column) for name, column in fields.items()}
-    found = _read(path, {message for message, _, _ in split.values()})
+    found, _ = _read(path, {message for message, _, _ in split.values()})
     columns = {name: _pick(found, *where, path) for name, where in split.items()}
     known = {
         name: _unit(name, fields[name], column.unit, units.get(name))
@@ -117,22 +117,79 @@ def read_dataflash(
 
 
 def dataflash_columns(path: str | os.PathLike[str]) -> dict[str, Column]:
-    """Every column of numbers by its name, the instance in it where a message has more than one."""
-    return {
+    """Every column of numbers by its name, the instance in it where a message has more than one;
+    and "log", the number of the log in the file, where the clock began again.
+    """
+    found, begun = _read(path, None)
+    columns = {
         f"{message}{'' if i == 0 else f'[{instance}]'}.{field}": column
-        for message, instances in _read(path, None).items()
+        for message, instances in found.items()
         for i, (instance, columns) in enumerate(instances.items())
         for field, column in columns.items()
         if column.time is not None and (message, field) != BATCH[:2]
     }
+    if len(begun) > 1:
+        columns["log"] = Column(np.array(begun), 1.0 + np.arange(len(begun)))
+    return columns
 
 
 _Found = dict[str, dict[str, dict[str, Column]]]
 """Column by message, instance ("" where there is only one) and field."""
 
 
-def _read(path: str | os.PathLike[str], wanted: Iterable[str] | None) -> _Found:
-    """Return these messages, or all; raise `UnknownNameError` for one that the log lacks."""
+class _Clock:
+    """The clock of a file in which it may begin again: s to add to the instants of messages, so
+    that each log is `GAP` behind the log before it, told by the messages of one kind, `name`.
+
+    One instant far ahead of its neighbours is damage, and no new beginning.
+    """
+
+    def __init__(self, log: Any) -> None:
+        counts = log.counts
+        kinds = {
+            form.name: counts.get(form.name, 0) if isinstance(counts, dict) else counts[form.type]
+            for form in log.formats.values()
+            if _clock_of(form) is not None and form.name not in ABOUT_THE_LOG
+        }
+        self.name = max(kinds, key=lambda name: (kinds[name], name), default="")
+        self.late, self.begun = 0.0, array("d")
+        self._last: tuple[float, float] | None = None
+
+    def places(self, message: Any) -> bool:
+        """Take note of a message; whether it is known to which log it belongs: between the end of
+        one and the first of the telling messages of the next it is not.
+        """
+        field = _clock_of(message.fmt)
+        if field is None:
+            return True
+        now = CLOCKS[field] * float(getattr(message, field))
+        again = self._last is not None and now < min(self._last) - RESTART
+        if message.get_type() != self.name:
+            return not again
+        if self._last is None:
+            self._last, self.begun = (now, now), array("d", [now])
+        elif again:
+            self.late += self._last[1] + GAP - now
+            self.begun.append(now + self.late)
+            self._last = now, now
+        else:
+            self._last = self._last[1], now
+        return True
+
+
+def _clock_of(form: Any) -> str | None:
+    """The field of a kind of message with the autopilot's clock."""
+    if form.name.startswith("GPS"):  # some count from the beginning of the week
+        return None
+    return next((name for name in CLOCKS if name in form.columns), None)
+
+
+def _read(
+    path: str | os.PathLike[str], wanted: Iterable[str] | None
+) -> tuple[_Found, array[float]]:
+    """Return these messages, or all, and the instant (s) at which each log of the file begins;
+    raise `UnknownNameError` for a message that it lacks.
+    """
     rows: dict[tuple[str, str], _Rows] = {}
     now = np.nan
     with _opened(path) as (log, said):
@@ -140,8 +197,11 @@ def _read(path: str | os.PathLike[str], wanted: Iterable[str] | None) -> _Found:
         names = dict.fromkeys(form.name for form in log.formats.values())
         present = [name for name in names if name not in ABOUT_THE_LOG]
         asked = present if wanted is None else wanted
-        for message in _messages(log, {*asked, BATCH[0]}):
+        clock = _Clock(log)
+        for message in _messages(log, {*asked, BATCH[0], clock.name} - {""}):
             name, known = message.get_type(), declared.get(message.fmt.type, {})
+            if not clock.places(message) or (name == clock.name and name not in asked):
+                continue
             if name == BATCH[0]:
                 now = BATCH[2] * float(getattr(message, BATCH[1], np.nan))
                 if name not in asked:
@@ -150,7 +210,7 @@ def _read(path: str | os.PathLike[str], wanted: Iterable[str] | None) -> _Found:
             key = "" if field is None else str(getattr(message, field))
             if (name, key) not in rows:
                 rows[name, key] = _Rows(message.fmt)
-            rows[name, key].append(message, now)
+            rows[name, key].append(message, now, clock.late)
         out: _Found = {}
         for (name, key), found in rows.items():
             known = declared.get(found.form.type, {})
@@ -165,7 +225,7 @@ def _read(path: str | os.PathLike[str], wanted: Iterable[str] | None) -> _Found:
     for name in wanted or ():
         if name not in out:
             raise UnknownNameError(f"message in {Path(path).name}", name, sorted(out) or present)
-    return out
+    return out, clock.begun
 
 
 def dataflash_parameters(path: str | os.PathLike[str]) -> dict[str, float]:
@@ -278,22 +338,23 @@ def _declared(log: Any) -> dict[int, dict[str, _FieldUnit]]:
 
 
 class _Rows:
-    """Messages of one kind: the instants (s) of the batches they stand in (NaN: none), and their
-    fields of numbers, eight bytes each.
+    """Messages of one kind: the instants (s) of the batches they stand in (NaN: none), what is to
+    be added to their own (s), and their fields of numbers, eight bytes each.
     """
 
     def __init__(self, form: Any) -> None:
-        self.form, self.now = form, array("d")
+        self.form, self.now, self.late = form, array("d"), array("d")
         self.fields = {
             name: array("d")
             for name, kind, letter in zip(form.columns, form.msg_types, form.msg_fmts, strict=False)
             if kind in (int, float) and letter != MODE
         }
 
-    def append(self, message: Any, now: float) -> None:
+    def append(self, message: Any, now: float, late: float) -> None:
         if message.fmt.columns != self.form.columns:
             return  # its format was declared anew
         self.now.append(now)
+        self.late.append(late)
         for name, values in self.fields.items():
             values.append(float(getattr(message, name)))
 
@@ -306,7 +367,7 @@ def _columns(rows: _Rows, known: Mapping[str, _FieldUnit]) -> dict[str, Column]:
         clock = BESIDE_THE_WEEK
     now, time, keep = np.array(rows.now), None, np.ones(len(rows.now), bool)
     if clock is not None:
-        time = factor * np.array(rows.fields[clock])
+        time = factor * np.array(rows.fields[clock]) + np.array(rows.late)
     elif (told := np.isfinite(now)).any():
         time, keep = now[told], told
     out = {}

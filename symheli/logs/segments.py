@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symheli.logs.column import Column, forward, without_holes
+from symheli.logs.column import RESTART, Column, forward, without_holes
 from symheli.logs.meaning import MAX_RATE, RATES, Guess
 from symheli.values.arrays import Array
 from symheli.values.units import to_si
@@ -21,9 +21,6 @@ REST_RATE = 0.005
 
 WINDOW = 2.0
 """Length of the window, s."""
-
-RESTART = 10.0
-"""A clock that goes back by more, s, began again."""
 
 MIN_DURATION = 5.0
 """Least duration, s, of a flight that is worth identifying from."""

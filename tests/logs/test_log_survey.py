@@ -13,7 +13,9 @@ from scipy.io import savemat
 from identification.judge.scores import percent
 from studies import cli
 from symheli.logs.column import Column
+from symheli.logs.dataflash import dataflash_columns
 from symheli.logs.meaning import guesses
+from symheli.records import FlightRecord
 
 DATA = Path(__file__).parents[1] / "data"
 STEP = 0.02
@@ -407,6 +409,41 @@ def test_flights_of_one_file_are_told_apart_by_the_hole_between_them_and_both_ar
     # all samples, none between; the last 0.3 of the time flown are held out, not of the clock
     assert found["rows_read"] == 900
     assert found["held_out_samples"] == pytest.approx(0.3 * found["samples"], abs=2)
+
+
+def test_a_dataflash_clock_that_begins_again_begins_another_segment_that_serves(
+    look, tmp_path, monkeypatch
+):
+    """Two flights of one file, the second on a clock from power on again; an instant far ahead of
+    its neighbours is damage, and no new beginning.
+    """
+    pytest.importorskip("pymavlink", reason="needs pymavlink: pip install 'symheli[logs]'")
+    monkeypatch.chdir(tmp_path)
+    rows, flown = [], flight(1500)
+    for k in range(1500):
+        again = k >= 700
+        us = int(1e6 * (20.0 + STEP * (k - 700 * again)))
+        q, theta, lon = (flown[name][k] for name in ("q", "theta", "lon"))
+        rows.append(("IMU", (us, 0, q, 20.0)))
+        rows.append(("ATT", (us, round(100 * np.degrees(theta)), 0)))
+        rows.append(("RATE", (us, round(1000 * lon))))
+    Path("log.bin").write_bytes(dataflash(rows))
+    seen, _ = look("log.bin")
+    first, second = seen["segments"]
+    assert (first["serves"], first["ends"]) == (True, "a hole of 10 s")
+    assert (second["serves"], second["ends"]) == (True, "the log ends")
+    # the second log is set 10 s behind the first
+    assert second["start"] - first["stop"] == pytest.approx(10.0, abs=2 * STEP)
+    record = FlightRecord.from_dataflash("log.bin", {"q": "IMU.GyrY"}, dt=STEP)
+    late = record.between(second["start"], None)
+    # the first of the others of the second log, before a RATE of it, are left out
+    expected = np.interp(late.time - second["start"], STEP * np.arange(800), flown["q"][700:])
+    # half a sample of the clock, in which q moves by less than this
+    assert np.max(np.abs(late["q"] - expected)) < np.abs(np.diff(flown["q"])).max()
+    assert len(late) == pytest.approx(800, abs=2)
+    rows[300] = ("IMU", (10**10, 0, 0.0, 20.0))
+    Path("wild.bin").write_bytes(dataflash(rows))
+    assert dataflash_columns("wild.bin")["log"].values.tolist() == [1.0, 2.0]
 
 
 def test_a_rate_that_is_exceeded_in_flight_is_no_crash(look, tmp_path):
