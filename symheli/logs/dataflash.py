@@ -6,7 +6,8 @@ A column is "message.field", such as "IMU.GyrY", of the first instance of the me
 and MULT messages); those are used. Headings count to 360 degrees and are made continuous.
 
 The instant of a message is in itself, on the autopilot's clock; in the logs of sdlog2 it is that of
-the latest message TIME.
+the latest message TIME. Where the clock begins again, a later log of the file is set `GAP` behind
+the one before it, and "log" is the number of the log.
 """
 
 from __future__ import annotations
