@@ -5,7 +5,7 @@ import pytest
 
 import symheli
 from evidence.tuning import THROW, parameters
-from studies.loops.tuned import loop_margins
+from studies.loops.tuned import QUANTITIES, loop_margins
 from symheli import AirspeedSchedule, Excitation
 from symheli.airframe.written import as_toml
 from symheli.errors import InputError
@@ -138,6 +138,35 @@ def test_a_gain_thirty_times_too_large_is_called_unstable(tune, ideal, loops, fo
     assert not any(row["stable"] for row in found["after"])
     assert all(row["stable"] for row in found["before"])
     assert "# After the change the loops are UNSTABLE" in written.read_text()
+
+
+def test_responses_are_shown_before_and_after_and_written_with_a_figure(tune, ideal, loops, folder):
+    pytest.importorskip("matplotlib")
+    out = folder / "figures"
+    words = ("--as-it-is", "--set", DOUBLED, "--airspeeds", "0,6", "--out", out)
+    found = tune(*words)
+    lateral = next(row for row in found["after"] if row["airspeed"] == 6.0)
+    changed = loops.with_parameters({"ATC_RAT_RLL_P": 0.04})
+    (true, *_) = loop_margins([ideal], changed, [6.0])
+    for name in QUANTITIES:
+        assert lateral[name] == pytest.approx(getattr(true, name), rel=1e-5, abs=1e-6), name
+        assert lateral[f"{name}_band"] == QUANTITIES[name].least  # one helicopter: no spread
+        assert found["units"][name] == QUANTITIES[name].unit
+    rows = np.genfromtxt(out / "tune.csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
+    assert rows["change"].tolist() == ["before"] * 6 + ["after"] * 6
+    assert rows["rejection"][9] == pytest.approx(lateral["rejection"])
+    assert "</svg>" in (out / "tune.svg").read_text()
+
+
+def test_a_proof_that_fails_says_why_and_stands_among_the_hypotheses(tune):
+    """The rate of the airspeed is that of the command."""
+    words = ("--airspeeds", "4,6", "--prove", "1", "--rate", "2")
+    found = tune("--as-it-is", "--set", MUCH, *words)
+    assert found["between"]["proven"] is False
+    assert found["between"]["rate"] == {"value": 2.0, "unit": "m/s^2"}
+    assert found["between"]["unstable_half_way"] == [5.0]
+    assert "NOT PROVEN that the changed loops are stable" in found["hypotheses"][1]
+    assert "from 4 to 6 m/s with |dV/dt| <= 2 m/s^2" in found["hypotheses"][1]
 
 
 def test_the_written_parameters_have_the_hypotheses_in_their_head(tune, folder):
