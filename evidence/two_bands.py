@@ -39,7 +39,7 @@ TRUTH, AIRSPEED = "xcell60", 8.0
 DRAWS = 20
 """Helicopters drawn from the calibration."""
 
-OFF_AXIS = ("q", "d_lat")
+OFF_AXIS = ("r", "d_col")
 """Drawn beside the responses that are on-axis."""
 
 
