@@ -14,9 +14,9 @@ import symheli
 from symheli import Helicopter, Servo
 from symheli.errors import InputError, TrimError
 from symheli.flight import HelicopterLoops
-from symheli.lpv import sample_delay
 from symheli.progress import tracked
 from symheli.values.arrays import Array
+from synthesis.loops.actuated import actuated
 from synthesis.loops.margins import loop, margins
 
 CONTROLS = ("d_lat", "d_lon", "d_ped")
@@ -62,14 +62,11 @@ def loop_margins(
     `delay` (s) is from command to servo, in whole periods of the loops. Raises `InputError` where
     it is not.
     """
-    late = delay / loops.dt
-    if not (late >= 0 and abs(late - round(late)) < 1e-6):
-        raise InputError(
-            f"delay: expected a multiple of the loops' period of {loops.dt:g} s, got {delay:g} s"
-        )
+    if not (math.isfinite(delay) and delay >= 0):
+        raise InputError(f"delay: expected seconds >= 0, got {delay:g}")
     rows = []
     for airspeed in tracked("margins", airspeeds):
-        each = [_at(h, loops, airspeed, servos, round(late)) for h in helicopters]
+        each = [_at(h, loops, airspeed, servos, delay) for h in helicopters]
         if each[0] is None:
             raise InputError(
                 f"the helicopter has no trim at {airspeed:g} m/s: leave this airspeed out"
@@ -85,7 +82,7 @@ def _at(
     loops: HelicopterLoops,
     airspeed: float,
     servos: Mapping[str, Servo] | None,
-    late: int,
+    delay: float,
 ) -> list[tuple[float, float, float, float]] | None:
     """Of each control: 1 where stable, gain margin (dB), phase margin (deg), crossover (rad/s);
     None without a trim.
@@ -94,13 +91,7 @@ def _at(
         model = symheli.linearize(heli, symheli.trim(heli, airspeed=float(airspeed)))
     except TrimError:
         return None
-    if servos:
-        model = model.driven_by({u: servos[u].linear(u) for u in model.inputs})
-    plant = model.discretize(loops.dt)
-    if late:
-        plant = plant.driven_by(
-            {str(u): sample_delay(str(u), late, loops.dt) for u in plant.inputs}
-        )
+    plant = actuated(model, servos, delay, loops.dt)
     out = []
     for control in CONTROLS:
         found = margins(loop(plant, loops.linear, control))
