@@ -33,20 +33,29 @@ there so that its gain is the peak: S = 1 - T; the disk is 1 / |S - 1/2|.
 """
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Proven:
-    """One specification as it is proven for every motion of the parameter at its rate: `value` in
-    the unit of the specification (NaN: nothing proven), that of the worst `frozen` model of the
-    same fit, the `certificate`, and the computing time, `seconds`.
+    """One specification as it is proven, by the `certificate` of its peak, for every motion of the
+    parameter at its rate; `seconds`: the computing time.
     """
 
     specification: Specification
-    value: float
-    frozen: float
     certificate: Certificate
     seconds: float
 
     __repr__ = summarized
+
+    @property
+    def value(self) -> float:
+        """In the unit of the specification; NaN where nothing is proven."""
+        proven = self.certificate.verified
+        return in_unit(self.specification.measure, self.certificate.gamma) if proven else math.nan
+
+    @property
+    def frozen(self) -> float:
+        """That of the worst frozen model of the same fit; NaN where one is unstable."""
+        frozen = self.certificate.frozen
+        return in_unit(self.specification.measure, frozen) if math.isfinite(frozen) else math.nan
 
     @property
     def margin(self) -> float:
@@ -127,6 +136,22 @@ def prove(
     ends of the range, otherwise of every motion of the parameter at most that fast, per second.
 
     The statement is about the fit of the plant that `peak_loop` makes. `options` are of `l2_gain`.
+
+    Examples
+    --------
+    >>> import symheli
+    >>> from synthesis.sheet.proven import prove
+    >>> from synthesis.sheet.sheet import Axis, Specification
+    >>> p = symheli.Scheduling("p", "1", 0.0, 1.0)
+    >>> cart = symheli.LPVStateSpace.polynomial(
+    ...     [[[0.0]]], [[[1.0]], [[1.0]]], [[[1.0]]], [[[0.0]]], p, inputs=("f",), outputs=("v",))
+    >>> axis = Axis(name="speed", control="f", response="v")
+    >>> disk = Specification(
+    ...     name="disk", axis="speed", measure="disk_phase", unit="deg", sense="at least",
+    ...     level_1=40.0, level_2=20.0, source="project target", length=1.0)
+    >>> gain = symheli.LinearModel.gain([[-3.0]], ("v",), ("f",))
+    >>> print(f"{prove(cart, gain, disk, axis).value:.0f} deg")  # of 3 (1 + p) / s
+    90 deg
     """
     begin = time.perf_counter()
     loop = peak_loop(
@@ -139,14 +164,4 @@ def prove(
         degree=degree,
     )
     certificate = l2_gain(loop, rate, **{"search": None, **options})
-    value = (
-        in_unit(specification.measure, certificate.gamma) if certificate.verified else math.nan
-    )
-    frozen = certificate.frozen
-    return Proven(
-        specification=specification,
-        value=value,
-        frozen=in_unit(specification.measure, frozen) if math.isfinite(frozen) else math.nan,
-        certificate=certificate,
-        seconds=time.perf_counter() - begin,
-    )
+    return Proven(specification, certificate, time.perf_counter() - begin)
