@@ -7,6 +7,7 @@ from __future__ import annotations
 import argparse
 import math
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,15 +17,15 @@ from studies.output import Output, columns, progress
 from symheli.errors import InputError, UnknownNameError
 
 if TYPE_CHECKING:
-    from symheli import LPVStateSpace
     from synthesis.sheet.evaluation import SpecificationTable
 
 HELP = "specification sheet over airspeed: design margins of controllers, frozen, proven and flown"
 
 LEGEND = """\
-margin: 0 % at the boundary of Level 1, -100 % at that of Levels 2 and 3, at most 100 %; in brackets,
-  and where the source is "not confirmed", it does not count
-worst: over all airspeeds; of an entry without boundaries, the range; flown: of 95 % of the flights"""
+margin: 0 % at the boundary of Level 1, -100 % at that of Levels 2 and 3, at most 100 %; in
+  brackets, and where the source is "not confirmed", it does not count
+worst: over all airspeeds; of an entry without boundaries, the range; flown: what 95 % of the
+  flights keep to"""
 
 ARGUMENTS = (
     positional(
@@ -52,21 +53,21 @@ ARGUMENTS = (
     several("--airspeeds", ("LOW", "HIGH"), "range, m/s (default: 0 13)", type=options.number),
     option("--points", "N", "airspeeds at which the models are frozen", options.at_least_one, 14),
     flag("--proven", "prove peaks and disk margins for every airspeed in between"),
-    option(
-        "--rate", "M/S^2", "largest |dV/dt| of the proofs; 0: airspeed held", options.rate, 0.0
-    ),
+    option("--rate", "M/S^2", "largest |dV/dt| of the proofs; 0: airspeed held", options.rate, 0.0),
     flag("--flown", "fly transitions in turbulence, and steps of attitude"),
-    option("--flights", "N", "of each transition, each with its own seed", options.at_least_one, 20),
-    option("--out", "DIR", "folder where designs, proofs and flights are kept", Path),
     option(
-        "--figure", "FILE", "picture of the margins (.png, .svg or .pdf)", options.picture
+        "--flights", "N", "of each transition, each with its own seed", options.at_least_one, 20
     ),
+    option("--out", "DIR", "folder where designs, proofs and flights are kept", Path),
+    option("--figure", "FILE", "picture of the margins (.png, .svg or .pdf)", options.picture),
+    option("--page", "FILE", "page (.html) with the picture, the margins and the sources", Path),
     flag("--whole", "print the whole sheet of every controller, not only of one"),
 )
 
 
 def run(arguments: argparse.Namespace) -> Output:
     """Design, evaluate frozen, and prove and fly where that is asked for."""
+    from studies.specs import page
     from studies.specs.of_vehicle import OfVehicle
     from synthesis.sheet.sheet import Sheet
 
@@ -98,11 +99,13 @@ def run(arguments: argparse.Namespace) -> Output:
         table = table.with_flown(
             flown(of, controllers, arguments.flights), time.perf_counter() - begin
         )
-    written = _figure(arguments, table)
-    head = (
-        f"{sheet.title}: {arguments.vehicle}, {low:g} to {high:g} m/s, {arguments.points} airspeeds,"
-        " servos, 20 ms of delay, 50 Hz"
+    lead = (
+        f"{arguments.vehicle}, {low:g} to {high:g} m/s, {arguments.points} airspeeds, servos, 20 ms"
+        " of delay, 50 Hz"
     )
+    head = f"{sheet.title}: {lead}"
+    table = replace(table, seconds={"controllers": designing, **table.seconds})
+    written = _written(arguments, table, lead, missing)
     shown = table.controllers if arguments.whole else table.controllers[:1]
     lines = [head, ""]
     if len(table.controllers) > 1:
@@ -111,14 +114,12 @@ def run(arguments: argparse.Namespace) -> Output:
         lines += [table.text(name), ""]
     lines += [LEGEND, ""]
     if table.proven:
-        lines += [_proofs(table, arguments.rate), ""]
+        rows = [page.PROOFS, *page.proofs(table)]
+        lines += [_about(arguments.rate), "", columns(rows, left=4), ""]
     lines += [f"{name}: {reason}" for name, reason in missing.items()]
-    lines.append(
-        f"{designing:.1f} s for the controllers; "
-        + ", ".join(f"{what} {s:.1f} s" for what, s in table.seconds.items())
-    )
+    progress("; ".join(f"{what} {s:.1f} s" for what, s in table.seconds.items()))
     lines += [f"wrote {path}" for path in written]
-    return Output("\n".join(lines), _data(table, missing, designing))
+    return Output("\n".join(lines).rstrip("\n"), _data(table, missing))
 
 
 def kept(arguments: argparse.Namespace) -> str:
@@ -170,40 +171,38 @@ def _cell(reached: Any) -> str:
     return "unstable" if math.isinf(reached.margin) and reached.margin < 0 else margin(reached)
 
 
-def _proofs(table: SpecificationTable, rate: float) -> str:
-    head = [
-        f"proven for every airspeed between the ends, held or changing at most at {rate:g} m/s^2, of"
-        " the cubic interpolation:"
-        if rate
-        else "proven for every airspeed between the ends, held, of the cubic interpolation:"
-    ]
-    rows = [["controller", "axis", "specification", "unit", "proven", "frozen", "margin, %", "s"]]
-    for name, proofs in table.proven.items():
-        for one in proofs:
-            spec = one.specification
-            value = "none" if math.isnan(one.value) else f"{one.value:.4g}"
-            frozen = "unstable" if math.isnan(one.frozen) else f"{one.frozen:.4g}"
-            share = "" if math.isnan(one.margin) else f"{one.margin:.0f}"
-            seconds = f"{one.seconds:.0f}"
-            rows.append([name, spec.axis, spec.name, spec.unit, value, frozen, share, seconds])
-    return "\n".join([*head, columns(rows, left=4)])
+def _about(rate: float) -> str:
+    """What the proofs are about."""
+    moving = f"changing at most at {rate:g} m/s^2" if rate else "held"
+    return (
+        f"Proven for every airspeed between the ends, {moving}, of the cubic interpolation of the"
+        " vehicle, sampled with its servos and the delay."
+    )
 
 
-def _figure(arguments: argparse.Namespace, table: SpecificationTable) -> list[Path]:
-    if arguments.figure is None:
-        return []
+def _written(
+    arguments: argparse.Namespace, table: SpecificationTable, lead: str, missing: dict[str, str]
+) -> list[Path]:
+    from studies.specs import page
     from synthesis.sheet.picture import save
 
-    return [save(table, arguments.figure)]
+    written = []
+    if arguments.figure is not None:
+        written.append(save(table, arguments.figure))
+    if arguments.page is not None:
+        about = _about(arguments.rate)
+        title = f"Specification sheet: {table.sheet.title}"
+        written.append(page.write(table, arguments.page, title, f"{lead}.", missing, about))
+    return written
 
 
-def _data(table: SpecificationTable, missing: dict[str, str], designing: float) -> dict[str, Any]:
+def _data(table: SpecificationTable, missing: dict[str, str]) -> dict[str, Any]:
     return {
         "title": table.sheet.title,
         "parameter": str(table.parameter),
         "unit": table.parameter.unit,
         "at": table.at,
-        "seconds": {"controllers": designing, **table.seconds},
+        "seconds": table.seconds,
         "missing": missing,
         "controllers": {
             name: {

@@ -1,1 +1,1 @@
-"""The specification sheet of a vehicle: the study's controllers and others, frozen, proven, flown."""
+"""The specification sheet of a vehicle, for the controllers of the study and others."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from studies.controllers.asked import CONTROLS, DELAY, PERIOD, SERVO_RATE
 from studies.controllers.flown import HIGH, LOW, WINDS, plan
-from studies.controllers.measures import AT_THE_STOP, heading, noise_of, rms, to_body
+from studies.controllers.measures import AT_THE_STOP, heading, noise_of, of_flight, rms, to_body
 from studies.controllers.measures import MEASUREMENTS as MEASURED
 from studies.specs.of_vehicle import FLIGHTS_FROM, OfVehicle, digest_of, share_met
 from symheli import (
@@ -96,8 +96,8 @@ def _of(vehicle: OfVehicle, K: LPVStateSpace, seeds: int) -> dict[tuple[str, str
 def measured(one: FlightData) -> dict[tuple[str, str], float]:
     """Return {(measure, control or ""): value} of one transition; nothing of a lost one.
 
-    Altitude and track are those of the air that the steady wind carries, from the velocity: no
-    controller of the study knows a position.
+    Altitude and track are how far the velocity has carried it from the reference, relative to the
+    air of the steady wind: no controller of the study knows a position or a heading.
     """
     if one.lost >= 0:
         return {}
@@ -113,16 +113,14 @@ def measured(one: FlightData) -> dict[tuple[str, str], float]:
     reference = np.column_stack([column[f"{s}_reference"] for s in ("u", "v", "w")])
     asked = np.einsum("nij,ni->nj", held, reference) - np.array(one.plan.wind.steady)
     gone = np.cumsum(level - asked, axis=0) * dt
+    whole = of_flight(one)
     out = {
-        ("speed", ""): rms(level[:, 0] - asked[:, 0]),
+        ("speed", ""): whole.speed,
         ("track", ""): float(np.abs(gone[:, 1]).max()),
         ("altitude", ""): float(np.abs(gone[:, 2]).max()),
         ("heading", ""): math.degrees(float(np.abs(psi).max())),
-        ("attitude", ""): math.degrees(
-            float(max(np.abs(true["phi"]).max(), np.abs(true["theta"]).max()))
-        ),
-        ("rotor_speed", ""): 100
-        * float(np.abs(column["Om"] / column["Om_reference"] - 1).max()),
+        ("attitude", ""): math.degrees(whole.attitude),
+        ("rotor_speed", ""): 100 * float(np.abs(column["Om"] / column["Om_reference"] - 1).max()),
     }
     for u, travel in zip(map(str, one.heli.inputs), one.heli.travel, strict=True):
         command = column[f"{u}_command"]

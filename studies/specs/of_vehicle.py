@@ -73,7 +73,8 @@ class OfVehicle:
     @cached_property
     def family(self) -> LinearFamily:
         """The exact linear models at every airspeed."""
-        return symheli.sweep(self.heli, np.linspace(*self.airspeeds, self.points), inputs=CONTROLS)
+        speeds = np.linspace(*self.airspeeds, self.points).tolist()
+        return symheli.sweep(self.heli, speeds, inputs=CONTROLS)
 
     @property
     def travel(self) -> dict[str, float]:

@@ -33,6 +33,4 @@ def actuated(
         )
     if not delay:
         return model
-    return model.driven_by(
-        {str(u): parts.delay(delay, str(u), PADE, dt) for u in model.inputs}
-    )
+    return model.driven_by({str(u): parts.delay(delay, str(u), PADE, dt) for u in model.inputs})

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -231,7 +231,7 @@ def worst(r: Reached) -> str:
     """Return the worst value in words: without boundaries, the range."""
     if math.isinf(r.margin) and r.margin < 0:
         return "unstable"
-    if not r.specification.sense and not math.isnan(r.least):
+    if not r.specification.sense and r.least < r.most:
         return f"{r.least:.4g} to {r.most:.4g}"
     return "" if math.isnan(r.value) else f"{r.value:.4g}"
 
@@ -428,8 +428,3 @@ def _worst(spec: Specification, values: Array, at: Array, stable: Array) -> Reac
 
 def _flown(spec: Specification, value: float) -> Reached:
     return Reached(spec, value, math.nan, spec.design_margin(value), value, value)
-
-
-def axes_of(table: SpecificationTable) -> Iterator[str]:
-    """Return the axes of the sheet in order."""
-    yield from dict.fromkeys(s.axis for s in table.sheet.specifications)

@@ -17,7 +17,7 @@ from scipy.optimize import least_squares
 from symheli.errors import InputError
 from symheli.lpv import LinearModel
 from symheli.values.arrays import Array
-from symheli.values.signal import indices
+from symheli.values.signal import Signal, indices, signals
 from synthesis.loops.handling_qualities import Bandwidth, bandwidth
 from synthesis.loops.margins import Margins, loop, margins
 from synthesis.sheet.sheet import Axis, Specification
@@ -90,9 +90,9 @@ class AxisLoop:
             B,
             np.vstack([rows[:1], control, rows[1:]]),
             np.vstack([[[0.0]], -K.D[[k], [j]][None, :], np.zeros((len(others) - 1, 1))]),
-            (*P.states, *(f"controller_{s}" for s in K.states)),
-            ("command",),
-            ("response", "control", *(["coupled"] if axis.coupled else [])),
+            _with_controller(P, K),
+            signals(("command",)),
+            signals(("response", "control", *(["coupled"] if axis.coupled else []))),
             P.dt,
         )
 
@@ -208,7 +208,7 @@ def mode_damping(T: LinearModel, band: tuple[float, float]) -> float:
     """Return the least damping of the modes with a natural frequency within `band`, rad/s, that are
     at least `SHARE` of the response of one output to a unit step; 1 where there is none.
     """
-    poles, left, right = eig(T.A, left=True, right=True)
+    poles, left, right = (np.asarray(part) for part in eig(T.A, left=True, right=True))
     if T.dt is None:
         s, steady = poles, -poles
     else:
@@ -218,14 +218,14 @@ def mode_damping(T: LinearModel, band: tuple[float, float]) -> float:
     with np.errstate(divide="ignore", invalid="ignore"):
         weight = np.sum(left.conj() * right, axis=0)
         share = (T.C @ right)[0] * (left.conj().T @ T.B)[:, 0] / (weight * steady)
-    seen = np.abs(share) * np.where(np.abs(poles.imag) > 0, 2.0, 1.0) >= SHARE
+    seen = np.abs(share) * np.where(np.abs(np.imag(poles)) > 0, 2.0, 1.0) >= SHARE
     kept = seen & (size >= band[0]) & (size <= band[1]) & (size > 0)
-    return float((-s[kept].real / size[kept]).min(initial=1.0))
+    return float((-np.real(s[kept]) / size[kept]).min(initial=1.0))
 
 
 def first_order_fit(y: Array, t: Array) -> tuple[float, float]:
-    """Return a (1/s) and tau (s) of b (1 - exp(-a (t - tau))) / a from tau on, 0 before, that fits a
-    step response (n,) best; a = 0 is a ramp.
+    """Return a (1/s) and tau (s) of b (1 - exp(-a (t - tau))) / a from tau on, 0 before, that fits
+    a step response (n,) best; a = 0 is a ramp.
     """
 
     def fitted(x: Array) -> Array:
@@ -241,6 +241,11 @@ def first_order_fit(y: Array, t: Array) -> tuple[float, float]:
     best = min(starts, key=lambda x: float(np.sum(fitted(np.array(x)) ** 2)))
     found = least_squares(fitted, best, bounds=((0.0, 0.0), high), x_scale=(1 / end, 0.1 * end))
     return float(found.x[0]), float(found.x[1])
+
+
+def _with_controller(P: LinearModel, K: LinearModel) -> tuple[Signal, ...]:
+    """Return the states of a plant and its controller."""
+    return signals((*P.states, *(f"controller_{s}" for s in K.states)))
 
 
 def _step(model: LinearModel, window: float) -> tuple[Array, Array]:
@@ -316,9 +321,9 @@ def _rate_at_the_stop(at: AxisLoop, spec: Specification) -> float:
         np.vstack([seen.B[:, [k]], np.zeros((len(K.A), 1))]),
         np.hstack([shown.C, np.zeros((1, len(K.A)))]),
         np.zeros((1, 1)),
-        (*P.states, *(f"controller_{s}" for s in K.states)),
-        (axis.control,),
-        (axis.response,),
+        _with_controller(P, K),
+        signals((axis.control,)),
+        signals((axis.response,)),
         P.dt,
     )
     y, _ = _step(free, spec.window)

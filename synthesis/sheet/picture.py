@@ -5,25 +5,31 @@ parameter.
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.values.drawing import GRID, INK, RED, axes_of, windowless_figure
+from symheli.values.drawing import GRID, INK, RED, axes_of, label, windowless_figure
 from symheli.values.whole_files import write_bytes
 from synthesis.sheet.sheet import Specification
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from synthesis.sheet.evaluation import SpecificationTable
 
 LOWEST, HIGHEST = -210.0, 110.0
 """Ends of the margins that are shown, percent; what is lower is an arrow at the end."""
 
-LEVELS = {"Level 1": (0.0, HIGHEST, "#ffffff"), "2": (-100.0, 0.0, "#e3e8ec"), "3": (LOWEST, -100.0, "#c3ccd4")}
+LEVELS = {
+    "Level 1": (0.0, HIGHEST, "#ffffff"),
+    "2": (-100.0, 0.0, "#e3e8ec"),
+    "3": (LOWEST, -100.0, "#c3ccd4"),
+}
 """Shades of grey, so that the marks have the colours."""
 
 COLOURS = "viridis"
@@ -92,39 +98,41 @@ def plot_margins(
     ax.tick_params(axis="both", length=0, labelsize=8)
     ax.spines[["top", "right", "left", "bottom"]].set_visible(False)
     unstable = "" if stable.all() else f", × unstable at {int((~stable).sum())} of {len(stable)}"
-    ax.set_title(f"{axis}: {controller}{unstable}", fontsize=9, loc="left", pad=14)
+    ax.set_title(f"{axis}: {controller}{unstable}", fontsize=8, loc="left", pad=14)
     if bar and marks is not None:
-        s = table.parameter
-        ax.figure.colorbar(marks, ax=ax, label=f"{s} ({s.unit})", pad=0.02, aspect=30)
+        ax.figure.colorbar(marks, ax=ax, label=label(table.parameter), pad=0.02, aspect=30)
     return ax
 
 
-def save(table: SpecificationTable, path: Path) -> Path:
-    """Write the margins of all axes, a row an axis and a column a controller."""
-    axes = list(dict.fromkeys(s.axis for s in table.frozen if s.sense))
-    heights = [len(shown(table, axis)) for axis in axes]
-    names = table.controllers
-    figure = windowless_figure(
-        1.9 + 3.3 * len(names), sum(0.75 + 0.21 * n for n in heights) + 0.5
-    )
+def figure_of(table: SpecificationTable, axes: Sequence[str] | None = None) -> Figure:
+    """Return the margins of these axes (None: of all), a row an axis and a column a controller."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    rows = axes or list(dict.fromkeys(s.axis for s in table.frozen if s.sense))
+    names, heights = table.controllers, [len(shown(table, axis)) for axis in rows]
+    figure = windowless_figure(2.6 + 2.3 * len(names), sum(0.8 + 0.21 * n for n in heights) + 0.4)
     grid = figure.subplots(
-        len(axes),
+        len(rows),
         len(names),
         squeeze=False,
         sharey="row",
         gridspec_kw={"height_ratios": [n + 3.0 for n in heights]},
     )
-    for i, axis in enumerate(axes):
+    for i, axis in enumerate(rows):
         for k, name in enumerate(names):
-            plot_margins(table, axis, name, grid[i, k], bar=False)
-            if i < len(axes) - 1:
-                grid[i, k].set_xlabel("")
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
-
+            ax = plot_margins(table, axis, name, grid[i, k], bar=False)
+            ax.tick_params(labelleft=k == 0)
+            if i < len(rows) - 1:
+                ax.set_xlabel("")
     s = table.parameter
     colours = ScalarMappable(Normalize(table.at.min(), table.at.max()), COLOURS)
-    figure.colorbar(colours, ax=grid, label=f"{s} ({s.unit})", shrink=0.4, pad=0.01)
+    figure.colorbar(colours, ax=grid, label=label(s), pad=0.01, aspect=30, fraction=0.03)
+    return figure
+
+
+def save(table: SpecificationTable, path: Path) -> Path:
+    """Write the margins of all axes in the format of the file's name."""
     content = io.BytesIO()
-    figure.savefig(content, format=path.suffix.removeprefix(".").lower(), dpi=130)
+    figure_of(table).savefig(content, format=path.suffix.removeprefix(".").lower(), dpi=130)
     return write_bytes(path, content.getvalue())

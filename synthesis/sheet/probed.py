@@ -33,7 +33,11 @@ def is_asked(given: object) -> bool:
 
 
 def probed(
-    controller: Any, measurements: Sequence[Signal], controls: Sequence[Signal], p: Signal, at: float
+    controller: Any,
+    measurements: Sequence[Signal],
+    controls: Sequence[Signal],
+    p: Signal,
+    at: float,
 ) -> LinearModel:
     """Return u = K (measured - reference) of a controller with `dt`, `reset` or `init`, and `step`,
     around rest with its scheduling parameter held: the realization of its responses to a pulse of

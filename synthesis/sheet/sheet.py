@@ -193,9 +193,7 @@ class Sheet:
         """Return the sheet for a vehicle of this rotor radius, m; see
         `Specification.at_length`.
         """
-        return replace(
-            self, specifications=tuple(s.at_length(length) for s in self.specifications)
-        )
+        return replace(self, specifications=tuple(s.at_length(length) for s in self.specifications))
 
 
 def _specification(axis: str, entry: Mapping[str, Any], lengths: Mapping[str, float]):

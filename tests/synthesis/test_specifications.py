@@ -1,5 +1,5 @@
-"""The specification sheet: measures against closed forms, python-control and slycot, Froude scaling,
-and what is refused.
+"""The specification sheet: measures against closed forms and slycot, Froude scaling, and what is
+refused.
 """
 
 import math
@@ -160,11 +160,11 @@ def test_the_integral_of_a_rate_lags_it_by_90_deg(dt):
     rate = tf([5.0], [1, 5.0])
     rate = rate if dt is None else rate.discretize(dt)
     omega = np.array([0.3, 2.0, 20.0])
-    ratio = (
-        integral(rate).frequency_response(omega) / rate.frequency_response(omega)
-    )[:, 0, 0]
+    ratio = (integral(rate).frequency_response(omega) / rate.frequency_response(omega))[:, 0, 0]
     assert np.angle(ratio) == pytest.approx(-math.pi / 2 * np.ones(3), abs=1e-9)
-    assert np.abs(ratio) * omega == pytest.approx(np.ones(3), rel=0.02)  # (w dt)^2 / 12 at w dt = .4
+    assert np.abs(ratio) * omega == pytest.approx(
+        np.ones(3), rel=0.02
+    )  # (w dt)^2 / 12 at w dt = .4
 
 
 @pytest.mark.parametrize("dt", [None, 0.01])
@@ -322,8 +322,10 @@ def test_what_is_proven_is_no_better_than_the_worst_frozen_value(measure):
         outputs=("y",),
     )
     K = LinearModel.gain([[-2.0]], ("y",), ("u",))
-    one = spec(measure) if measure == "disk_phase" else spec(
-        measure, sense="at most", level_1=6.0, level_2=9.0
+    one = (
+        spec(measure)
+        if measure == "disk_phase"
+        else spec(measure, sense="at most", level_1=6.0, level_2=9.0)
     )
     proof = prove(arm, K, one, AXIS)
     table = synthesis.specifications(arm, {"P": K}, replace(sheet_of(), specifications=(one,)))
@@ -335,8 +337,8 @@ def test_what_is_proven_is_no_better_than_the_worst_frozen_value(measure):
 
 def test_what_cannot_be_evaluated_is_refused_in_words(tmp_path):
     gain = {("u", "y"): -3.0}
+    other = replace(sheet_of("damping"), axes={"arm": replace(AXIS, control="d_lat")})
     with pytest.raises(InputError, match="none of the axes"):
-        other = replace(sheet_of("damping"), axes={"arm": replace(AXIS, control="d_lat")})
         synthesis.specifications(cart(), {"P": gain}, other)
     with pytest.raises(UnknownNameError, match="damping"):
         synthesis.specifications(cart(), {"P": gain}, sheet_of("dampin"))
@@ -349,7 +351,7 @@ def test_what_cannot_be_evaluated_is_refused_in_words(tmp_path):
     (tmp_path / "no.toml").write_text("[[specification]]\nname = 1\n")
     with pytest.raises(InputError, match="an entry of the sheet is wrong"):
         Sheet.load(tmp_path / "no.toml")
-    with pytest.raises(InputError, match="no.such"):
+    with pytest.raises(InputError, match=r"no\.such"):
         Sheet.load(tmp_path / "no.such")
     with pytest.raises(UnknownNameError, match="rol"):
         Sheet.load().select(["rol"])
@@ -357,9 +359,7 @@ def test_what_cannot_be_evaluated_is_refused_in_words(tmp_path):
 
 def test_rejection_bandwidth_needs_no_grid():
     """A narrow dip below -3 dB, 1e-3 wide, is found."""
-    S = LinearModel.from_control(
-        control.tf2ss(control.tf([1, 1e-4, 4], [1, 1e-3, 4]))
-    )
+    S = LinearModel.from_control(control.tf2ss(control.tf([1, 1e-4, 4], [1, 1e-3, 4])))
     found = rejection_bandwidth(S)
     gain = abs(S.frequency_response([found])[0, 0, 0])
     assert gain == pytest.approx(10 ** (-3 / 20), rel=1e-4)
