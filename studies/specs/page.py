@@ -58,7 +58,7 @@ def write(
             verdicts=[(name, table.verdict(name)) for name in table.controllers],
             missing=missing,
             pictures=pictures,
-            width=260 + 190 * count,
+            width=380 + 190 * count,
             least=170 + 90 * count,
             controllers=table.controllers,
             margins=_margins(table),
