@@ -29,9 +29,7 @@ def frozen(names: Sequence[str] = NAMES, folder: Path | None = None) -> Specific
 def row(table: SpecificationTable, name: str) -> list[str]:
     """Return how many entries that count are in Level 1, and the least margin of each axis."""
     counted = [
-        r
-        for r in table.reached(name)
-        if r.specification.counts and not math.isnan(r.margin)
+        r for r in table.reached(name) if r.specification.counts and not math.isnan(r.margin)
     ]
     inside = sum(r.margin >= 0 for r in counted)
     least = [

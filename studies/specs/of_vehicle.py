@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 import symheli
-from studies.controllers.asked import CONTROLS, DELAY, SERVO_RATE, TOP
+from studies.controllers.asked import CONTROLS, DELAY, POINTS, SERVO_RATE, TOP
 from studies.controllers.certified import FORM, SOLVER
 from studies.controllers.designs import (
     IDENTIFIED,
@@ -114,7 +114,9 @@ class OfVehicle:
         They are about the cubic interpolation of plant and controller.
         """
         wanted = [s for s in provable(self.scaled) if axes is None or s.axis in axes]
-        plant = self.family.interpolate("polynomial", PROOF_DEGREE, rate=max(rate, 1e-9))
+        speeds = np.linspace(*self.airspeeds, max(self.points, POINTS)).tolist()
+        family = symheli.sweep(self.heli, speeds, inputs=CONTROLS)
+        plant = family.interpolate("polynomial", PROOF_DEGREE, rate=rate)
         jobs = [(name, spec) for name in controllers for spec in wanted]
         found: dict[str, list[Proven]] = {name: [] for name in controllers}
         for name, spec in tracked("proving", jobs, len(jobs)):

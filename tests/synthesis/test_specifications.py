@@ -364,3 +364,17 @@ def test_rejection_bandwidth_needs_no_grid():
     gain = abs(S.frequency_response([found])[0, 0, 0])
     assert gain == pytest.approx(10 ** (-3 / 20), rel=1e-4)
     assert 2.0 < found < 2.001
+
+
+def test_a_picture_has_a_mark_an_airspeed_in_the_shades_of_the_levels():
+    sheet = sheet_of("rejection_bandwidth", level_1=6.0, level_2=3.0)
+    table = synthesis.specifications(cart(), {"P": {("u", "y"): -3.0}}, sheet, at=[0, 0.5, 1])
+    ax = table.plot("arm")
+    marks = np.concatenate(
+        [one.get_offsets() for one in ax.collections if len(one.get_offsets()) == 3]
+    )
+    exact = 100 * (3 * np.array([1, 1.5, 2]) / math.sqrt(10**0.3 - 1) - 6) / 3
+    assert marks[:, 0] == pytest.approx(np.minimum(exact, 100))
+    assert len(ax.patches) == 3
+    with pytest.raises(InputError, match="no frozen specification"):
+        table.plot("leg")
