@@ -164,7 +164,8 @@ class OfVehicle:
         return result
 
     def _key(self, what: str) -> str:
-        text = f"{self._content}\n{what}\n{self.airspeeds}\n{self.points}\n{self.scaled}"
+        text = f"{self._content}\n{what}\n{self.airspeeds}\n{self.points}\n"
+        text += f"{self.scaled.axes}\n{self.scaled.specifications}"
         return hashlib.sha256(text.encode()).hexdigest()
 
     @cached_property

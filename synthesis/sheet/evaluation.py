@@ -72,6 +72,23 @@ class SpecificationTable:
         {controller: tuple of Proven}: what is proven for every value of the parameter.
     seconds : mapping
         {what: computing time}, s.
+
+    Examples
+    --------
+    >>> import symheli, synthesis
+    >>> from synthesis.sheet.sheet import Axis
+    >>> lag = symheli.LinearModel([[-1.0]], [[2.0]], [[1.0]], [[0.0]], ("x",), ("u",), ("y",))
+    >>> family = symheli.LinearFamily.from_models([0.0, 5.0], [lag, lag])
+    >>> axis = Axis(name="arm", control="u", response="y")
+    >>> phase = Specification(
+    ...     name="phase margin", axis="arm", measure="phase_margin", unit="deg", sense="at least",
+    ...     level_1=45.0, level_2=22.5, source="project target", length=1.0)
+    >>> sheet = Sheet(title="arm", axes={"arm": axis}, specifications=(phase,))
+    >>> table = synthesis.specifications(family, {"P": {("u", "y"): -2.0}}, sheet)
+    >>> print(table.over("P", "arm", "phase margin").round(1))  # of 4 / (s + 1)
+    [104.5 104.5]
+    >>> print(table.verdict("P"))
+    1 of 1 entries that count are in Level 1; least margin 100 %: arm, phase margin
     """
 
     sheet: Sheet
@@ -312,7 +329,7 @@ def specifications(
     ...         sense="at least", level_1=2.0, level_2=1.0, source="project target", length=1.0),))
     >>> table = synthesis.specifications(cart, {"P": {("f", "v"): -3.0}}, sheet, at=[0.0, 1.0])
     >>> print(table.over("P", "speed", "rejection").round(2))  # 3 (1 + p) / sqrt(10^0.3 - 1)
-    [3.   6.01]
+    [3.01 6.01]
     >>> print(f"{table.mark('P').margin:.0f} % at p = {table.mark('P').at:g}")
     100 % at p = 0
     """

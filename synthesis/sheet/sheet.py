@@ -14,6 +14,7 @@ from typing import Any, Literal
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.values.numbers import positive
+from symheli.values.summary import as_table, summarized
 
 SMALL_HELICOPTER = Path(__file__).parent / "small_helicopter.toml"
 
@@ -121,7 +122,7 @@ class Specification:
         )
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Sheet:
     """A specification sheet: axes by name, and specifications in the order they are shown, one axis
     after the other.
@@ -138,6 +139,9 @@ class Sheet:
     title: str
     axes: Mapping[str, Axis]
     specifications: tuple[Specification, ...]
+
+    __repr__ = summarized
+    _repr_html_ = as_table
 
     @classmethod
     def load(cls, path: str | os.PathLike[str] | None = None) -> Sheet:
