@@ -66,7 +66,7 @@ class AxisLoop:
     @cached_property
     def closed(self) -> LinearModel:
         """From the command of the response to the response, the control (the command to the servo),
-        and the coupled signal if there is one.
+        and the coupled signal if the plant has it.
         """
         P, K, axis = self.plant, self.controller, self.axis
         (j,) = indices([axis.response], K.inputs, "measurement of the controller")
@@ -80,7 +80,8 @@ class AxisLoop:
         A = np.block([[P.A + seen.B @ K.D @ seen.C, seen.B @ K.C], [K.B @ seen.C, K.A]])
         B = -np.vstack([seen.B @ K.D[:, [j]], K.B[:, [j]]])
         control = np.hstack([K.D[[k]] @ seen.C, K.C[[k]]])
-        others = [axis.response, *([axis.coupled] if axis.coupled else [])]
+        coupled = [axis.coupled] if axis.coupled in P.outputs else []
+        others = [axis.response, *coupled]
         shown = P.select(inputs=K.outputs, outputs=others)
         if np.any(shown.D):
             raise InputError(f"{', '.join(others)}: an input acts on one directly, without a state")
@@ -92,7 +93,7 @@ class AxisLoop:
             np.vstack([[[0.0]], -K.D[[k], [j]][None, :], np.zeros((len(others) - 1, 1))]),
             _with_controller(P, K),
             signals(("command",)),
-            signals(("response", "control", *(["coupled"] if axis.coupled else []))),
+            signals(("response", "control", *("coupled" for _ in coupled))),
             P.dt,
         )
 
@@ -290,7 +291,7 @@ def _quickness(at: AxisLoop, spec: Specification) -> float:
 
 
 def _coupling(at: AxisLoop, spec: Specification) -> float:
-    if not at.axis.coupled:
+    if "coupled" not in at.closed.outputs:
         return math.nan
     return float(np.abs(at.stepped(spec.window)[0][:, 2]).max()) / at.axis.step
 
