@@ -29,6 +29,7 @@ VERBS = (
     "calibrate",
     "tune",
     "margins",
+    "specs",
     "synthesize",
     "certify",
     "verify",

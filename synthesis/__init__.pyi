@@ -80,6 +80,9 @@ from synthesis.plant.plant import Plant as Plant
 from synthesis.polynomial.matrix import PolynomialMatrix as PolynomialMatrix
 from synthesis.program.cone_program import Solver as Solver
 from synthesis.program.cone_program import installed_solvers as installed_solvers
+from synthesis.sheet.evaluation import SpecificationTable as SpecificationTable
+from synthesis.sheet.evaluation import specifications as specifications
+from synthesis.sheet.sheet import Sheet as Sheet
 from synthesis.worst.frozen import frozen_gain as frozen_gain
 from synthesis.worst.lft import frozen_box_gain as frozen_box_gain
 from synthesis.worst.lower_bound import Search as Search

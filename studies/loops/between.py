@@ -11,13 +11,13 @@ import numpy as np
 import symheli
 import synthesis
 from studies.loops.responses import closed_loops
-from studies.loops.tuned import periods, sampled_plant
 from symheli import Helicopter, LinearFamily, LPVStateSpace, Servo
 from symheli.errors import InputError, TrimError
 from symheli.flight import HelicopterLoops
 from symheli.progress import task, tracked
 from symheli.values.arrays import Array
 from synthesis import Certificate
+from synthesis.loops.actuated import actuated
 
 APART = 2.0
 """Largest distance (m/s) of the airspeeds between which the plant is taken as straight."""
@@ -89,13 +89,12 @@ def stable_between(
         raise InputError(
             f"a proof between airspeeds needs two of them, got {low:g} to {high:g} m/s"
         )
-    late = periods(delay, loops)
     airspeeds = np.linspace(low, high, max(math.ceil((high - low) / APART), 1) + 1)
     halfway = 0.5 * (airspeeds[1:] + airspeeds[:-1])
 
     def plants(heli: Helicopter, at: Array) -> LinearFamily:
         family = symheli.sweep(heli, at.tolist())
-        each = family.models.each(lambda m: sampled_plant(m, loops.dt, servos, late))
+        each = family.models.each(lambda m: actuated(m, servos, delay, loops.dt))
         return replace(family, models=each)
 
     found: list[tuple[LPVStateSpace, LPVStateSpace, Certificate]] = []

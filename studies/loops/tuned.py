@@ -13,13 +13,13 @@ import numpy as np
 
 import symheli
 from studies.loops.responses import Responses, closed_loops, responses
-from symheli import Helicopter, LinearModel, Servo
+from symheli import Helicopter, Servo
 from symheli.errors import InputError, TrimError
 from symheli.flight import HelicopterLoops
 from symheli.flight.ardupilot import AXES, COMMANDS
-from symheli.lpv import sample_delay
 from symheli.progress import tracked
 from symheli.values.arrays import Array
+from synthesis.loops.actuated import actuated
 from synthesis.loops.margins import loop, margins
 
 CONTROLS = tuple(control for _, _, control in AXES.values())
@@ -111,10 +111,11 @@ def loop_margins(
     `delay` (s) is from command to servo, in whole periods of the loops. Raises `InputError` where
     it is not.
     """
-    late = periods(delay, loops)
+    if not (math.isfinite(delay) and delay >= 0):
+        raise InputError(f"delay: expected seconds >= 0, got {delay:g}")
     rows = []
     for airspeed in tracked("margins", airspeeds):
-        each = [_at(h, loops, airspeed, servos, late) for h in helicopters]
+        each = [_at(h, loops, airspeed, servos, delay) for h in helicopters]
         if each[0] is None:
             raise InputError(
                 f"the helicopter has no trim at {airspeed:g} m/s: leave this airspeed out"
@@ -125,34 +126,12 @@ def loop_margins(
     return rows
 
 
-def periods(delay: float, loops: HelicopterLoops) -> int:
-    """A delay (s) in periods of the loops; `InputError` where it is no whole number of them."""
-    late = delay / loops.dt
-    if not (late >= 0 and abs(late - round(late)) < 1e-6):
-        raise InputError(
-            f"delay: expected a multiple of the loops' period of {loops.dt:g} s, got {delay:g} s"
-        )
-    return round(late)
-
-
-def sampled_plant(
-    model: LinearModel, dt: float, servos: Mapping[str, Servo] | None, late: int
-) -> LinearModel:
-    """A continuous model behind servos, sampled, behind a delay of `late` periods."""
-    if servos:
-        model = model.driven_by({u: servos[u].linear(u) for u in model.inputs})
-    plant = model.discretize(dt)
-    if not late:
-        return plant
-    return plant.driven_by({str(u): sample_delay(str(u), late, dt) for u in plant.inputs})
-
-
 def _at(
     heli: Helicopter,
     loops: HelicopterLoops,
     airspeed: float,
     servos: Mapping[str, Servo] | None,
-    late: int,
+    delay: float,
 ) -> list[list[float]] | None:
     """Of each control: 1 where stable, crossover (rad/s), then `QUANTITIES`; None without a
     trim.
@@ -161,7 +140,7 @@ def _at(
         model = symheli.linearize(heli, symheli.trim(heli, airspeed=float(airspeed)))
     except TrimError:
         return None
-    plant = sampled_plant(model, loops.dt, servos, late)
+    plant = actuated(model, servos, delay, loops.dt)
     closed = closed_loops(plant, loops)
     unknown = Responses(*[math.nan] * len(Responses._fields))
     felt = responses(closed, RESPOND) if closed.is_stable() else dict.fromkeys(CONTROLS, unknown)

@@ -37,7 +37,11 @@ class Bandwidth(NamedTuple):
 
 
 def bandwidth(
-    model: LinearModel, band: tuple[float, float] = (1.0, 60.0), points: int = 2000
+    model: LinearModel,
+    band: tuple[float, float] = (1.0, 60.0),
+    points: int = 2000,
+    *,
+    command: bool = False,
 ) -> Bandwidth:
     """Compute the ADS-33 bandwidth and phase delay of an attitude response.
 
@@ -45,12 +49,15 @@ def bandwidth(
     ----------
     model : LinearModel
         One input, one output: rad per rad of stick. Put servos and delays into it first; a response
-        of opposite sign is turned round.
+        of opposite sign is turned round, unless it is that to a `command`.
     band : (float, float)
         Searched, rad/s; its lower end lies above the phugoid, where attitude already integrates
         rate (phase near -90 deg).
     points : int
         Of the frequency grid.
+    command : bool
+        The input is the commanded attitude, which the response follows: in phase with it, or up to
+        half a turn away, at the lower end of the band.
 
     Returns
     -------
@@ -91,7 +98,8 @@ def bandwidth(
         raise InputError(f"{model.outputs[0]} does not respond to {model.inputs[0]}")
     phase = np.unwrap(np.angle(values))
     # within half a turn of the -90 deg of an integrated rate; the sign of the stick is a convention
-    phase += np.pi * np.round((-np.pi / 2 - phase[0]) / np.pi)
+    if not command:
+        phase += np.pi * np.round((-np.pi / 2 - phase[0]) / np.pi)
 
     def lag(omega: float) -> float:
         value = complex(model.frequency_response([omega])[0, 0, 0])

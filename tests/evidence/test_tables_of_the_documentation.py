@@ -13,7 +13,7 @@ from typing import NamedTuple
 import pytest
 
 import synthesis
-from evidence import logs, responses, tuning, two_bands
+from evidence import logs, responses, specs, tuning, two_bands
 from evidence.bracket.measured import GAINS, bracket
 from evidence.jerk.measured import TransitionPlan, fastest
 from evidence.marks import calibrated, guarantee, measured
@@ -219,7 +219,19 @@ def _ran(*arguments):
     return found.stdout
 
 
+def margins_of_the_lqr_schedule():
+    """Every least margin to a percent: a hair of its design moves some by half of one."""
+    cells = KEPT["controllers.md", "specification sheet"].cells("LQR schedule")
+    found = specs.row(specs.frozen(["LQR schedule"]), "LQR schedule")[1:]
+    assert found[0] == cells[0]
+    for new, old in zip(found[1:], cells[1:], strict=True):
+        (number, name), (shown, of) = (cell.split(" ", 1) for cell in (new, old))
+        assert name == of
+        assert abs(float(number) - float(shown)) <= 1.0
+
+
 ROWS = {
+    ("controllers.md", "specification sheet"): margins_of_the_lqr_schedule,
     ("gains.md", "interpolated"): lambda: proven_by_p_alone("interpolated", lateral_loop(_xcell())),
     ("gains.md", "exact"): lambda: proven_by_p_alone("exact", ExactLateral.of(_xcell()).loop()),
     ("gains.md", "identified"): frozen_gain_of_the_exact_servo_loop,

@@ -72,6 +72,7 @@ EXEMPT: dict[str, str] = {
                 "Estimator",
                 "GainCurve",
                 "Margins",
+                "SpecificationTable",
                 "Tube",
             ),
             *(),

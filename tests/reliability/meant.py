@@ -71,6 +71,16 @@ def _no_phase_delay(found: NotANumber, arguments: Arguments) -> bool:
     return math.isinf(omega) or (dt is not None and 2 * omega > 0.999 * math.pi / dt)
 
 
+def _where_unstable(found: NotANumber, _: Arguments) -> bool:
+    """A value of a specification that is always defined is missing only where the loop is not
+    stable, which the table says.
+    """
+    table = found.owners[0]
+    return not any(
+        np.isnan(values[:, table.stable[name]]).any() for name, values in table.values.items()
+    )
+
+
 # --- records and predictions ---------------------------------------------------------------------
 
 
@@ -232,6 +242,7 @@ BY_ENTRY: dict[str, tuple[tuple[str, Rule], ...]] = {
     "identification.KinematicModel.predict": (("", _past_is_incomplete),),
     "identification.LPVARXModel.score": ((r"\['\w+'\]", _nothing_predicted),),
     "identification.KinematicModel.score": ((r"\['\w+'\]", _nothing_predicted),),
+    "synthesis.specifications": ((r"\.values\['.*'\]", _where_unstable),),
     "identification.Scores.of": ((r"\.(one_step|ahead|free_run)\['\w+'\]", _nothing_to_compare),),
     "identification.scores": ((r"\.(one_step|ahead|free_run)\['\w+'\]", _nothing_predicted),),
 }

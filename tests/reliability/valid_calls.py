@@ -17,6 +17,8 @@ from collections.abc import Callable, Iterator
 from types import CodeType, FrameType
 from typing import Any, NamedTuple
 
+import symheli.threads
+
 PACKAGES = ("symheli", "identification", "synthesis")
 EXAMPLE = "<doctest"
 INSIDE = {
@@ -101,7 +103,10 @@ def caught(entries: Callable[[str], bool] = lambda _: True) -> list[ValidCall]:
             first = next(iter(frame.f_locals.values()), None)
             made = first if isinstance(first, type) else type(first)
             entry = classes.get(made, "")
-        direct = frame.f_back.f_code.co_filename.startswith(EXAMPLE)
+        caller: FrameType | None = frame.f_back
+        while caller is not None and caller.f_code.co_filename == symheli.threads.__file__:
+            caller = caller.f_back  # a decorator of this project is not who asks
+        direct = caller is not None and caller.f_code.co_filename.startswith(EXAMPLE)
         if not entry or not (direct or (entry in INSIDE and not seen.get(entry))):
             return
         seen[entry] = seen.get(entry, 0) + 1

@@ -124,7 +124,7 @@ def test_delay_and_servos_cost_phase(ideal, loops):
     servo = symheli.Servo(natural_frequency=40.0, damping=0.7)
     servos = dict.fromkeys(map(str, ideal.inputs), servo)
     assert phase(servos=servos)[0] < alone[0] - 1.0
-    with pytest.raises(InputError, match=r"multiple of the loops' period of 0.02 s, got 0.03 s"):
+    with pytest.raises(InputError, match=r"0.03 s is no whole number of samples of 0.02 s"):
         loop_margins([ideal], loops, [4.0], delay=0.03)
 
 

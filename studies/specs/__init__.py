@@ -1,0 +1,1 @@
+"""The specification sheet of a vehicle, for the controllers of the study and others."""

@@ -1,0 +1,187 @@
+"""symheli specs: from a vehicle to design margins, proofs that are kept, flights, and a page."""
+
+import json
+import math
+import shutil
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from studies.controllers.designs import LQR
+from studies.controllers.flown import plan
+from studies.specs.flown import flown, measured
+from studies.specs.of_vehicle import OfVehicle, share_met
+from symheli import (
+    AirspeedSchedule,
+    Helicopter,
+    TableController,
+    fly_batch,
+    gain_scheduled_lqr,
+)
+from symheli.flight import XCELL_SERVOS
+from synthesis import Sheet
+
+NAME = "mine"
+
+
+@pytest.fixture(scope="module")
+def vehicle(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("specs")
+    return OfVehicle(name="xcell60", points=2, folder=folder, sheet=Sheet.load().select(["roll"]))
+
+
+@pytest.fixture(scope="module")
+def lqr(vehicle):
+    """The schedule of the study at five airspeeds."""
+    autopilot = gain_scheduled_lqr(vehicle.heli, 0.0, 13.0, 0.02, 5, XCELL_SERVOS)
+    return autopilot.scheduled_controller.model
+
+
+@pytest.fixture(scope="module")
+def file(lqr, tmp_path_factory):
+    return TableController.of(lqr, 9).save(tmp_path_factory.mktemp("table") / f"{NAME}.json")
+
+
+@pytest.fixture
+def words(file):
+    return ("specs", "--controller", file, "--points", "2", "--axes", "roll")
+
+
+def test_what_is_kept_is_not_made_again(vehicle):
+    made = []
+
+    def make():
+        made.append(1)
+        return 3.5
+
+    assert [vehicle.kept("design", "one", make) for _ in range(2)] == [3.5, 3.5]
+    assert len(made) == 1
+    other = replace(vehicle, points=3)
+    assert other.kept("design", "one", make) == 3.5
+    assert len(made) == 2  # of other airspeeds: not the same question
+
+
+@pytest.mark.slow
+def test_the_design_of_the_study_is_evaluated_and_kept(vehicle, monkeypatch):
+    made = next(vehicle.designs([LQR])).controller
+    assert vehicle.frozen({LQR: made}).stable[LQR].all()
+    monkeypatch.setattr("studies.specs.of_vehicle.design", lambda *_: pytest.fail("made again"))
+    again = next(vehicle.designs([LQR])).controller
+    assert np.array_equal(again.A, made.A)
+    assert np.array_equal(again.D, made.D)
+
+
+def test_the_command_says_what_the_table_says(run, words, vehicle, file):
+    table = vehicle.frozen({NAME: TableController.load(file).model})
+    status, out, _ = run(*words, "--json")
+    assert status == 0
+    data = json.loads(out)["controllers"][NAME]
+    found = {s["name"]: s for s in data["specifications"]}
+    for reached in table.reached(NAME):
+        if not math.isnan(reached.margin):
+            one = found[reached.specification.name]
+            assert one["margin"] == pytest.approx(reached.margin, rel=1e-9)
+            assert one["at"] == reached.at
+    assert data["verdict"] == table.verdict(NAME)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--only", "nobody"), "LQR schedule"),
+        (("--axes", "rol"), "roll"),
+        (("--airspeeds", "5", "2"), "LOW < HIGH"),
+        (("--controller", "no.json", "--only", "LQR"), "leave out"),
+    ],
+)
+def test_what_cannot_be_asked_for_is_refused_in_words(run, words, said):
+    status, _, err = run("specs", *words)
+    assert status == 1
+    assert said in err
+
+
+def test_the_share_of_flights_that_keep_to_a_value():
+    """95 % of 20 flights are 19: the second largest; a lost one is infinite."""
+    values = np.arange(1.0, 21.0)
+    assert share_met(values, 0.95) == 19.0
+    assert share_met(np.append(values[:-1], math.inf), 0.95) == 19.0
+    assert share_met(np.append(values[:-2], [math.inf, math.inf]), 0.95) == math.inf
+
+
+def test_a_flight_along_its_reference_misses_nothing(lqr):
+    """Made of its own reference: no error of altitude, track, heading or rotor, and no command
+    beside the trim; as it flew it has some.
+    """
+    heli = Helicopter.load("xcell60", governor="pi")
+    slow = AirspeedSchedule((4.0,), (2.0,), (1.0,))
+    short = replace(plan(lqr, 7.7), schedule=slow, sensors={})
+    (one,) = fly_batch(heli, [short], seeds=[0], workers=1).data
+    column = one.columns()
+    for y in ("u", "v", "w", "phi", "theta", "Om"):
+        column[y] = column[f"{y}_reference"]
+    for y in ("p", "q", "r"):  # a reference that pitches while it banks would turn
+        column[y] = np.zeros_like(column[y])
+    for u in ("d_lon", "d_lat", "d_col", "d_ped"):
+        column[f"{u}_command"] = column[f"{u}_reference"]
+    names = ("lost", "heli", "plan", "clock", "course", "kept")
+    ideal = SimpleNamespace(columns=lambda: column, **{name: getattr(one, name) for name in names})
+    found, flew = measured(ideal), measured(one)
+    for key in (("altitude", ""), ("track", ""), ("rotor_speed", ""), ("effort", "d_lat")):
+        assert found[key] == pytest.approx(0.0, abs=1e-9)
+        assert flew[key] > 1e-4
+
+
+@pytest.mark.slow
+def test_flown_and_proven_entries_stand_beside_the_frozen_ones(vehicle, lqr):
+    """One proof and few flights of the LQR schedule: the proof is no better than the worst frozen
+    model of the same fit, and close to it; flights are kept.
+    """
+    proofs = vehicle.proven({LQR: lqr}, 0.0, ["roll"])[LQR]
+    assert [p.specification.name for p in proofs] == [
+        "disk gain margin",
+        "disk phase margin",
+        "sensitivity peak at the servo",
+        "disturbance rejection peak",
+    ]
+    for one in proofs:
+        assert one.certificate.verified
+        worst = one.specification.design_margin(one.frozen)
+        assert one.margin <= worst + 1e-6
+        assert one.margin == pytest.approx(worst, abs=1.0)  # percent of the width of Level 2
+    values = flown(vehicle, {LQR: lqr}, 2)[LQR]
+    assert set(values) >= {("roll", "actuator in turbulence"), ("roll", "quickness, flown")}
+    assert flown(vehicle, {LQR: lqr}, 2)[LQR] == values
+
+
+@pytest.mark.slow
+def test_the_page_shows_every_axis_and_every_source(run, words, tmp_path):
+    page = tmp_path / "specs.html"
+    assert run(*words, "--page", page, "--figure", tmp_path / "margins.svg")[0] == 0
+    text = page.read_text(encoding="utf-8")
+    assert "MIL-F-9490D" in text
+    assert text.count("<figure>") == 1
+    assert "not confirmed" in text
+    assert (tmp_path / "margins.svg").stat().st_size > 1000
+
+
+@pytest.mark.slow
+def test_the_page_fits_a_phone_and_a_screen(run, words, tmp_path):
+    page = tmp_path / "specs.html"
+    assert run(*words, "--page", page)[0] == 0
+    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
+    playwright = pytest.importorskip("playwright.sync_api", reason="wants playwright")
+    if chromium is None:
+        pytest.skip("wants Chromium")
+    with playwright.sync_playwright() as tools:
+        browser = tools.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        for width in (390, 1280):
+            shown = browser.new_page(viewport={"width": width, "height": 900})
+            said = []
+            shown.on("console", lambda message, said=said: said.append(message.text))
+            shown.goto(page.as_uri())
+            beyond = shown.evaluate("document.documentElement.scrollWidth - innerWidth")
+            assert beyond <= 0
+            assert not said
+        browser.close()
