@@ -80,6 +80,10 @@ from synthesis.plant.plant import Plant as Plant
 from synthesis.polynomial.matrix import PolynomialMatrix as PolynomialMatrix
 from synthesis.program.cone_program import Solver as Solver
 from synthesis.program.cone_program import installed_solvers as installed_solvers
+from synthesis.structures.design import StructuredController as StructuredController
+from synthesis.structures.design import structured as structured
+from synthesis.structures.structure import Gain as Gain
+from synthesis.structures.structure import Structure as Structure
 from synthesis.worst.frozen import frozen_gain as frozen_gain
 from synthesis.worst.lft import frozen_box_gain as frozen_box_gain
 from synthesis.worst.lower_bound import Search as Search
