@@ -63,7 +63,7 @@ def bfgs(function: Function, start: Point, iterations: int, enough: float = -mat
     """
     here, H, fresh = start, np.eye(len(start.x)), True
     history = [here.value]
-    for _ in range(iterations):
+    for _ in tracked("descending", range(iterations)):
         if here.value < enough:
             break
         direction = -H @ here.at.slope

@@ -17,6 +17,7 @@ from symheli.lpv.bases.polynomials import lobatto_points
 from symheli.progress import task
 from symheli.threads import with_one_thread
 from symheli.values.numbers import whole
+from symheli.values.summary import summarized
 from synthesis.loops.controller import Controller
 from synthesis.lpv.objectives import L2
 from synthesis.lpv.search import check_points
@@ -90,6 +91,8 @@ class StructuredController(Controller):
     stationarity: Stationarity
     starts: tuple[float, ...] = field(default=())
 
+    __repr__ = summarized
+
     def gain(self, name: str, p: Any) -> Array:
         """Return a gain at p: (K,) values, or one, of the one parameter, (K, m) of several."""
         own = self.structure.coefficients(self.gains)[name]
@@ -148,6 +151,7 @@ def structured(
     *,
     start: Mapping[str, float | Array] | None = None,
     units: Mapping[str, float] | None = None,
+    decay: float = 0.0,
     starts: int = 8,
     seed: int = 0,
 ) -> StructuredController:
@@ -177,6 +181,10 @@ def structured(
         within the bounds.
     units : mapping of str to float, optional
         About how large a gain is; default half the width of its bounds, its first value, or 1.
+    decay : float
+        Every pole of a loop at a condition is to have a real part of at most minus this, 1/s (of
+        sampled loops log|z| over the period): keeps modes that the channels hardly show, such as
+        integrators, from the border of stability, where descent ends.
     starts : int
         The first, and so many less one random ones around it, one unit away.
     seed : int
@@ -219,7 +227,10 @@ def structured(
     >>> print(made.gains["u_y_P"].round(4), round(made.promised, 5))
     [-2.] 1.11803
     """
-    search = _Search.of(plant, structure, specifications, start, units, whole(starts, "starts", 1))
+    count = whole(starts, "starts", 1)
+    if not 0 <= decay < math.inf:
+        raise InputError(f"decay: expected a finite number >= 0, got {decay!r}")
+    search = _Search.of(plant, structure, specifications, start, units, decay, count)
     notes: list[str] = []
     rng = np.random.default_rng(whole(seed, "seed"))
     try:
@@ -243,9 +254,10 @@ class _Search:
         wanted: tuple[L2, ...],
         first: Array,
         units: Array,
+        decay: float,
         starts: int,
     ):
-        self.plant, self.structure, self.wanted = plant, structure, wanted
+        self.plant, self.structure, self.wanted, self.decay = plant, structure, wanted, decay
         self.first, self.units, self.starts = first, units, starts
         m = len(plant.parameters)
         varies = plant.basis.size > 1 or structure.basis is not None
@@ -273,6 +285,7 @@ class _Search:
         specifications: L2 | Sequence[L2],
         start: Mapping[str, float | Array] | None,
         units: Mapping[str, float] | None,
+        decay: float,
         starts: int,
     ) -> _Search:
         """Check what was given."""
@@ -318,12 +331,14 @@ class _Search:
             raise InputError(f"units: expected numbers > 0, got {dict(units or {})}")
         unit = np.array(each)
         x = np.concatenate([*first.values()]) / unit
-        return cls(plant, structure, given or (L2(),), x, unit, starts)
+        return cls(plant, structure, given or (L2(),), x, unit, float(decay), starts)
 
     def _loops(self, points: Array) -> Loops:
         ends = np.cumsum([self.structure.numbers_of(gain) for gain in self.structure.gains])
         units = self.units[ends - 1]
-        return Loops.of(self.plant, self.structure, points, self.wanted, units, self.between)
+        return Loops.of(
+            self.plant, self.structure, points, self.wanted, units, self.between, self.decay
+        )
 
     def function(self, x: Array) -> Value:
         """The logarithm of the largest gain over its bound, at the conditions."""
@@ -367,7 +382,7 @@ class _Search:
 
     def _stabilised(self, x: Array) -> Point | None:
         """Return numbers near these with which every loop is stable, None where none are found."""
-        point = bfgs(self.loops.pole, Point(x, self.loops.pole(x)), STABILISING, 0.0)
+        point = bfgs(self.loops.pole, Point(x, self.loops.pole(x)), STABILISING, -self.decay)
         value = self.function(point.x)
         self.poles.append(point.value)
         return Point(point.x, value) if math.isfinite(value.value) else None
@@ -402,11 +417,10 @@ class _Search:
         why = modes_out_of_reach(
             self.plant.matrices(p), self.plant.channels, dt=self.plant.dt, at=said
         )
-        what = "largest real part of a pole" if self.plant.dt is None else "largest modulus less 1"
         line = (
-            f"no start led to gains with which every loop is stable: {what} at best"
-            f" {min(self.poles):.3g}; give `start` gains that stabilise, `units` of their size,"
-            " more `starts`, or a richer structure"
+            "no start led to gains with which every loop is stable: the largest real part of a"
+            f" pole is at best {min(self.poles):.3g} 1/s; give `start` gains that stabilise,"
+            " `units` of their size, more `starts`, or a richer structure"
         )
         return SynthesisError("\n  ".join([line, *why]), (line, *why))
 

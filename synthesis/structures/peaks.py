@@ -32,6 +32,13 @@ of the structure: steeper than what was seen to be won by exceeding one.
 """
 
 
+SLOW = 10.0
+"""The same of the decay, per unit of what is asked."""
+
+TINY = 1e-300
+"""In place of a divisor that is zero."""
+
+
 class Active(NamedTuple):
     """The condition, specification and frequency (rad/s) of the largest gain over its bound."""
 
@@ -63,7 +70,8 @@ class Loops:
 
     `open`: matrices with a leading axis; `shares` (K, n, g): of every free number in every gain;
     `channels`: disturbances, performance and bound of each specification; `low`, `high` (g,) hold
-    where the shares are `bounded` (M, n, g); `units` (g,): of a gain, about its size.
+    where the shares are `bounded` (M, n, g); `units` (g,): of a gain, about its size;
+    `decay`: every pole is to lie left of minus this, 1/s.
     """
 
     open: Generalized
@@ -73,6 +81,7 @@ class Loops:
     high: Array
     bounded: Array
     units: Array
+    decay: float
     dt: float | None
 
     @classmethod
@@ -84,6 +93,7 @@ class Loops:
         specifications: Sequence[L2],
         units: Array,
         bounded: Array,
+        decay: float = 0.0,
     ) -> Loops:
         """At `points` (K, m) of the parameters; bounds hold at those and at `bounded` (M, m)."""
         channels = [
@@ -102,6 +112,7 @@ class Loops:
             np.array([gain.high for gain in structure.gains]),
             shares(structure, np.vstack([bounded, points])) * units,
             units,
+            decay,
             plant.dt,
         )
 
@@ -143,32 +154,40 @@ class Loops:
         if not math.isfinite(active.gain) or active.gain <= 0:
             return Value(math.inf, np.zeros(len(x))), active
         more, steeper = self._beyond(x)
-        slope = self._slope(closed, active) / active.gain
-        return Value(math.log(active.gain) + more, slope + steeper), active
+        slope = self._slope(closed, active) / active.gain + steeper
+        if self.decay > 0 and (pole := self._pole(closed)).value > -self.decay:
+            more += SLOW * (1 + pole.value / self.decay)
+            slope = slope + SLOW / self.decay * pole.slope
+        return Value(math.log(active.gain) + more, slope), active
 
     def pole(self, x: Array) -> Value:
-        """Return the largest real part of a pole (1/s), of sampled loops the largest modulus less
-        1, with the penalty of bounds that are exceeded.
+        """Return the largest real part of a pole (1/s; of sampled loops log|z| over the period)
+        with its slope, and the penalty of bounds that are exceeded.
         """
         closed = self._closed(x)
         if closed is None:
             return Value(math.inf, np.zeros(len(x)))
+        value, slope = self._pole(closed)
+        more, steeper = self._beyond(x)
+        return Value(value + more, slope + steeper)
+
+    def _pole(self, closed: _Closed) -> Value:
         values = np.linalg.eigvals(closed.A)
-        sizes = np.real(values) if self.dt is None else np.abs(values) - 1
+        sizes = np.real(values) if self.dt is None else np.abs(values)
         k = int(np.argmax(sizes.max(axis=1)))
         poles, right = np.linalg.eig(closed.A[k])
         j = int(np.argmax(np.real(poles) if self.dt is None else np.abs(poles)))
-        x_r = right[:, j]
+        pole, x_r = complex(poles[j]), right[:, j]
         adjoint, left = np.linalg.eig(closed.A[k].conj().T)
-        y = left[:, int(np.argmin(np.abs(adjoint - poles[j].conj())))]
+        y = left[:, int(np.argmin(np.abs(adjoint - pole.conjugate())))]
         scale = y.conj() @ x_r
         w, z = self._sizes
-        turned = 1.0 if self.dt is None else poles[j].conj() / max(abs(poles[j]), 1e-300)
         each = (y.conj() @ closed.B[k][:, w:]) * (closed.C[k][z:] @ x_r)
-        by_gain = np.real(turned * each / scale) if abs(scale) > 1e-300 else np.zeros(each.shape)
-        more, steeper = self._beyond(x)
-        value = float(poles[j].real if self.dt is None else abs(poles[j]) - 1)
-        return Value(value + more, self.shares[k] @ by_gain + steeper)
+        each = each / scale if abs(scale) > TINY else np.zeros(each.shape)
+        if self.dt is None:
+            return Value(pole.real, self.shares[k] @ np.real(each))
+        size = max(abs(pole), TINY)
+        return Value(math.log(size) / self.dt, self.shares[k] @ np.real(each / pole) / self.dt)
 
     @property
     def _sizes(self) -> tuple[int, int]:
