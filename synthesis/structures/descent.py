@@ -13,7 +13,8 @@ from symheli.progress import tracked
 from synthesis.structures.peaks import Value
 
 Array = np.ndarray
-Function = Callable[[Array], Value]
+Function = Callable[[Array, float], Value]
+"""The value and slope at numbers (n,); above the limit any value above it is enough."""
 
 DECREASE, CURVATURE = 1e-4, 0.5
 """Constants of the weak Wolfe conditions."""
@@ -100,8 +101,9 @@ def _line_search(function: Function, here: Point, direction: Array) -> Point | N
     low, high, t, best = 0.0, math.inf, 1.0, None
     for _ in range(HALVINGS):
         x = here.x + t * direction
-        at = function(x)
-        if not at.value < here.value + DECREASE * t * slope:
+        limit = here.value + DECREASE * t * slope
+        at = function(x, limit)
+        if not at.value < limit:
             high = t
         else:
             best = Point(x, at) if best is None or at.value < best.value else best
@@ -148,7 +150,7 @@ def sampled_descent(
         radius = RADII[k]
         steps = rng.standard_normal((min(2 * n, MAX_SAMPLES), n))
         steps *= (rng.uniform(size=len(steps)) ** (1 / n) / np.linalg.norm(steps, axis=1))[:, None]
-        around = [function(here.x + radius * step) for step in steps]
+        around = [function(here.x + radius * step, math.inf) for step in steps]
         slopes = [here.at.slope, *(v.slope for v in around if math.isfinite(v.value))]
         downhill = shortest(np.array(slopes))
         length = float(np.linalg.norm(downhill))
@@ -171,8 +173,9 @@ def _backtracked(
     t = 16 * radius
     while t > 1e-3 * radius:
         x = here.x + t * direction
-        at = function(x)
-        if at.value < here.value - DECREASE * t * length:
+        limit = here.value - DECREASE * t * length
+        at = function(x, limit)
+        if at.value < limit:
             return Point(x, at)
         t *= 0.5
     return None

@@ -340,14 +340,17 @@ class _Search:
             self.plant, self.structure, points, self.wanted, units, self.between, self.decay
         )
 
-    def function(self, x: Array) -> Value:
-        """The logarithm of the largest gain over its bound, at the conditions."""
-        value, active = self.loops.gain(x, self.known)
+    def function(self, x: Array, limit: float = math.inf) -> Value:
+        """The logarithm of the largest gain over its bound, at the conditions; see `Loops.gain`."""
+        value, active = self.loops.gain(x, self.known, limit)
         if math.isfinite(active.gain):
             self.known = active
-            if self.best is None or value.value < self.best.value:
+            if value.value <= limit and (self.best is None or value.value < self.best.value):
                 self.best = Point(x, value)
         return value
+
+    def _pole(self, x: Array, _: float = 0.0) -> Value:
+        return self.loops.pole(x)
 
     def run(self, rng: np.random.Generator) -> None:
         """Search from all starts, then between the conditions, then by gradient sampling."""
@@ -382,7 +385,7 @@ class _Search:
 
     def _stabilised(self, x: Array) -> Point | None:
         """Return numbers near these with which every loop is stable, None where none are found."""
-        point = bfgs(self.loops.pole, Point(x, self.loops.pole(x)), STABILISING, -self.decay)
+        point = bfgs(self._pole, Point(x, self._pole(x)), STABILISING, -self.decay)
         value = self.function(point.x)
         self.poles.append(point.value)
         return Point(point.x, value) if math.isfinite(value.value) else None

@@ -120,9 +120,9 @@ class Loops:
         """Gains (K, g) for free numbers x (n,)."""
         return np.einsum("n,kng->kg", x, self.shares)
 
-    def _largest(self, closed: _Closed, known: Active | None) -> Active:
-        """Return the largest gain, as a ratio to its bound; infinite where a loop is not stable.
-        `known`: where it was near by, which is looked at first.
+    def _largest(self, closed: _Closed, known: Active | None, limit: float) -> Active:
+        """Return the largest gain, as a ratio to its bound, or some gain above the `limit`;
+        infinite where a loop is not stable.
         """
         order = [(k, s) for k in range(len(closed.A)) for s in range(len(self.channels))]
         if known is not None:
@@ -138,19 +138,22 @@ class Loops:
                 gain, omega = math.inf, math.nan
             if gain > worst.gain:
                 worst = Active(gain, k, s, omega)
-            if not math.isfinite(gain):
+            if gain > limit:
                 break
         return worst
 
-    def gain(self, x: Array, known: Active | None = None) -> tuple[Value, Active]:
+    def gain(
+        self, x: Array, known: Active | None = None, limit: float = math.inf
+    ) -> tuple[Value, Active]:
         """Return the logarithm of the largest gain as a ratio to its bound, with the penalty of
         bounds that are exceeded, and where that gain is; infinite where a loop is not stable.
-        `known`: where it was near by, which is looked at first.
+        `known`: where it was near by, which is looked at first. Above the `limit` of the logarithm
+        it may be another gain than the largest.
         """
         closed = self._closed(x)
         if closed is None:
             return Value(math.inf, np.zeros(len(x))), Active(math.inf, 0, 0, math.nan)
-        active = self._largest(closed, known)
+        active = self._largest(closed, known, math.exp(min(limit, 700.0)))
         if not math.isfinite(active.gain) or active.gain <= 0:
             return Value(math.inf, np.zeros(len(x))), active
         more, steeper = self._beyond(x)
