@@ -8,52 +8,29 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import hashlib
 import io
 import json
 import os
 import tempfile
-import urllib.error
-import urllib.parse
-import urllib.request
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from evidence.public_files import PublicFile, fetched
 from evidence.tables import DOCS, keep, markdown
 from identification.judge.scores import percent
 from studies import cli
 from symheli.errors import InputError
-from symheli.values.whole_files import write_bytes
-
-RAW = "https://raw.githubusercontent.com"
-"""Where files of public repositories are served as they are."""
-MAX_BYTES = 16 * 2**20
-"""Largest answer of the server that is taken."""
-TIMEOUT = 60.0
-"""s"""
 
 
 @dataclass(frozen=True)
-class PublicLog:
-    """A file of a public repository at a commit, with its SHA-256 and licence, what wrote it, and
-    whether it is expected to be identified.
-    """
+class PublicLog(PublicFile):
+    """A log with its licence, what wrote it, and whether it is expected to be identified."""
 
-    name: str
-    repository: str
-    commit: str
-    path: str
-    sha256: str
     licence: str
     writer: str
     identified: bool
-
-    @property
-    def address(self) -> str:
-        """Where it is fetched from."""
-        return f"{RAW}/{self.repository}/{self.commit}/{urllib.parse.quote(self.path)}"
 
 
 LOGS = (
@@ -228,33 +205,6 @@ class Verdict:
     def identified(self) -> bool:
         """Whether a model came out and was scored."""
         return not self.reason
-
-
-def fetched(log: PublicLog, folder: Path) -> Path:
-    """The file in `folder`, fetched where it is not there; raises `InputError` where it cannot be,
-    or is another than the table says.
-    """
-    file = folder / log.name
-    if not file.is_file():
-        try:
-            with urllib.request.urlopen(log.address, timeout=TIMEOUT) as answer:
-                content = answer.read(MAX_BYTES + 1)
-        except (urllib.error.URLError, OSError) as error:
-            raise InputError(
-                f"{log.name} is not in {folder}, and {log.address} cannot be fetched ({error})"
-            ) from error
-        _refuse_another(log, content, log.address)
-        folder.mkdir(parents=True, exist_ok=True)
-        write_bytes(file, content)
-    _refuse_another(log, file.read_bytes(), str(file))
-    return file
-
-
-def _refuse_another(log: PublicLog, content: bytes, where: str) -> None:
-    if (found := hashlib.sha256(content).hexdigest()) != log.sha256:
-        raise InputError(
-            f"{where}: SHA-256 {found}, expected {log.sha256}: another file; remove it"
-        )
 
 
 def judged(file: Path) -> Verdict:

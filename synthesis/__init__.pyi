@@ -83,6 +83,10 @@ from synthesis.program.cone_program import installed_solvers as installed_solver
 from synthesis.sheet.evaluation import SpecificationTable as SpecificationTable
 from synthesis.sheet.evaluation import specifications as specifications
 from synthesis.sheet.sheet import Sheet as Sheet
+from synthesis.structures.design import StructuredController as StructuredController
+from synthesis.structures.design import structured as structured
+from synthesis.structures.structure import Gain as Gain
+from synthesis.structures.structure import Structure as Structure
 from synthesis.worst.frozen import frozen_gain as frozen_gain
 from synthesis.worst.lft import frozen_box_gain as frozen_box_gain
 from synthesis.worst.lower_bound import Search as Search

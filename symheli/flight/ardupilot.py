@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -59,6 +59,8 @@ class RateController:
     FLTD: float
     attitude: float = 0.0
 
+
+NO_GAINS = dict.fromkeys(("P", "I", "D", "FF", "attitude"), 0.0)
 
 RATE_ENTRIES = tuple(f.name for f in fields(RateController))[:-1]
 
@@ -347,6 +349,69 @@ class HelicopterLoops:
         return np.array([reference[str(u)] + moved[str(u)] for u in INPUTS]), state
 
     # --- as a linear model -----------------------------------------------------------------------
+
+    @property
+    def gains(self) -> dict[str, float]:
+        """P, I, D and FF of every axis and the gains of the attitudes, by their parameters."""
+        of = {"RAT": ("P", "I", "D", "FF"), "ANG": ("attitude",)}
+        return {
+            f"ATC_{kind}_{axis}_{entry if kind == 'RAT' else 'P'}": getattr(controller, entry)
+            for axis, controller in self.axes.items()
+            for kind, entries in of.items()
+            for entry in entries
+            if kind == "RAT" or AXES[axis][1]
+        }
+
+    @cached_property
+    def opened(self) -> LinearModel:
+        """The loops without their `gains`, within the limits of outputs and integrators and nothing
+        leaking: discrete, from p, q, r (rad/s), phi, theta (rad) and the outputs of the gains to
+        d_lat, d_lon, d_ped (rad) and the inputs of the gains.
+        """
+        rest, names = self.init(), list(self.gains)
+        sizes = [np.size(part) for part in rest]
+        nx, m = sum(sizes), sum(sizes) + 5 + len(names)
+        # every signal is a row over (states, measurements, outputs of the gains); axes are last
+        unit = np.eye(m)
+        parts = np.split(unit[:nx].T, np.cumsum(sizes)[:-1], axis=1)
+        gyro, *others = (a.reshape(m, *b.shape) for a, b in zip(parts, rest, strict=True))
+        memory = _Memory(np.moveaxis(gyro, 0, 2), *others)
+        rate = unit[nx : nx + 3].T
+        attitude = np.column_stack([-unit[nx + 3], -unit[nx + 4], np.zeros(m)])
+        returned = {name: unit[nx + 5 + k] for k, name in enumerate(names)}
+
+        def of(kind: str, entry: str) -> Array:
+            nothing = np.zeros(m)
+            return np.column_stack([returned.get(f"ATC_{kind}_{a}_{entry}", nothing) for a in AXES])
+
+        without = {name: RateController(**{**vars(c), **NO_GAINS}) for name, c in self.axes.items()}
+        _, later = replace(self, axes=without)._advance(memory, rate, of("ANG", "P"), limited=False)
+        later = later._replace(integrator=later.integrator + of("RAT", "I"))
+        out = later.integrator + of("RAT", "P") + of("RAT", "D") + of("RAT", "FF")
+        read = {
+            "P": later.error,
+            "I": self.dt * later.error,
+            "D": later.derivative,
+            "FF": later.target,
+        }
+        inputs = []
+        for name in names:
+            _, kind, axis, entry = name.split("_")
+            signal = attitude if kind == "ANG" else read[entry]
+            inputs.append(signal[:, list(AXES).index(axis)])
+        kept = later._replace(gyro=np.moveaxis(later.gyro, 2, 0))
+        A = np.concatenate([part.reshape(m, -1) for part in kept], axis=1).T
+        C = np.vstack([(self._numbers["throw"] * out).T, np.reshape(inputs, (-1, m))])
+        return LinearModel(
+            A[:, :nx],
+            A[:, nx:],
+            C[:, :nx],
+            C[:, nx:],
+            signals([f"loops_{k}" for k in range(nx)]),
+            signals(("p", "q", "r", "phi", "theta", *names)),
+            signals((*self._controls, *names)),
+            self.dt,
+        )
 
     @cached_property
     def linear(self) -> LinearModel:

@@ -5,7 +5,7 @@ with signal names.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -90,14 +90,31 @@ def reasons(
     >>> print(*[sentence.split(":")[0] for sentence in found])
     the mode at 0.5 rad/s (mostly w) is not stable, and d_col cannot stabilise it
     """
+    return _over_family(plant, at, lambda P: _reasons(P, channels, dt, gamma))
+
+
+def modes_out_of_reach(
+    plant: Generalized, channels: Channels, *, dt: float | None, at: Sequence[object] | None = None
+) -> tuple[str, ...]:
+    """Return a sentence for each mode that no controller can stabilise; see `reasons`."""
+
+    def modes(P: Generalized) -> list[str]:
+        return [*_modes(P, channels, dt), *_modes(P.dual, channels, dt, dual=True)]
+
+    return _over_family(plant, at, modes)
+
+
+def _over_family(
+    plant: Generalized, at: Sequence[object] | None, sentences: Callable[[Generalized], list[str]]
+) -> tuple[str, ...]:
     leading = np.broadcast_shapes(*(M.shape[:-2] for M in plant))
     if not leading:
-        return tuple(_reasons(plant, channels, dt, gamma))
+        return tuple(sentences(plant))
     family = [np.broadcast_to(M, (*leading, *M.shape[-2:])) for M in plant]
     first: dict[str, list[str]] = {}
     for k in np.ndindex(leading):
         label = str(at[k[0]]) if at is not None else f"model {k[0] if len(k) == 1 else k}"
-        for sentence in _reasons(Generalized(*(M[k] for M in family)), channels, dt, gamma):
+        for sentence in sentences(Generalized(*(M[k] for M in family))):
             first.setdefault(sentence, []).append(label)
     return tuple(f"{_where(labels)}: {sentence}" for sentence, labels in first.items())
 

@@ -10,8 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from evidence import logs
-from evidence.logs import LOGS, PublicLog, Verdict, fetched, judged, table
+from evidence import public_files
+from evidence.logs import LOGS, PublicLog, Verdict, judged, table
+from evidence.public_files import fetched
 from symheli.errors import InputError
 
 BESIDE = Path(__file__).resolve().parents[3] / "shared" / "data" / "xplane"
@@ -65,7 +66,7 @@ def test_a_file_that_is_there_is_not_fetched_and_one_that_cannot_be_is_said(tmp_
     def no_network(*_, **__):
         raise OSError("no network")
 
-    monkeypatch.setattr(logs.urllib.request, "urlopen", no_network)
+    monkeypatch.setattr(public_files.urllib.request, "urlopen", no_network)
     content = b"a log"
     log = PublicLog(
         "x.bin", "o/r", "0" * 40, "a b.bin", hashlib.sha256(content).hexdigest(), "MIT", "W", True

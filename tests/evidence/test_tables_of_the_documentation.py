@@ -17,6 +17,7 @@ from evidence import logs, responses, specs, tuning, two_bands
 from evidence.bracket.measured import GAINS, bracket
 from evidence.jerk.measured import TransitionPlan, fastest
 from evidence.marks import calibrated, guarantee, measured
+from evidence.public_files import fetched
 from evidence.reach.measured import gains
 from evidence.tables import DOCS
 from studies.loops.exact_lateral import ExactLateral
@@ -166,7 +167,7 @@ def one_public_log():
     log = next(log for log in logs.LOGS if log.name == "Data.txt")
     if not (folder / log.name).is_file():
         pytest.skip(f"{log.name} is not here: python -m evidence.logs --folder DIR --fetch-only")
-    *_, row = logs.table([(log, logs.judged(logs.fetched(log, folder.resolve())))]).splitlines()
+    *_, row = logs.table([(log, logs.judged(fetched(log, folder.resolve())))]).splitlines()
     (shown,) = (
         line
         for line in KEPT["identify.md", "public logs"].text.splitlines()

@@ -73,6 +73,7 @@ EXEMPT: dict[str, str] = {
                 "GainCurve",
                 "Margins",
                 "SpecificationTable",
+                "StructuredController",
                 "Tube",
             ),
             *(),
@@ -97,7 +98,7 @@ SLOW = {
     *("synthesis.proven_around", "synthesis.state_feedback", "synthesis.with_wrong_parameter"),
     *("synthesis.frozen_box_gain", "synthesis.generalized_h2", "synthesis.decay_rate"),
     *("synthesis.stability", "synthesis.lower_bound", "synthesis.lft_gain"),
-    *("synthesis.Certificate.verify", "synthesis.lft_stability"),
+    *("synthesis.Certificate.verify", "synthesis.lft_stability", "synthesis.structured"),
 }
 """Entries that fly, sweep or solve: `FEW` inputs each."""
 LARGER = {"synthesis.multiobjective", "synthesis.output_feedback", "synthesis.lft_feedback"}

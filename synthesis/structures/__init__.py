@@ -1,0 +1,3 @@
+"""Controllers of a given structure: named gains, found by descent on the largest closed-loop
+gain.
+"""
