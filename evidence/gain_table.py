@@ -18,7 +18,7 @@ from studies.controllers.certified import FORM, SOLVER
 from studies.controllers.designs import lqr_schedule
 from studies.controllers.flown import transition
 from studies.controllers.measures import Measures, measured
-from studies.controllers.plant import baseline, flown_plant
+from studies.controllers.plant import baseline, closed, flown_plant
 from symheli import Dryden, FlightPlan, Helicopter, LPVStateSpace, ScheduledController, Wind
 from symheli.errors import ValidityWarning
 from symheli.flight import XCELL_SERVOS
@@ -104,7 +104,7 @@ def tuned(heli: Helicopter, starts: int = STARTS) -> StructuredController:
 
 def ratios(of: Plant, model: LPVStateSpace) -> list[float]:
     """Largest frozen gain of each specification over its bound, at 27 airspeeds."""
-    loop = of.close(model)
+    loop = closed(of, model)
     out = []
     for one in specifications(of):
         own = loop.select(outputs=one.performance)
@@ -115,7 +115,7 @@ def ratios(of: Plant, model: LPVStateSpace) -> list[float]:
 
 def proof(of: Plant, model: LPVStateSpace) -> Certificate:
     """The gain over all channels at the study's acceleration."""
-    return synthesis.l2_gain(of.close(model), RATE, form=FORM, solver=SOLVER, search=None)
+    return synthesis.l2_gain(closed(of, model), RATE, form=FORM, solver=SOLVER, search=None)
 
 
 def flight(heli: Helicopter, model: LPVStateSpace) -> Measures:
@@ -131,7 +131,7 @@ def flight(heli: Helicopter, model: LPVStateSpace) -> Measures:
     )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ValidityWarning)
-        return measured(symheli.fly_batch(heli, [plan]))[0]
+        return measured(symheli.fly_batch(heli, [plan]).data)[0]
 
 
 def main() -> None:
