@@ -190,7 +190,10 @@ class Loops:
         if self.dt is None:
             return Value(pole.real, self.shares[k] @ np.real(each))
         size = max(abs(pole), TINY)
-        return Value(math.log(size) / self.dt, self.shares[k] @ np.real(each / pole) / self.dt)
+        return Value(
+            math.log(size) / self.dt,
+            self.shares[k] @ np.real(each * (pole.conjugate() / size) / size) / self.dt,
+        )
 
     @property
     def _sizes(self) -> tuple[int, int]:
