@@ -10,8 +10,9 @@ import numpy as np
 from symheli import LinearModel
 from symheli.flight import HelicopterLoops
 from symheli.flight.ardupilot import AXES, COMMANDS, MEASURED
+from symheli.lpv import connect
 from symheli.values.arrays import Array
-from symheli.values.signal import Signal, indices, signals
+from symheli.values.signal import indices
 
 LOWEST = 0.1
 """Frequency, rad/s, from which responses are searched: slower motion is the pilot's."""
@@ -52,26 +53,14 @@ def closed_loops(plant: LinearModel, loops: HelicopterLoops) -> LinearModel:
     their commands and by disturbances of the same, in that order.
     """
     K = loops.commanded
-    P = plant.select(inputs=K.outputs, outputs=MEASURED)
-    measured = len(MEASURED)
-    into, out = K.B[:, :measured], K.D[:, :measured]
-    A = np.block([[P.A + P.B @ out @ P.C, P.B @ K.C], [into @ P.C, K.A]])
     outputs = [attitude or rate for rate, attitude, _ in AXES.values()]
-    rows = indices(outputs, MEASURED, "output")
-    columns = [*range(measured, len(K.inputs)), *rows]
-    C = np.hstack([P.C[rows], np.zeros((len(rows), len(K.A)))])
-    return LinearModel(
-        A,
-        np.vstack([P.B @ K.D[:, columns], K.B[:, columns]]),
-        C,
-        np.zeros((len(rows), len(columns))),
-        (*P.states, *K.states),
-        (
-            *signals(COMMANDS, COMMANDS),
-            *(Signal(f"{y}_disturbance", y.unit) for y in signals(outputs)),
-        ),
-        signals(outputs),
-        plant.dt,
+    disturbances = {y: f"{y}_disturbance" for y in outputs}
+    return connect(
+        plant.select(inputs=K.outputs, outputs=MEASURED),
+        K,
+        inputs=(*COMMANDS, *disturbances.values()),
+        outputs=outputs,
+        sums={y: {y: 1.0, d: 1.0} for y, d in disturbances.items()},
     )
 
 

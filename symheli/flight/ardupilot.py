@@ -362,30 +362,40 @@ class HelicopterLoops:
             if kind == "RAT" or AXES[axis][1]
         }
 
-    @cached_property
+    @property
     def opened(self) -> LinearModel:
         """The loops without their `gains`, within the limits of outputs and integrators and nothing
         leaking: discrete, from p, q, r (rad/s), phi, theta (rad) and the outputs of the gains to
         d_lat, d_lon, d_ped (rad) and the inputs of the gains.
         """
+        return self._opened.select(inputs=(*MEASURED, *self.gains))
+
+    @cached_property
+    def _opened(self) -> LinearModel:
+        """The model `opened` with `COMMANDS` as further inputs."""
         rest, names = self.init(), list(self.gains)
         sizes = [np.size(part) for part in rest]
-        nx, m = sum(sizes), sum(sizes) + 5 + len(names)
-        # every signal is a row over (states, measurements, outputs of the gains); axes are last
+        nx = sum(sizes)
+        own = signals((*MEASURED, *COMMANDS, *names), COMMANDS)
+        m = nx + len(own)
+        # every signal is a row over (states, inputs); axes are last
         unit = np.eye(m)
         parts = np.split(unit[:nx].T, np.cumsum(sizes)[:-1], axis=1)
         gyro, *others = (a.reshape(m, *b.shape) for a, b in zip(parts, rest, strict=True))
         memory = _Memory(np.moveaxis(gyro, 0, 2), *others)
-        rate = unit[nx : nx + 3].T
-        attitude = np.column_stack([-unit[nx + 3], -unit[nx + 4], np.zeros(m)])
-        returned = {name: unit[nx + 5 + k] for k, name in enumerate(names)}
+        row = dict(zip(map(str, own), unit[nx:], strict=True))
+        rate = np.column_stack([row[rate] for rate, _, _ in AXES.values()])
+        error = [row["phi_command"] - row["phi"], row["theta_command"] - row["theta"]]
+        attitude = np.column_stack([*error, np.zeros(m)])
 
         def of(kind: str, entry: str) -> Array:
             nothing = np.zeros(m)
-            return np.column_stack([returned.get(f"ATC_{kind}_{a}_{entry}", nothing) for a in AXES])
+            return np.column_stack([row.get(f"ATC_{kind}_{a}_{entry}", nothing) for a in AXES])
 
         without = {name: RateController(**{**vars(c), **NO_GAINS}) for name, c in self.axes.items()}
-        _, later = replace(self, axes=without)._advance(memory, rate, of("ANG", "P"), limited=False)
+        target = of("ANG", "P")
+        target[:, 2] += row["r_command"]
+        _, later = replace(self, axes=without)._advance(memory, rate, target, limited=False)
         later = later._replace(integrator=later.integrator + of("RAT", "I"))
         out = later.integrator + of("RAT", "P") + of("RAT", "D") + of("RAT", "FF")
         read = {
@@ -408,7 +418,7 @@ class HelicopterLoops:
             C[:, :nx],
             C[:, nx:],
             signals([f"loops_{k}" for k in range(nx)]),
-            signals(("p", "q", "r", "phi", "theta", *names)),
+            own,
             signals((*self._controls, *names)),
             self.dt,
         )
@@ -425,28 +435,8 @@ class HelicopterLoops:
         """The model `linear` with the commands of the pilot as further inputs: phi_command,
         theta_command (rad) and r_command (rad/s).
         """
-        rest = self.init()
-        sizes = [np.size(part) for part in rest]
-        nx, n = sum(sizes), self._numbers
-        nu = len(MEASURED) + len(COMMANDS)
-        A, B = np.zeros((nx, nx)), np.zeros((nx, nu))
-        C, D = np.zeros((3, nx)), np.zeros((3, nu))
-        for k in range(nx + nu):
-            x, y = np.zeros(nx), np.zeros(nu)
-            (x if k < nx else y)[k if k < nx else k - nx] = 1.0
-            parts = np.split(x, np.cumsum(sizes)[:-1])
-            memory = _Memory(*(a.reshape(b.shape) for a, b in zip(parts, rest, strict=True)))
-            target = n["attitude"] * np.array([y[5] - y[3], y[6] - y[4], 0.0])
-            target[2] = y[7]
-            out, later = self._advance(memory, y[:3], target, limited=False)
-            column = np.concatenate([np.ravel(part) for part in later])
-            if k < nx:
-                A[:, k], C[:, k] = column, n["throw"] * out
-            else:
-                B[:, k - nx], D[:, k - nx] = column, n["throw"] * out
-        names = [f"loops_{k}" for k in range(nx)]
-        inputs = signals((*MEASURED, *COMMANDS), COMMANDS)
-        return LinearModel(A, B, C, D, signals(names), inputs, signals(self._controls), self.dt)
+        closed = self._opened.feedback({(name, name): k for name, k in self.gains.items()})
+        return closed.select(inputs=(*MEASURED, *COMMANDS), outputs=self._controls)
 
     def with_parameters(self, changes: Mapping[str, float]) -> HelicopterLoops:
         """The loops after a change of parameters, {"ATC_RAT_RLL_P": 0.15}.
