@@ -5,7 +5,6 @@ the study and others.
 from __future__ import annotations
 
 import argparse
-import math
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -168,7 +167,7 @@ def _beside(table: SpecificationTable) -> str:
 def _cell(reached: Any) -> str:
     from synthesis.sheet.evaluation import margin
 
-    return "unstable" if math.isinf(reached.margin) and reached.margin < 0 else margin(reached)
+    return reached.failure or margin(reached)
 
 
 def _about(rate: float) -> str:

@@ -31,6 +31,7 @@ from symheli.flight.flight_data import FlightData
 from symheli.progress import tracked
 from symheli.values.arrays import Array
 from symheli.values.named_vector import NamedVector
+from synthesis.sheet.measures import rate_over_change
 from synthesis.sheet.sheet import Axis
 
 ACCELERATIONS = (1.0, 3.0)
@@ -41,6 +42,10 @@ SHARE = 0.95
 
 STEP_AT, STEP_FOR = 1.0, 3.0
 """When an attitude is commanded, and how long the flight goes on, s."""
+
+OF_A_FLIGHT = ("speed", "track", "altitude", "heading", "attitude", "rotor_speed")
+OF_A_CONTROL = ("effort", "stops")
+"""What is measured of a transition."""
 
 HELD_AT = (0.0, 6.5, 13.0)
 """Airspeeds of the steps, m/s."""
@@ -76,10 +81,7 @@ def _of(vehicle: OfVehicle, K: LPVStateSpace, seeds: int) -> dict[tuple[str, str
             heli, plans, seeds=range(FLIGHTS_FROM, FLIGHTS_FROM + seeds), workers=1
         ).data
     each = [measured(one) for one in data]
-    by_measure = {
-        key: share_met(np.array([m.get(key, math.inf) for m in each]), SHARE)
-        for key in dict.fromkeys(k for m in each for k in m)
-    }
+    by_measure = {key: share_met(np.array([m[key] for m in each]), SHARE) for key in each[0]}
     axes = vehicle.scaled.axes
     quick = {a.name: quickness(heli, K, a) for a in axes.values() if a.type == "attitude"}
     found: dict[tuple[str, str], float] = {}
@@ -94,13 +96,15 @@ def _of(vehicle: OfVehicle, K: LPVStateSpace, seeds: int) -> dict[tuple[str, str
 
 
 def measured(one: FlightData) -> dict[tuple[str, str], float]:
-    """Return {(measure, control or ""): value} of one transition; nothing of a lost one.
+    """Return {(measure, control or ""): value} of one transition; inf of a lost one.
 
     Altitude and track are how far the velocity has carried it from the reference, relative to the
     air of the steady wind: no controller of the study knows a position or a heading.
     """
     if one.lost >= 0:
-        return {}
+        keys = [(m, "") for m in OF_A_FLIGHT]
+        keys += [(m, str(u)) for u in one.heli.inputs for m in OF_A_CONTROL]
+        return dict.fromkeys(keys, math.inf)
     column, dt = one.columns(), one.plan.dt
     noise = noise_of(one)
     true = {y: column[y] - noise[:, i] for i, y in enumerate(MEASURED)}
@@ -172,9 +176,7 @@ def quickness(heli: Helicopter, K: LPVStateSpace, axis: Axis) -> float:
         if one.lost >= 0:
             return math.nan
         y = one.column(axis.response)
-        start = y[round(STEP_AT / PERIOD)]
-        change = float(np.abs(y - start).max())
-        least = min(least, float(np.abs(np.diff(y)).max()) / PERIOD / change)
+        least = min(least, rate_over_change(y, PERIOD))
     return least
 
 

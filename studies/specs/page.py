@@ -107,8 +107,8 @@ def _margins(table: SpecificationTable) -> list[dict[str, Any]]:
 def _cell(r: Reached, unit: str) -> dict[str, str]:
     at = "" if math.isnan(r.at) else f" at {r.at:.4g} {unit}"
     told = worst(r) + at
-    if math.isinf(r.margin) and r.margin < 0:
-        return {"text": "unstable", "level": "three", "title": told}
+    if r.failure:
+        return {"text": r.failure, "level": "three", "title": told}
     if math.isnan(r.margin):
         return {"text": worst(r), "level": "open", "title": told}
     level = "one" if r.margin >= 0 else "two" if r.margin >= -100 else "three"

@@ -48,6 +48,15 @@ class Reached(NamedTuple):
     least: float
     most: float
 
+    @property
+    def failure(self) -> str:
+        """Why there is no value: "unstable" at some value of the parameter, or flights "lost"; ""
+        where there is one.
+        """
+        if self.margin != -math.inf:
+            return ""
+        return "lost" if self.specification.kind == "flown" else "unstable"
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SpecificationTable:
@@ -246,8 +255,8 @@ def boundary(spec: Specification) -> str:
 
 def worst(r: Reached) -> str:
     """Return the worst value in words: without boundaries, the range."""
-    if math.isinf(r.margin) and r.margin < 0:
-        return "unstable"
+    if r.failure:
+        return r.failure
     if not r.specification.sense and r.least < r.most:
         return f"{r.least:.4g} to {r.most:.4g}"
     return "" if math.isnan(r.value) else f"{r.value:.4g}"

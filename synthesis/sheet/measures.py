@@ -15,9 +15,9 @@ from scipy.linalg import eig
 from scipy.optimize import least_squares
 
 from symheli.errors import InputError
-from symheli.lpv import LinearModel
+from symheli.lpv import LinearModel, connect
 from symheli.values.arrays import Array
-from symheli.values.signal import Signal, indices, signals
+from symheli.values.signal import indices, signals
 from synthesis.loops.handling_qualities import Bandwidth, bandwidth
 from synthesis.loops.margins import Margins, loop, margins
 from synthesis.sheet.sheet import Axis, Specification
@@ -69,33 +69,27 @@ class AxisLoop:
         and the coupled signal if the plant has it.
         """
         P, K, axis = self.plant, self.controller, self.axis
-        (j,) = indices([axis.response], K.inputs, "measurement of the controller")
-        (k,) = indices([axis.control], K.outputs, "control")
+        indices([axis.response], K.inputs, "measurement of the controller")
+        indices([axis.control], K.outputs, "control")
         seen = P.select(inputs=K.outputs, outputs=K.inputs)
         if np.any(seen.D):
             raise InputError(
                 "an output that is fed back depends on an input directly; put an actuator or a"
                 " delay between"
             )
-        A = np.block([[P.A + seen.B @ K.D @ seen.C, seen.B @ K.C], [K.B @ seen.C, K.A]])
-        B = -np.vstack([seen.B @ K.D[:, [j]], K.B[:, [j]]])
-        control = np.hstack([K.D[[k]] @ seen.C, K.C[[k]]])
         coupled = [axis.coupled] if axis.coupled in P.outputs else []
-        others = [axis.response, *coupled]
-        shown = P.select(inputs=K.outputs, outputs=others)
+        shown = P.select(inputs=K.outputs, outputs=dict.fromkeys((*K.inputs, *coupled)))
         if np.any(shown.D):
-            raise InputError(f"{', '.join(others)}: an input acts on one directly, without a state")
-        rows = np.hstack([shown.C, np.zeros((len(others), len(K.A)))])
-        return LinearModel(
-            A,
-            B,
-            np.vstack([rows[:1], control, rows[1:]]),
-            np.vstack([[[0.0]], -K.D[[k], [j]][None, :], np.zeros((len(others) - 1, 1))]),
-            _with_controller(P, K),
-            signals(("command",)),
-            signals(("response", "control", *("coupled" for _ in coupled))),
-            P.dt,
+            raise InputError(f"{axis.coupled}: an input acts on it directly, without a state")
+        found = connect(
+            shown,
+            K,
+            inputs=["command"],
+            outputs=[axis.response, axis.control, *coupled],
+            sums={axis.response: {axis.response: 1.0, "command": -1.0}},
         )
+        names = ("response", "control", *("coupled" for _ in coupled))
+        return replace(found, outputs=signals(names))
 
     @cached_property
     def rejection(self) -> LinearModel:
@@ -112,8 +106,8 @@ class AxisLoop:
     def stepped(self, window: float) -> tuple[Array, Array]:
         """Return outputs (n, ..) of `closed` after a step of the axis's size, and times (n,)."""
         if ("step", window) not in self._kept:
-            y, t = _step(self.closed, window)
-            self._kept["step", window] = y * self.axis.step, t
+            found = self.closed.step_response(window, SAMPLES + 1)
+            self._kept["step", window] = found.values[:, :, 0] * self.axis.step, found.time
         return self._kept["step", window]
 
     def attitude(self, band: tuple[float, float]) -> Bandwidth:
@@ -224,6 +218,14 @@ def mode_damping(T: LinearModel, band: tuple[float, float]) -> float:
     return float((-np.real(s[kept]) / size[kept]).min(initial=1.0))
 
 
+def rate_over_change(y: Array, dt: float) -> float:
+    """Return the peak rate over the peak change, 1/s, of a signal (n,) sampled every `dt` s; NaN of
+    one at rest.
+    """
+    change = float(np.abs(y - y[0]).max())
+    return float(np.abs(np.diff(y)).max()) / dt / change if change else math.nan
+
+
 def first_order_fit(y: Array, t: Array) -> tuple[float, float]:
     """Return a (1/s) and tau (s) of b (1 - exp(-a (t - tau))) / a from tau on, 0 before, that fits
     a step response (n,) best; a = 0 is a ramp.
@@ -242,26 +244,6 @@ def first_order_fit(y: Array, t: Array) -> tuple[float, float]:
     best = min(starts, key=lambda x: float(np.sum(fitted(np.array(x)) ** 2)))
     found = least_squares(fitted, best, bounds=((0.0, 0.0), high), x_scale=(1 / end, 0.1 * end))
     return float(found.x[0]), float(found.x[1])
-
-
-def _with_controller(P: LinearModel, K: LinearModel) -> tuple[Signal, ...]:
-    """Return the states of a plant and its controller."""
-    return signals((*P.states, *(f"controller_{s}" for s in K.states)))
-
-
-def _step(model: LinearModel, window: float) -> tuple[Array, Array]:
-    """Return outputs (n, ny) after a unit step of the one input, and times (n,)."""
-    A, B, dt = model.A, model.B[:, 0], model.dt
-    if dt is None:
-        dt = window / SAMPLES
-        sampled = model.discretize(dt)
-        A, B = sampled.A, sampled.B[:, 0]
-    count = max(2, round(window / dt) + 1)
-    x, out = np.zeros(len(A)), np.empty((count, len(model.C)))
-    for k in range(count):
-        out[k] = model.C @ x + model.D[:, 0]
-        x = A @ x + B
-    return out, dt * np.arange(count)
 
 
 def _decibels(gain: float) -> float:
@@ -286,8 +268,7 @@ def _quickness(at: AxisLoop, spec: Specification) -> float:
     of its impulse response, which is the same of the attitude.
     """
     y, t = at.stepped(spec.window)
-    largest = np.abs(y[:, 0]).max()
-    return float(np.abs(np.diff(y[:, 0])).max() / (t[1] - t[0]) / largest) if largest else math.nan
+    return rate_over_change(y[:, 0], t[1] - t[0])
 
 
 def _coupling(at: AxisLoop, spec: Specification) -> float:
@@ -310,24 +291,14 @@ def _rate_at_the_stop(at: AxisLoop, spec: Specification) -> float:
     """Largest response, deg/s, with the control moved to its stop from the middle and its own loop
     open.
     """
-    P, K, axis = at.plant, at.controller, at.axis
-    seen = P.select(inputs=K.outputs, outputs=K.inputs)
-    (k,) = indices([axis.control], K.outputs, "control")
-    others = [i for i in range(len(K.outputs)) if i != k]
-    B = seen.B[:, others]
-    A = np.block([[P.A + B @ K.D[others] @ seen.C, B @ K.C[others]], [K.B @ seen.C, K.A]])
-    shown = P.select(inputs=K.outputs, outputs=[axis.response])
-    free = LinearModel(
-        A,
-        np.vstack([seen.B[:, [k]], np.zeros((len(K.A), 1))]),
-        np.hstack([shown.C, np.zeros((1, len(K.A)))]),
-        np.zeros((1, 1)),
-        _with_controller(P, K),
-        signals((axis.control,)),
-        signals((axis.response,)),
-        P.dt,
+    L, inputs = at.broken, at.controller.outputs
+    C = at.plant.select(inputs=inputs, outputs=[at.axis.response]).C
+    free = replace(
+        L,
+        C=np.hstack([C, np.zeros((1, len(L.A) - C.shape[1]))]),
+        outputs=signals((at.axis.response,)),
     )
-    y, _ = _step(free, spec.window)
+    y = free.step_response(spec.window, SAMPLES + 1).values
     return math.degrees(float(np.abs(y).max()) * at.travel)
 
 

@@ -22,6 +22,7 @@ from symheli import (
 )
 from symheli.flight import XCELL_SERVOS
 from synthesis import Sheet
+from synthesis.sheet.evaluation import worst
 
 NAME = "mine"
 
@@ -131,6 +132,21 @@ def test_a_flight_along_its_reference_misses_nothing(lqr):
     for key in (("altitude", ""), ("track", ""), ("rotor_speed", ""), ("effort", "d_lat")):
         assert found[key] == pytest.approx(0.0, abs=1e-9)
         assert flew[key] > 1e-4
+
+
+def test_a_controller_that_loses_every_flight_is_lost_and_not_left_out(vehicle, lqr):
+    """Every entry that a flight has is infinite of a lost one; the sheet then says so."""
+    heli = Helicopter.load("xcell60", governor="pi")
+    slow = AirspeedSchedule((4.0,), (2.0,), (1.0,))
+    (one,) = fly_batch(heli, [replace(plan(lqr, 7.7), schedule=slow)], seeds=[0], workers=1).data
+    fell = measured(SimpleNamespace(lost=10, heli=one.heli))
+    assert set(fell) == set(measured(one))
+    assert set(fell.values()) == {math.inf}
+    found = {("roll", "actuator in turbulence"): math.inf}
+    table = vehicle.frozen({LQR: lqr}).with_flown({LQR: found}, 0.0)
+    (cell,) = (r for r in table.reached(LQR) if r.specification.name == "actuator in turbulence")
+    assert cell.margin == -math.inf
+    assert worst(cell) == "lost"
 
 
 @pytest.mark.slow
