@@ -27,7 +27,7 @@ import numpy as np
 from symheli.errors import InputError, UnknownNameError
 from symheli.extras import extra
 from symheli.logs.column import GAP, RESTART, Column, continuous, on_one_axis
-from symheli.logs.files import Table, bounded, error_text, positive, quiet, warn_of_damage
+from symheli.logs.files import Table, bounded, error_text, positive, quiet, units_of, warn_of_damage
 from symheli.values.units import to_si
 
 LABELS = {
@@ -99,12 +99,10 @@ def read_dataflash(
     common time, and a unit that is missing or contradicts the log; `UnknownNameError` for messages
     and fields the log lacks.
     """
-    dt, units = positive(dt), units or {}
+    dt = positive(dt)
     if not fields:
         raise InputError('name at least one signal: fields={"q": "IMU.GyrY", "theta": "ATT.Pitch"}')
-    for name in units:
-        if name not in fields:
-            raise UnknownNameError("signal in units", name, fields)
+    units = units_of(fields, units)
     split = {name: _split(column) for name, column in fields.items()}
     found, _ = _read(path, {message for message, _, _ in split.values()})
     columns = {name: _pick(found, *where, path) for name, where in split.items()}

@@ -6,12 +6,12 @@ import contextlib
 import io
 import os
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
 
-from symheli.errors import DataWarning, InputError
+from symheli.errors import DataWarning, InputError, UnknownNameError
 from symheli.values.units import to_si
 
 MAX_BYTES = 256 * 2**20
@@ -84,6 +84,16 @@ def positive(dt: float, name: str = "dt") -> float:
     if not (np.isfinite(dt) and dt > 0):
         raise InputError(f"{name} must be a positive number of seconds, got {dt}")
     return float(dt)
+
+
+def units_of(fields: Mapping[str, str], units: Mapping[str, str] | None) -> Mapping[str, str]:
+    """Return the units that are declared of signals; raise `UnknownNameError` for one of a signal
+    that is not among the `fields`.
+    """
+    for name in units or {}:
+        if name not in fields:
+            raise UnknownNameError("signal in units", name, fields)
+    return units or {}
 
 
 def seconds_in(time_unit: str) -> float:

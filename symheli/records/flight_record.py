@@ -16,7 +16,7 @@ from symheli.extras import extra
 from symheli.logs.blackbox import read_blackbox
 from symheli.logs.csv import read_csv, with_units
 from symheli.logs.dataflash import read_dataflash
-from symheli.logs.files import seconds_in
+from symheli.logs.files import seconds_in, units_of
 from symheli.logs.mat import read_mat
 from symheli.logs.signal_map import SignalMap
 from symheli.logs.ulog import read_ulog
@@ -262,10 +262,7 @@ class FlightRecord:
 
         Units are those that the log declares; `units` gives those it does not, "1" else.
         """
-        units = units or {}
-        for name in units:
-            if name not in fields:
-                raise UnknownNameError("signal in units", name, fields)
+        units = units_of(fields, units)
         asked = {name: (column, units.get(name, "")) for name, column in fields.items()}
         return replace(
             cls._from_table(*read_blackbox(path, asked, dt), path),
