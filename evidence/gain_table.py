@@ -132,6 +132,20 @@ def flight(heli: Helicopter, model: LPVStateSpace) -> Measures:
         return measured(symheli.fly_batch(heli, [plan]).data)[0]
 
 
+def row(name: str, heli: Helicopter, of: Plant, model: LPVStateSpace) -> list[str]:
+    """Return a row of the table: frozen gains, the proven gain, and errors of the flight."""
+    one, two = ratios(of, model)
+    found, flown = proof(of, model), flight(heli, model)
+    return [
+        name,
+        f"{BOUNDS[0] * one:.4g}",
+        f"{BOUNDS[1] * two:.4g}",
+        f"{found.gamma:.4g}" if found.verified else "none",
+        "lost" if flown.lost else f"{flown.speed:.2f} m/s",
+        f"{np.degrees(flown.attitude):.0f} deg",
+    ]
+
+
 def main() -> None:
     """Print both tables, or keep them in docs/structured.md."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -145,18 +159,7 @@ def main() -> None:
     print(made, f"\n{time.perf_counter() - begin:.0f} s", flush=True)
     rows = []
     for name, model in (("structured", made.model), ("scheduled LQR", lqr_schedule(heli))):
-        one, two = ratios(of, model)
-        found, flown = proof(of, model), flight(heli, model)
-        rows.append(
-            [
-                name,
-                f"{BOUNDS[0] * one:.4g}",
-                f"{BOUNDS[1] * two:.4g}",
-                f"{found.gamma:.4g}" if found.verified else "none",
-                "lost" if flown.lost else f"{flown.speed:.2f} m/s",
-                f"{np.degrees(flown.attitude):.0f} deg",
-            ]
-        )
+        rows.append(row(name, heli, of, model))
         print(*rows[-1], flush=True)
     head = ["controller", "velocities, rates", "attitudes, commands"]
     compared = markdown([*head, "proven, all at 3 m/s^2", "speed error", "attitude"], rows)

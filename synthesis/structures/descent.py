@@ -20,7 +20,7 @@ DECREASE, CURVATURE = 1e-4, 0.5
 """Constants of the weak Wolfe conditions."""
 HALVINGS = 30
 """Largest number of trials of a line search."""
-WINDOW, STANDSTILL = 15, 1e-6
+WINDOW, STANDSTILL = 15, 1e-8
 """BFGS ends where so many steps lowered the value by no more than this."""
 
 RADII = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5)

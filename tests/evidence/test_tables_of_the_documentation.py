@@ -13,7 +13,7 @@ from typing import NamedTuple
 import pytest
 
 import synthesis
-from evidence import logs, responses, specs, tuning, two_bands
+from evidence import gain_table, logs, responses, specs, structured, tuning, two_bands
 from evidence.bracket.measured import GAINS, bracket
 from evidence.jerk.measured import TransitionPlan, fastest
 from evidence.marks import calibrated, guarantee, measured
@@ -231,6 +231,24 @@ def margins_of_the_lqr_schedule():
         assert abs(float(number) - float(shown)) <= 1.0
 
 
+def static_output_feedback_of_one_helicopter():
+    """HE1, from as many starts as the table."""
+    found = structured.row("HE1", structured.tuned("HE1"))[1:]
+    shown = KEPT["structured.md", "static output feedback"].cells("HE1")
+    assert found[:2] == shown[:2]
+    assert same(shown[2], float(found[2]), rel=1e-6)  # its infimum is at infinite gains
+
+
+def scheduled_lqr_beside_the_gain_table():
+    heli = Helicopter.load("xcell60", governor="ideal")
+    of = gain_table.plant(heli)
+    name, *found = gain_table.row("scheduled LQR", heli, of, gain_table.lqr_schedule(heli))
+    for new, shown in zip(found, KEPT["structured.md", "gain table"].cells(name), strict=True):
+        (number, *unit), (old, *old_unit) = new.split(), shown.split()
+        assert unit == old_unit
+        assert same(old, float(number), rel=1e-2)  # a proof of another machine ends elsewhere
+
+
 ROWS = {
     ("controllers.md", "specification sheet"): margins_of_the_lqr_schedule,
     ("gains.md", "interpolated"): lambda: proven_by_p_alone("interpolated", lateral_loop(_xcell())),
@@ -242,6 +260,8 @@ ROWS = {
     ),
     ("gains.md", "flights"): fastest_of_the_test_flight,
     ("lft.md", "reach"): gains_on_a_narrow_range,
+    ("structured.md", "static output feedback"): static_output_feedback_of_one_helicopter,
+    ("structured.md", "gain table"): scheduled_lqr_beside_the_gain_table,
     ("tubes.md", "amplitudes"): tube_in_hover,
     ("identify.md", "public logs"): one_public_log,
     ("identified.md", "xcell60"): lambda: marks_of_the_worst_seed("xcell60"),
