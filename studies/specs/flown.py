@@ -25,7 +25,7 @@ from symheli import (
     ScheduledController,
     fly_batch,
 )
-from symheli.errors import ValidityWarning
+from symheli.errors import CompilerWarning, ValidityWarning
 from symheli.flight import XCELL_SERVOS
 from symheli.flight.flight_data import FlightData
 from symheli.progress import tracked
@@ -172,6 +172,7 @@ def quickness(heli: Helicopter, K: LPVStateSpace, axis: Axis) -> float:
     for plan_ in _steps(K, axis, [v for v in HELD_AT if low <= v <= high]):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ValidityWarning)
+            warnings.simplefilter("ignore", CompilerWarning)  # steps are few, and made in Python
             (one,) = fly_batch(heli, [plan_], seeds=[0], workers=1).data
         if one.lost >= 0:
             return math.nan

@@ -78,7 +78,7 @@ class AxisLoop:
                 " delay between"
             )
         coupled = [axis.coupled] if axis.coupled in P.outputs else []
-        shown = P.select(inputs=K.outputs, outputs=dict.fromkeys((*K.inputs, *coupled)))
+        shown = P.select(inputs=K.outputs, outputs=[*dict.fromkeys((*K.inputs, *coupled))])
         if np.any(shown.D):
             raise InputError(f"{axis.coupled}: an input acts on it directly, without a state")
         found = connect(

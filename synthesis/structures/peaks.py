@@ -214,7 +214,7 @@ class Loops:
 
     def _channel(self, closed: _Closed, k: int, s: int) -> tuple[Array, Array, Array, Array]:
         w, z, bound = self.channels[s]
-        C, D = closed.C[k][z] / bound, closed.D[k][np.ix_(z, w)] / bound
+        C, D = closed.C[k][z] / bound, closed.D[k][z][:, w] / bound
         return closed.A[k], closed.B[k][:, w], C, D
 
     def _slope(self, closed: _Closed, active: Active) -> Array:
@@ -230,7 +230,7 @@ class Loops:
             T = C @ np.linalg.solve(point * np.eye(len(A)) - A, B) + D
         else:
             T = D.astype(complex)
-        u, _, v = np.linalg.svd(T[np.ix_(z, w)] / bound)
+        u, _, v = np.linalg.svd(T[z][:, w] / bound)
         by_output = u[:, 0].conj() @ T[z, first_w:] / bound
         by_input = T[first_z:, w] @ v[0].conj()
         return self.shares[k] @ np.real(by_output * by_input)
