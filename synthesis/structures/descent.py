@@ -57,8 +57,15 @@ class Stationarity(NamedTuple):
     radius: float
 
 
-def bfgs(function: Function, start: Point, iterations: int, enough: float = -math.inf) -> Point:
-    """Descend until the value is below `enough`, does not fall any more, or `iterations` are spent.
+def bfgs(
+    function: Function,
+    start: Point,
+    iterations: int,
+    enough: float = -math.inf,
+    standstill: float = STANDSTILL,
+) -> Point:
+    """Descend until the value is below `enough`, falls by no more than `standstill` in `WINDOW`
+    steps, or `iterations` are spent.
 
     Source: Lewis and Overton, Mathematical Programming 141 (2013).
     """
@@ -88,7 +95,7 @@ def bfgs(function: Function, start: Point, iterations: int, enough: float = -mat
             H = left @ H @ left.T + rho * np.outer(s, s)
             fresh = False
         history.append(here.value)
-        if len(history) > WINDOW and history[-1 - WINDOW] - here.value < STANDSTILL:
+        if len(history) > WINDOW and history[-1 - WINDOW] - here.value < standstill:
             break
     return here
 

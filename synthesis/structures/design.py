@@ -26,7 +26,7 @@ from synthesis.lti.hinf import hinf
 from synthesis.plant.diagnosis import modes_out_of_reach, unpriced
 from synthesis.plant.plant import Plant, require_plant
 from synthesis.plant.refusals import conditions, require_channels
-from synthesis.structures.descent import Point, Stationarity, bfgs, sampled_descent
+from synthesis.structures.descent import STANDSTILL, Point, Stationarity, bfgs, sampled_descent
 from synthesis.structures.peaks import Active, Loops, Value
 from synthesis.structures.structure import Structure
 from synthesis.worst.frozen import norm
@@ -37,6 +37,10 @@ POINTS = {1: 9, 2: 4}
 """Conditions of each parameter at first (more parameters: 3)."""
 STABILISING, SHORT, LONG = 300, 100, 1500
 """Steps of BFGS at most: on the pole, on the gain from every start, and from the best of those."""
+SCHEDULED_STANDSTILL = 1e-6
+"""`STANDSTILL` of BFGS over several conditions. Where one of them decides, a finer search only moves
+the gains at the others, and the gain while p moves with them.
+"""
 KEPT = 3
 """So many of the starts are continued."""
 ROUNDS = 5
@@ -267,6 +271,7 @@ class _Search:
             if varies
             else np.array([[0.5 * (low + high) for low, high in box]])
         )
+        self.standstill = SCHEDULED_STANDSTILL if varies else STANDSTILL
         self.between = check_points(plant.parameters) if varies else self.points
         inside = {gain.name: gain.inside for gain in structure.gains}
         self.inside = np.concatenate([*structure.coefficients(inside).values()]) / units
@@ -366,26 +371,30 @@ class _Search:
                 if stable is None:
                     self.reached.append(math.inf)
                 else:
-                    found.append(bfgs(self.function, stable, SHORT))
+                    found.append(self._descended(stable, SHORT))
                     self.reached.append(math.exp(found[-1].value))
                 progress.step(said())
             found.sort(key=lambda point: point.value)
             for point in found[:KEPT]:
-                bfgs(self.function, point, LONG)
+                self._descended(point, LONG)
                 progress.step(said())
             for _ in range(ROUNDS if self.best is not None else 0):
                 if not self._with_worse_conditions():
                     break
                 assert self.best is not None  # noqa: S101 - it was not
-                bfgs(self.function, self.best, LONG)
+                self._descended(self.best, LONG)
                 progress.step(said())
             if self.best is not None:
                 end, self.stationarity = sampled_descent(self.function, self.best, rng)
                 self.best = end if end.value <= self.best.value else self.best
 
+    def _descended(self, start: Point, iterations: int) -> Point:
+        """The gain after so many steps from a stable point at most."""
+        return bfgs(self.function, start, iterations, standstill=self.standstill)
+
     def _stabilised(self, x: Array) -> Point | None:
         """Return numbers near these with which every loop is stable, None where none are found."""
-        point = bfgs(self._pole, Point(x, self._pole(x)), STABILISING, -self.decay)
+        point = bfgs(self._pole, Point(x, self._pole(x)), STABILISING, -self.decay, self.standstill)
         value = self.function(point.x)
         self.poles.append(point.value)
         return Point(point.x, value) if math.isfinite(value.value) else None
