@@ -38,8 +38,8 @@ POINTS = {1: 9, 2: 4}
 STABILISING, SHORT, LONG = 300, 100, 1500
 """Steps of BFGS at most: on the pole, on the gain from every start, and from the best of those."""
 SCHEDULED_STANDSTILL = 1e-6
-"""`STANDSTILL` of BFGS over several conditions. Where one of them decides, a finer search only moves
-the gains at the others, and the gain while p moves with them.
+"""`STANDSTILL` of BFGS over several conditions. Where one of them decides, a finer search only
+moves the gains at the others, and the gain while p moves with them.
 """
 KEPT = 3
 """So many of the starts are continued."""
