@@ -4,7 +4,6 @@ of an X-Cell under ArduPilot-like loops, calibrated from the log of the flight.
 
 from __future__ import annotations
 
-import argparse
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,13 +13,12 @@ import numpy as np
 
 import symheli
 from evidence.marks.calibrated import start_of
-from evidence.marks.measured import seeds_of
+from evidence.seeds import over_seeds, parser_of, seeds_of
 from evidence.tables import DOCS, keep, markdown, parsed
 from identification import calibrate
-from studies.campaigns.runners import results, runner
 from studies.known_kinematics.models import PAIRS
 from studies.loops.tuned import QUANTITIES, LoopMargins, loop_margins
-from studies.output import as_json, progress
+from studies.output import as_json
 from symheli import AirspeedSchedule, Excitation, Helicopter
 from symheli.flight import HelicopterLoops
 
@@ -202,15 +200,8 @@ def table(found: Sequence[Prediction]) -> str:
 
 def main() -> None:
     """Print how predictions held, and keep it in docs/identified.md."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", default="0-99")
-    parser.add_argument("--quick", action="store_true", help="the first two seeds")
-    parser.add_argument("--json", action="store_true")
-    options = parsed(parser, "identified.md", timed=False)
-    seeds = seeds_of(options.seeds)[: 2 if options.quick else None]
-    progress(f"{len(seeds)} flights")
-    with runner() as on:
-        found = list(results(on, [partial(of_seed, s) for s in seeds]))
+    options = parsed(parser_of(__doc__, "0-99"), "identified.md", timed=False)
+    found = list(over_seeds(options, [partial(of_seed, s) for s in seeds_of(options)]))
     text = table(found)
     print(as_json([vars(p) for p in found]) if options.json else text)
     if options.write:
@@ -218,4 +209,6 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    from evidence import tuning  # under its own name: its results are handed on and stored by it
+
+    tuning.main()

@@ -4,7 +4,6 @@ from the numbers of another.
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import warnings
 from collections.abc import Sequence
@@ -14,14 +13,13 @@ from functools import partial
 import numpy as np
 
 import symheli
-from evidence.marks.measured import seeds_of
+from evidence.seeds import over_seeds, parser_of, seeds_of
 from evidence.tables import DOCS, keep, markdown, parsed
 from identification import calibrate
-from studies.campaigns.runners import results, runner
 from studies.known_kinematics.flights import aggressive
 from studies.known_kinematics.models import PAIRS
 from studies.known_kinematics.truth import FrozenAxes, Truth
-from studies.output import as_json, progress
+from studies.output import as_json
 from studies.transition.flights import autopilot_for
 from symheli import DataWarning, Helicopter
 from symheli.errors import TrimError
@@ -135,17 +133,11 @@ def table(truth: str, marks: Sequence[Marks]) -> str:
 
 def main() -> None:
     """Print the marks of a vehicle, and keep them in docs/identified.md."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = parser_of(__doc__, "0-20")
     parser.add_argument("--truth", default="xcell60", choices=sorted(PAIRS))
-    parser.add_argument("--seeds", default="0-20")
-    parser.add_argument("--quick", action="store_true", help="the first two seeds")
-    parser.add_argument("--json", action="store_true")
     options = parsed(parser, "identified.md", timed=False)
-    seeds = seeds_of(options.seeds)[: 2 if options.quick else None]
-    progress(f"{len(seeds)} flights of {options.truth}")
-    with runner() as on:
-        calls = [partial(of_seed, seed, options.truth) for seed in seeds]
-        marks = list(results(on, calls))
+    calls = [partial(of_seed, seed, options.truth) for seed in seeds_of(options)]
+    marks = list(over_seeds(options, calls))
     text = table(options.truth, marks)
     print(as_json([vars(m) for m in marks]) if options.json else text)
     if options.write:
@@ -153,4 +145,8 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    from evidence.marks import (
+        calibrated,  # under its own name: its results are handed on and stored by it
+    )
+
+    calibrated.main()

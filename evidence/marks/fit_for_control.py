@@ -4,10 +4,9 @@ the flight alone, and compared with the exact linear models that the verdict has
 
 from __future__ import annotations
 
-import argparse
 import json
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import cache, partial
 from typing import Any
@@ -15,7 +14,7 @@ from typing import Any
 import numpy as np
 
 import symheli
-from evidence.marks.measured import seeds_of
+from evidence.seeds import over_seeds, parser_of, seeds_of
 from identification import (
     FilterError,
     FitForControl,
@@ -26,7 +25,6 @@ from identification import (
 )
 from identification import fit_for_control as judge
 from identification.judge.criteria import SHARE_OF_MARGIN
-from studies.campaigns.runners import results, runner
 from studies.known_kinematics.models import PAIRS
 from studies.loops.lateral import STATES
 from studies.loops.robust_lateral import FEEDBACK, INPUTS, SIZES
@@ -175,19 +173,15 @@ def outcome(vehicle: str, kind: str, method: str, seed: int) -> Outcome:
     return Outcome.of(vehicle, kind, method, seed, found)
 
 
-def campaign(
-    seeds: Sequence[int], methods: Sequence[str] = METHODS[:1], processes: int | None = None
-) -> Iterator[Outcome]:
-    """Every vehicle, kind and method with each of the seeds."""
-    calls = [
+def campaign(seeds: Sequence[int], methods: Sequence[str] = METHODS[:1]) -> list[partial[Outcome]]:
+    """The call for every vehicle, kind and method with each of the seeds."""
+    return [
         partial(outcome, vehicle, kind, method, seed)
         for seed in seeds
         for method in methods
         for kind in KINDS
         for vehicle in PAIRS
     ]
-    with runner(processes) as on:
-        yield from results(on, calls)
 
 
 def table(outcomes: Sequence[Outcome]) -> str:
@@ -223,14 +217,11 @@ def table(outcomes: Sequence[Outcome]) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """`python -m evidence.marks.fit_for_control`."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", default="1000-1009", metavar="A-B")
+    parser = parser_of(__doc__, "1000-1009")
     parser.add_argument("--methods", nargs="+", choices=METHODS, default=METHODS[:1])
-    parser.add_argument("--processes", type=int, metavar="N", help="default: one a core")
-    parser.add_argument("--json", action="store_true", help="a line of JSON a flight instead")
     given = parser.parse_args(arguments)
     outcomes = []
-    for one in campaign(seeds_of(given.seeds), given.methods, given.processes):
+    for one in over_seeds(given, campaign(seeds_of(given), given.methods)):
         outcomes.append(one)
         progress(f"{len(outcomes)} {one.vehicle} {one.kind} {one.seed}: {one.verdict}")
         if given.json:

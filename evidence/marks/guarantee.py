@@ -4,7 +4,6 @@ the exact model.
 
 from __future__ import annotations
 
-import argparse
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,17 +15,16 @@ import numpy as np
 import symheli
 import synthesis
 from evidence.marks.coverage import coverage
-from evidence.marks.measured import seeds_of
+from evidence.seeds import over_seeds, parser_of, seeds_of
 from evidence.tables import DOCS, keep, parsed
 from identification import unseen_flight
-from studies.campaigns.runners import results, runner
 from studies.known_kinematics.flights import aggressive, gentle, transition
 from studies.known_kinematics.models import PAIRS, identified
 from studies.known_kinematics.robust_loop import FORM, Verdict, robust_loop, verdict
 from studies.known_kinematics.truth import Truth
 from studies.loops.exact_lateral import ExactLateral
 from studies.loops.robust_lateral import FEEDBACK
-from studies.output import progress
+from studies.output import as_json, progress
 from studies.transition.flights import TOP, autopilot_for
 from studies.transition.guarantees import PERIOD, scaled
 from symheli import Helicopter
@@ -120,34 +118,24 @@ def table(truth: str, exact: tuple[float, float], found: Sequence[Guarantee]) ->
 
 def main() -> None:
     """Count how often a certificate from flight data holds."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = parser_of(__doc__, "0-59")
     parser.add_argument("--truth", default="xcell60", choices=sorted(PAIRS))
-    parser.add_argument("--seeds", default="0-59")
     parser.add_argument("--aggressive-alone", action="store_true", help="without the gentle flight")
-    parser.add_argument("--processes", type=int, help="default: one a core")
     options = parsed(parser, "identified.md", timed=False)
-    seeds = seeds_of(options.seeds)
     proof = exact_gain(Helicopter.load(options.truth, governor="ideal"))
     exact = proof.gamma, proof.lower
     progress(f"exact loop: proven {exact[0]:.3f}, lower bound {exact[1]:.3f}")
     found = []
-    with runner(options.processes) as on:
-        calls = [
-            partial(
-                of_seed,
-                options.truth,
-                PAIRS[options.truth],
-                seed,
-                exact,
-                not options.aggressive_alone,
-            )
-            for seed in seeds
-        ]
-        for answer in results(on, calls):
-            found.append(answer)
-            progress(str(found[-1]))
+    about = (exact, not options.aggressive_alone)
+    calls = [
+        partial(of_seed, options.truth, PAIRS[options.truth], seed, *about)
+        for seed in seeds_of(options)
+    ]
+    for answer in over_seeds(options, calls):
+        found.append(answer)
+        progress(str(answer))
     text = table(options.truth, exact, found)
-    print(text)
+    print(as_json([vars(g) for g in found]) if options.json else text)
     if options.write:
         keep(DOCS / "identified.md", f"guarantee {options.truth}", text)
 

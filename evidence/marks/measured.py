@@ -4,7 +4,6 @@ seeds, each identified with a simulator that is another vehicle.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -13,13 +12,13 @@ from typing import Any
 import numpy as np
 
 import symheli
+from evidence.seeds import over_seeds, parser_of, seeds_of
 from evidence.tables import DOCS, keep, parsed
-from studies.campaigns.runners import results, runner
 from studies.known_kinematics.flights import aggressive, transition
 from studies.known_kinematics.models import PAIRS, identified
 from studies.known_kinematics.predictions import HORIZON, OUTPUTS, fits_of, states_of
 from studies.known_kinematics.truth import SPEEDS, Truth, frozen_axes
-from studies.output import as_json, progress
+from studies.output import as_json
 from studies.transition.comparison import along_the_command
 from studies.transition.flights import (
     ABOVE_GROUND,
@@ -176,32 +175,19 @@ def _row(name: str, mark: float, values: Array, marks: Sequence[Marks], worst: f
     )
 
 
-def seeds_of(text: str) -> list[int]:
-    """ "0-20" or "3,5,7"."""
-    if "-" in text:
-        first, last = text.split("-")
-        return list(range(int(first), int(last) + 1))
-    return [int(s) for s in text.split(",")]
-
-
-def measure(setting: Setting, seeds: Sequence[int]) -> tuple[list[Marks], dict[str, float]]:
-    """Every seed, on the runner that is there; and the simulator's own gaps."""
+def simulators_gaps(setting: Setting) -> dict[str, float]:
+    """The worst nu-gap over airspeed of the simulator itself, by set of axes."""
     heli, simulator = setting.helicopters()
     own = Truth.of(heli, setting.servos).compare(Truth.of(simulator, setting.servos).models)
-    with runner() as on:
-        found = list(results(on, [partial(of_seed, setting, s) for s in seeds]))
-    return found, {name: float(one["model"].gap.max()) for name, one in own.items()}
+    return {name: float(one["model"].gap.max()) for name, one in own.items()}
 
 
 def main() -> None:
     """Print the marks of a vehicle, and keep them in docs/identified.md."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = parser_of(__doc__, "0-20")
     parser.add_argument("--truth", default="xcell60", choices=sorted(PAIRS))
     parser.add_argument("--simulator", help="default: the other vehicle")
     parser.add_argument("--servos", action="store_true", help="servos, 20 ms delay, governor pi")
-    parser.add_argument("--seeds", default="0-20")
-    parser.add_argument("--quick", action="store_true", help="the first two seeds")
-    parser.add_argument("--json", action="store_true")
     parser.add_argument("--turbulent", action="store_true", help="breeze and light turbulence")
     options = parsed(parser, "identified.md", timed=False)
     setting = Setting(
@@ -210,10 +196,9 @@ def main() -> None:
         options.servos,
         options.turbulent,
     )
-    seeds = seeds_of(options.seeds)[: 2 if options.quick else None]
-    progress(f"{len(seeds)} flights of {setting.truth}")
-    marks, own = measure(setting, seeds)
-    text = table(setting, marks, own)
+    calls = [partial(of_seed, setting, s) for s in seeds_of(options)]
+    marks = list(over_seeds(options, calls))
+    text = table(setting, marks, simulators_gaps(setting))
     print(as_json(_plain(marks)) if options.json else text)
     if options.write:
         section = setting.truth + (

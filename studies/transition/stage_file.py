@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-PACKAGES = ("symheli", "identification", "synthesis", "studies")
+PACKAGES = ("symheli", "identification", "synthesis", "studies", "evidence")
 """Classes of other packages are neither written nor read."""
 TREE = "tree.json"
 ALLOWED = (int, float, str, bool, type(None))
