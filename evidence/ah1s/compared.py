@@ -80,8 +80,8 @@ class Kind:
 
     def at(self, model: KinematicModel, speed: float, record: FlightRecord) -> LinearModel:
         """From sticks, at an airspeed held (m/s)."""
-        p = speed if len(model.parameters) == 1 else (speed, 0.0)
-        held = model.at(p)
+        p = (speed,) if len(model.parameters) == 1 else (speed, 0.0)
+        held = model.at(*p)
         return series(servos(record), held) if self.deflections else held
 
 

@@ -218,7 +218,7 @@ def responses(
     try:
         found = response_match(
             records,
-            lambda p: model.at(p if len(p) > 1 else float(p[0])),  # type: ignore[arg-type]
+            lambda p: model.at(*p),
             plant.outputs,
             [str(u) for u in model.inputs],
             plant.regression.parameters,

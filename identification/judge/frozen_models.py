@@ -18,7 +18,7 @@ from symheli.values.summary import summarized
 class Freezable(Protocol):
     """A model whose scheduling can be held: LPV state space, LFT, identified model."""
 
-    def at(self, p: Any, /) -> LinearModel:
+    def at(self, *p: float) -> LinearModel:
         """The linear model with the scheduling held at p."""
         ...
 
@@ -309,7 +309,7 @@ def _held(
 ) -> list[LinearModel]:
     """The linear models at the points."""
     if not isinstance(model, Mapping):
-        return [model.at(point) for point in points]
+        return [model.at(*np.atleast_1d(point)) for point in points]
     if set(points) - set(model):
         raise InputError(f"{name}: expected a model at the points {points}, got {list(model)}")
     return [model[point] for point in points]

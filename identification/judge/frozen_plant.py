@@ -46,16 +46,16 @@ class FrozenPlant:
                 if name not in known:
                     raise UnknownNameError(f"{kind} of the plant", name, known)
 
-    def at(self, p: float | Sequence[float]) -> LinearModel:
+    def at(self, *p: float) -> LinearModel:
         """Discrete, with the scheduling held at p."""
         if isinstance(self.model, KinematicModel):
-            return self.model.at(p, self.outputs, self.inputs)
-        return self.model.at(p).select(inputs=self.inputs, outputs=self.outputs)
+            return self.model.at(*p, outputs=self.outputs, inputs=self.inputs)
+        return self.model.at(*p).select(inputs=self.inputs, outputs=self.outputs)
 
-    def of_each(self, thetas: Array, p: float | Sequence[float]) -> LinearModels:
+    def of_each(self, thetas: Array, *p: float) -> LinearModels:
         """The plants of coefficients (K, n, ny) in the place of the model's, at p."""
         return LinearModels.of(
-            [replace(self, model=self.model.with_theta(t)).at(p) for t in thetas]
+            [replace(self, model=self.model.with_theta(t)).at(*p) for t in thetas]
         )
 
     @property
@@ -85,15 +85,21 @@ class AtPoint:
             "output_scale": np.array([self.scales[y] for y in self.plant.outputs]),
         }
 
+    @property
+    def _values(self) -> tuple[float, ...]:
+        return self.p if isinstance(self.p, tuple) else (self.p,)
+
     @cached_property
     def estimate(self) -> LinearModel:
         """The plant of the model."""
-        return self.plant.at(self.p)  # type: ignore[arg-type]
+        return self.plant.at(*self._values)
 
     @cached_property
     def drawn(self) -> LinearModels | None:
         """Those of the draws; None without a covariance."""
-        return None if self.thetas is None else self.plant.of_each(self.thetas, self.p)  # type: ignore[arg-type]
+        return (
+            None if self.thetas is None else self.plant.of_each(self.thetas, *self._values)
+        )
 
     @cached_property
     def margin(self) -> float:
@@ -120,7 +126,9 @@ class AtPoint:
         """The largest to another estimate, NaN without one."""
         if not self.second:
             return float("nan")
-        return float(self.gaps_to([other.at(self.p) for other in self.second]).max())  # type: ignore[arg-type]
+        return float(
+            self.gaps_to([other.at(*self._values) for other in self.second]).max()
+        )
 
     @cached_property
     def lost(self) -> float:

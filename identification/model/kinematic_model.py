@@ -14,6 +14,7 @@ from identification.model.kinematic_realization import Realization
 from identification.model.kinematic_run import Run
 from identification.model.lpvarx_model import LEAST_SQUARES, LPVARXModel
 from identification.model.prediction import named_fit, require_horizon
+from identification.model.realization import held_value
 from identification.structure.kinematic_arx import MOVING, STATES, KinematicARX
 from symheli.errors import InputError
 from symheli.lpv import FunctionSpace, LinearModel, LPVStateSpace, UncertainStateSpace
@@ -162,7 +163,7 @@ class KinematicModel:
         """The same with other coefficients (n, 6), whose covariance is not known."""
         return replace(self, aerodynamics=self.aerodynamics.with_theta(theta))
 
-    def score(self, record: FlightRecord, horizon: int | None) -> NamedVector:
+    def score(self, record: FlightRecord, horizon: int | None = None) -> NamedVector:
         """Fit of each state in percent, `horizon` samples ahead or with None in free run; see
         `fit_percent`.
         """
@@ -224,7 +225,7 @@ class KinematicModel:
 
     def at(
         self,
-        p: float | Sequence[float],
+        *p: float,
         outputs: Sequence[str] | None = None,
         inputs: Sequence[str] | None = None,
     ) -> LinearModel:
@@ -233,7 +234,7 @@ class KinematicModel:
 
         With `outputs` and `inputs` only these, as `to_state_space` keeps them.
         """
-        return self.realization.at(p, outputs, inputs)
+        return self.realization.at(held_value(p), outputs, inputs)
 
     def to_state_space(
         self,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -190,13 +190,15 @@ class LPVARXModel:
         )
         return prediction.named_fit(self.outputs, record, guess)
 
-    def at(self, p: float | Sequence[float]) -> LinearModel:
+    def at(self, *p: float) -> LinearModel:
         """The discrete model with the scheduling held at p (one number a parameter), in observer
         form.
 
         The offsets are left out: deviation dynamics.
         """
-        return realization.at(self.coefficients, p, self.outputs, self.inputs, self.dt)
+        return realization.at(
+            self.coefficients, realization.held_value(p), self.outputs, self.inputs, self.dt
+        )
 
     def to_state_space(self, route: Literal["shifted", "direct"] | None = None) -> LPVStateSpace:
         """The discrete LPV model with static dependence on p(k) that responds exactly as this one,

@@ -4,6 +4,8 @@ exact.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from identification.model.coefficients import Coefficients
@@ -107,6 +109,11 @@ def direct(
         _lagged(s, i) for i in range(1, L + 1) for s in inputs
     ]
     return LPVStateSpace(basis, A, B, C, D, parameters, tuple(states), inputs, outputs, dt)
+
+
+def held_value(p: Sequence[object]) -> object:
+    """The value of one parameter, or those of several, as `at(*p)` takes them."""
+    return p[0] if len(p) == 1 else p
 
 
 def one_value(p: object, basis: FunctionSpace) -> Array:

@@ -116,9 +116,9 @@ def frozen_axes(model: KinematicModel, truth: Truth) -> FrozenAxes:
 
 def frozen(model: KinematicModel, axis: Axis, airspeed: float) -> LinearModel:
     """Return an identified model of an axis in level flight, with the names of the exact model."""
-    p = (airspeed, 0.0) if len(model.parameters) == 2 else airspeed
+    p = (airspeed, 0.0) if len(model.parameters) == 2 else (airspeed,)
     commands = {u.removesuffix("_command"): u for u in map(str, model.inputs)}
-    part = model.at(p, axis.outputs, [commands[u] for u in axis.inputs])
+    part = model.at(*p, outputs=axis.outputs, inputs=[commands[u] for u in axis.inputs])
     inputs = tuple(Signal(u.removesuffix("_command"), u.unit) for u in part.inputs)
     return replace(part, inputs=inputs)
 

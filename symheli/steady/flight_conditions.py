@@ -70,10 +70,13 @@ class FlightConditions(Sequence[FlightCondition]):
     @overload
     def __getitem__(self, k: int) -> FlightCondition: ...
     @overload
-    def __getitem__(self, k: slice) -> FlightConditions: ...
-    def __getitem__(self, k: int | slice) -> FlightCondition | FlightConditions:
-        if isinstance(k, slice):
-            return self.at(np.arange(len(self))[k])
+    def __getitem__(self, k: slice | Array) -> FlightConditions: ...
+    def __getitem__(self, k: int | slice | Array) -> FlightCondition | FlightConditions:
+        """The condition at a position, or those of a slice, a mask (N,) or positions."""
+        if isinstance(k, slice | np.ndarray):
+            chosen = {name: getattr(self, name)[k] for name in (*_NUMBERS, "wind")}
+            altitude = None if self.altitude is None else np.asarray(self.altitude)[k]
+            return FlightConditions(**chosen, altitude=altitude)
         airspeed, *others = (float(getattr(self, name)[k]) for name in _NUMBERS)
         return FlightCondition(
             airspeed,
@@ -81,12 +84,6 @@ class FlightConditions(Sequence[FlightCondition]):
             wind=tuple(self.wind[k].tolist()),
             altitude=None if self.altitude is None else float(np.asarray(self.altitude)[k]),
         )
-
-    def at(self, which: Array) -> FlightConditions:
-        """Return the conditions at these positions."""
-        chosen = {name: getattr(self, name)[which] for name in (*_NUMBERS, "wind")}
-        altitude = None if self.altitude is None else np.asarray(self.altitude)[which]
-        return FlightConditions(**chosen, altitude=altitude)
 
     @property
     def demand(self) -> Array:

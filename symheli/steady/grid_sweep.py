@@ -119,7 +119,7 @@ def sweep_grid(
     return LinearFamily(
         (AIRSPEED, *(AXES[name] for name in given)),
         (speeds, *map(np.asarray, given.values())),
-        linear_models(flights.at(airspeed_first), trims.at(airspeed_first), inputs),
+        linear_models(flights[airspeed_first], trims[airspeed_first], inputs),
     )
 
 

@@ -46,7 +46,7 @@ def _crossings(heli: Helicopter, trims: TrimBatch, names: list[str], between: Ar
     ends = trims.conditions.airspeed[at]
     values = np.array([trims.switches[name][k] for name, k in zip(names, at, strict=True)])
     # in each bracket one cut after the other, the brackets side by side
-    asked = trims.conditions.at(np.tile(between, CUTS))
+    asked = trims.conditions[np.tile(between, CUTS)]
     start = unknowns(heli, trims)[between]
     while np.any(np.ptp(ends, axis=1) > ACCURACY):
         cuts = _cuts(ends, values)

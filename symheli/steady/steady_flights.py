@@ -76,9 +76,9 @@ class SteadyFlights:
         """The helicopter of flight k."""
         return self.helis[self.which[k]]
 
-    def at(self, which: Array) -> SteadyFlights:
+    def __getitem__(self, which: Array) -> SteadyFlights:
         """Return the flights at these positions."""
-        return SteadyFlights(self.helis, self.which[which], self.conditions.at(which))
+        return SteadyFlights(self.helis, self.which[which], self.conditions[which])
 
     def solved(self, starts: Array, after: Array | int) -> tuple[Array, Array]:
         """Newton's method in each flight: unknowns (N, nz) and largest residuals (N,).

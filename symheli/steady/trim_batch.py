@@ -115,10 +115,14 @@ class TrimBatch(OperatingPoints):
     @overload
     def __getitem__(self, k: int) -> TrimPoint: ...
     @overload
-    def __getitem__(self, k: slice) -> tuple[TrimPoint, ...]: ...
-    def __getitem__(self, k: int | slice) -> TrimPoint | tuple[TrimPoint, ...]:
-        if isinstance(k, slice):
-            return tuple(self[i] for i in range(*k.indices(len(self))))
+    def __getitem__(self, k: slice | Array) -> TrimBatch: ...
+    def __getitem__(self, k: int | slice | Array) -> TrimPoint | TrimBatch:
+        """The trim at a position, or those of a slice, a mask (N,) or positions."""
+        if isinstance(k, slice | np.ndarray):
+            names = ("x", "u", "xdot", "residual", "wind", "density", "on_stops", "vortex_ring")
+            chosen = {name: getattr(self, name)[k] for name in (*names, "torque")}
+            switches = {name: values[k] for name, values in self.switches.items()}
+            return replace(self, conditions=self.conditions[k], switches=switches, **chosen)
         k = range(len(self))[k]
         if k not in self._made:
             self._made[k] = self._point(k)
@@ -138,13 +142,6 @@ class TrimBatch(OperatingPoints):
         known = [k for k, name in enumerate(names) if name in self.inputs]
         out[:, known] = self.u[:, indices([names[k] for k in known], self.inputs, "input")]
         return out
-
-    def at(self, which: Array) -> TrimBatch:
-        """The trims at these positions."""
-        names = ("x", "u", "xdot", "residual", "wind", "density", "on_stops", "vortex_ring")
-        chosen = {name: getattr(self, name)[which] for name in (*names, "torque")}
-        switches = {name: values[which] for name, values in self.switches.items()}
-        return replace(self, conditions=self.conditions.at(which), switches=switches, **chosen)
 
     def _point(self, k: int) -> TrimPoint:
         condition = self.conditions[k]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 
@@ -108,8 +108,17 @@ class TrimMap:
         point = next(point for row in self.points for point in row if point is not None)
         return (*point.x.signals, *point.u.signals, POWER)
 
-    def __getitem__(self, name: str) -> Array:
-        """A state, input or "power" over the grid (n, m), NaN where the equations do not hold."""
+    @overload
+    def __getitem__(self, name: str) -> Array: ...
+    @overload
+    def __getitem__(self, name: tuple[int, int]) -> TrimPoint | None: ...
+    def __getitem__(self, name: str | tuple[int, int]) -> Array | TrimPoint | None:
+        """A state, input or "power" over the grid (n, m), NaN where the equations do not hold; by
+        [i, j] the trim at airspeed i and climb rate j, None where the airspeed is less than that.
+        """
+        if isinstance(name, tuple):
+            i, j = name
+            return self.points[i][j]
         if name not in self.signals:
             raise UnknownNameError("signal", name, self.signals)
         if name == POWER:
@@ -121,10 +130,6 @@ class TrimMap:
             return point.x[name] if name in point.x else point.u[name]
 
         return np.array([[value(point) for point in row] for row in self.points])
-
-    def at(self, i: int, j: int) -> TrimPoint | None:
-        """The trim at airspeed i and climb rate j."""
-        return self.points[i][j]
 
     def csv(self) -> str:
         """Return every signal and flag, one line for each possible grid point."""

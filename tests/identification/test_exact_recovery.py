@@ -112,12 +112,12 @@ def test_a_model_of_several_parameters_freezes():
     left = np.eye(2) + sum(values.A[i] * z ** -(i + 1.0) for i in range(2))
     right = sum(values.B[j] * z ** -float(j) for j in range(2))
     np.testing.assert_allclose(
-        model.at([4.0, 1.2]).frequency_response(omega)[0], np.linalg.solve(left, right), **EXACT
+        model.at(4.0, 1.2).frequency_response(omega)[0], np.linalg.solve(left, right), **EXACT
     )
     with pytest.raises(InputError, match="expected 2 along the last axis"):
         model.at(4.0)
     with pytest.raises(InputError, match="expected one value of p"):
-        model.at([[4.0, 1.2], [5.0, 1.2]])
+        model.at([4.0, 5.0], [1.2, 1.2])
 
 
 def test_several_parameters_that_move_together_are_refused():

@@ -361,7 +361,7 @@ def test_polynomials_of_the_state_space_are_exact_at_every_p(vehicle, flight):
         size = np.abs(exact.A).max()
         assert np.abs(found.A - exact.A).max() < 1e-9 * size  # what interpolation stops at
         assert np.abs(found.B - exact.B).max() < 1e-9 * size
-        kept, some = model.at(p, ["v", "p", "r", "phi"], ["d_lat"]), part.at(p)
+        kept, some = model.at(p, outputs=["v", "p", "r", "phi"], inputs=["d_lat"]), part.at(p)
         assert some.states == kept.states
         np.testing.assert_allclose(some.A, kept.A, atol=1e-9 * size)
     with pytest.raises(InputError, match="leave at least one parameter moving"):

@@ -38,8 +38,8 @@ def test_a_trim_map_holds_the_trims_of_its_points(ideal, envelope):
         for j, rate in enumerate(envelope.climb_rates):
             if envelope.possible[i, j] and not envelope.vortex_ring[i, j]:
                 alone = symheli.trim(ideal, speed, climb_rate=rate)
-                np.testing.assert_allclose(envelope.at(i, j).u.array, alone.u.array, atol=1e-9)
-                assert envelope["d_col"][i, j] == envelope.at(i, j).u["d_col"]
+                np.testing.assert_allclose(envelope[i, j].u.array, alone.u.array, atol=1e-9)
+                assert envelope["d_col"][i, j] == envelope[i, j].u["d_col"]
     assert np.isnan(envelope["theta"][0, 0])
     assert envelope.level_speeds[2, 4] == 0.0
 
@@ -51,7 +51,7 @@ def test_climbing_takes_power_and_descending_gives_it(ideal, envelope):
     slope = (envelope["power"][2, 3] - envelope["power"][2, 1]) / 8.0
     assert slope == pytest.approx(80.4, rel=0.15)
     values = ideal.compiled("diagnostics")(
-        x=envelope.at(2, 2).x.array, u=envelope.at(2, 2).u.array, wind=0
+        x=envelope[2, 2].x.array, u=envelope[2, 2].u.array, wind=0
     )
     assert envelope["power"][2, 2] == pytest.approx(167.0 * float(values["Q_e"]), rel=1e-12)
 
