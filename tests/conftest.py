@@ -41,8 +41,25 @@ def lot(nodeid):
     return TOGETHER.get(file, file)
 
 
+def quick_case(item, mark):
+    """Whether a marker `slow` of a function leaves out this case of it."""
+    case = item.callspec.id if hasattr(item, "callspec") else None
+    but, only = (
+        (ids,) if isinstance(ids, str) else ids
+        for ids in (mark.kwargs.get("but", ()), mark.kwargs.get("only", ()))
+    )
+    return case in but or (bool(only) and case not in only)
+
+
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config, items):
-    """In processes: the longest lots first, then those of many tests."""
+    """Quick cases of slow tests are not slow. In processes: the longest lots first, then those of
+    many tests.
+    """
+    for item in items:
+        item.own_markers = [
+            m for m in item.own_markers if not (m.name == "slow" and quick_case(item, m))
+        ]
     if hasattr(config, "workerinput"):
         size = Counter(lot(item.nodeid) for item in items)
         first = {name: place for place, name in enumerate(LONGEST)}

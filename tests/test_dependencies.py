@@ -91,6 +91,7 @@ def complaint(source, own=ROOMS):
     return ""
 
 
+@pytest.mark.slow(but="evidence")
 @pytest.mark.parametrize("package", [*ROOMS, "evidence"])
 def test_every_import_is_declared(package):
     own = (*ROOMS, "evidence") if package == "evidence" else ROOMS

@@ -78,6 +78,47 @@ def start():
     return of
 
 
+LONG = (
+    "synthesis-Certificate",
+    "synthesis-Controller",
+    "synthesis-Estimator",
+    "synthesis-GainCurve",
+    "synthesis-StructuredController",
+    "synthesis-Tube",
+    "synthesis-certify_sampled",
+    "synthesis-decay_rate",
+    "synthesis-estimator",
+    "synthesis-frozen_gain",
+    "synthesis-gain_against_rate",
+    "synthesis-l2_gain",
+    "synthesis-lft_feedback",
+    "synthesis-lower_bound",
+    "synthesis-output_feedback",
+    "synthesis-proven_around",
+    "synthesis-stability",
+    "synthesis-state_feedback",
+    "synthesis-structured",
+    "synthesis-tube",
+    "synthesis-with_wrong_parameter",
+    "symheli-FlightDataset",
+    "symheli-LinearFamily",
+    "symheli-simulate_batch",
+    "symheli-sweep_grid",
+    "identification-FilterError",
+    "identification-FitForControl",
+    "identification-KinematicModel",
+    "identification-OutputError",
+    "identification-RigidBodyOnline",
+    "identification-calibrate",
+    "identification-fit_for_control",
+    "identification-unseen_flight",
+    "symheli.lpv-balanced_truncation",
+    "symheli.records-check_kinematics",
+)
+"""Examples that take more than a second."""
+
+
+@pytest.mark.slow(only=LONG)
 @pytest.mark.parametrize(("package", "name"), exported())
 def test_the_examples_of_an_exported_name_print_what_they_say(package, name, start):
     text = inspect.getdoc(getattr(importlib.import_module(package), name)) or ""
@@ -117,6 +158,7 @@ EXPLAINED = [
 ]
 
 
+@pytest.mark.slow(only=LONG)
 @pytest.mark.parametrize(("package", "name"), EXPLAINED)
 def test_an_example_needs_nothing_but_its_imports(package, name, start, tmp_path, monkeypatch):
     """And what the docstring of its package makes."""

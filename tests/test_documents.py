@@ -300,6 +300,7 @@ COMMAND = re.compile(
 )
 
 
+@pytest.mark.slow(but="xplane")
 @pytest.mark.parametrize(
     ("command", "table"),
     COMMAND.findall((DOCS / "identify.md").read_text(encoding="utf-8")),

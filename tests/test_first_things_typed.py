@@ -100,6 +100,7 @@ def test_prints_show_what_was_asked_for(ideal):
     assert identification.__version__ == symheli.__version__
 
 
+@pytest.mark.slow
 def test_a_certificate_is_three_lines_and_a_sampled_controller_says_so():
     p = Scheduling("p", "1", 0.0, 1.0, rate=0.5)
     lag = LPVStateSpace.polynomial([[[-1.0]], [[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], p)

@@ -113,6 +113,7 @@ def test_flights_are_counted(heard, ideal, tmp_path):
     assert [p.done for p in heard.of("flying") if p.over] == [3, 2]
 
 
+@pytest.mark.slow
 def test_a_certificate_tells_of_its_search_its_attempts_and_its_verification(heard):
     cert = synthesis.l2_gain(spring())
     assert cert.verify(rigorous=True)
@@ -126,6 +127,7 @@ def test_a_certificate_tells_of_its_search_its_attempts_and_its_verification(hea
     assert exact.done == exact.total
 
 
+@pytest.mark.slow
 def test_a_design_tells_the_digits_of_its_gamma(heard):
     lag = LPVStateSpace.polynomial(
         A=[[[-1.0]], [[2.0]]],

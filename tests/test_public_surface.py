@@ -226,6 +226,7 @@ def test_a_script_beside_a_folder_called_symheli_imports_the_package(tmp_path):
     subprocess.run([sys.executable, str(script)], check=True, capture_output=True, cwd=tmp_path)
 
 
+@pytest.mark.slow(but=("identification", "studies"))
 @pytest.mark.parametrize("room", ROOMS)
 def test_the_rooms_import_one_way(room):
     """And none of them what is not installed with it."""
@@ -310,6 +311,7 @@ def test_no_path_of_somebodys_computer(room):
     assert not wrong, "\n".join(wrong)
 
 
+@pytest.mark.slow
 def test_examples_run():
     for path in sorted((ROOT / "examples").glob("*.py")):
         subprocess.run([sys.executable, str(path)], check=True, capture_output=True, timeout=60)

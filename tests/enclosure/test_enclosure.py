@@ -232,6 +232,7 @@ def heli(request):
     return Helicopter.load(request.param, governor="ideal")
 
 
+@pytest.mark.slow(but="xcell60-4.0")
 @pytest.mark.parametrize("airspeed", [0.0, 4.0, 13.0])
 def test_the_helicopter_and_its_jacobian(heli, airspeed):
     # against the compiled model with its own inflow solver: tolerance 1e-9, that of the solver

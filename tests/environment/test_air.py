@@ -51,6 +51,7 @@ def test_a_gust_rises_and_falls_as_one_minus_cosine():
     assert not speeds[:, :2].any()
 
 
+@pytest.mark.slow(but="12.0")
 @pytest.mark.parametrize("airspeed", [3.0, 12.0])
 def test_the_variance_under_dryden_spectra_is_that_of_the_intensities(airspeed):
     air = Dryden(wind=15.0, altitude=30.0)
@@ -83,6 +84,7 @@ def test_turbulence_has_its_intensity_correlation_and_spectrum():
     )
 
 
+@pytest.mark.slow
 def test_one_step_and_many_small_ones_have_the_same_covariance():
     """Exact in distance: the correlation over 4 m does not depend on how many samples lie
     between.

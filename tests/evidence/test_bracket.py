@@ -12,6 +12,7 @@ from synthesis import Memory, Search, Spline, Status
 QUICK = Search(levels=6, dwells=5, starts=1, nodes=40, evaluations=8, samples=5000)
 
 
+@pytest.mark.slow
 def test_a_bracket_is_ordered_and_its_proof_exact(ideal):
     loop = lateral_loop(ideal, 5.0, 9.0, points=9)
     found = bracket(loop, 3.0, Memory(0.6, segments=3, grading=1.0, across_segments=1), QUICK)

@@ -30,6 +30,7 @@ def reached(name, starts):
     return made
 
 
+@pytest.mark.slow
 def test_a_helicopter_of_compleib_from_one_start():
     """HE1, two numbers; its infimum is at infinite gains."""
     made = reached("HE1", 1)

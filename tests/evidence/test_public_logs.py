@@ -27,6 +27,7 @@ def _parameters():
         yield pytest.param(log, id=log.name, marks=marks)
 
 
+@pytest.mark.slow(but="ardupilot-bench.bin")
 @pytest.mark.parametrize("log", _parameters())
 def test_a_public_log_is_identified_or_refused_as_expected(log):
     if not (FOLDER / log.name).is_file():

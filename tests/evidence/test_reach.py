@@ -38,6 +38,7 @@ def test_a_jumping_airspeed_costs_the_longitudinal_loop_almost_nothing(ideal):
     assert certificate.verify(rigorous=True)
 
 
+@pytest.mark.slow
 def test_on_the_lateral_loop_each_scaling_proves_more_of_the_range_but_none_all(ideal):
     loop = lateral_loop(ideal, points=14)
     # inside the reach of the richer class, outside that of the poorer one

@@ -18,6 +18,7 @@ MODULES = (
 )
 
 
+@pytest.mark.slow(only=("symheli.export.mat", "symheli.lpv.uncertain_state_space"))
 @pytest.mark.parametrize("name", MODULES)
 def test_the_examples_run(name):
     found = doctest.testmod(importlib.import_module(name))

@@ -136,6 +136,7 @@ def flights(controllers, samples, seed=0):
     return [np.array(said) for said in commands], statuses
 
 
+@pytest.mark.slow(but="gains")
 @pytest.mark.skipif(CC is None, reason="no C compiler")
 def test_the_check_beside_it_finds_no_other_bit(tmp_path, controller):
     files = write_controller(controller, tmp_path, "own")
@@ -147,6 +148,7 @@ def test_the_check_beside_it_finds_no_other_bit(tmp_path, controller):
     assert "0 other statuses" in done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(CC is None, reason="no C compiler")
 def test_c_gives_the_bits_of_python_over_any_flight(tmp_path, controller):
     compiled = InC(controller, tmp_path, (EXACT,))
@@ -161,6 +163,7 @@ def test_c_gives_the_bits_of_python_over_any_flight(tmp_path, controller):
     assert np.isfinite(python).all()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(CC is None, reason="no C compiler")
 def test_a_compiler_that_contracts_products_and_sums_changes_the_last_digits_only(tmp_path):
     controller = TABLES["position"]()

@@ -23,6 +23,7 @@ def export(*arguments):
 # --- C -------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow(but="ideal")
 @needs_compiler
 @pytest.mark.parametrize("governor", ["ideal", "pi"])
 def test_the_check_beside_the_c_code_passes_with_warnings_as_errors(governor, tmp_path):
@@ -53,6 +54,7 @@ def test_the_check_fails_where_a_number_of_the_model_is_wrong(tmp_path, ideal):
     assert done.stdout.count("FAILED") == 3
 
 
+@pytest.mark.slow
 @needs_compiler
 @pytest.mark.skipif(shutil.which("cmake") is None, reason="no cmake")
 def test_cmake_builds_and_tests_it(tmp_path, ideal):

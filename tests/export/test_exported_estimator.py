@@ -92,6 +92,7 @@ def built(folder, name, *more):
     return subprocess.run([str(folder / "check")], capture_output=True, text=True)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(CC is None, reason="no C compiler")
 @pytest.mark.parametrize(
     ("case", "flags"),
@@ -105,6 +106,7 @@ def test_the_exported_estimator_reproduces_python_to_the_last_bit(tmp_path, case
     assert "the same to the last bit" in done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(CC is None, reason="no C compiler")
 def test_the_check_notices_another_number(tmp_path):
     write_estimator(CASES["longitudinal"], Everything(), tmp_path)
@@ -119,6 +121,7 @@ def test_the_check_notices_another_number(tmp_path):
     assert "last bit" not in done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(CC is None or shutil.which("nm") is None, reason="no C compiler, or no nm")
 def test_nothing_is_allocated_and_no_library_is_called(tmp_path):
     """All the compiler may add on its own are the four memory functions every C environment must

@@ -29,6 +29,7 @@ def built(folder, name="estimator"):
     return subprocess.run([str(folder / "check")], capture_output=True, text=True)
 
 
+@pytest.mark.slow(but="estimator-double")
 @pytest.mark.skipif(CC is None, reason="no C compiler")
 @pytest.mark.parametrize("precision", ["double", "single"])
 @pytest.mark.parametrize("name", ["estimator", "heli"])
@@ -41,6 +42,7 @@ def test_it_learns_what_python_learns(tmp_path, precision, name):
     assert float(done.stdout.split()[-1]) < {"double": 1e-12, "single": 1e-3}[precision]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(CC is None, reason="no C compiler")
 @pytest.mark.parametrize(
     ("file", "old", "new"),

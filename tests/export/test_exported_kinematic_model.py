@@ -59,6 +59,7 @@ def built(folder, name="model"):
     return subprocess.run([str(folder / "check")], capture_output=True, text=True)
 
 
+@pytest.mark.slow(but="airspeed")
 @pytest.mark.skipif(CC is None, reason="no C compiler")
 @pytest.mark.parametrize("case", STRUCTURES)
 def test_the_c_model_is_python_to_rounding(tmp_path, case):
@@ -78,6 +79,7 @@ def test_single_precision_keeps_its_digits(tmp_path):
     assert "typedef float model_body_real;" in (tmp_path / "model_body.h").read_text()
 
 
+@pytest.mark.slow(but="model_body.c-v * r - w * q-v * r + w * q")
 @pytest.mark.skipif(CC is None, reason="no C compiler")
 @pytest.mark.parametrize(
     ("file", "old", "new"),

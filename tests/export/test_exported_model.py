@@ -79,6 +79,7 @@ def built(folder, name="model"):
     return subprocess.run([str(folder / "check")], capture_output=True, text=True)
 
 
+@pytest.mark.slow(only=("orders by signal-double", "orders by signal-single"))
 @pytest.mark.skipif(CC is None, reason="no C compiler")
 @pytest.mark.parametrize("precision", ["double", "single"])
 @pytest.mark.parametrize("case", STRUCTURES)

@@ -66,6 +66,7 @@ def test_the_number_of_workers_changes_no_bit(ideal, mixed, together, workers):
         np.testing.assert_array_equal(first.values, second.values)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="levels of x86-64")
 @pytest.mark.skipif(compiling.compiler() is None, reason="no compiler")
 def test_the_level_of_instructions_changes_no_bit(pi, monkeypatch):

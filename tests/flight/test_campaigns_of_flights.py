@@ -76,6 +76,7 @@ def test_a_stopped_campaign_goes_on_where_it_was(campaign, tmp_path):
     assert all(p.stat().st_mtime_ns == stamp for p, stamp in before.items())  # not flown twice
 
 
+@pytest.mark.slow
 def test_a_killed_campaign_loses_nothing_finished(campaign, tmp_path):
     path = tmp_path / "killed.zarr"
     script = textwrap.dedent(f"""

@@ -52,6 +52,7 @@ def test_both_governors_fly(pi):
     assert record["airspeed"][-1] == pytest.approx(3.0, abs=1.0)
 
 
+@pytest.mark.slow
 def test_runge_kutta_is_of_order_four(ideal):
     point = symheli.trim(ideal, 6.0)  # no wake edge nearby: the equations are smooth there
     cp, sp, ct, st = (

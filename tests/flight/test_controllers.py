@@ -20,6 +20,7 @@ def at_one_speed(pilot):
     return LinearModel.gain(-pilot.gain(5.0), pilot.states, INPUTS)
 
 
+@pytest.mark.slow(only=("ideal-table", "pi-table"))
 @pytest.mark.parametrize("make", ["table", "lpv", "reading"])
 def test_machine_code_and_python_ask_the_same(heli, make):
     controller = {

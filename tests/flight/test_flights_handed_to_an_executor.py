@@ -41,6 +41,7 @@ def campaign(ideal):
     return fly
 
 
+@pytest.mark.slow
 def test_a_flight_has_the_same_bits_wherever_its_chunk_was_flown(campaign, tmp_path):
     here = campaign(tmp_path / "here.zarr")
     copying, seen = Copying(), []

@@ -44,6 +44,7 @@ def controller(request, ideal):
     return MAKES[request.param](ideal)
 
 
+@pytest.mark.slow(but="scheduled")
 def test_one_object_in_two_threads_flies_as_alone(ideal, controller):
     """Two schedules, several times each, so that their samples fall between each other."""
     schedules = 3 * (SHORT, BACK)
@@ -54,6 +55,7 @@ def test_one_object_in_two_threads_flies_as_alone(ideal, controller):
             np.testing.assert_array_equal(record.values, alone[k % 2])
 
 
+@pytest.mark.slow(only="table")
 def test_a_flight_leaves_its_controller_as_it_was(ideal, controller):
     """The first flight fills what is computed once, as matrices in the order of a flight."""
     fly(ideal, SHORT, controller=controller)

@@ -157,6 +157,7 @@ def test_looking_up_at_the_airspeed_itself_does_not_count_speed_derivatives_twic
     )
 
 
+@pytest.mark.slow
 def test_the_filter_decides_where_the_tables_are_read(ideal):
     family = symheli.sweep(ideal, ANCHORS)
     u = np.tile(family.trims[2].u.array, (60, 1))
@@ -177,6 +178,7 @@ def test_the_filter_decides_where_the_tables_are_read(ideal):
     assert np.abs(fast - none).max() < 0.1 * np.abs(slow - none).max()
 
 
+@pytest.mark.slow
 def test_flights_side_by_side_are_flights_one_by_one(ideal):
     family = symheli.sweep(ideal, ANCHORS)
     stitched = StitchedModel.from_family(family, filter=0.5)

@@ -102,6 +102,7 @@ def test_within_its_limits_a_table_runs_as_its_model_in_double_precision():
     assert np.abs(mine - exact).max() > 0.0  # it is another arithmetic
 
 
+@pytest.mark.slow
 def test_a_table_flies_as_its_model_does(heli):
     t = TableController.of(dynamic(heli).model)
     calm = {"wind": STORM, "delay": 0.02}  # a sensor that rounds would double any difference
@@ -302,6 +303,7 @@ def gain(**monitor):
     return InFlight(static(1.0, follow="reading", monitor=ParameterMonitor(**monitor)))
 
 
+@pytest.mark.slow
 def test_whatever_is_read_the_airspeed_in_use_keeps_to_the_certified_rate():
     rng = np.random.default_rng(0)
     for seed in range(3):

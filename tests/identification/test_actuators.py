@@ -12,6 +12,7 @@ from symheli.flight import XCELL_SERVOS
 CONTROLS = ("d_lon", "d_lat", "d_col", "d_ped")
 
 
+@pytest.mark.slow(but="0.02")
 @pytest.mark.parametrize("delay", [0.0, 0.013, 0.02, 0.047])
 def test_the_mean_deflection_is_that_of_the_servo_integrated_finely(delay):
     """Trapezoids over 200 steps a sample: their error is (dt w / 200)^2 / 12 of the deflection,
@@ -55,6 +56,7 @@ def flight(ideal):
     )
 
 
+@pytest.mark.slow
 def test_a_delay_is_estimated_beside_the_parameters(ideal, flight):
     """Two milliseconds are asked for; the parameter as without actuators."""
     wrong = ideal.with_parameters({"body.Ixx": 0.25})

@@ -33,6 +33,7 @@ def wrong(ideal):
     return ideal.with_parameters({"body.Ixx": 0.27, "body.Iyy": 0.25, KNOWN[2]: 1.1})
 
 
+@pytest.mark.slow
 def test_without_noise_parameters_come_back(ideal, wrong, flown):
     """With the steps of the flight itself the equations are the same to rounding; the priors pull
     by the square of noise over prior.
@@ -44,6 +45,7 @@ def test_without_noise_parameters_come_back(ideal, wrong, flown):
     assert found.determined.all()
 
 
+@pytest.mark.slow
 def test_noise_leaves_errors_of_the_stated_size(ideal, wrong, flown):
     found = idn.calibrate(wrong, flown["noisy"], KNOWN)
     errors = found.values - [ideal.parameters[name] for name in KNOWN]
@@ -52,6 +54,7 @@ def test_noise_leaves_errors_of_the_stated_size(ideal, wrong, flown):
     assert max(map(abs, found.whiteness.values())) < 0.1  # 3 standard deviations of 1/sqrt(n)
 
 
+@pytest.mark.slow
 def test_a_missing_measurement_is_no_error(ideal, wrong, flown):
     record, rng = flown["noisy"], np.random.default_rng(0)
     q = np.where(rng.random(len(record)) < 0.3, np.nan, record["q"])
@@ -61,6 +64,7 @@ def test_a_missing_measurement_is_no_error(ideal, wrong, flown):
     assert np.all(np.abs(errors) < 4 * found.deviations)
 
 
+@pytest.mark.slow
 def test_what_a_flight_does_not_tell_stays_at_the_prior(wrong, flown):
     """Where the governor is ideal no motion depends on the engine; the areas of a surface and their
     lift slope enter as a product.
@@ -75,6 +79,7 @@ def test_what_a_flight_does_not_tell_stays_at_the_prior(wrong, flown):
     assert f"only together with {found.tied['main_rotor.chord']}" in str(found)
 
 
+@pytest.mark.slow
 def test_the_file_keeps_the_deviations_and_they_are_the_next_prior(wrong, flown, tmp_path):
     found = idn.calibrate(wrong, flown["noisy"], KNOWN)
     again = symheli.Helicopter.load(found.save(tmp_path / "mine.toml"), governor="ideal")
@@ -87,6 +92,7 @@ def test_the_file_keeps_the_deviations_and_they_are_the_next_prior(wrong, flown,
     np.testing.assert_allclose(second.deviations, found.deviations / np.sqrt(2), rtol=0.2)
 
 
+@pytest.mark.slow
 def test_hidden_rotor_states_are_estimated_too(pi):
     schedule = symheli.AirspeedSchedule.transition(2.0, 4.0, acceleration=2.0, hold=2.0)
     lqr = symheli.flight.gain_scheduled_lqr(pi, 0.0, 8.0, 0.02)
@@ -110,6 +116,7 @@ def test_wind_leaves_residuals_that_are_not_white(ideal, flown):
     assert "The residuals of" in str(found)
 
 
+@pytest.mark.slow
 def test_a_steady_wind_is_estimated_beside_the_parameters(ideal, wrong):
     """3 m/s from ahead: without the wind the residuals tell, with it they are white and the
     parameters right.
@@ -131,6 +138,7 @@ def test_a_steady_wind_is_estimated_beside_the_parameters(ideal, wrong):
     assert not found.coloured
 
 
+@pytest.mark.slow(only="change4-as long as a window")
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -162,6 +170,7 @@ def test_bad_records_are_refused(ideal, flown):
         idn.calibrate(record, ideal)
 
 
+@pytest.mark.slow
 def test_a_search_that_is_cut_short_says_so(wrong, flown):
     with (
         pytest.warns(symheli.ConvergenceWarning, match="allow more rounds"),

@@ -59,6 +59,15 @@ def awkward(arx, n=160):
     return rows
 
 
+@pytest.mark.slow(
+    only=(
+        "two outputs, offset, rate-Constant(factor=0.9, floor=0.0)-double",
+        "two outputs, offset, rate-Constant(factor=0.9, floor=0.0)-single",
+        "spline, current p-Constant(factor=0.9, floor=0.0)-single",
+        "nine outputs-Constant(factor=0.9, floor=0.0)-double",
+        "nine outputs-Constant(factor=0.9, floor=0.0)-single",
+    )
+)
 @pytest.mark.parametrize("precision", ["double", "single"])
 @pytest.mark.parametrize("way", WAYS, ids=str)
 @pytest.mark.parametrize("name", STRUCTURES)
@@ -133,6 +142,7 @@ BESIDE = {
 }
 
 
+@pytest.mark.slow(but="one's own functions-double")
 @pytest.mark.parametrize("precision", ["double", "single"])
 @pytest.mark.parametrize("name", BESIDE)
 def test_other_bases_give_what_batch_least_squares_gives(name, precision):

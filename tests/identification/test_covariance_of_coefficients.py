@@ -65,6 +65,7 @@ def test_equations_with_their_own_regressors_have_the_covariance_of_their_soluti
     assert known.covariance.shape == model.covariance.shape
 
 
+@pytest.mark.slow(but="same regressors")
 @pytest.mark.parametrize("arx", [SAME, OTHER], ids=["same regressors", "own regressors"])
 def test_coefficients_of_200_records_scatter_as_it_says(arx):
     """The errors e' P^-1 e of r coefficients are chi-squared with r degrees of freedom, their sum

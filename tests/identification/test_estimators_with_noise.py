@@ -58,6 +58,7 @@ def test_noise_at_10_db_biases_least_squares_with_or_without_a_penalty(method):
     assert np.abs(biased.mean(axis=0)).max() > 10 * biased.std(axis=0).max()
 
 
+@pytest.mark.slow(only="oe")
 @pytest.mark.parametrize("method", [idn.InstrumentalVariables("u"), "riv", "oe"])
 def test_noise_at_10_db_does_not_bias_instruments_nor_output_error(method):
     # what is left is scatter: up to 0.02 a realization (iv), so the mean of three stays within

@@ -124,6 +124,7 @@ def test_without_noise_the_coefficients_are_exact(vehicle):
     assert found.details["sensor_noise"] == pytest.approx(NOISE)
 
 
+@pytest.mark.slow
 def test_the_order_of_records_does_not_matter_and_more_of_them_say_more(vehicle):
     first, second = (vehicle.record(240, seed=s, sensors=SENSORS) for s in (1, 2))
     clean = [vehicle.record(240, seed=s) for s in (1, 2)]
@@ -157,6 +158,7 @@ def test_a_missing_sample_cuts_a_record_in_two(vehicle):
         assert np.abs((found[0].theta - other.theta) / spread).max() < 1e-5
 
 
+@pytest.mark.slow
 def test_it_is_closer_than_instruments_and_these_than_least_squares(vehicle):
     """Noise on the sensors biases least squares; instruments only scatter; weights scatter less."""
     record, source = vehicle.record(600, sensors=SENSORS), vehicle.without_noise(seed=1)

@@ -79,6 +79,7 @@ def noisy():
     return flown(noise=0.1)
 
 
+@pytest.mark.slow
 def test_a_model_that_is_right_is_fit(noisy):
     model, joint = fitted(noisy)
     found = idn.fit_for_control(model, noisy, LOOP, scales=SCALES, covariance=joint, **SHORT)
@@ -86,6 +87,7 @@ def test_a_model_that_is_right_is_fit(noisy):
     assert {row.verdict for row in found.criteria} == {"fit"}
 
 
+@pytest.mark.slow
 def test_a_model_with_a_wrong_gain_is_not_fit_however_sure_it_is(noisy):
     model, joint = fitted(noisy)
     wrong = with_gain(model, 2.0)
@@ -95,6 +97,7 @@ def test_a_model_with_a_wrong_gain_is_not_fit_however_sure_it_is(noisy):
     assert found["nu-gap over margin"].verdict == "fit"  # the draws lie around what is wrong
 
 
+@pytest.mark.slow
 def test_of_what_was_not_excited_nothing_is_known():
     """The input moves the output by a hundredth of the noise."""
     silent = flown(noise=0.1, size=1e-3)
@@ -135,6 +138,7 @@ def test_tic_of_a_wrong_gain(factor):
     assert found.verdict == ("fit" if found.value <= 0.25 else "not fit")
 
 
+@pytest.mark.slow
 def test_gap_margin_and_gain_of_one_coefficient(noisy):
     """|P| = b at every frequency: the ends of the 95 % interval, b +- 1.96 s, on the sphere."""
     model, joint = fitted(noisy)
@@ -152,6 +156,7 @@ def test_gap_margin_and_gain_of_one_coefficient(noisy):
     assert found["static gain in the loop"].value == pytest.approx(slope * far / b, rel=0.01)
 
 
+@pytest.mark.slow
 def test_scales_are_units(noisy):
     """The input in hundredths, everything told so: the same gaps and margins."""
     model, joint = fitted(noisy)
@@ -224,6 +229,7 @@ def test_derivatives_of_a_body_are_sums_over_lags(ideal):
         assert value == pytest.approx(expected, rel=1e-9, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_the_truth_stands_beside_and_decides_nothing(noisy):
     model, joint = fitted(noisy)
     far = LinearModel([[0.0]], [[1.0]], [[4 * GAIN]], [[0.0]], ["x"], ["u"], ["y"], dt=DT)
@@ -238,6 +244,7 @@ def test_the_truth_stands_beside_and_decides_nothing(noisy):
     assert row.truth > row.threshold > row.value
 
 
+@pytest.mark.slow
 def test_a_second_estimate_that_disagrees_is_heard(noisy):
     model, joint = fitted(noisy)
     options = {"scales": SCALES, "covariance": joint, **SHORT}
@@ -250,6 +257,7 @@ def test_a_second_estimate_that_disagrees_is_heard(noisy):
     assert other.second_gap[0] > agrees.second_gap[0]
 
 
+@pytest.mark.slow
 def test_a_loop_that_the_estimate_does_not_survive_is_not_fit(noisy):
     model, joint = fitted(noisy)
     found = idn.fit_for_control(
@@ -260,6 +268,7 @@ def test_a_loop_that_the_estimate_does_not_survive_is_not_fit(noisy):
     assert found.margin[0] == 0.0
 
 
+@pytest.mark.slow
 def test_draws_that_the_loop_loses_are_not_known():
     silent = flown(noise=0.1, size=0.02)
     model, joint = fitted(silent)
@@ -278,6 +287,7 @@ def test_one_bad_row_decides():
     assert together(["fit"]) == "fit"
 
 
+@pytest.mark.slow
 def test_the_table_names_every_row(noisy):
     model, joint = fitted(noisy)
     found = idn.fit_for_control(model, noisy, LOOP, scales=SCALES, covariance=joint, **SHORT)
@@ -302,6 +312,7 @@ def test_what_makes_no_plant_is_refused(noisy):
         idn.fit_for_control(model, noisy, LOOP, scales=SCALES, points=[0.0], truth={})
 
 
+@pytest.mark.slow
 def test_a_loop_that_asks_for_no_derivative_is_content_with_any():
     """A plant of gain 1e-3: without it the loop hardly changes."""
     faint = flown(gain=1e-3, noise=1e-4)
@@ -334,6 +345,7 @@ def test_the_truth_is_fit_at_20_db_under_feedback(truth):
     assert (found["TIC"].verdict, found["TIC"].where) == ("fit", "noise of the sensors taken off")
 
 
+@pytest.mark.slow(but="2.5")
 @pytest.mark.parametrize("factor", [0.4, 2.5])
 def test_what_is_wrong_is_not_fit_at_20_db_under_feedback(truth, factor):
     """The effect of the input by a factor."""

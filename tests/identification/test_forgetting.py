@@ -24,6 +24,7 @@ def rows(record):
     return np.column_stack([record["y"], record["u"], record["p"]])
 
 
+@pytest.mark.slow(only="constant-1e-07")
 @pytest.mark.parametrize(
     ("way", "noise"),
     [*((way, noise) for way in WAYS for noise in (0.0, 1e-7)), ("directional", 1e-3)],
@@ -117,6 +118,7 @@ def errors(way, *, noise=0.02, jump=1.0, louder=1.0, after=250):
     return np.array(out)
 
 
+@pytest.mark.slow(only="constant-0.01-0.03")
 @pytest.mark.parametrize(
     ("way", "median", "worst"),
     [
@@ -135,6 +137,7 @@ def test_a_jump_of_the_plant_is_followed(way, median, worst):
     assert np.max(followed) < worst
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [0.02, 0.1])
 def test_variable_forgetting_is_as_steady_as_its_longest_memory(noise):
     """Over plants, inputs and noises: what chance makes of the ratio of powers hardly shortens the
@@ -151,6 +154,7 @@ def test_variable_forgetting_is_as_steady_as_its_longest_memory(noise):
     assert np.max(settled / short) < 1.1
 
 
+@pytest.mark.slow(but="0.02-1.0-0.05-0.33")
 @pytest.mark.parametrize(
     ("noise", "jump", "median", "worst"),
     [

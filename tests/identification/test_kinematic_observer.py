@@ -33,6 +33,7 @@ def model_of(vehicle, record):
     return vehicle.model(vehicle.record(600))
 
 
+@pytest.mark.slow
 def test_the_error_is_that_of_its_own_covariance(vehicle, flown):
     """Normalized error squared, averaged over 870 samples of 8 states: 1 for a consistent filter,
     of a correlated sequence within 15 %.
@@ -51,6 +52,7 @@ def test_the_error_is_that_of_its_own_covariance(vehicle, flown):
     np.testing.assert_array_equal(observer.run(measured)[-1] - truth[-1], errors[-1])
 
 
+@pytest.mark.slow
 def test_a_missing_measurement_is_predicted_over(vehicle, flown):
     truth, measured = flown
     observer = model_of(vehicle, measured).observer(NOISE, PROCESS)
@@ -66,6 +68,7 @@ def test_a_missing_measurement_is_predicted_over(vehicle, flown):
     assert error[600:650, 1:].max() < 4
 
 
+@pytest.mark.slow
 def test_a_gap_and_a_missing_input_start_anew(vehicle, flown):
     _, measured = flown
     observer = model_of(vehicle, measured).observer(NOISE, PROCESS)
@@ -83,6 +86,7 @@ def test_a_gap_and_a_missing_input_start_anew(vehicle, flown):
     np.testing.assert_array_equal(found[501:], observer.run(after))
 
 
+@pytest.mark.slow
 def test_in_a_simulated_flight_it_is_closer_than_the_sensors(ideal):
     """A helicopter whose flapping the model does not know, identified from another noisy flight."""
     plan = symheli.AirspeedSchedule((6.0, 2.0), (1.5, 1.5), (2.0, 2.0), start=2.0)
@@ -123,6 +127,7 @@ def test_what_it_must_be_told_is_asked_for(vehicle, flown):
         )
 
 
+@pytest.mark.slow(but="1e+100")
 @pytest.mark.parametrize("size", [1e100, 1e300])
 def test_an_estimate_that_leaves_the_range_of_numbers_is_refused_and_begun_anew(
     vehicle, flown, size

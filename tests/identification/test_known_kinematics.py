@@ -56,6 +56,7 @@ def test_the_number_of_coefficients():
     assert leaner.n_regressors == (8 + 4 * 2) * 3 + 3
 
 
+@pytest.mark.slow(but="options0")
 @pytest.mark.parametrize(
     "options", [dict(), dict(na=1, nb=1), dict(degree=2), dict(na={"q": 3}, nb=1)]
 )
@@ -134,6 +135,7 @@ def test_two_corrections_leave_the_cube_of_a_turn(vehicle, flight):
     assert 0 < error.max() < turn**3 * step * 3
 
 
+@pytest.mark.slow
 def test_free_run_and_closed_loop_reproduce_the_flight(vehicle, flight, converged):
     model = vehicle.model(flight)
     y, first = flight.columns(STATES), vehicle.kin.memory
@@ -284,6 +286,7 @@ def misfit(model, record, matrices_at):
     return out
 
 
+@pytest.mark.slow(but="True")
 @pytest.mark.parametrize("moving", [False, True])
 def test_the_state_space_is_the_nonlinear_step_for_small_deviations(
     vehicle, flight, converged, moving

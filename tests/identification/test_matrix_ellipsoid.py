@@ -31,6 +31,7 @@ def drawn(P, count, seed=1):
     return (white @ factor.T).reshape(count, m, n).swapaxes(1, 2)
 
 
+@pytest.mark.slow(only="12-3")
 @pytest.mark.parametrize(("n", "m"), SIZES)
 def test_the_matrix_is_inside_at_least_as_often_as_promised(n, m):
     P, count = correlated(n, m), 20000
@@ -40,6 +41,7 @@ def test_the_matrix_is_inside_at_least_as_often_as_promised(n, m):
         assert inside > probability - 3 * math.sqrt(probability * (1 - probability) / count)
 
 
+@pytest.mark.slow(only="12-3")
 @pytest.mark.parametrize(("n", "m"), SIZES)
 def test_a_radius_of_draws_is_smaller_and_keeps_the_promise_too(n, m):
     P, count = correlated(n, m), 20000

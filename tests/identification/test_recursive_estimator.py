@@ -147,6 +147,7 @@ def test_a_missing_sample_teaches_nothing_and_empties_the_lags():
     assert waits == [False, False, True]
 
 
+@pytest.mark.slow(but="0.9")
 @pytest.mark.parametrize("forgetting", [0.9, 0.99])
 def test_slow_scheduling_and_a_long_silence_wind_nothing_up(forgetting):
     """Constant forgetting without a floor reaches coefficients of 1e35 in other packages once

@@ -33,6 +33,7 @@ def model(vehicle, flight):
     return idn.fit(vehicle.kin, flight)
 
 
+@pytest.mark.slow
 def test_it_comes_back_to_the_last_bit(model, flight, tmp_path):
     n = model.structure.n_regressors
     covariance = np.arange(36.0 * n * n).reshape(6, n, 6, n) / 7
@@ -50,6 +51,7 @@ def test_it_comes_back_to_the_last_bit(model, flight, tmp_path):
     np.testing.assert_array_equal(back.simulate(flight), model.simulate(flight))
 
 
+@pytest.mark.slow
 def test_a_covariance_under_its_name_of_before_is_read(model, tmp_path):
     path = model.save(tmp_path / "m.json")
     content = plain_file.read(path, saved_kinematic_model.SCHEMA)
@@ -69,6 +71,7 @@ def test_functions_brought_along_must_be_brought_again(flight, tmp_path):
     assert idn.KinematicModel.load(path, basis=OWN).structure.basis == OWN
 
 
+@pytest.mark.slow
 def test_another_kind_of_file_is_refused(model, flight, tmp_path):
     path = model.save(tmp_path / "m.json")
     with pytest.raises(InputError, match="expected a file of 'symheli LPV-ARX model'"):

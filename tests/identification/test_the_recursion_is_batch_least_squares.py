@@ -159,6 +159,7 @@ def at_one_instant(one, state, columns, outputs, data, k):
         assert (np.abs((data.phi[k + 1][columns] / scale) @ error) <= allowed).all()
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(experiments(), st.sampled_from(["all", "constant", "no floor", "variable"]))
 def test_coefficients_are_those_of_the_weighted_rows_with_what_keeps_them_awake(experiment, way):
@@ -186,6 +187,7 @@ def test_directional_forgetting_on_records_nobody_chose(experiment, way):
     compare(*experiment, WAYS[way], checks=4)
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None, derandomize=True)
 @given(experiments())
 def test_batch_and_recursion_call_the_same_records_determined(experiment):
@@ -251,6 +253,7 @@ def test_an_airspeed_that_creeps_away_from_rest_does_not_run_away(degree, noise)
     )
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(
     kernel.compiled_kernel("double") is None,
     reason="twenty thousand samples want the compiled kernel",

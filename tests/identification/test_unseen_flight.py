@@ -24,6 +24,7 @@ def model(vehicle):
     return idn.fit(vehicle.kin, vehicle.record(1600, seed=1, sensors=SENSORS), method)
 
 
+@pytest.mark.slow
 def test_other_flights_of_the_vehicle_are_explained(vehicle, model):
     """Ten of them: what is left is chi-squared, three standard deviations are rarely passed."""
     judged = [

@@ -47,6 +47,7 @@ def fir_record(seed, colour, n=1500):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("colour", [0.0, 0.9])
 def test_standard_errors_are_the_scatter_of_repeated_experiments(colour):
     fits, errors, white = [], [], []
@@ -66,6 +67,7 @@ def test_standard_errors_are_the_scatter_of_repeated_experiments(colour):
         )  # the usual formula is too sure of itself
 
 
+@pytest.mark.slow
 def test_bands_hold_the_true_coefficient_functions_as_often_as_they_say():
     p = np.linspace(1.0, 12.0, 5)
     inside = []

@@ -41,6 +41,7 @@ def feedback(heli, n, seed=0):
     )
 
 
+@pytest.mark.slow(but="ideal")
 def test_each_flight_is_the_single_flight_to_the_bit(heli):
     x0, u, wind, mass = many(heli, 37)  # all lanes once, and a rest
     batch = simulate_batch(heli, x0, u, wind, dt=0.02, parameters={"body.mass": mass}, keep=1)
@@ -63,6 +64,7 @@ def test_workers_and_neighbours_change_no_bit(ideal):
     np.testing.assert_array_equal(turned[::-1], one)
 
 
+@pytest.mark.slow(but="pi")
 def test_numpy_differs_from_machine_code_by_rounding(heli, monkeypatch):
     x0, u, wind, mass = many(heli, 20, n=3)
     options = {

@@ -85,6 +85,7 @@ def test_the_lane_changes_no_bit(side_by_side, name):
     )
 
 
+@pytest.mark.slow(only="exp")
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="levels of x86-64")
 @pytest.mark.parametrize("name", ARGUMENTS)
 def test_the_level_of_instructions_changes_no_bit(side_by_side, name, tmp_path):

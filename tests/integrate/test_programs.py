@@ -64,6 +64,7 @@ def in_machine_code(made, layout, inputs):
     return out
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_machine_code_gives_the_same_bits_in_every_layout(ideal):
     made, everywhere = program(ideal.flight_rhs), points(ideal, 640)

@@ -37,6 +37,7 @@ def case(heli, method, m=3, n=6):
     return flown, directions, rng.normal(size=(*flown.states.shape, 2))
 
 
+@pytest.mark.slow(but=("ideal-method1", "ideal-method2"))
 @pytest.mark.parametrize("method", METHODS)
 def test_adjoint_and_tangent_agree_to_rounding(either, method):
     """<weights, tangent(d)> = <gradient(weights), d>: two routes through two separately
@@ -58,6 +59,7 @@ def test_adjoint_and_tangent_agree_to_rounding(either, method):
     )
 
 
+@pytest.mark.slow(only="ideal-method3")
 @pytest.mark.parametrize("method", METHODS)
 def test_tangents_are_the_limit_of_differences_of_flights(either, method):
     flown, directions, _ = case(either, method, m=1)
@@ -120,6 +122,7 @@ def test_about_a_trim_point_the_transition_matrix_is_the_matrix_exponential(eith
     )
 
 
+@pytest.mark.slow
 def test_without_a_compiler_derivatives_agree(either, monkeypatch):
     flown, directions, weights = case(either, RungeKutta4(), m=9, n=2)
     change, bar = tangent(either, flown, *directions), gradient(either, flown, weights)
@@ -159,6 +162,7 @@ def test_what_does_not_fit_is_refused(ideal):
         gradient(ideal, flown, np.zeros(3))
 
 
+@pytest.mark.slow(but="method1")
 @pytest.mark.parametrize("method", [RungeKutta4(), Radau()])
 def test_tangents_along_parameters_are_the_limit_of_differences(ideal, method, monkeypatch):
     flown, _, _ = case(ideal, method, n=4)

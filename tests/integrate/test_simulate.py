@@ -39,6 +39,7 @@ def test_the_error_falls_with_the_order_of_the_method(ideal, methods, order):
     )  # the next term of the error is still a tenth of the first
 
 
+@pytest.mark.slow
 def test_three_methods_fly_the_same_flight(heli):
     x0, u = manoeuvre(heli, n=25)
     wind = 0.5 * np.sin(np.arange(25)[:, None] * [0.3, 0.5, 0.7])
@@ -131,6 +132,7 @@ def test_flapping_too_fast_for_explicit_steps_is_flown_by_the_implicit_method(id
     )  # the implicit error, 2e-6, falls by 32 and more as its step is halved
 
 
+@pytest.mark.slow(but="ideal")
 def test_without_a_compiler_a_flight_differs_by_rounding(heli, monkeypatch):
     x0, u = manoeuvre(heli, n=5)
     changed = heli.with_parameters({"body.mass": 8.0, "density": 1.1})
@@ -146,6 +148,7 @@ def test_without_a_compiler_a_flight_differs_by_rounding(heli, monkeypatch):
         np.testing.assert_allclose(plain.steps, compiled.steps, rtol=1e-6)
 
 
+@pytest.mark.slow(but="ideal")
 def test_without_a_compiler_40_s_of_a_stable_flight_agree_to_a_billionth(heli, monkeypatch):
     """Feedback forgets a rounding, so that it does not grow; only the place remembers it all."""
     x0, u, feedback = held(heli, 40.0)

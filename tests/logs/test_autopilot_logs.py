@@ -217,6 +217,7 @@ def test_a_misspelt_field_gets_the_nearest(ardupilot, field, message):
         FlightRecord.from_dataflash(ardupilot(), {"theta": field}, dt=0.1)
 
 
+@pytest.mark.slow(but="binary")
 def test_a_signal_map_names_messages_and_needs_no_units(ardupilot, tmp_path):
     signal_map = tmp_path / "m.toml"
     signal_map.write_text(
@@ -228,6 +229,7 @@ def test_a_signal_map_names_messages_and_needs_no_units(ardupilot, tmp_path):
     np.testing.assert_array_equal(record["q2"], 1.0)
 
 
+@pytest.mark.slow(but="binary")
 def test_an_ardupilot_log_that_ends_anywhere_is_read_so_far_or_refused(ardupilot, tmp_path):
     path = ardupilot()
 

@@ -269,6 +269,7 @@ def test_a_header_that_cannot_be_right_is_refused_in_words(tmp_path, options, me
         blackbox_columns(path)
 
 
+@pytest.mark.slow
 def test_the_survey_suggests_what_identifies(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "log.bbl").write_bytes(bbl(flown(6000)))

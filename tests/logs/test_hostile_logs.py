@@ -68,6 +68,7 @@ def test_a_dataflash_message_shorter_than_its_head_is_refused(tmp_path, size):
         contents_of(tmp_path / "log.bin")
 
 
+@pytest.mark.slow
 def test_a_matlab_file_that_swells_is_refused(tmp_path):
     stream, swollen = zlib.compressobj(9), []
     for _ in range(MAX_INFLATED // 2**20 + 1):

@@ -128,6 +128,7 @@ def ulog_log(tmp_path):
 LOGS = {"csv": csv_log, "csv without time": timeless_csv, "mat": mat_log, "ulog": ulog_log}
 
 
+@pytest.mark.slow(but="mat")
 @pytest.mark.parametrize("kind", LOGS)
 def test_the_suggested_command_identifies_what_was_flown(look, answer, tmp_path, monkeypatch, kind):
     monkeypatch.chdir(tmp_path)

@@ -29,6 +29,7 @@ def states(count, seed=1):
     )
 
 
+@pytest.mark.slow(but="at1-f1")
 @pytest.mark.parametrize("f", [MIXED, VAN_DER_POL])
 @pytest.mark.parametrize("at", [{}, {"x1": 0.3, "x2": 1.0, "u": 0.2}])
 def test_the_embedding_is_the_nonlinear_model(f, at):
@@ -82,6 +83,7 @@ def test_what_cannot_be_embedded_is_refused_with_the_reason(f, message):
         symheli.embed(f, BOX, INPUT)
 
 
+@pytest.mark.slow
 def test_the_helicopter_is_embedded_about_a_trim(ideal):
     """Six degrees of freedom with implicit inflow and flapping, within .2 m/s, .06 rad/s, 1 deg."""
     point = symheli.trim(ideal, 8.0)

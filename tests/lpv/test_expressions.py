@@ -62,6 +62,7 @@ def test_one_parameter_and_sympy_matrices():
     same(decaying, ([[sympy.exp(-p) - 3]], [[1]], [[1]], [[0]]))
 
 
+@pytest.mark.slow
 def test_a_textbook_model_is_certified_as_it_is_written_down():
     """x' = -(1 + p) x + u: the gain is one over the slowest pole."""
     rho = Scheduling("p", "1", low=0.0, high=1.0, rate=0.1)

@@ -93,6 +93,7 @@ def test_one_parameter_as_a_special_case_of_several_has_the_same_minimal_order()
     assert several.sizes == (lpv.to_lft().reduce().order, 0)
 
 
+@pytest.mark.slow(but="2")
 @pytest.mark.parametrize("seed", range(3))
 def test_truncation_keeps_its_promises(seed):
     _, lft = polynomial(seed, rank=2)

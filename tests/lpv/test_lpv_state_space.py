@@ -139,6 +139,7 @@ def test_sampled_model_is_the_hold_equivalent_at_the_nodes_up_to_its_residuals()
     assert np.abs(discrete.residuals.A).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_simulation_agrees_with_an_ode_solver_and_converges_with_the_step():
     lpv = stable()
 

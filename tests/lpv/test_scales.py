@@ -30,6 +30,7 @@ def in_units(terms, row, column, parameters):
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("reduced", [False, True])
 @settings(max_examples=40, deadline=None)
 @given(units(3, 2, 2, 2), st.integers(0, 10**6))
@@ -146,6 +147,7 @@ def test_a_polynomial_whose_loop_was_rotated_is_recognised_and_keeps_all_its_ter
         np.testing.assert_allclose(back.at(p).A, lpv.at(p).A, atol=1e-12)
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(units(3, 2, 2, 1), st.booleans(), st.booleans(), st.integers(0, 10**6))
 def test_feedback_closes_the_loop_of_every_frozen_model_in_any_units(

@@ -132,6 +132,7 @@ def test_simulation_along_a_flight_converges_to_the_differential_equation():
     assert errors[2] < 1e-5
 
 
+@pytest.mark.slow
 def test_reduction_keeps_the_response_over_the_box():
     """A fourth state hardly excited: three keep the response."""
     whole = model()

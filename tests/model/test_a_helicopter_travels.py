@@ -23,6 +23,7 @@ def pickled(heli):
     return pickle.loads(pickle.dumps(heli))
 
 
+@pytest.mark.slow(but="deepcopy")
 @pytest.mark.parametrize("travel", [copy.deepcopy, copy.copy, pickled])
 def test_a_used_helicopter_is_copied_and_flies_as_before(used, travel):
     other = travel(used)

@@ -19,6 +19,7 @@ R50 = (resources.files("symheli.airframe.vehicles") / "r50_hover.linear.toml").r
 )
 
 
+@pytest.mark.slow(but="xcell_kahn_hudson-ideal")
 @pytest.mark.parametrize("governor", ["ideal", "pi"])
 @pytest.mark.parametrize("name", vehicles())
 def test_every_packaged_airframe_trims_along_the_transition(name, governor):
@@ -69,6 +70,7 @@ def test_more_blades_of_less_chord_are_the_same_rotor(ideal):
         )  # rounding of the solidity through Newton's method
 
 
+@pytest.mark.slow(only="xcell_kahn_hudson-0.3")
 @pytest.mark.filterwarnings("ignore::symheli.errors.ValidityWarning")
 @pytest.mark.parametrize("factor", [0.3, 5.0])
 @pytest.mark.parametrize("name", vehicles())

@@ -44,6 +44,7 @@ def close(got, expected, scale):
     np.testing.assert_allclose(got, expected, rtol=1e-12, atol=1e-12 * scale)
 
 
+@pytest.mark.slow
 def test_rigid_body_functions_are_the_derived_equations():
     """A rotor at rest in space (Om = -r) carries no angular momentum: what is left is the rigid
     body.
@@ -69,6 +70,7 @@ def test_rigid_body_functions_are_the_derived_equations():
         )
 
 
+@pytest.mark.slow
 def test_quaternion_kinematics_are_the_derived_ones():
     _, kinematics = derived("quaternion")
     rng = np.random.default_rng(2)

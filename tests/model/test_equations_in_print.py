@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pytest
 import sympy
 from airframes import AFT_ROTOR, WING, WING_COMPONENT, write
 
@@ -21,6 +22,7 @@ def model(options):
     return symheli.Helicopter.load("xcell60", **options)
 
 
+@pytest.mark.slow
 def test_every_equation_and_symbol_can_be_set_and_fits_a_page():
     from matplotlib.mathtext import MathTextParser
 

@@ -72,6 +72,7 @@ def states_of_the_envelope(heli, count, seed):
     return found
 
 
+@pytest.mark.slow
 def test_right_hand_side_and_jacobian_over_the_envelope(heli, exact):
     for x, u, wind in states_of_the_envelope(heli, 8, seed=11):
         z, start = np.concatenate([x, u, wind]), inflow_start(heli, x, u, wind)
@@ -84,6 +85,7 @@ def test_right_hand_side_and_jacobian_over_the_envelope(heli, exact):
         )
 
 
+@pytest.mark.slow(but="pi-6.0")
 @pytest.mark.parametrize("speed", [0.7, 2.0, 6.0, 9.5, 14.0, 20.0])
 def test_right_hand_side_and_jacobian_at_trims(heli, exact, speed):
     point = symheli.trim(heli, speed)
@@ -95,6 +97,7 @@ def test_right_hand_side_and_jacobian_at_trims(heli, exact, speed):
     )
 
 
+@pytest.mark.slow(but="pi")
 def test_jacobian_in_hover_is_one_of_the_one_sided_derivatives(heli, exact):
     """Hover sits on several corners at once (|u|, wake, limits of flows that vanish): each entry
     equals one side to rounding.
@@ -133,6 +136,7 @@ def either_side(heli, cause, speed):
     return at(low - 1e-9), at(high + 1e-9)
 
 
+@pytest.mark.slow
 def test_jacobian_on_both_sides_of_every_kink_of_the_transition(ideal):
     """Close to each corner the Jacobian is that of its side, and across it the two sides differ."""
     exact, wind = Exact(ideal), np.zeros(3)

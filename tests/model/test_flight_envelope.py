@@ -36,6 +36,7 @@ STATES = st.tuples(
 )  # u v, w, p q r, phi, theta, a1 b1, Om, om_i
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None)
 @given(
     STATES,

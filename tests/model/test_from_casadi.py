@@ -141,6 +141,7 @@ def test_the_whole_right_hand_side_in_sympy_and_in_50_digits(heli):
     np.testing.assert_allclose(np.array(xdot, float).ravel(), digits, rtol=1e-15, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_right_hand_side_with_symbols_agrees_with_casadi_at_random_states_and_parameters(heli):
     """The same code through SymPy, every parameter a symbol; parameters changed at random in
     both.

@@ -87,6 +87,7 @@ def test_failures_are_kept_in_the_map(ideal):
     assert np.isnan(found["d_col"][0, 1])
 
 
+@pytest.mark.slow(but="ideal")
 @pytest.mark.parametrize("governor", ["ideal", "pi"])
 def test_derivatives_are_those_of_force_and_moment(ideal, governor):
     """Central differences of X .. N by mass and inertia of the body alone, which know no gravity
@@ -150,6 +151,7 @@ def test_derivatives_know_their_units_and_nomenclature(level):
         symheli.derivatives(level.discretize(0.02))
 
 
+@pytest.mark.slow(only="density-values2-<lambda>")
 @pytest.mark.parametrize(
     ("name", "values", "variant"),
     [

@@ -51,6 +51,7 @@ ASKED = (
 )
 
 
+@pytest.mark.slow(only=("level-printed", "acceleration-climb_rate-smoothed"))
 @pytest.mark.filterwarnings("ignore::symheli.errors.ValidityWarning")
 @pytest.mark.parametrize(
     ("name", "asked"),
@@ -89,6 +90,7 @@ def test_conditions_may_jump_about(pi):
         assert str(found[k].condition) == str(alone.condition)
 
 
+@pytest.mark.slow(but="ideal")
 def test_the_residual_of_every_trim_holds_in_the_equations_with_their_numbers_written_in(heli):
     """`Helicopter.rhs` is another function than the one the batch solved."""
     found = symheli.trim_batch(heli, SPEEDS, acceleration=1.5)

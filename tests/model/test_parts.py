@@ -49,6 +49,7 @@ def test_a_wing_of_ones_own_changes_z_w_as_its_closed_form_says(tmp_path, ideal)
     assert symheli.trim(winged, 9.0).success
 
 
+@pytest.mark.slow(but="pi")
 @pytest.mark.parametrize("governor", ["ideal", "pi"])
 def test_a_second_rotor_trims_and_linearizes_under_names_of_its_own(tmp_path, governor):
     """Two rotors fore and aft, collectives mixed for pitch: the names of the first stay, the second

@@ -111,6 +111,7 @@ def test_main_rotor_is_mirror_symmetric(rotor, seed):
         np.testing.assert_allclose(right * mirror, left, rtol=1e-13, atol=1e-15)
 
 
+@pytest.mark.slow(but="pi")
 def test_compiled_and_interpreted_functions_agree(heli):
     point = symheli.trim(heli, 7.0)
     x, u = point.x.array + 0.01, point.u.array

@@ -68,6 +68,7 @@ def one_sided(f, z, i, h):
     ) / (2 * h)
 
 
+@pytest.mark.slow(only=("ideal-0.0", "pi-0.0"))
 @pytest.mark.parametrize("speed", [0.0, 0.15, 0.6, 2.0, 5.0, 9.5, 12.0, 19.0])
 def test_jacobian_agrees_with_differences_on_each_side_of_a_kink(heli, speed):
     """At a kink the algorithmic derivative must equal one side; elsewhere both. Hover (0) is a kink

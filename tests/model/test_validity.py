@@ -217,6 +217,7 @@ def test_a_vehicle_without_a_main_rotor_is_not_judged_by_one(ideal):
     assert judge.harmless == (math.inf, math.inf)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("always::symheli.errors.ValidityWarning")
 def test_the_command_line_says_it_once(capsys):
     assert main(["linearize", "--airspeed", "24"]) == 0  # a trim and a linear model

@@ -125,6 +125,7 @@ def holed():
     return FlightRecord.from_arrays(time, {"q": "rad/s", "n": "1"}, q=q, n=np.ones(11))
 
 
+@pytest.mark.slow
 def test_a_plot_has_units_and_no_line_across_gaps_and_missing_samples():
     got = holed()
     q, n = got.plot()
@@ -185,6 +186,7 @@ print(matplotlib.get_backend().lower(), len(axes), len(plt.get_fignums()))
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("backend", ["agg", "", "tkagg"])
 def test_a_script_without_a_display_draws(tmp_path, backend):
     """Told nothing, or to use windows, matplotlib falls back on a backend for files."""

@@ -94,6 +94,7 @@ def within(estimate, true, limit):
     return abs(estimate.value - true) <= limit * estimate.standard_error
 
 
+@pytest.mark.slow
 def test_exact_motion_has_no_fault_to_the_error_of_splines():
     """Steps of 0.02 s of sines up to 4 rad/s: (4 * 0.02)^4 / 384 is 1e-7."""
     found = check_kinematics(analytic(noise=0.0))
@@ -103,6 +104,7 @@ def test_exact_motion_has_no_fault_to_the_error_of_splines():
             assert estimate is None or abs(estimate.value - true) < 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 2))])
 def test_faults_of_every_kind_come_back_within_their_errors(seed):
     record = analytic(seed)
@@ -174,6 +176,7 @@ def test_sound_flights_are_consistent_with_noise_and_without(ideal):
 DEG = 180 / np.pi
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("factors", "said"),
     [
@@ -210,6 +213,7 @@ def test_wrong_units_and_signs_are_called_by_their_name(factors, said):
         assert words in found[name].verdict
 
 
+@pytest.mark.slow
 def test_a_heading_that_starts_anew_at_north_is_one_heading():
     record = analytic()
     wrapped = changed(record, psi=np.mod(record["psi"] - 1.0, 2 * np.pi))
@@ -238,6 +242,7 @@ def test_another_column_is_no_rate_of_roll():
     assert "check which columns phi and p are" in found["phi"].verdict
 
 
+@pytest.mark.slow
 def test_what_does_not_move_is_not_known_and_its_bias_is():
     n, rng = 2000, np.random.default_rng(0)
     still = {name: NOISE[name] * rng.standard_normal(n) for name in ("p", "q", "r")}

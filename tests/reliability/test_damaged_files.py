@@ -15,6 +15,7 @@ def readers(tmp_path_factory):
     return good_files.readers(tmp_path_factory.mktemp("files"))
 
 
+@pytest.mark.slow
 def test_no_damage_of_a_file_fails_silently(readers):
     told = [fault for reader in readers for fault in damaged_files.tally(reader, 16).faults]
     assert not told, "\n".join(map(str, told))

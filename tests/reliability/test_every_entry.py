@@ -64,6 +64,7 @@ def _calls(accepted):
     return found
 
 
+@pytest.mark.slow
 def test_no_changed_argument_of_quick_entries_fails_silently():
     told, asked = [], 0
     for entry, calls in _calls(lambda name: name in QUICK).items():

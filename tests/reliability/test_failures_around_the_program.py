@@ -74,6 +74,7 @@ WRONG = (
 )
 
 
+@pytest.mark.slow(only="arguments5-1-TrimError")
 @pytest.mark.parametrize(("arguments", "status", "kind"), WRONG)
 def test_what_fails_is_one_sentence_and_under_json_an_object(
     tmp_path, monkeypatch, capsys, arguments, status, kind
@@ -92,6 +93,7 @@ def test_what_fails_is_one_sentence_and_under_json_an_object(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs /dev/full")
 @pytest.mark.parametrize("arguments", [["vehicles"], ["vehicles", "--json"]])
 def test_an_answer_that_finds_no_room_is_a_failure_too(arguments):
@@ -113,6 +115,7 @@ def test_a_solver_that_is_not_there_is_named():
         synthesis.stability(LAG, solver=synthesis.Solver("NOSUCH"))
 
 
+@pytest.mark.slow
 def test_without_a_compiler_numbers_come_out_and_it_is_said():
     code = (
         "import warnings, symheli\n"

@@ -306,6 +306,7 @@ def test_a_response_beyond_the_range_of_numbers_is_refused():
         norm(np.diag([-1.0, -5e-324]), np.ones((2, 1)), np.ones((1, 2)), np.zeros((1, 1)))
 
 
+@pytest.mark.slow
 def test_a_constant_parameter_has_no_growth_in_a_cycle():
     """It was NaN, and nothing said so."""
     p = symheli.Scheduling("p", "1", 0.0, 1.0, rate=0.5)
@@ -524,6 +525,7 @@ def test_information_of_an_experiment_is_finite():
             idn.Experiment("one", seconds, factor, {})
 
 
+@pytest.mark.slow
 def test_trims_are_numbers_with_controls_on_their_stops_or_not(ideal):
     """NaN was carried on, as true."""
     trims = symheli.trim_batch(ideal, airspeed=[4.0, 5.0])

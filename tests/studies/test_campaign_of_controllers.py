@@ -16,6 +16,7 @@ from studies.controllers.designs import Designs
 from studies.controllers.flown import WINDS, fly_controllers
 
 
+@pytest.mark.slow
 def test_it_flies_what_the_study_flies():
     row = control(controller="lqr", wind=WINDS[0], flights=2, seed=5)
     designs = Designs(designs=(designed("xcell60", "lqr", 0),), plant=plants("xcell60")[1])

@@ -292,6 +292,7 @@ def test_a_folder_that_cannot_be_written_is_one_sentence(tmp_path):
         run(asked(), tmp_path / "file" / "c.zarr", here)
 
 
+@pytest.mark.slow
 def test_the_dataset_is_read_by_xarray_and_pandas(tmp_path, pd):
     pytest.importorskip("zarr", reason="needs zarr: pip install 'symheli[campaigns]'")
     xarray = pytest.importorskip("xarray")
@@ -394,6 +395,7 @@ def deaths(tmp_path, on, count):
     return dataset.reasons
 
 
+@pytest.mark.slow
 def test_a_cluster_gives_the_numbers_of_one_process(tmp_path, cluster):
     same_numbers(tmp_path, cluster)
 
@@ -439,6 +441,7 @@ def test_processes_do_the_same_without_a_cluster(tmp_path, importable):
         assert "has ended" in deaths(tmp_path / "again", on, 99)[3]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["Here", pytest.param("Cluster.local", marks=pytest.mark.slow)])
 def test_a_killed_campaign_goes_on_where_it_was(tmp_path, importable, kind):
     if kind != "Here":

@@ -90,6 +90,7 @@ def test_certify_takes_a_memory_and_a_degree(answer, run):
     assert "proves stability only" in err
 
 
+@pytest.mark.slow
 def test_a_saved_certificate_is_proven_again_from_its_file(answer, run, tmp_path):
     path = tmp_path / "proof.json"
     made = answer("certify", "--rate", 0, "--airspeeds", 4, 9, "--save", path)
@@ -124,6 +125,7 @@ def test_certify_refuses_options_that_mean_nothing_together(run, options, said):
     assert said in err
 
 
+@pytest.mark.slow
 def test_certify_with_an_lft_test_lets_the_airspeed_jump(answer, run):
     got = answer("certify", "--lft", "DG", "--airspeeds", 5.5, 7.5, "--stability")
     assert got["verified"]
@@ -221,6 +223,7 @@ def test_identify_reads_by_a_map_and_compares_orders(answer, run, tmp_path):
     assert "held-out samples" in error
 
 
+@pytest.mark.slow(but="svg")
 @pytest.mark.parametrize("end", ["png", "svg", "pdf"])
 def test_identify_draws_what_was_measured_and_predicted(run, answer, tmp_path, end):
     log, picture = scheduled_csv(tmp_path / "log.csv", noise=0.1), tmp_path / f"fits.{end}"
@@ -385,6 +388,7 @@ def test_identify_reads_matlab_files_by_content(answer, tmp_path):
     assert got["scheduling_pays"]["y"]
 
 
+@pytest.mark.slow
 def test_an_xplane_log_needs_one_short_line(run):
     log = DATA / "xplane" / "Forward.txt"
     if not log.exists():
@@ -395,6 +399,7 @@ def test_an_xplane_log_needs_one_short_line(run):
     assert "does NOT pay" in out
 
 
+@pytest.mark.slow
 def test_a_real_flight_is_identified_and_scheduling_does_not_pay(answer):
     log = DATA / "trex550" / "trex550_flight_clean.csv"
     if not log.exists():
@@ -435,6 +440,7 @@ def test_a_real_flight_is_identified_and_scheduling_does_not_pay(answer):
 # --- failure -------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow(only="arguments3-no trim at")
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [

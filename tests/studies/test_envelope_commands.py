@@ -11,6 +11,7 @@ import pytest
 import symheli
 
 
+@pytest.mark.slow
 def test_envelope_shows_the_map_and_writes_table_and_figure(run, tmp_path, ideal):
     grid = ("--airspeeds", 0, 10, 3, "--climb-rates", -10, 10, 5, "--out", tmp_path / "deep")
     status, out, _ = run("envelope", *grid)
@@ -28,6 +29,7 @@ def test_envelope_shows_the_map_and_writes_table_and_figure(run, tmp_path, ideal
     assert data["units"]["power"] == "W"
 
 
+@pytest.mark.slow
 def test_derivatives_prints_the_table_and_writes_it(run, tmp_path, ideal):
     status, out, _ = run("derivatives", "--airspeeds", 0, 8, 3, "--out", tmp_path)
     assert status == 0

@@ -27,6 +27,7 @@ def test_the_models_jump_where_the_fin_stalls(models):
     assert np.abs(after - before).max() > 0.05
 
 
+@pytest.mark.slow
 def test_the_covered_gain_is_hardly_above_that_of_the_polynomials(ideal):
     models = ExactLateral.of(ideal, 5.0, 8.0)
     loop = models.loop()

@@ -10,6 +10,7 @@ import symheli
 from studies.transition.recovery import recover
 
 
+@pytest.mark.slow(but="8.2")
 @pytest.mark.parametrize("mass", [8.2, 9.5])
 def test_matrices_come_back_for_another_helicopter(tmp_path, mass):
     """Rounding that was left of samples explained whole once became rows of no number, for one mass

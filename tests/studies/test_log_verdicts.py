@@ -230,6 +230,7 @@ def test_a_moving_trim_is_tried_and_kept_where_it_predicts_better(identify):
     assert "offset_rate" not in text
 
 
+@pytest.mark.slow(but=("p-options3", "y-options0", "u-options1", "p-options2"))
 @pytest.mark.parametrize(
     ("column", "options"),
     [
@@ -257,6 +258,7 @@ def test_empty_cells_of_any_column_are_skipped(identify, tmp_path, monkeypatch, 
     assert "nan" not in text
 
 
+@pytest.mark.slow
 def test_a_measured_p_is_held_from_the_start_of_each_prediction(identify):
     """The trim's motion within a second is news to whoever schedules on a measurement."""
     ahead = {c: identify(about_a_trim(), *c)[0] for c in ((), ("--commanded",))}
@@ -268,6 +270,7 @@ def test_a_measured_p_is_held_from_the_start_of_each_prediction(identify):
     assert [found["scheduling_held"] for found in ahead.values()] == [True, False]
 
 
+@pytest.mark.slow
 def test_means_are_identified_with_feedthrough_unless_told_otherwise(identify):
     log = about_a_trim(6000)
     auto, text = identify(log, "--commanded", "--decimate", 4)
@@ -305,6 +308,7 @@ def test_another_log_is_held_out_as_a_whole(identify, tmp_path):
     )
 
 
+@pytest.mark.slow(but="iv-options0")
 @pytest.mark.parametrize(
     ("method", "options"), [("iv", ("--instruments", "u")), ("ridge", ()), ("rls", ())]
 )
@@ -323,6 +327,7 @@ def test_instruments_for_a_method_that_takes_none_are_refused(tmp_path, capsys):
     assert "--instruments are for --method iv, riv or oe, not ls" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_scheduling_signal_made_of_outputs_is_found_and_its_free_runs_are_not_counted(identify):
     rng = np.random.default_rng(0)
     u, y, p = rng.standard_normal(3000), np.zeros(3000), np.zeros(3000)
@@ -366,6 +371,7 @@ def flown_csv(path, heli, **factors):
     return path
 
 
+@pytest.mark.slow
 def test_rates_in_degrees_are_noticed_before_anything_is_believed(tmp_path, ideal, capsys):
     asked = ("--outputs", "q,theta", "--inputs", "d_lon", "--scheduling", "airspeed_command")
     sound = flown_csv(tmp_path / "sound.csv", ideal)

@@ -21,6 +21,7 @@ def family_file(tmp_path_factory, ideal):
 ROLL = ("--states", "v,p,r,phi,b1", "--feedback", "d_lat=phi:-0.02")
 
 
+@pytest.mark.slow
 def test_a_family_from_a_file_is_certified_as_the_vehicle_it_came_from(answer, family_file, ideal):
     got = answer(
         *("certify", "--model", family_file, *ROLL, "--rate", 0),
@@ -45,6 +46,7 @@ def test_margins_of_a_family_from_a_file_are_those_of_its_models(answer, family_
     assert "--feedback" in err
 
 
+@pytest.mark.slow
 def test_identified_models_from_files_are_certified_and_exported(answer, run, tmp_path):
     rng = np.random.default_rng(0)
     p, u = 0.5 + 0.5 * np.sin(0.05 * np.arange(600)), rng.uniform(-1, 1, 600)

@@ -60,6 +60,7 @@ def test_on_a_terminal_there_are_bars_and_what_is_printed_stays_whole():
         assert part in text
 
 
+@pytest.mark.slow
 def test_where_there_is_no_terminal_there_are_lines_after_a_while():
     child = run(3, 0.5, stderr=subprocess.PIPE)
     out, err = child.communicate(timeout=60)

@@ -52,6 +52,7 @@ def page(outcome, folder):
     return report.write_report(outcome, folder).read_text()
 
 
+@pytest.mark.slow
 def test_a_full_outcome_fills_every_section(full, tmp_path, unpainted):
     for name in STAGES:
         assert getattr(full, name), f"{name} is empty: not a full outcome"
@@ -64,6 +65,7 @@ def test_a_full_outcome_fills_every_section(full, tmp_path, unpainted):
         assert {path.stem for path in (tmp_path / "figures").glob(f"*.{ending}")} == drawn
 
 
+@pytest.mark.slow
 def test_the_numbers_of_a_full_outcome_are_what_the_schema_says(full, tmp_path):
     schema = Path(report.__file__).with_name("results.schema.json").read_text(encoding="utf-8")
     found = json.loads(report.write_results(full, tmp_path).read_text())
@@ -79,6 +81,7 @@ def test_an_empty_outcome_says_what_was_not_reached(tmp_path, unpainted):
     assert "No result that was reached is negative" in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", STAGES)
 def test_any_stage_of_the_outcome_may_be_missing(full, tmp_path, monkeypatch, name):
     outcome = replace(full, **{name: None})
@@ -87,6 +90,7 @@ def test_any_stage_of_the_outcome_may_be_missing(full, tmp_path, monkeypatch, na
     assert outcome.summary()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     [pytest.param(n, marks=() if n in QUICKLY else pytest.mark.slow) for n in DRAWN],
@@ -112,6 +116,7 @@ def test_a_vehicle_whose_entries_are_all_fitted_gets_its_report(full, tmp_path, 
     assert "Corners of the model" not in page(replace(full, baseline=kinkless), tmp_path)
 
 
+@pytest.mark.slow
 def test_a_loop_that_is_unstable_when_frozen_gets_its_report(full, tmp_path, unpainted):
     growing = LPVStateSpace.polynomial(
         [[[-1.0]], [[1.0]]],
@@ -130,6 +135,7 @@ def test_a_loop_that_is_unstable_when_frozen_gets_its_report(full, tmp_path, unp
     assert outcome.summary()
 
 
+@pytest.mark.slow
 def test_numbers_are_on_the_disk_before_a_picture_fails(full, tmp_path, monkeypatch):
     def fail(_):
         raise RuntimeError("a picture failed")

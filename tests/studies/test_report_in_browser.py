@@ -143,6 +143,7 @@ def test_the_slider_moves_poles_and_responses(opened, width):
     assert said == []
 
 
+@pytest.mark.slow
 def test_pointing_at_a_curve_tells_its_value(opened, full):
     """The first point of the first curve of the trim: hover, and its pitch attitude."""
     page, _ = opened(1280)
@@ -161,6 +162,7 @@ def test_pointing_at_a_curve_tells_its_value(opened, full):
     assert pitch == pytest.approx(math.degrees(full.baseline.nodes.trims[0].x["theta"]), abs=0.01)
 
 
+@pytest.mark.slow
 def test_pointing_at_a_curve_of_a_picture_tells_its_value(opened, full):
     """A figure too dense for curves in the page: the airspeed of the training flight midway."""
     page, _ = opened(1280)

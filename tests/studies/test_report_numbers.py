@@ -88,6 +88,7 @@ def cells(table):
                 yield column, cell
 
 
+@pytest.mark.slow
 def test_every_number_of_a_table_is_in_results_json_where_the_table_says(full, results):
     looked_at = 0
     for table in every_table(full):
@@ -106,6 +107,7 @@ def test_a_number_that_is_not_in_results_json_would_be_found():
     assert not any(printed(x, "1.24") for x in found)
 
 
+@pytest.mark.slow
 def test_what_scheduling_is_worth_is_the_difference_of_the_fits(full, results):
     fits = {one["name"]: one["ahead"] for one in results["known_kinematics"]["models"]}
     table = tables.scheduling(full.known_kinematics)
@@ -117,6 +119,7 @@ def test_what_scheduling_is_worth_is_the_difference_of_the_fits(full, results):
         assert abs(int(cell) - change) <= 0.5
 
 
+@pytest.mark.slow
 def test_the_ranking_is_that_of_the_medians(full, results):
     table = controllers.ranking(full.flown_controllers)
     for row, wind in zip(table.rows, WINDS, strict=True):
@@ -133,6 +136,7 @@ def test_the_ranking_is_that_of_the_medians(full, results):
                 assert abs(float(cell) - 100 * (ratios[name] / ratios[best] - 1)) <= 0.5
 
 
+@pytest.mark.slow
 def test_every_path_that_the_report_names_is_in_results_json(full, results, page):
     named = re.findall(r'<span class="path">\[<code>([\w.]+)</code>', page)
     named += [row.path for row in shortfalls(full)]
@@ -158,6 +162,7 @@ def test_a_mention_of_what_was_not_reached_is_no_link():
     assert labels.to("table", "flown") == "table not reached"
 
 
+@pytest.mark.slow
 def test_the_best_that_diverges_in_free_run_is_not_bold(full):
     """The winner 1 s ahead is made to diverge: the next best stands out, and without one none."""
     compared = full.comparison.predictions[0]
@@ -181,12 +186,14 @@ def test_the_best_that_diverges_in_free_run_is_not_bold(full):
     assert not [row for row, column in tables.comparison(none).bold if column == 1]
 
 
+@pytest.mark.slow
 def test_no_bold_cell_of_any_table_diverges(full):
     for table in every_table(full):
         for row, column in table.bold:
             assert not re.search(r"diverges|unstable|lost|inf|nan|none", table.rows[row][column])
 
 
+@pytest.mark.slow
 def test_abstract_and_conclusion_are_short_sentences_with_the_numbers(full):
     for said in (conclusions.abstract(full), conclusions.conclusions(full)):
         assert 4 <= len(said) <= 13
@@ -196,6 +203,7 @@ def test_abstract_and_conclusion_are_short_sentences_with_the_numbers(full):
     assert any(f"{worst:.3f}" in sentence for sentence in conclusions.abstract(full))
 
 
+@pytest.mark.slow
 def test_the_answer_follows_the_proofs(full):
     """The gust loop of the fixture grows when airspeed jumps; a lag that hardly changes does not
     care.
@@ -221,6 +229,7 @@ def hardly_changing():
     return tuple(guarantees.answered([*asked, *guarantees.lft_bounds("baseline", "gust", lag)]))
 
 
+@pytest.mark.slow
 def test_models_at_a_held_airspeed_are_computed_once_until_they_change(full, monkeypatch):
     asked = []
     monkeypatch.setattr(held, "_kept", [])

@@ -115,6 +115,7 @@ def test_it_goes_on_with_the_stage_that_was_interrupted(stopped, short, capsys):
     assert capsys.readouterr().err.count("taken from") == 2
 
 
+@pytest.mark.slow
 def test_without_being_asked_it_begins_anew(stopped, short):
     run(stopped)
     assert tuple(short) == FIRST
@@ -125,6 +126,7 @@ def test_the_whole_study_takes_from_a_look_what_reads_nothing_of_the_effort(stop
     assert short == ["exact_recovery"]
 
 
+@pytest.mark.slow(but="{'seed': 1}")
 @pytest.mark.parametrize("other", [{"seed": 1}, {"vehicle": "xcell_kahn_hudson"}], ids=str)
 def test_stages_of_another_seed_or_vehicle_are_computed_again(stopped, short, capsys, other):
     run(stopped, resume=True, **other)
@@ -139,6 +141,7 @@ def test_stages_of_other_code_are_computed_again(stopped, short, monkeypatch):
     assert tuple(short) == FIRST
 
 
+@pytest.mark.slow(but="foreign")
 @pytest.mark.parametrize("damage", ["cut", "changed", "emptied", "foreign"])
 def test_a_damaged_stage_is_computed_again_and_said(stopped, short, capsys, damage):
     path = stopped / "stages" / "baseline.stage"
@@ -285,6 +288,7 @@ def test_one_rate_changed_in_the_file_computes_only_what_it_touches(tmp_path, mo
     assert again("ramps = 5\nservo_rates = [0, 3]") == (["flights", "servo", "robust"], first)
 
 
+@pytest.mark.slow
 def test_the_command_says_how_to_go_on(short, tmp_path, monkeypatch, capsys):
     from studies import cli
 
@@ -340,6 +344,7 @@ def test_a_stage_whose_file_is_removed_is_computed_again_alone(stopped, short):
     assert short == ["paper_experiment"]
 
 
+@pytest.mark.slow
 def test_what_was_asked_for_is_kept_and_asks_for_the_same(short, tmp_path):
     asked = Configuration.of(
         {"quick": True, "seed": 2, "out": tmp_path, "effort": {"ramps": 7, "search": {"nodes": 50}}}
@@ -354,6 +359,7 @@ def test_what_was_asked_for_is_kept_and_asks_for_the_same(short, tmp_path):
     assert not short
 
 
+@pytest.mark.slow
 def test_the_last_line_says_where_the_report_is(short, tmp_path, capsys):
     from studies import cli
 

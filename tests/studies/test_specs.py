@@ -74,6 +74,7 @@ def test_the_design_of_the_study_is_evaluated_and_kept(vehicle, monkeypatch):
     assert np.array_equal(again.D, made.D)
 
 
+@pytest.mark.slow
 def test_the_command_says_what_the_table_says(run, words, vehicle, file):
     table = vehicle.frozen({NAME: TableController.load(file).model})
     status, out, _ = run(*words, "--json")
@@ -134,6 +135,7 @@ def test_a_flight_along_its_reference_misses_nothing(lqr):
         assert flew[key] > 1e-4
 
 
+@pytest.mark.slow
 def test_a_controller_that_loses_every_flight_is_lost_and_not_left_out(vehicle, lqr):
     """Every entry that a flight has is infinite of a lost one; the sheet then says so."""
     heli = Helicopter.load("xcell60", governor="pi")

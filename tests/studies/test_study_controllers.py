@@ -140,6 +140,7 @@ def test_the_continuous_model_is_the_one_that_tustins_rule_samples(base):
 # --- designs ------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_synthesis_that_finds_none_is_a_design_with_its_reason(base):
     def none():
         raise SynthesisError("nothing moves it")
@@ -180,6 +181,7 @@ def test_the_verdict_on_a_model_is_a_sentence(verdict, said):
     assert "slow modes" not in text
 
 
+@pytest.mark.slow
 def test_the_schedule_of_point_designs_keeps_their_gain_at_each_point(base):
     plant = design_plant(base)
     made = hinf_schedule(plant, np.linspace(0.0, TOP, 3), BACK_OFF)
@@ -201,6 +203,7 @@ def test_what_flies_has_fewer_states_and_hardly_more_gain(base):
     assert frozen <= NEAR**2 * full
 
 
+@pytest.mark.slow
 def test_the_lqr_is_stable_behind_servos_and_delay(lqr, base):
     assert lqr.order == 0
     loop = closed(flown_plant(base), lqr.controller)
@@ -258,6 +261,7 @@ def test_what_the_sensors_added_is_known_to_rounding(heli):
     assert np.allclose(noise_of(loud), added, rtol=0.0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_measures_of_a_flight_are_those_of_its_record(lqr, base):
     """Still air but for the noise: forward airspeed, energy and commands from the record alone."""
     designs = Designs(designs=(lqr,), plant=flown_plant(base))
@@ -313,6 +317,7 @@ def test_the_table_says_how_many_flights_the_equations_do_not_promise():
     assert tables.beyond(FlownControllers(flown=(none,), seeds=2, duration=9.0)) == []
 
 
+@pytest.mark.slow
 def test_the_share_beyond_the_equations_is_that_of_the_true_airspeed(lqr, base, ideal):
     designs = Designs(designs=(lqr,), plant=flown_plant(base))
     plan = next(plan for _, wind, plan in plans(designs) if wind == 0.0)
@@ -373,6 +378,7 @@ def test_nothing_is_claimed_of_a_gain_that_was_not_proven():
 # --- together -----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_flights_are_the_same_for_every_controller_and_come_back_from_their_stage(
     lqr, base, tmp_path
 ):

@@ -144,6 +144,7 @@ def test_what_is_shown_fits_a_terminal_and_names_what_is_known(found):
     assert "1 of 1 were lost" in text(lost, [])
 
 
+@pytest.mark.slow
 def test_as_many_states_and_airspeeds_as_are_asked_for(family, found):
     _, plant = plants(model_of(found.asked, family), found.asked)
     for asked in (replace(found.asked, knots=5), replace(found.asked, order=1)):
@@ -191,6 +192,7 @@ def said_of(tmp_path, capsys, choices=OF_IDENTIFIED):
     return capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_controller_for_a_saved_identified_model_is_proven_around_that_model(tmp_path, capsys):
     """Known to higher airspeeds than are asked for; the loop of the proof is by hand that of the
     coefficients that made the record.
@@ -256,6 +258,7 @@ def test_a_file_that_holds_no_model_over_airspeed_is_refused(tmp_path, capsys, f
     assert "LinearFamily.fix" in said
 
 
+@pytest.mark.slow
 def test_a_controller_whose_loop_does_not_stand_the_delay_is_refused_with_what_to_change(
     family, found
 ):

@@ -167,6 +167,7 @@ def test_a_median_meets_the_mark_where_single_flights_may_scatter():
     assert shown.to_dict()["w"]["mark"] is None
 
 
+@pytest.mark.slow
 def test_gust_loop_is_proven_for_slow_airspeed_and_grows_when_it_may_jump(baseline):
     loop = guarantees.gust_loop(baseline.nodes)
     slow = synthesis.l2_gain(loop, rate=1.0, form=synthesis.Spline(segments=8), search=None)

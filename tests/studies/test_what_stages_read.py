@@ -14,6 +14,7 @@ ASKING = [
 ]
 
 
+@pytest.mark.slow(but="longitudinal-whole")
 @pytest.mark.parametrize(
     "effort",
     [Effort(), pytest.param(Effort.look(), marks=pytest.mark.slow)],

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from identification import fit, scores
 from identification.judge.against_constant import HORIZONS
@@ -12,6 +13,7 @@ from studies.transition.axes import LATERAL
 from studies.transition.flights import TransitionPlan, autopilot_for
 
 
+@pytest.mark.slow
 def test_every_output_of_every_axis_is_judged_and_counted():
     short = {"short": TransitionPlan(ramps=3)}
     with Here() as here:
@@ -31,6 +33,7 @@ def test_every_output_of_every_axis_is_judged_and_counted():
     assert np.all([line.lpv[HORIZONS[0]][0] > line.lti[HORIZONS[0]][0] - 5 for line in lines])
 
 
+@pytest.mark.slow
 def test_the_models_are_those_of_the_study_with_a_moving_trim(ideal):
     plan = TransitionPlan(ramps=3)
     autopilot = autopilot_for(ideal)

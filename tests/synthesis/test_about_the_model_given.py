@@ -60,6 +60,7 @@ def stiff(slow, fast, coupling):
     )
 
 
+@pytest.mark.slow(but="decay")
 @pytest.mark.parametrize("route", ROUTES)
 @settings(max_examples=5, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 @given(
@@ -82,6 +83,7 @@ def test_a_stiff_model_has_the_same_bound_in_any_units(route, speeds, coupling, 
         assert bounds[0].proven == pytest.approx(bounds[0].frozen, rel=1e-3)
 
 
+@pytest.mark.slow(but="energy to peak-1")
 @pytest.mark.parametrize("seed", [1, *(pytest.param(k, marks=pytest.mark.slow) for k in (0, 2))])
 @pytest.mark.parametrize("route", ["splines", "box", "energy to peak"])
 def test_random_models_have_the_same_gain_in_any_units(route, seed):
@@ -94,6 +96,7 @@ def test_random_models_have_the_same_gain_in_any_units(route, seed):
     assert gains[1] == pytest.approx(gains[0], rel=1e-3)
 
 
+@pytest.mark.slow(but=("lag-decay", "lag-energy to peak"))
 @pytest.mark.parametrize("route", ["splines", "box", "energy to peak", "decay"])
 @pytest.mark.parametrize(
     "lpv",
@@ -112,6 +115,7 @@ def test_no_limit_on_the_rate_is_worse_than_none(route, lpv):
     )
 
 
+@pytest.mark.slow(but="1000000000000.0")
 @pytest.mark.parametrize("rate", [1e3, 1e7, 1e12])
 def test_stability_under_jumps_is_stability_under_any_limit(rate):
     cert = stability(random_stable(1), rate, search=None)
@@ -133,6 +137,7 @@ def silent(how):
     return replace(lpv, **{name: 0 * getattr(lpv, name) for name in how})
 
 
+@pytest.mark.slow(but=("frozen-B-lft", "frozen-unobservable-lft", "frozen-C-lft", "frozen-B-box"))
 @pytest.mark.parametrize("route", ["splines", "box", "energy to peak", "lft"])
 @pytest.mark.parametrize(
     "how", ["B", "C", pytest.param("BC", marks=pytest.mark.slow), "unobservable"]
@@ -161,6 +166,7 @@ def test_frozen_gains_near_zero_set_no_scale():
     assert 0.186 < cert.gamma < 0.2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("route", ROUTES)
 @pytest.mark.parametrize(
     "lpv",

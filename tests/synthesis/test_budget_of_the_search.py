@@ -29,6 +29,7 @@ def mass_spring():
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seconds", [0.3, 1.0])
 def test_a_search_over_a_box_keeps_to_its_budget_and_says_so(seconds):
     began = time.process_time()
@@ -42,6 +43,7 @@ def test_a_search_over_a_box_keeps_to_its_budget_and_says_so(seconds):
     assert cert.frozen <= cert.lower <= cert.gamma
 
 
+@pytest.mark.slow
 def test_a_search_that_was_not_made_is_not_claimed():
     assert "no trajectory was searched" in l2_gain(spring(damping=0.4), 0.1, search=None).details
     quick = Search(

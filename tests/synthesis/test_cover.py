@@ -26,6 +26,7 @@ def left_out(size):
     return np.array([[[size, 0.0]], [[-size, 0.0]]]) / SAFETY
 
 
+@pytest.mark.slow
 def test_a_pole_known_within_a_margin_has_the_gain_of_the_slowest_pole():
     certificate = l2_gain(covering(lag(), left_out(0.005)), 0.0, form=PLAIN)
     truth = 1 / (1 - 0.005)
@@ -59,6 +60,7 @@ def test_every_measured_difference_is_within_the_remainder_with_the_promised_saf
     assert norms.max() == pytest.approx(1 / SAFETY)
 
 
+@pytest.mark.slow
 def test_without_a_remainder_the_covering_set_has_the_gain_of_the_model():
     certificate = l2_gain(covering(lag(), left_out(1e-12)), 0.0, form=PLAIN, search=None)
     assert certificate.gamma == pytest.approx(1.0, rel=1e-3)

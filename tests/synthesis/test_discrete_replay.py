@@ -57,6 +57,7 @@ def within(lpv, rate, trajectory):
     assert np.abs(np.diff(p)).max(initial=0.0) <= rate * lpv.dt * (1 + 1e-9)
 
 
+@pytest.mark.slow
 @common
 @given(lpv=models, rate=rates)
 def test_the_input_along_the_worst_trajectory_shows_the_gain(lpv, rate):

@@ -37,6 +37,7 @@ def sampled(model, dt, change=0.0, parameters=1):
     return LPVStateSpace.polynomial(terms, *({zero: M} for M in (into, C, D)), p, dt=dt)
 
 
+@pytest.mark.slow(but="0.001-1")
 @pytest.mark.parametrize("parameters", [1, 2])
 @pytest.mark.parametrize("dt", [1e-1, 1e-3, 1e-5])
 def test_the_proven_gain_does_not_lose_by_fine_sampling(dt, parameters):
@@ -60,6 +61,7 @@ def not_falsely_proven(seed, share, changed):
     assert not certificate.verified or certificate.verify(rigorous=True)
 
 
+@pytest.mark.slow
 def test_floating_point_is_not_believed_where_a_sample_changes_nothing():
     """The slowest mode decays by 1e-10 a sample: rounding of A alone moved the gain by 2e-6, below
     its lower bound.

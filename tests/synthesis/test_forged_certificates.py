@@ -122,6 +122,7 @@ def refused(forge):
     return not cert.verify() and not cert.verify(rigorous=True)
 
 
+@pytest.mark.slow(only=("sampled", "memory", "uncertain", "uncertain, sampled"))
 @pytest.mark.parametrize("form", FORMS)
 def test_the_certificate_itself_is_accepted(form):
     cert = genuine(form)

@@ -76,6 +76,7 @@ def agree(seeds):
         assert norm(*model)[0] == pytest.approx(dense(*model), rel=1.1e-8), seed
 
 
+@pytest.mark.slow
 def test_the_norm_of_lightly_damped_models_is_that_of_a_dense_grid():
     agree(range(60))
 
@@ -123,6 +124,7 @@ def test_a_sampled_model_has_the_norm_of_its_bilinear_twin(seed):
     assert norm(*sampled, dt=0.1)[0] == pytest.approx(norm(A, B, C, D)[0], rel=1e-7)
 
 
+@pytest.mark.slow(but="0.001")
 @pytest.mark.parametrize("dt", [1e-3, 1e-5, 1e-7])
 def test_the_frozen_gain_of_a_finely_sampled_model_is_that_of_the_continuous_one(dt):
     lpv = random_stable(3)
@@ -139,6 +141,7 @@ def test_the_norm_does_not_depend_on_the_units_of_states():
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("box", [False, True])
 def test_a_gain_that_is_loose_for_its_sample_period_says_so(box):
     """A gain of 1 is proven within a percent where a sample is 1e-3 s; at 1e-7 s the margins of the

@@ -70,6 +70,7 @@ def test_no_centre_where_the_start_is_no_storage_function():
     assert analytic_centre(*one, 2.0, 5.0, np.array([[0.1]])) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", [0.0, pytest.param(1e-3, marks=pytest.mark.slow)])
 def test_a_resting_or_slow_parameter_costs_a_fiftieth(rate):
     own, frozen = search(rate)
@@ -84,6 +85,7 @@ def test_nothing_is_proven_of_a_parameter_that_moves_too_fast():
     assert own.of_frozen_models(frozen).proof is None
 
 
+@pytest.mark.slow(but="form1")
 @pytest.mark.parametrize("form", [Spline(degree=0), Spline(segments=4)])
 def test_a_form_of_p_that_was_given_is_kept(form):
     own, frozen = search(0.0, form)

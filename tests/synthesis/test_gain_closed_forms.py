@@ -14,6 +14,7 @@ from synthesis import Spline, frozen_gain, l2_gain, stability
 COARSE = Spline(segments=4)
 
 
+@pytest.mark.slow(but="inf")
 @pytest.mark.parametrize("rate", [0.0, 1.0, math.inf])
 def test_a_lag_has_its_static_gain_at_any_rate(rate):
     cert = l2_gain(lag(), rate, form=COARSE, search=None)
@@ -22,6 +23,7 @@ def test_a_lag_has_its_static_gain_at_any_rate(rate):
     assert cert.frozen == pytest.approx(1.0, abs=1e-7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("seed", "dt"),
     [
@@ -67,6 +69,7 @@ def test_feedthrough_alone_is_its_largest_singular_value():
     assert cert.gamma == pytest.approx(3.0, rel=2e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dt", [None, 0.05])
 def test_the_gain_does_not_depend_on_units_of_the_states(dt):
     lpv = random_stable(3, dt=dt)
@@ -77,6 +80,7 @@ def test_the_gain_does_not_depend_on_units_of_the_states(dt):
     assert b == pytest.approx(a, rel=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [1e-5, 1e5])
 def test_the_gain_scales_with_the_output(factor):
     lpv = random_stable(4)
@@ -85,6 +89,7 @@ def test_the_gain_scales_with_the_output(factor):
     assert b == pytest.approx(factor * a, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_the_gain_does_not_depend_on_the_unit_of_time():
     lpv = random_stable(5, rate=0.3)
     s = lpv.scheduling
@@ -95,6 +100,7 @@ def test_the_gain_does_not_depend_on_the_unit_of_time():
     assert b == pytest.approx(a, rel=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", [0.0, 0.1, 2.0])
 def test_a_fast_sampled_model_has_the_gain_of_the_continuous_one(rate):
     lpv = random_stable(6, degree=1)
@@ -105,6 +111,7 @@ def test_a_fast_sampled_model_has_the_gain_of_the_continuous_one(rate):
     assert sampled.gamma == pytest.approx(continuous.gamma, rel=0.03)
 
 
+@pytest.mark.slow
 def test_a_spline_model_has_the_gain_of_the_polynomial_it_samples():
     from symheli.lpv import CubicSpline as Cubic
 
@@ -121,6 +128,7 @@ def test_a_spline_model_has_the_gain_of_the_polynomial_it_samples():
     assert b.verify(rigorous=True)
 
 
+@pytest.mark.slow
 def test_a_piecewise_linear_model_is_certified_up_to_its_corners():
     from symheli.lpv import PiecewiseLinear
 
@@ -138,6 +146,7 @@ def test_a_piecewise_linear_model_is_certified_up_to_its_corners():
     assert 1.0 <= cert.gamma <= 1.0 + 1e-5
 
 
+@pytest.mark.slow
 def test_a_narrower_range_than_the_basis_is_certified_on_that_range_only():
     lpv = lag().with_scheduling(Scheduling("p", "1", 0.5, 0.9, 1.0))
     cert = l2_gain(lpv, form=COARSE, search=None)

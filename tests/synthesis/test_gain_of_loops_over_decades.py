@@ -26,6 +26,7 @@ def proven(seed, dependence):
     return l2_gain(own.scheduled(dependence, RATE, seed), search=None), own.norm
 
 
+@pytest.mark.slow(but="11")
 @pytest.mark.parametrize("seed", QUICK)
 def test_the_proven_gain_of_a_time_invariant_loop_is_its_norm(seed):
     certificate, norm = proven(seed, "none")
@@ -51,6 +52,7 @@ def test_a_dependence_on_p_that_leaves_the_gain_leaves_the_proof(first):
     assert all(math.isfinite(c.gamma) for c, _ in found.values())
 
 
+@pytest.mark.slow
 def test_a_bound_far_above_what_trajectories_show_names_its_cause():
     p = Scheduling("p", "1", 0.0, 1.0, rate=0.01)
     # a spring that stiffens slowly

@@ -14,6 +14,7 @@ COARSE = Spline(segments=2, degree=2)
 SOS = {"form": Spline(degree=1, segments=1), "impose": SumOfSquares()}
 
 
+@pytest.mark.slow(only="l2_gain-options0")
 @pytest.mark.parametrize("options", [{"form": COARSE}, SOS])
 @pytest.mark.parametrize("analysis", [l2_gain, stability])
 def test_the_misfit_of_a_fitted_model_is_among_the_hypotheses(analysis, options):

@@ -35,6 +35,7 @@ print("ended by itself")
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "n", "m", "after"),
     [
@@ -76,6 +77,7 @@ while True:
 """
 
 
+@pytest.mark.slow
 def test_an_interrupted_analysis_of_many_states_ends_within_two_seconds():
     process = subprocess.Popen(
         [sys.executable, "-c", ANALYSE], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

@@ -119,6 +119,7 @@ def heavier():
     )
 
 
+@pytest.mark.slow(but="D")
 @pytest.mark.parametrize("scaling", SCALINGS)
 def test_a_lag_has_its_static_gain(scaling):
     # the search does not depend on the scaling, and finds nothing above the frozen gain
@@ -144,6 +145,7 @@ def test_without_parameters_every_test_gives_the_h_infinity_norm(dt):
             assert gamma == pytest.approx(expected, rel=CLOSE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("seed", "dt"),
     [
@@ -194,6 +196,7 @@ def test_the_gain_of_the_oscillator_in_closed_form():
     assert np.ptp(gains(oscillator(0.2))) < 1e-4
 
 
+@pytest.mark.slow
 def test_two_parameters_in_the_order_of_the_theory_and_down_to_what_constant_p_allows():
     lft = two_parameters(0.2)
     small, D, DG, full = gains(lft)
@@ -205,6 +208,7 @@ def test_two_parameters_in_the_order_of_the_theory_and_down_to_what_constant_p_a
     assert full >= gridded(lft, 9) * (1 - 1e-6)
 
 
+@pytest.mark.slow
 def test_full_blocks_reach_the_gridded_gain_of_a_rational_model():
     lft = heavier().reduce()
     assert lft.order == 2
@@ -214,6 +218,7 @@ def test_full_blocks_reach_the_gridded_gain_of_a_rational_model():
     assert full == pytest.approx(below, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_tustins_rule_keeps_every_gain():
     # the multiplier is static and the nominal loop undergoes a bilinear transform: the
     # frequency-domain inequality is the same
@@ -284,6 +289,7 @@ def test_an_lft_and_its_polynomial_model_have_the_same_lower_bound():
     assert expected.gain > 1.001 * frozen_gain(lpv).gain
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "search",
     [

@@ -241,6 +241,7 @@ def test_a_matrix_of_blocks_that_is_not_definite_is_refused():
         BlockCholesky({(0, 0): np.eye(2), (1, 0): 2 * np.eye(2), (1, 1): np.eye(2)})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dt", [pytest.param(None, marks=pytest.mark.slow), 0.05])
 def test_of_a_model_that_does_not_move_it_finds_the_frozen_norm(dt):
     """The bounded real lemma is exact there; the norm comes from level sets of the response."""
@@ -260,6 +261,7 @@ def test_of_a_model_that_does_not_move_it_finds_the_frozen_norm(dt):
     assert cert.verify(rigorous=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dt", [None, pytest.param(0.1, marks=pytest.mark.slow)])
 def test_it_agrees_with_a_general_solver(dt):
     for seed in (1, 2):
@@ -275,6 +277,7 @@ def test_it_agrees_with_a_general_solver(dt):
         assert own.gamma >= own.frozen
 
 
+@pytest.mark.slow
 def test_many_states_take_it_unless_told_otherwise(tmp_path):
     lpv = springs(7, 0.2)
     cert = l2_gain(lpv, form=FORM, search=None)
@@ -332,6 +335,7 @@ def test_a_method_that_is_stopped_says_so_and_proves_nothing_it_has_not_reached(
     assert not late.verified
 
 
+@pytest.mark.slow(only=("12", "30"))
 @pytest.mark.parametrize("states", LOOPS)
 def test_the_loops_of_the_benchmark_have_the_states_they_name_and_are_stable_when_frozen(states):
     loop = closed_loop(states)
@@ -341,6 +345,7 @@ def test_the_loops_of_the_benchmark_have_the_states_they_name_and_are_stable_whe
     assert poles.real.max() < -0.5
 
 
+@pytest.mark.slow
 def test_a_closed_loop_as_it_flies_is_proven_near_its_frozen_gain():
     cert = l2_gain(closed_loop(16), 1.0, search=None)
     assert cert.solver.startswith("interior-point method for Lyapunov inequalities, symheli ")

@@ -46,6 +46,7 @@ def test_an_unstable_plant_has_a_lower_gain_margin_and_an_integrator_none():
     assert single.disk == pytest.approx(2.0)  # |1/(1+L) - 1/2| = 1/2 at every frequency
 
 
+@pytest.mark.slow(only=("0", "1"))
 @pytest.mark.parametrize("seed", range(8))
 def test_margins_are_the_onset_of_instability(seed):
     """Random loops: inside the gain margins every gain is stable, just outside it is not;

@@ -41,6 +41,7 @@ def unstable(excess, scale, dt=None):
 SCALES, EXCESSES = (1e-4, 1.0, 1e4), (1e-1, 1e-4, 1e-8)
 
 
+@pytest.mark.slow(but="0.0001-0.1-CLARABEL")
 @pytest.mark.parametrize("solver", EVERY)
 @pytest.mark.parametrize(
     ("scale", "excess"),
@@ -69,6 +70,7 @@ def test_an_unstable_plant_is_never_called_stable(solver, scale, excess):
                 assert searched(lpv, rate, kind, COARSE, solver=quick).proof is None
 
 
+@pytest.mark.slow(but="CLARABEL")
 @pytest.mark.parametrize("solver", EVERY)
 def test_a_stable_plant_is_called_stable_by_every_solver(solver):
     for dt in (None, 0.1):
@@ -78,6 +80,7 @@ def test_a_stable_plant_is_called_stable_by_every_solver(solver):
         assert cert.solver.startswith(NAMED.get(solver, solver))
 
 
+@pytest.mark.slow
 def test_solvers_agree_on_the_gain():
     quick = [Solver(name, iterations=2000 if name == "SCS" else None) for name in EVERY]
     gains = [
@@ -87,6 +90,7 @@ def test_solvers_agree_on_the_gain():
     assert max(gains) <= min(gains) * (1 + 1e-2)
 
 
+@pytest.mark.slow(but="None")
 @pytest.mark.parametrize("dt", [None, 0.1])
 def test_exact_arithmetic_confirms_a_good_certificate_and_rejects_a_tampered_one(dt):
     cert = l2_gain(random_stable(2, dt=dt), form=Spline(segments=3, degree=2), search=None)
@@ -173,6 +177,7 @@ def test_importing_loads_no_solver_and_every_name_is_documented():
         assert inspect.getdoc(getattr(synthesis, name)), name
 
 
+@pytest.mark.slow(but="None")
 @pytest.mark.parametrize("dt", [None, 0.2])
 def test_a_varying_p_of_v_proves_nothing_when_p_may_jump(dt):
     cert = l2_gain(
@@ -185,6 +190,7 @@ def test_a_varying_p_of_v_proves_nothing_when_p_may_jump(dt):
     assert not jumping.verify(rigorous=True)
 
 
+@pytest.mark.slow
 def test_a_model_without_response_has_no_gain():
     cert = l2_gain(replace(lag(), C=0 * lag().C), 1.0, form=COARSE)
     assert cert.frozen == 0.0

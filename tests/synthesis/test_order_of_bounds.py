@@ -53,6 +53,7 @@ def response(lpv, time, p, u, x, step):
     return x, float(energy)
 
 
+@pytest.mark.slow(but="2-0.1")
 @pytest.mark.parametrize(
     ("seed", "dt"),
     [
@@ -68,6 +69,7 @@ def test_upper_bounds_are_never_below_lower_bounds(seed, dt):
     assert cert.lower <= cert.gamma * (1 + 1e-6)
 
 
+@pytest.mark.slow(but="None")
 @pytest.mark.parametrize("dt", [None, 0.25])
 def test_the_gain_does_not_fall_when_p_may_move_faster(dt):
     lpv = spring() if dt is None else spring().discretize(dt)
@@ -111,6 +113,7 @@ def test_a_growing_trajectory_does_grow_when_it_is_flown():
     assert growth.max() > 0.5 * found.growth**8 > 0.5
 
 
+@pytest.mark.slow(but="0.2")
 @pytest.mark.parametrize("dt", [None, 0.2])
 def test_the_lower_bound_is_the_ratio_of_an_input_that_can_be_flown(dt):
     lpv = spring() if dt is None else spring().discretize(dt)
@@ -134,6 +137,7 @@ def test_the_lower_bound_is_the_ratio_of_an_input_that_can_be_flown(dt):
     assert found.gain > l2_gain(lpv, 0.0, form=COARSE, search=None).frozen
 
 
+@pytest.mark.slow
 def test_the_search_for_bad_trajectories_is_deterministic():
     a, b = (lower_bound(spring(), 0.2, search=QUICK) for _ in range(2))
     assert a.gain == b.gain

@@ -30,6 +30,7 @@ def test_one_for_all_one_for_each_or_by_name():
         rates((SPEED, MASS), "1 m/s")
 
 
+@pytest.mark.slow
 def test_the_rate_of_the_one_parameter_may_be_given_by_name():
     for question in (l2_gain, stability):
         named, plain = question(lag(), {"p": 0.3}, search=None), question(lag(), 0.3, search=None)

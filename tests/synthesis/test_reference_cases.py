@@ -79,6 +79,7 @@ def worst_growth(damping, low, high):
 # x'' + x' + (2 + k p) x = 0, the second-order problem of absolute stability
 
 
+@pytest.mark.slow
 def test_a_constant_p_reaches_the_circle_criterion():
     """Constant P exists up to k = -1/min Re 1/(2 - w^2 + j w) = 1 + 2 sqrt 2 (at 2 - w^2 = -sqrt
     2).
@@ -98,6 +99,7 @@ def test_a_constant_p_reaches_the_circle_criterion():
         assert l2_gain(beyond, search=None).status is Status.INFEASIBLE
 
 
+@pytest.mark.slow
 def test_a_solver_stopped_early_is_not_taken_for_an_answer():
     """A P exists, 1 % below the limit, but one iteration does not find it: nothing is known."""
     inside, hasty = oscillator(1, 2, 2 + 0.99 * (1 + 2 * math.sqrt(2))), Solver(iterations=1)
@@ -120,6 +122,7 @@ def test_one_parameter_that_jumps_costs_no_more_as_a_complex_number(scaling):
     ).verified
 
 
+@pytest.mark.slow
 def test_no_stability_is_proven_beyond_the_worst_switching():
     """k* = 6.985: Margaliot and Langholz, "Necessary and sufficient conditions for absolute
     stability: the case of second-order systems", IEEE Trans. Circuits and Systems I 50 (2003), the
@@ -134,6 +137,7 @@ def test_no_stability_is_proven_beyond_the_worst_switching():
     assert stability(oscillator(1, 2, 2 + critical * 0.999)).status is not Status.GROWING
 
 
+@pytest.mark.slow
 def test_a_form_of_degree_six_proves_what_piecewise_quadratic_functions_did():
     """Printed 6.2 for a piecewise quadratic V in Xie, Shishkin and Fu (1997); a V of degree four
     reaches 5.7, short of it.
@@ -165,6 +169,7 @@ def mathieu_multiplier(z, e):
     return np.abs(np.linalg.eigvals(np.array(M).T)).max()
 
 
+@pytest.mark.slow
 def test_the_mathieu_equation_is_proven_below_its_first_tongue_and_refused_above():
     """p = cos 2t keeps |dp/dt| <= 2, and its tongue opens at e = 4 z + O(z^2), here 0.2001
     (Floquet).
@@ -183,6 +188,7 @@ def test_the_mathieu_equation_is_proven_below_its_first_tongue_and_refused_above
     assert stability(above, form=Spline(segments=8)).status is Status.GROWING
 
 
+@pytest.mark.slow
 def test_meissners_equation_limits_what_is_proven_when_p_jumps():
     """Constant P exists for e < 2 z sqrt(1 - z^2), the inverse peak of 1/(s^2 + 2 z s + 1); the
     truth is e = pi z + O(z^2).
@@ -209,6 +215,7 @@ def test_meissners_equation_limits_what_is_proven_when_p_jumps():
 # pairs of matrices in discrete time
 
 
+@pytest.mark.slow
 def test_the_pair_of_the_golden_ratio_is_proven_up_to_its_joint_spectral_radius():
     """[1 1; 0 1] and its transpose: both have the norm phi = (1 + sqrt 5)/2, and their product the
     eigenvalue phi^2.
@@ -226,6 +233,7 @@ def test_the_pair_of_the_golden_ratio_is_proven_up_to_its_joint_spectral_radius(
     )
 
 
+@pytest.mark.slow
 def test_the_gain_of_the_golden_pair_is_that_of_its_alternation():
     """|x(k+1)| <= s phi |x| + |u| gives 1/(1 - s phi); A0 maps its first singular vector onto that
     of A1 and back, so that a slow input along them attains it. s = 0.5: 5.236; no frozen model
@@ -306,6 +314,7 @@ def scalar_gain(rate):
     return high
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", [0.01, 0.1, 1.0, 10.0])
 def test_a_first_order_gain_between_frozen_and_jumping_follows_its_differential_equation(rate):
     exact = scalar_gain(rate)
@@ -314,6 +323,7 @@ def test_a_first_order_gain_between_frozen_and_jumping_follows_its_differential_
     assert exact <= cert.gamma * (1 + 1e-6) <= exact * (1 + 5e-5)
 
 
+@pytest.mark.slow
 def test_a_first_order_gain_at_its_two_ends_is_known():
     """p frozen: max of (2 - p)(1 + p) = 2.25. p jumps: min over q of max over p of ((2 - p)^2 q^2 +
     (1 + p)^2)/(2 q) = 2.5 at q = 1, attained by one switch: Margaliot and Hespanha,
@@ -339,6 +349,7 @@ def test_the_lower_bound_of_a_first_order_gain_comes_close_to_its_exact_value(ra
     assert share < l2_gain(scalar(rate), form=COARSE).lower / exact <= 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", [0.0, 1.0, math.inf])
 def test_a_gyroscopic_term_does_not_change_the_gain(rate):
     """x' = (-I + w J) x + u, |w| <= 5: |x| does not feel the rotation, so that the gain is 1
@@ -351,6 +362,7 @@ def test_a_gyroscopic_term_does_not_change_the_gain(rate):
     assert 1.0 <= cert.gamma <= 1.0 + INFLATED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", [0.0, 1.0, math.inf])
 def test_a_positive_model_has_the_static_gain_of_its_largest_member(rate):
     """x' = [-2 p; 1 -2] x + [1; 1] u, y = x1 + x2: off-diagonal entries grow with p, a diagonal P
@@ -412,6 +424,7 @@ def test_swapping_a_lag_and_its_gain_costs_no_more_than_the_rate():
     assert round(cert.lower, 1) == round(cert.gamma, 1) == 0.2
 
 
+@pytest.mark.slow
 def test_the_discrete_norm_of_the_manual_comes_back():
     """Documentation of `norm` in MATLAB's Control System and System Identification Toolboxes:
     2.5721 at 3.0178 rad/s.
@@ -433,6 +446,7 @@ def test_the_discrete_norm_of_the_manual_comes_back():
     assert l2_gain(lpv, form=COARSE, search=None).gamma == pytest.approx(found.gain, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_a_time_invariant_gain_agrees_with_thirty_digits():
     """1/((s + 1)(s^2 + 0.02 s + 1)(s^2 + 0.06 s + 4)): the peak from d|G|^2/dw = 0 in mpmath."""
     denominator = np.polymul([1, 1], np.polymul([1, 0.02, 1], [1, 0.06, 4]))

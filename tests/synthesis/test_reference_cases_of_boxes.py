@@ -61,6 +61,7 @@ def peak_of_scalar(rate):
     return max(-float(inside.fun), peak(1.0))
 
 
+@pytest.mark.slow(but="inf-3e-06-0.01")
 @pytest.mark.parametrize(
     ("rate", "above", "below"),
     [(0.1, 2e-3, 1e-2), (1.0, 2e-3, 6e-3), (10.0, 1e-3, 1.2e-2), (math.inf, INFLATED, 1e-2)],
@@ -78,6 +79,7 @@ def test_the_peak_of_a_first_order_model_lies_between_its_bounds(rate, above, be
     assert exact * (1 - 1e-9) <= cert.gamma <= exact * (1 + above)
 
 
+@pytest.mark.slow(but="0.0")
 @pytest.mark.parametrize("rate", [0.0, 1.0, math.inf])
 def test_a_gyroscopic_term_does_not_change_the_peak(rate):
     """x' = (-I + w J) x + u, |w| <= 5: the Gramian is I/2 whatever w(t), so that the peak of |x| is
@@ -116,6 +118,7 @@ def discrete(rate):
     )
 
 
+@pytest.mark.slow(but="inf-3e-06-1e-09")
 @pytest.mark.parametrize(
     ("rate", "above", "below"), [(0.3, 1e-2, 4e-2), (math.inf, INFLATED, 1e-9)]
 )
@@ -163,6 +166,7 @@ def product_peak(rate):
     return max(peak(p, q) for p in ends for q in ends if q <= p)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", [1.0, math.inf])
 def test_the_peak_of_two_parameters_lies_between_its_bounds(rate):
     """p and q at the same rate: 3.58 frozen, 6.75 at a rate of 1 (with p = q = 1 at the end),
@@ -195,6 +199,7 @@ def product():
     )
 
 
+@pytest.mark.slow
 def test_a_first_order_gain_in_the_product_of_two_parameters_is_known():
     """2.25 frozen and 2.5 where they jump, as in test_reference_cases."""
     frozen = l2_gain(product(), 0.0, impose=SumOfSquares())
@@ -222,6 +227,7 @@ def golden(s):
     return LPVStateSpace.polynomial(A, eye, eye, {(0, 0): np.zeros((2, 2))}, parameters, dt=1.0)
 
 
+@pytest.mark.slow
 def test_two_entries_that_jump_are_proven_up_to_their_joint_spectral_radius():
     """All entries grow with a and b, so that a = b = 1 is the worst: [1 1; 1 1] has the norm and
     the spectral radius 2.

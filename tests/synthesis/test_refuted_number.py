@@ -113,6 +113,7 @@ def test_a_constant_p_gives_the_printed_gain_on_the_printed_grid():
     assert gridded(range(2, 8), 1) == pytest.approx(20.1361, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_the_printed_gain_is_that_of_six_points_and_grows_with_their_number():
     gains = [gridded(np.linspace(2, 7, n), 5) for n in (6, 41)]
     # printed 1.2968 and 1.2946; 1.29457 and 1.3806 by another route, to the solver's gap

@@ -64,6 +64,7 @@ def mass_spring(rate=0.1, dt=None, spring=0.3):
     )
 
 
+@pytest.mark.slow(but="sos-0.1")
 @pytest.mark.parametrize("dt", [None, 0.1])
 @pytest.mark.parametrize("kind", PROOFS)
 def test_a_scalar_system_of_two_parameters_has_its_closed_forms(kind, dt):
@@ -87,6 +88,7 @@ def test_a_scalar_system_of_two_parameters_has_its_closed_forms(kind, dt):
     assert stability(model, **options).verify(rigorous=True)
 
 
+@pytest.mark.slow
 def test_sums_of_squares_lie_between_grid_and_bernstein():
     """The same P: every Bernstein proof is a sum of squares, and what holds in the box holds on the
     grid.
@@ -105,6 +107,7 @@ def test_sums_of_squares_lie_between_grid_and_bernstein():
         assert found["sos"].verify(rigorous=True)
 
 
+@pytest.mark.slow
 def test_subdivision_and_elevation_bring_bernstein_to_the_sums_of_squares():
     model = replace(spring(0.3), B=spring().B)
     one = Spline(degree=2, segments=1)
@@ -183,6 +186,7 @@ def test_no_scaling_makes_an_unstable_plant_proven(solver, scale, excess):
     never_proven(solver, scale, excess)
 
 
+@pytest.mark.slow(but="CLARABEL")
 @pytest.mark.parametrize("solver", installed_solvers())
 def test_an_unstable_plant_is_never_proven(solver):
     """Barely unstable, between the ends of the range."""
@@ -233,6 +237,7 @@ def test_a_grid_is_never_a_proof(analysis):
         replace(cert, verified=True)
 
 
+@pytest.mark.slow(but="0.2")
 @pytest.mark.parametrize("dt", [None, 0.2])
 def test_exact_arithmetic_rejects_a_tampered_certificate(dt):
     model = mass_spring(dt=dt, spring=0.3 if dt is None else 0.1)

@@ -14,6 +14,7 @@ from benchmarks.reliability import ROUTES, count
 CHUNK = 500
 
 
+@pytest.mark.slow
 def test_no_proof_of_the_first_plants_is_false():
     asked, proven, wrong = count(0, 48)
     assert not wrong

@@ -140,6 +140,7 @@ LONG = (("perturb a weight", "box"), ("drop strips", "box"))
 """Two analyses of one solver, of which "energy to peak" is the richer."""
 
 
+@pytest.mark.slow(but="drop cells-energy to peak")
 @pytest.mark.parametrize(
     ("case", "analysis"),
     [
@@ -178,6 +179,7 @@ def test_an_error_shared_by_assembly_and_proof_is_found(case, analysis, monkeypa
     assert not cert.verify(rigorous=True)
 
 
+@pytest.mark.slow
 def test_the_witness_of_the_decay_and_of_higher_degrees_looks_too(monkeypatch):
     decay = decay_rate(spring(damping=0.4), 0.2, **BOX, search=None)
     quartic = stability(spring(damping=0.4), 0.2, form=HigherOrder(2, segments=2), search=None)

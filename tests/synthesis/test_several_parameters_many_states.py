@@ -17,6 +17,7 @@ def over_two(own, rate):
     return LPVStateSpace.polynomial(*({(0, 0): M} for M in own.model), parameters)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "seed", [MANY[1], *(pytest.param(s, marks=pytest.mark.slow) for s in MANY if s != MANY[1])]
 )

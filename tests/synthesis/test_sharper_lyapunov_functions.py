@@ -84,6 +84,7 @@ def wandering(low, high, rate, seconds, step, rng):
     return np.array(out)
 
 
+@pytest.mark.slow(but="6.0")
 @pytest.mark.parametrize("rate", [0.05, 0.7, 6.0])
 def test_no_trajectory_leaves_the_region_of_the_lag(rate):
     rng = np.random.default_rng(5)
@@ -130,6 +131,7 @@ def test_memory_polynomials_are_the_lmi_at_every_point():
         assert form.weight([p, share]).item() == pytest.approx(height)
 
 
+@pytest.mark.slow
 def test_higher_degrees_close_in_on_the_damping_that_a_jumping_spring_needs():
     """The truth is known: each degree proves more than the one before, none what is false."""
     change = 0.6
@@ -154,6 +156,7 @@ def test_higher_degrees_close_in_on_the_damping_that_a_jumping_spring_needs():
     assert needed[2] < 1.12 * truth
 
 
+@pytest.mark.slow(but="form1")
 @pytest.mark.parametrize("form", SHARPER)
 def test_they_prove_a_spring_at_a_rate_at_which_a_quadratic_does_not(form):
     plain = Spline(segments=(8, 16), grading=1.0)
@@ -175,6 +178,7 @@ def test_memory_brings_the_gain_nearer_to_its_lower_bound():
     assert below <= memory.gamma < 0.9 * plain.gamma
 
 
+@pytest.mark.slow(but="form1")
 @pytest.mark.parametrize("form", SHARPER)
 def test_a_growing_spring_is_never_called_stable(form):
     # the search finds growth here, whatever form is asked
@@ -189,6 +193,7 @@ def test_a_growing_spring_is_never_called_stable(form):
         assert not proof.verified
 
 
+@pytest.mark.slow(but=("0.1-form1", "1e-08-form1"))
 @pytest.mark.parametrize("form", SHARPER)
 @pytest.mark.parametrize("excess", [1e-1, pytest.param(1e-4, marks=pytest.mark.slow), 1e-8])
 def test_an_unstable_plant_is_never_called_stable(form, excess):
@@ -213,6 +218,7 @@ def test_a_lag_keeps_its_static_gain_with_a_memory():
     assert cert.verify(rigorous=True)
 
 
+@pytest.mark.slow
 def test_tampered_proofs_fail_in_either_arithmetic():
     remembered, quartic = (stability(spring(), 0.05, form=form, search=None) for form in SHARPER)
     P, V = remembered.lyapunov, quartic.lyapunov

@@ -62,6 +62,7 @@ def test_it_never_exceeds_the_gain_where_the_rate_is_bounded_alone_and_equals_it
     assert all(cert.gamma <= alone * (1 + 2e-6) for cert in gains)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("jerk", [math.inf, pytest.param(1.0, marks=pytest.mark.slow), 0.3])
 def test_what_is_found_from_below_keeps_to_rate_and_jerk_and_does_not_beat_the_proof(jerk):
     cert = l2_gain(tied(jerk, slope=0.3), form=BOTH, search=QUICK)
@@ -129,6 +130,7 @@ def test_sampled_the_worst_trajectory_is_one_that_a_flight_can_have():
     assert np.abs(np.diff(a)).max() <= 1.0 * 0.1 * (1 + 1e-6)
 
 
+@pytest.mark.slow
 def test_no_random_input_along_the_worst_trajectory_beats_the_proof():
     cert = l2_gain(tied(1.0, slope=0.3), form=BOTH, search=QUICK)
     time, p = cert.worst
@@ -188,6 +190,7 @@ def test_what_cannot_be_reached_is_left_out_and_nothing_else():
         assert motion.reaches([(V, V), (a, a)]) == (a * a <= 2 * 0.5 * room * (1 + 1e-9))
 
 
+@pytest.mark.slow
 def test_the_exact_proof_holds_and_the_file_proves_itself(tmp_path):
     cert = l2_gain(tied(1.0), form=BOTH, search=None)
     assert cert.verify(rigorous=True)
@@ -198,6 +201,7 @@ def test_the_exact_proof_holds_and_the_file_proves_itself(tmp_path):
     assert "|da/dt| <= 1" in said
 
 
+@pytest.mark.slow
 def test_a_proof_for_less_jerk_is_none_for_more():
     cert = l2_gain(tied(0.1), form=BOTH, search=None)
     evidence = cert.proof.evidence
@@ -231,6 +235,7 @@ def test_stability_and_what_is_refused():
         l2_gain(tied(1.0), {"V": "jolt"})
 
 
+@pytest.mark.slow
 def test_a_number_for_the_rate_takes_the_tie_away():
     free = l2_gain(tied(1.0), {"V": TOP}, form=BOTH, search=None)
     bound = l2_gain(tied(1.0), form=BOTH, search=None)
@@ -238,11 +243,13 @@ def test_a_number_for_the_rate_takes_the_tie_away():
     assert "|dV/dt| <= 0.3" in " ".join(free.hypotheses)
 
 
+@pytest.mark.slow
 def test_peaks_are_proven_too():
     found = [generalized_h2(tied(j), form=BOTH, search=None).gamma for j in (math.inf, 0.3)]
     assert found[1] < found[0]
 
 
+@pytest.mark.slow
 def test_the_form_may_differ_by_parameter():
     with pytest.raises(InputError, match="expected one for each of 2"):
         l2_gain(tied(1.0), form=Spline(degree=(3, 2, 1)), search=None)

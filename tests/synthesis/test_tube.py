@@ -26,6 +26,7 @@ def proven(request):
     return found
 
 
+@pytest.mark.slow
 def test_no_nonlinear_flight_leaves_the_tube(proven):
     # from its border, in gusts of full size that change at random, slowly and fast
     rng = np.random.default_rng(0)
@@ -46,11 +47,13 @@ def test_no_nonlinear_flight_leaves_the_tube(proven):
     assert most < 1 + 1e-6  # that of the integration
 
 
+@pytest.mark.slow
 def test_the_worst_gust_found_fills_a_good_part_of_the_tube(proven):
     # .4 of its size at least: the tube is not much larger than it must be
     assert 0.4 < worst(proven) < 1
 
 
+@pytest.mark.slow
 def test_a_saved_tube_is_proven_again_from_its_file(proven, tmp_path, capsys):
     path = proven.save(tmp_path / "tube.json")
     again = Tube.load(path)
@@ -75,6 +78,7 @@ FORGED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("forgery", FORGED)
 def test_a_forged_tube_is_not_proven(proven, tmp_path, forgery):
     path = proven.save(tmp_path / "tube.json")
@@ -105,6 +109,7 @@ def test_a_damaged_file_is_refused(proven, tmp_path, damage):
         Tube.load(path)
 
 
+@pytest.mark.slow
 def test_where_there_is_no_tube_it_says_why(tmp_path):
     heli = Helicopter.load("xcell60", governor="ideal")
     large = tube(heli, 8.0, gust=3.0)

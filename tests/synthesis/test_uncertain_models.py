@@ -36,6 +36,7 @@ COARSE = Spline(segments=2, degree=2)
 CLOSE = 1e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("pole", "bound", "dt", "truth"),
     [
@@ -54,6 +55,7 @@ def test_a_pole_known_within_a_margin_has_the_gain_of_the_slowest(pole, bound, d
     assert stability(uncertain_pole(pole, bound, dt)).verify(rigorous=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("pole", "dt"), [(0.5, 0.1), (-1.0, None)])
 def test_a_pole_that_may_be_unstable_has_no_certificate(pole, dt):
     unc = uncertain_pole(pole, 1.001 * (0.5 if dt else 1.0), dt)
@@ -65,6 +67,7 @@ def test_a_pole_that_may_be_unstable_has_no_certificate(pole, dt):
     assert searched(unc, 0.5, "stability").proof is None
 
 
+@pytest.mark.slow
 def test_a_block_that_feeds_itself_counts_as_closed():
     """d = delta (x + j d) is delta/(1 - delta j) x; at delta j = 1 it is none."""
     a, b, j = 0.5, 0.2, 1.0
@@ -106,6 +109,7 @@ def scaled_norm(A, B, C, D, bound, dt):
     return high
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("seed", "dt"),
     [
@@ -124,6 +128,7 @@ def test_of_a_time_invariant_model_it_is_the_norm_with_the_best_scaling(seed, dt
     assert l2_gain(still, form=COARSE, search=None).gamma == pytest.approx(expected, rel=CLOSE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dt", [None, pytest.param(0.1, marks=pytest.mark.slow)])
 def test_without_perturbation_it_is_the_certificate_of_the_model(dt):
     for bound in (0.0, 1e-9):
@@ -132,6 +137,7 @@ def test_without_perturbation_it_is_the_certificate_of_the_model(dt):
         assert l2_gain(unc, form=COARSE, search=None).gamma == pytest.approx(own, rel=CLOSE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("seed", "dt"),
     [
@@ -151,6 +157,7 @@ def test_no_model_of_the_set_exceeds_the_bound_and_the_worst_one_found_is_one(se
     assert worst <= cert.lower <= cert.gamma
 
 
+@pytest.mark.slow
 def test_the_bound_holds_while_p_and_the_perturbation_move():
     unc = random_uncertain(1, 0.3, dt=0.1)
     cert = l2_gain(unc, form=COARSE, search=None)
@@ -170,6 +177,7 @@ def test_the_bound_holds_while_p_and_the_perturbation_move():
         assert math.sqrt(energy) <= cert.gamma * np.linalg.norm(u)
 
 
+@pytest.mark.slow
 def test_the_rate_still_costs_around_a_block():
     unc = random_uncertain(0, 0.2)
     slow, fast = (l2_gain(unc, rate, form=COARSE, search=None) for rate in (0.0, 3.0))
@@ -180,6 +188,7 @@ def test_the_rate_still_costs_around_a_block():
         assert cert.verify(rigorous=True)
 
 
+@pytest.mark.slow
 def test_a_larger_set_has_no_smaller_bound():
     gammas = [
         l2_gain(random_uncertain(2, bound), form=COARSE, search=None).gamma
@@ -218,6 +227,7 @@ def test_a_spline_that_holds_no_products_is_certified_too():
         assert cert.status is Status.UNSTABLE
 
 
+@pytest.mark.slow
 def test_a_certificate_says_for_which_perturbations_and_with_what_promise():
     cert = l2_gain(uncertain_pole(0.5, 0.2, 0.1))
     text = cert.details
@@ -226,6 +236,7 @@ def test_a_certificate_says_for_which_perturbations_and_with_what_promise():
     assert "multiplier of degree" in text
 
 
+@pytest.mark.slow
 def test_a_file_holds_the_multiplier_and_no_other_bound_than_its_words(tmp_path):
     cert = l2_gain(random_uncertain(2, 0.3, dt=0.1), form=COARSE, search=None)
     path = cert.save(tmp_path / "proof.json")
@@ -240,6 +251,7 @@ def test_a_file_holds_the_multiplier_and_no_other_bound_than_its_words(tmp_path)
         Certificate.load(path)
 
 
+@pytest.mark.slow
 def test_files_from_before_there_were_blocks_are_read(tmp_path):
     cert = l2_gain(uncertain_pole(0.5, 0.0, 0.1).nominal, search=None)
     path = cert.save(tmp_path / "proof.json")
@@ -250,6 +262,7 @@ def test_files_from_before_there_were_blocks_are_read(tmp_path):
     assert Certificate.load(path).verify(rigorous=True)
 
 
+@pytest.mark.slow
 def test_a_forged_block_or_multiplier_is_refused():
     cert = l2_gain(random_uncertain(2, 0.3), form=COARSE, search=None)
     evidence, P = cert.proof.evidence, cert.lyapunov
@@ -278,6 +291,7 @@ def test_a_forged_block_or_multiplier_is_refused():
         replace(P, multiplier=P.multiplier[:-1])
 
 
+@pytest.mark.slow
 def test_half_a_block_in_search_and_proof_is_found_by_the_second_witness(monkeypatch):
     """An error that both would believe."""
     unc = random_uncertain(2, 1.0)
@@ -329,6 +343,7 @@ def test_what_is_not_asked_of_a_set_is_refused_with_what_to_do(ask):
         ask()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dt", [None, pytest.param(0.1, marks=pytest.mark.slow)])
 def test_the_method_for_many_states_finds_what_the_general_solver_finds(dt):
     unc = random_uncertain(1, 0.3, dt)

@@ -32,6 +32,14 @@ UNITS = [
 ]
 
 
+@pytest.mark.slow(
+    only=(
+        "{'position': 1000000000000.0}-True",
+        "{'velocity': 1000000000000.0}-True",
+        "{'position': 1e-12}-False",
+        "{'position': 1000000.0, 'velocity': 1e-06}-False",
+    )
+)
 @pytest.mark.parametrize("reduced", [False, True])
 @pytest.mark.parametrize("units", UNITS, ids=str)
 def test_a_plant_that_grows_is_never_proven_in_whatever_units(units, reduced):
@@ -44,6 +52,7 @@ def test_a_plant_that_grows_is_never_proven_in_whatever_units(units, reduced):
     assert l2_gain(lft, search=None).status is Status.UNSTABLE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("units", [UNITS[1], UNITS[5], {"u": 1e12}, {"y": 1e-12}], ids=str)
 def test_the_proven_gain_is_the_same_in_all_units(units):
     plain, other = (l2_gain(oscillator(0.5, **u), search=None) for u in ({}, units))

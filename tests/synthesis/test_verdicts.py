@@ -35,6 +35,7 @@ ANALYSES = {
 }
 
 
+@pytest.mark.slow(only=("splines", "box"))
 @pytest.mark.parametrize("analysis", ANALYSES)
 def test_every_certificate_answers_the_same_questions(analysis):
     cert = ANALYSES[analysis]()
@@ -74,6 +75,7 @@ def test_every_certificate_answers_the_same_questions(analysis):
     assert all(f"  - {sentence}" in text for sentence in cert.hypotheses)
 
 
+@pytest.mark.slow(only="splines")
 @pytest.mark.parametrize("analysis", [name for name in ANALYSES if "stability" not in name])
 def test_no_certificate_can_be_made_out_of_order(analysis):
     cert = ANALYSES[analysis]()

@@ -82,6 +82,7 @@ def test_the_lifted_response_from_rest_is_the_step_by_step_one():
     assert gain(system).value == pytest.approx(math.log(worst_input(system)[0]), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_the_ascent_reaches_the_fastest_pumping_of_a_spring():
     best = fastest_growth(0.05, 0.6)
     # the pumping wave, a quarter and a tenth off
@@ -94,6 +95,7 @@ def test_the_ascent_reaches_the_fastest_pumping_of_a_spring():
     assert 0.97 * best < value / cycle.time[-1] < best * (1 + 1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dt", [None, 0.05])
 def test_the_ascent_keeps_range_and_rate_and_never_loses(dt):
     lpv = spring() if dt is None else spring().discretize(dt)
@@ -114,6 +116,7 @@ def test_the_ascent_keeps_range_and_rate_and_never_loses(dt):
                 assert cycle.time / dt == pytest.approx(np.round(cycle.time / dt), abs=1e-9)
 
 
+@pytest.mark.slow
 def test_the_search_finds_more_than_the_waves_it_starts_from():
     from synthesis import Search, lower_bound
     from synthesis.worst.lower_bound import _TrajectorySearch
@@ -193,6 +196,7 @@ def test_a_bound_by_jumps_is_flown_as_it_is_reported():
     assert found.gain > 1.1 * lower_bound(lpv, 0.0).gain
 
 
+@pytest.mark.slow
 def test_a_slow_p_is_given_the_time_to_cross_its_range():
     """x' = -x + (2 - p) u, y = (1 + p) x, rate 0.01: 2.25 frozen, 2.25441 in truth, by a cycle much
     longer than the model's own time.

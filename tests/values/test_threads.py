@@ -70,6 +70,7 @@ def test_the_environment_decides(monkeypatch):
         assert count() == {2}
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("two_threads")
 def test_a_certificate_takes_one(monkeypatch):
     seen = []

@@ -52,6 +52,7 @@ def test_the_gain_of_the_adjoint_is_that_of_the_loop(loop, dt):
     assert lower_bound(model, 2.0, search=GLANCE).gain <= turned.gamma
 
 
+@pytest.mark.slow
 def test_a_controller_is_proven_by_the_adjoint_where_y_moves(made):
     proof = made.certify(RATE, search=None)
     assert ADJOINT in proof.hypotheses
@@ -66,6 +67,7 @@ def test_a_rate_that_is_another_parameter_is_not_turned_around(loop):
         wide.with_rate({"p": "acceleration"}).adjoint()
 
 
+@pytest.mark.slow
 def test_nor_where_the_rate_is_said_with_the_question():
     wide = spring().model.with_parameter(Scheduling("acceleration", "1/s", -0.5, 0.5, rate=1.0))
     own = spring()
@@ -82,6 +84,7 @@ def test_nor_where_the_rate_is_said_with_the_question():
     assert ADJOINT not in proof.hypotheses
 
 
+@pytest.mark.slow
 def test_another_form_or_solver_is_taken_as_it_is_asked_for(made):
     proof = made.certify(RATE, search=None, form=Memory(0.5, segments=2))
     assert isinstance(proof.lyapunov, MemoryLyapunov)

@@ -67,6 +67,7 @@ def transposed(plant):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", [0.0, 0.5])
 @pytest.mark.parametrize("plant", [spring, heave])
 def test_it_is_state_feedback_of_the_transposed_plant(plant, rate):
@@ -76,6 +77,7 @@ def test_it_is_state_feedback_of_the_transposed_plant(plant, rate):
     assert made.promised == pytest.approx(dual.promised, rel=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pole", [-1.0, 0.5])
 def test_the_error_is_proven_whether_the_plant_is_stable_or_not(pole):
     made = estimator(heave(pole), back_off=BACK_OFF)
@@ -86,6 +88,7 @@ def test_the_error_is_proven_whether_the_plant_is_stable_or_not(pole):
         assert made.error.at(p).is_stable()
 
 
+@pytest.mark.slow
 def test_the_error_does_not_depend_on_the_control():
     """Plant and estimator side by side, at one p: from d_col to z minus its estimate is nothing."""
     plant, p, omega = heave(), 0.4, np.array([0.3, 2.0])

@@ -30,6 +30,7 @@ def test_jumps_cost_more_than_rates_and_no_less_than_standing_still():
     assert jumps.optimum >= worst
 
 
+@pytest.mark.slow
 def test_the_controller_is_an_lft_in_p():
     made = lft_feedback(spring())
     lft = made.model.to_lft().reduce()

@@ -122,6 +122,7 @@ def test_poles_of_a_frozen_plant_lie_in_every_region():
     assert np.all(-poles.real >= 0.7 * np.abs(poles))
 
 
+@pytest.mark.slow
 def test_one_gain_alone_is_that_of_the_inequalities_without_the_controller():
     """Two programs with nothing in common: a constant X and Y for every p, p jumps."""
     plant = spring()

@@ -30,6 +30,7 @@ def least(seed, slow):
     return made.optimum / drawn.worst
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("slow", [False, True])
 @pytest.mark.parametrize("seed", QUICK)
 def test_the_least_gain_is_the_worst_frozen_optimum(seed, slow):

@@ -41,6 +41,7 @@ def least(plant, rate=0.0, **options):
     return output_feedback(plant, rate, back_off=BACK_OFF, **options).promised / BACK_OFF
 
 
+@pytest.mark.slow(but="-1-1-1")
 @pytest.mark.parametrize(
     ("a", "b", "c"), [(0, 3, 2), (1, 2, 0.5), (-1, 1, 1), (5, 1, 1), (0.3, 10, 2), (-2, 3, 4)]
 )
@@ -57,6 +58,7 @@ def test_a_first_order_plant_has_its_optimum_in_closed_form(a, b, c):
     assert least(lag(a, b, c)) == pytest.approx(q**-0.5, rel=5e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("plant", "optimum"),
     [
@@ -86,6 +88,7 @@ def mixed_sensitivity(bandwidths):
     return named(A, B, C1, D, 2, 2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("bandwidths", "optimum"),
     [((0.25, 0.25), 2.795484), ((0.25, 25), 2.916176), ((25, 0.25), 6.722849)],
@@ -95,6 +98,7 @@ def test_skogestad_postlethwaite_mixed_sensitivity(bandwidths, optimum):
     assert least(of(*mixed_sensitivity(bandwidths))) == pytest.approx(optimum, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_mcfarlane_glover():
     """Normalised coprime factors of 200/((10s + 1)(.05s + 1)^2) times (s + 2)/(s + 1e-6): printed
     2.34.
@@ -110,6 +114,7 @@ def test_mcfarlane_glover():
     assert least(plant) == pytest.approx(2.338767, rel=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("seed", "dt"),
     [
@@ -131,6 +136,7 @@ def test_inequalities_and_riccati_equations_agree(seed, dt):
 # --- scheduled -----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_faster_the_parameter_the_larger_the_gain_between_frozen_and_jumps():
     rates = (0.0, 0.3, 3.0, math.inf)
     gains = [least(spring(), rate, X=0, Y=0 if math.isinf(rate) else 2) for rate in rates]
@@ -140,6 +146,7 @@ def test_the_faster_the_parameter_the_larger_the_gain_between_frozen_and_jumps()
     assert worst * (1 - 1e-6) <= least(spring(), 0.0) <= gains[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", [0.0, 0.5, math.inf])
 def test_what_was_promised_is_proven(rate):
     made = output_feedback(spring(), rate)
@@ -148,6 +155,7 @@ def test_what_was_promised_is_proven(rate):
     assert proof.gamma <= made.promised * PROVEN
 
 
+@pytest.mark.slow
 def test_standing_still_the_least_gain_is_the_worst_frozen_optimum():
     plant = spring()
     worst = max(hinf(*frozen(plant, p)).optimum for p in np.linspace(0, 1, 21))
@@ -184,6 +192,7 @@ def test_a_missile_over_its_envelope():
 # --- sampled -------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("a", [-1.0, 0.5])
 def test_a_sampled_first_order_plant(a):
     model, controls, measured = first_order(a, 2.0, 1.0)
@@ -258,6 +267,7 @@ def test_the_loop_of_a_lagged_parameter_is_proven_by_tied_rates():
 # --- what cannot be asked ------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_controller_that_would_need_the_rate_is_refused():
     lagged = spring(1.0).lagged(0.2)
     rate = lagged.parameters[1].name
@@ -271,6 +281,7 @@ def test_a_controller_that_would_need_the_rate_is_refused():
         output_feedback(spring(), math.inf, X=0, Y=2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degree", [-1, 1.5, (1, 1), True])
 def test_a_degree_is_a_whole_number_for_each_parameter(degree):
     with pytest.raises(InputError, match="expected a degree >= 0, one for each of p"):

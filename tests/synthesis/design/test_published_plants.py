@@ -39,6 +39,7 @@ def test_the_loop_of_the_disks_is_proven_near_what_its_design_promised():
     assert certificate.verify()
 
 
+@pytest.mark.slow
 def test_the_least_gain_of_the_lft_tutorial_is_no_more_than_the_printed_one():
     """LPVTools' documentation prints 2.1480, backed off by 1.2."""
     made = output_feedback(lft_tutorial(math.inf))

@@ -29,6 +29,7 @@ def heave(reached=1.0, seen=1.0):
     )
 
 
+@pytest.mark.slow
 def test_a_mode_that_the_controls_do_not_reach_is_named():
     with pytest.raises(SynthesisError) as error:
         output_feedback(heave(reached=0.0))
@@ -88,6 +89,7 @@ def arm(price):
     return of(model, ["u"], ["y"])
 
 
+@pytest.mark.slow
 def test_a_gamma_that_is_the_gain_of_a_weight_says_so():
     """With a price that forbids the control every design promises the weight's DC gain, which
     proves nothing.

@@ -77,6 +77,7 @@ def test_a_state_without_which_the_loop_is_unstable_stays(made):
         made.reduce(1)
 
 
+@pytest.mark.slow
 def test_what_was_promised_of_all_states_is_not_promised_of_fewer(made):
     more = extended(made, np.eye(3))
     less = more.reduce(2)
@@ -90,6 +91,7 @@ def test_what_was_promised_of_all_states_is_not_promised_of_fewer(made):
     assert less.certify(search=None).verified
 
 
+@pytest.mark.slow
 def test_the_least_order_within_a_loss_is_found():
     gusts = LinearModel([[-20.0]], [[20.0]], [[1.0]], [[0.0]], ("x",), ("in",), ("out",))
     made = output_feedback(spring().weighted({"w": gusts}))

@@ -32,6 +32,7 @@ def uncertain(bound):
     )
 
 
+@pytest.mark.slow
 def test_a_set_of_one_model_is_that_model():
     alone = output_feedback(spring(), X=0, Y=2, back_off=BACK_OFF).promised
     assert output_feedback(uncertain(0.0), X=0, Y=2, back_off=BACK_OFF).promised == pytest.approx(

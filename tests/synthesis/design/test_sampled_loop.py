@@ -43,6 +43,7 @@ def table(gain=lambda p: -1.0 - p / 10, knots=(0.0, 10.0)):
     return symheli.TableController(knots, D, (), ("phi",), ("d_lat",), DT)
 
 
+@pytest.mark.slow
 def test_the_loop_is_that_of_the_numbers_of_32_bits():
     gain = -1.0 / 3.0
     flown = certify_sampled(table(lambda p: gain), roll(), form=PLAIN, search=None)
@@ -67,6 +68,7 @@ def test_an_unstable_loop_is_said_to_have_no_proof():
     assert "nothing is proven" in str(flown)
 
 
+@pytest.mark.slow
 def test_what_the_plant_misses_is_carried_through_the_proof():
     missed = 0.01
     plain = certify_sampled(table(), roll(residual=missed), cover=False, form=PLAIN, search=None)

@@ -102,6 +102,7 @@ def test_the_plant_of_a_sampled_controller_holds_its_inputs_between_the_samples(
         np.testing.assert_allclose(np.hstack([found.B1, found.B2]), B, atol=tolerance)
 
 
+@pytest.mark.slow
 def test_a_sampled_controller_is_certified_and_says_that_the_loop_is_sampled(made):
     proof = made.discretize(0.02).certify(search=None)
     assert proof.verified
@@ -205,6 +206,7 @@ def test_a_design_against_a_reference_flies_as_it_is(ideal, roll):
     assert np.ptp(flown[0]) > 1e-5
 
 
+@pytest.mark.slow
 def test_its_states_begin_at_zero(roll):
     """Step by step, twice: a controller with states, from noisy readings."""
     noisy = roll.plant.with_noise({"p": 0.02, "phi": 0.02})

@@ -39,6 +39,7 @@ def test_what_no_spline_serves_comes_to_an_end():
     assert cut_to_serve(peak, P, lambda fit, p: np.zeros(len(p), bool)) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (7, 29))]
 )

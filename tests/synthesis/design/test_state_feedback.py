@@ -29,6 +29,7 @@ DIGITS = 2e-6
 DEAR = {0, 0.1, 0.3, 3, 10, 30}
 
 
+@pytest.mark.slow(but="inf")
 @pytest.mark.parametrize(
     "rate", [pytest.param(r, marks=[pytest.mark.slow] if r in DEAR else []) for r in EXACT]
 )

@@ -110,6 +110,7 @@ def test_descent_ends_at_the_kink_of_a_known_function():
 # --- values --------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_an_integrator_with_a_bounded_gain_reaches_its_closed_form():
     """sqrt(1 + k^2)/|k| from w to (x, k x), least at the largest |k| that is allowed."""
     plant = integrator()
@@ -137,6 +138,7 @@ def test_no_structure_undercuts_the_optimum_of_every_order_and_a_richer_one_is_n
     assert pd.optimum == pytest.approx(full)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "plant",
     [
@@ -323,6 +325,7 @@ def test_without_a_stabilising_start_the_reason_is_said():
         structured(plant, Structure.pid(plant), starts=2)
 
 
+@pytest.mark.slow
 def test_an_interrupted_search_returns_the_best_so_far_and_says_so():
     plant = random_plant(3)
 
@@ -343,6 +346,7 @@ def test_an_interrupted_search_returns_the_best_so_far_and_says_so():
         structured(plant, Structure.pid(plant), starts=3)
 
 
+@pytest.mark.slow
 def test_conditions_are_added_where_the_gain_between_is_larger():
     """With two conditions, at the ends, the middle is found."""
     plant = spring(0.5)

@@ -84,6 +84,7 @@ def scheduled(basis, seed=0, order=2):
     )
 
 
+@pytest.mark.slow(but="0.0")
 @pytest.mark.parametrize("error", [0.0, 0.1, 0.3, 0.6])
 def test_of_an_affine_gain_on_one_state_the_bound_is_the_gain_of_the_worst_error(error):
     wrong = with_wrong_parameter(lag(), gain(-1.0, -3.0), error)
@@ -145,6 +146,7 @@ def test_frozen_loops_of_wrong_readings_are_within_the_bound(basis, error):
     assert right <= worst * (1 + 1e-9)
 
 
+@pytest.mark.slow
 def test_the_bound_is_that_of_the_exact_analysis_over_parameter_and_error():
     """K(p + b) of an affine K is a model over p and b, where b may jump."""
     error, c0, c1, plant = 0.1, -1.0, 1.0, pendulum()
@@ -183,6 +185,7 @@ def test_an_error_of_zero_leaves_the_loop():
     assert not np.any(wrong.model.B[:, :, 1:])
 
 
+@pytest.mark.slow
 def test_the_block_of_an_uncertain_plant_is_kept():
     plant = lag()
     missed = np.array([[[0.01, 0.0, 0.0]]])
@@ -239,6 +242,7 @@ def two_gains(*coefficients, basis=None):
     return LPVStateSpace(basis, *nothing, D, (P,), (), ("a", "b"), ("u", "v"), None)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [1.0, 1e3, 1e7, 1e12])
 def test_the_bound_covers_the_worst_reading_in_any_units_of_the_measurements(size):
     """Where p is 1 and read as 0.75 the first pole is 1.2 - 0.325: a gain of 0.8."""
@@ -313,6 +317,7 @@ def test_balancing_never_costs_and_finds_the_spectral_radius_of_one_matrix():
     assert 3.0 <= balanced(one[None], 3)[2] < 3.3
 
 
+@pytest.mark.slow
 def test_a_frozen_reading_is_proven_up_to_where_the_loop_turns_unstable():
     # u = -1.2 y: the pole 0.9 + 0.3 p - 0.12 reaches 1 at p = 0.7333
     low, high = proven_around(lag(), {("u", "y"): -1.2}, 0.5, tolerance=0.02)
@@ -320,6 +325,7 @@ def test_a_frozen_reading_is_proven_up_to_where_the_loop_turns_unstable():
     assert 0.7333 - 0.02 * 0.5 <= high < 0.73334
 
 
+@pytest.mark.slow
 def test_a_frozen_reading_holds_the_numbers_of_the_place_where_it_froze():
     # K(0.2) = -1.6: stable up to p = 0.8667; K(p) itself everywhere
     low, high = proven_around(lag(), gain(-1.0, -3.0), 0.2, tolerance=0.02)
