@@ -51,6 +51,8 @@ from synthesis.loops.sampled_loop import certify_sampled as certify_sampled
 from synthesis.loops.wrong_parameter import with_wrong_parameter as with_wrong_parameter
 from synthesis.lpv.estimator import Estimator as Estimator
 from synthesis.lpv.estimator import estimator as estimator
+from synthesis.lpv.linear_quadratic import lqg as lqg
+from synthesis.lpv.linear_quadratic import lqr as lqr
 from synthesis.lpv.multiobjective import multiobjective as multiobjective
 from synthesis.lpv.objectives import (
     H2 as H2,

@@ -15,7 +15,7 @@ from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.linear_model import LinearModel, is_control_system
 from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.lpv.mixing import ERROR, turned
-from symheli.lpv.scheduling import Scheduling
+from symheli.lpv.scheduling import UNSCHEDULED, Scheduling
 from symheli.values.arrays import Array
 from symheli.values.controllers import PureController, StatefulController
 from symheli.values.named_vector import NamedVector
@@ -80,7 +80,7 @@ class ScheduledController:
     model : LPVStateSpace
         Sampled; its inputs are measured states (u v w p q r phi theta; Om om_i), its outputs
         helicopter inputs (d_lon d_lat d_col d_ped), both as deviations, its parameters `airspeed`,
-        `acceleration` or both. An input `<name>_error` is reference minus measured, and becomes
+        `acceleration` or both, or none. An input `<name>_error` is reference minus measured, and becomes
         `<name>`; of a `synthesis.Controller` its model.
     follow : {"command", "reading"}
         Whether p is what is commanded, or the airspeed as its sensor reads it.
@@ -122,6 +122,9 @@ class ScheduledController:
             )
         require_names("measured signal", self.model.inputs, CONTROLLER_INPUTS)
         require_names("helicopter input", self.model.outputs, INPUTS)
+        if [s.name for s in self.model.parameters] == [UNSCHEDULED.name]:
+            one = self.model.at(UNSCHEDULED.middle)
+            object.__setattr__(self, "model", LPVStateSpace.constant(one, EVERY_SPEED))
         names = tuple(s.name for s in self.model.parameters)
         require_parameters(
             "a controller flies over airspeed (m/s) and acceleration (m/s^2)", self.model

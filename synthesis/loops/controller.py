@@ -15,6 +15,7 @@ from symheli.values.summary import as_table, summarized
 from synthesis.certificate import Attempt, Certificate
 from synthesis.forms import Spline
 from synthesis.impose import Bernstein
+from synthesis.plant.as_controller import as_controller
 from synthesis.plant.diagnosis import decided
 from synthesis.plant.refusals import conditions
 from synthesis.program.cone_program import LYAPUNOV, Solver
@@ -110,6 +111,24 @@ class Controller:
 
     __repr__ = summarized
     _repr_html_ = as_table
+
+    @classmethod
+    def of(cls, plant: Plant, given: Any, method: str = "given") -> Controller:
+        """Return a controller of a plant that was made in another way: gains set by hand, the
+        controller of a point design, a `Structure` with its gains; whatever `Plant.close` takes.
+
+        Raises `InputError` for anything else, `UnknownNameError` for signals of another plant.
+
+        Examples
+        --------
+        >>> high = synthesis.Controller.of(plant, {("u", "y"): -10.0}, "by hand")
+        >>> high.certify(search=None).verified
+        True
+        """
+        K = as_controller(given, plant.controls, plant.measurements)
+        if isinstance(K, LinearModel):
+            K = LPVStateSpace.constant(K, plant.parameters)
+        return Controller(model=K, plant=plant, promised=math.nan, method=method)
 
     def at(self, *p: float) -> LinearModel:
         """Return the controller frozen at p, one value a parameter."""
