@@ -1,4 +1,4 @@
-"""LQR and LQG of any plant: closed forms, two routes to the same gains, the same object in flight."""
+"""LQR and LQG of any plant: closed forms, two routes to the same gains, flown as all others."""
 
 import math
 
@@ -205,10 +205,11 @@ def test_what_does_not_fit_is_refused_in_words():
     ):
         with pytest.raises(InputError, match=words):
             synthesis.lqr(cart, **given)
+    twice = plant_of([[0.0, 1.0], [0.0, 0.0]], [[0.0], [1.0]], C=[[1, 0], [2, 0]])
     with pytest.raises(InputError, match="linearly independent"):
-        twice = plant_of([[0.0, 1.0], [0.0, 0.0]], [[0.0], [1.0]], C=[[1, 0], [2, 0]])
         synthesis.lqr(twice, Q={"x0": 1.0}, R={"u0": 1.0})
+    stuck, some = plant_of([[1.0]], [[0.0]]), random_plant(0)
     with pytest.raises(SynthesisError, match="cannot stabilise"):
-        synthesis.lqr(plant_of([[1.0]], [[0.0]]), Q=[[1.0]], R=[[1.0]])
+        synthesis.lqr(stuck, Q=[[1.0]], R=[[1.0]])
     with pytest.raises(InputError, match="both W and V"):
-        synthesis.lqg(random_plant(0), W=np.eye(3))
+        synthesis.lqg(some, W=np.eye(3))
