@@ -89,6 +89,10 @@ from synthesis.structures.design import StructuredController as StructuredContro
 from synthesis.structures.design import structured as structured
 from synthesis.structures.structure import Gain as Gain
 from synthesis.structures.structure import Structure as Structure
+from synthesis.switching.dwell_time import DwellTime as DwellTime
+from synthesis.switching.dwell_time import dwell_time as dwell_time
+from synthesis.switching.switched import SwitchedController as SwitchedController
+from synthesis.switching.switched import switched as switched
 from synthesis.worst.frozen import frozen_gain as frozen_gain
 from synthesis.worst.lft import frozen_box_gain as frozen_box_gain
 from synthesis.worst.lower_bound import Search as Search
