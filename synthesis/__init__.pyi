@@ -73,6 +73,7 @@ from synthesis.lpv.output_feedback import (
     output_feedback as output_feedback,
 )
 from synthesis.lpv.state_feedback import state_feedback as state_feedback
+from synthesis.lti.coefficient_diagram import cdm as cdm
 from synthesis.lti.h2 import h2 as h2
 from synthesis.lti.hinf import hinf as hinf
 from synthesis.lti.loop_shaping import ncf as ncf

@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from numpy.typing import ArrayLike
+
 from symheli.errors import InputError
 from symheli.lpv import LinearModel, LPVStateSpace, UncertainStateSpace
 from symheli.values.arrays import Array
@@ -273,14 +275,16 @@ class Controller:
 
         return ScheduledController(self.model)
 
-    def init(self) -> Array:
-        """Return the states (n,) before a flight: zero."""
-        return self.scheduled_controller.init()
+    def init(self, command: ArrayLike | None = None, *, fade: float = 1.0) -> Any:
+        """Return the states (n,) before a flight: zero; with `command` (nu,), rad, the state from
+        which the first step answers just that, see `ScheduledController.init`.
+        """
+        return self.scheduled_controller.init(command, fade=fade)
 
     def step(
-        self, state: Array, measured: NamedVector, reference: NamedVector, p: NamedVector
-    ) -> tuple[Array, Array]:
-        """Return the commands (4,), rad, at one sample and the states (n,) at the next; see
+        self, state: Any, measured: NamedVector, reference: NamedVector, p: NamedVector
+    ) -> tuple[Array, Any]:
+        """Return the commands (4,), rad, at one sample and the state at the next; see
         `symheli.PureController`.
         """
         return self.scheduled_controller.step(state, measured, reference, p)

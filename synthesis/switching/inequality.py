@@ -19,8 +19,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from symheli.values.arrays import Array
 from synthesis.polynomial.definite import negative_definite_exactly
 from synthesis.polynomial.exact import exact, positive_definite, rational
@@ -84,9 +82,7 @@ def _changes(
     unit = ((decay * 0, decay * 0 + 1),)
     for k, length in enumerate(lengths):
         c = P[DEGREE * k : DEGREE * (k + 1) + 1]
-        own = PolynomialMatrix(
-            (*A.box, *unit), c.reshape(*(1,) * len(A.box), *c.shape)
-        )
+        own = PolynomialMatrix((*A.box, *unit), c.reshape(*(1,) * len(A.box), *c.shape))
         slope = own.derivative(len(A.box)) * (1 / length)
         found.append(_sum(own @ A.extend(unit)) + slope)
     return found

@@ -27,14 +27,10 @@ from synthesis.switching.dwell_time import DwellTime, dwell_time
 
 
 class SwitchedState(NamedTuple):
-    """State between samples: which design flies (-1: none yet), its states (n,), what is left of
-    the offsets of the commands (nu,), rad, and the commands to begin with (nu,), None: its own.
-    """
+    """State between samples: which design flies (-1: none yet), and its own state."""
 
     design: int
-    x: Array
-    offset: Array
-    command: Array | None = None
+    own: Any
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -154,9 +150,7 @@ class SwitchedController:
         """Return the state before a flight; with `command` (nu,), rad, those in force, which the
         first step answers.
         """
-        nu = len(self.designs[0].outputs)
-        told = None if command is None else frozen(command, "command", (nu,))
-        return SwitchedState(-1, self._flown[0].init(), np.zeros(nu), told)
+        return SwitchedState(-1, self._flown[0].init(command, fade=self.fade))
 
     def step(
         self, state: SwitchedState, measured: NamedVector, reference: NamedVector, p: NamedVector
@@ -165,17 +159,13 @@ class SwitchedController:
         `symheli.PureController`.
         """
         (parameter,) = self.plant.parameters
-        design = self.design_at(float(p[parameter.name]), state.design)
-        u, x = self._flown[design].step(state.x, measured, reference, p)
-        u, offset = u.copy(), state.offset
-        if state.command is not None:
-            offset = state.command - u[self._rows]
-        elif design != state.design and state.design >= 0:
-            before, _ = self._flown[state.design].step(state.x, measured, reference, p)
-            offset = offset + (before - u)[self._rows]
-        u[self._rows] += offset
-        assert self.dt is not None  # noqa: S101 - it flies
-        return u, SwitchedState(design, x, math.exp(-self.dt / self.fade) * offset)
+        design, own = self.design_at(float(p[parameter.name]), state.design), state.own
+        if design != state.design and state.design >= 0:  # begin at what the other commands
+            before, _ = self._flown[state.design].step(own, measured, reference, p)
+            begun = self._flown[design].init(before[self._rows], fade=self.fade)
+            own = begun._replace(x=getattr(own, "x", own))
+        u, own = self._flown[design].step(own, measured, reference, p)
+        return u, SwitchedState(design, own)
 
     def design_at(self, p: float, before: int = -1) -> int:
         """Return which design flies at p after `before`; after none the one whose region p is
