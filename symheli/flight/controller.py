@@ -150,13 +150,18 @@ class ScheduledController:
         return len(self.model.states)
 
     @cached_property
+    def rows(self) -> list[int]:
+        """Position of each output among the helicopter inputs."""
+        return indices(self.model.outputs, INPUTS, "output")
+
+    @cached_property
     def coefficients(self) -> Array:
         """(n, order + 4, order + 10): [A B; C D] of each function of the basis, with a column for
         every measured state and a row for every input of the helicopter.
         """
         m, n = self.model, self.order
         out = np.zeros((m.basis.size, n + len(INPUTS), n + len(CONTROLLER_INPUTS)))
-        rows = [n + i for i in indices(m.outputs, INPUTS, "output")]
+        rows = [n + i for i in self.rows]
         columns = [n + i for i in indices(m.inputs, CONTROLLER_INPUTS, "input")]
         out[:, :n, :n] = m.A
         out[:, :n, columns] = m.B
@@ -244,9 +249,8 @@ class ScheduledController:
         u, x = self.step(state.x, measured, reference, p)
         offset = state.offset
         if state.command is not None:
-            rows = indices(self.model.outputs, INPUTS, "output")
             offset = np.zeros(len(INPUTS))
-            offset[rows] = state.command - u[rows]
+            offset[self.rows] = state.command - u[self.rows]
         assert not isinstance(x, Entered)  # noqa: S101 - the step of plain states
         return u + offset, Entered(x, _held(state.left * offset), None, state.left)
 

@@ -162,7 +162,7 @@ class SwitchedController:
         design, own = self.design_at(float(p[parameter.name]), state.design), state.own
         if design != state.design and state.design >= 0:  # begin at what the other commands
             before, _ = self._flown[state.design].step(own, measured, reference, p)
-            begun = self._flown[design].init(before[self._rows], fade=self.fade)
+            begun = self._flown[design].init(before[self._flown[design].rows], fade=self.fade)
             own = begun._replace(x=getattr(own, "x", own))
         u, own = self._flown[design].step(own, measured, reference, p)
         return u, SwitchedState(design, own)
@@ -189,12 +189,6 @@ class SwitchedController:
     @cached_property
     def _flown(self) -> list[Any]:
         return [Controller.of(self.plant, K).scheduled_controller for K in self.designs]
-
-    @cached_property
-    def _rows(self) -> list[int]:
-        from symheli.dynamics import INPUTS
-
-        return [INPUTS.index(u) for u in self.designs[0].outputs]
 
 
 def switched(
