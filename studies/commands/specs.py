@@ -42,8 +42,8 @@ ARGUMENTS = (
     option(
         "--only",
         "NAME",
-        "only the controllers of the study, or of regulator behind servos, LQG and H-infinity of one"
-        " airspeed, whose names begin so; may be repeated",
+        "only the controllers whose names begin so, of the study or of 'regulator behind servos',"
+        " 'LQG' and 'H-infinity of one airspeed'; may be repeated",
         None,
         [],
         action="append",

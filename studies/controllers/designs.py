@@ -151,7 +151,7 @@ def classical(base: LPVStateSpace) -> dict[str, Callable[[], Controller]]:
     plant = design_plant(base)
 
     def of_one_airspeed() -> Controller:
-        one = plant.model.at(TOP / 2)
+        one = plant.nominal.at(TOP / 2)
         found = hinf(
             one,
             plant.controls,

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from scipy import linalg
 
 from symheli.errors import InputError, SynthesisError
+from symheli.lpv import UncertainStateSpace
 from symheli.lpv.bases import PiecewiseLinear
 from symheli.values.arrays import Array, frozen
 from symheli.values.signal import Signal, indices, signals
@@ -250,7 +251,7 @@ def _not_measured(plant: Plant) -> list[int]:
     p, said = conditions(plant)
     at = plant.matrices(p)
     ny = len(plant.measurements)
-    _, _, order = linalg.qr(at.C2[len(said) // 2], pivoting=True)
+    _, _, order = linalg.qr(at.C2[len(said) // 2], pivoting=True)  # type: ignore[misc]
     kept = sorted(order[ny:])
     own = np.delete(at.C2, kept, axis=-1)
     dependent = own.shape[-2] != own.shape[-1] or any(
@@ -300,8 +301,9 @@ def _schedule(
 
 def _stable(made: Controller, computed: str = "") -> Controller:
     """Return the controller; raise `SynthesisError` where a frozen loop is not stable."""
-    found = frozen_stability(made.closed())
-    if found.stable is not False:
+    loop = made.closed()
+    found = frozen_stability(loop.nominal if isinstance(loop, UncertainStateSpace) else loop)
+    if found.stable is not False or found.p is None:
         return made
     at = ", ".join(
         f"{s.name} = {v:g} {s.unit}"

@@ -42,7 +42,7 @@ class Modes(NamedTuple):
 def holds(
     modes: Modes,
     P: Sequence[Array],
-    lengths: Sequence[float],
+    lengths: Sequence[float] | Array,
     decay: float = 0.0,
     growth: float = 1.0,
 ) -> bool:

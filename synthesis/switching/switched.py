@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symheli.errors import InputError
-from symheli.lpv import LinearModel, LPVStateSpace
+from symheli.lpv import LinearModel, LPVStateSpace, UncertainStateSpace
 from symheli.values.arrays import Array, frozen
 from symheli.values.named_vector import NamedVector
 from symheli.values.numbers import positive
@@ -238,8 +238,8 @@ def switched(
     (0, 1, 0.2)
     """
     require_plant(plant)
-    if len(plant.parameters) != 1:
-        raise InputError("switched: expected a plant over one parameter")
+    if len(plant.parameters) != 1 or isinstance(plant.model, UncertainStateSpace):
+        raise InputError("switched: expected a plant over one parameter, without uncertainty")
     own = tuple(_frozen(Controller.of(plant, one)) for one in designs)
     (parameter,) = plant.parameters
     width, at = positive(hysteresis, "hysteresis"), frozen(edges, "edges", (None,))
