@@ -101,11 +101,14 @@ def cdm(
     P = target(1.0, n + order, g.tolist())  # in the time unit tau, as all below
     if np.roots(P).real.max(initial=-1.0) >= 0:
         raise InputError(f"indices {g.tolist()}: their polynomial is not stable; raise them")
-    numerator, denominator = _fraction(tau * G.A, tau * G.B, G.C)
+    with np.errstate(over="ignore", invalid="ignore"):  # refused below
+        numerator, denominator = _fraction(tau * G.A, tau * G.B, G.C)
     size = np.abs(numerator).max(initial=0.0)
     powers_a, powers_b = range(order, int(integral) - 1, -1), range(order - roll_off, -1, -1)
     columns = [_shifted(denominator, k, n + order) for k in powers_a]
     columns += [_shifted(numerator / (size or 1.0), k, n + order) for k in powers_b]
+    if not np.isfinite(columns).all():
+        raise InputError(f"tau: {tau:g} s is out of all proportion to the poles of the plant")
     x = _solved(np.array(columns).T, P)
     if x is None:
         near = f"{_common(numerator, denominator) / tau:.4g} 1/s"

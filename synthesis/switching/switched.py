@@ -159,7 +159,7 @@ class SwitchedController:
         `symheli.PureController`.
         """
         (parameter,) = self.plant.parameters
-        design, own = self.design_at(float(p[parameter.name]), state.design), state.own
+        design, own = self._design_at(float(p[parameter.name]), state.design), state.own
         if design != state.design and state.design >= 0:  # begin at what the other commands
             before, _ = self._flown[state.design].step(own, measured, reference, p)
             begun = self._flown[design].init(before[self._flown[design].rows], fade=self.fade)
@@ -167,7 +167,7 @@ class SwitchedController:
         u, own = self._flown[design].step(own, measured, reference, p)
         return u, SwitchedState(design, own)
 
-    def design_at(self, p: float, before: int = -1) -> int:
+    def _design_at(self, p: float, before: int = -1) -> int:
         """Return which design flies at p after `before`; after none the one whose region p is
         farthest inside.
         """
@@ -234,8 +234,8 @@ def switched(
     --------
     >>> gains = [{("u", "y"): -k} for k in (5.0, 8.0)]
     >>> made = synthesis.switched(plant, gains, edges=[0.5], hysteresis=0.2)
-    >>> made.design_at(0.55, 0), made.design_at(0.55, 1), made.travel.__round__(3)
-    (0, 1, 0.2)
+    >>> print(made.regions, f"{made.travel:g}")
+    ((0.0, 0.6), (0.4, 1.0)) 0.2
     """
     require_plant(plant)
     if len(plant.parameters) != 1 or isinstance(plant.model, UncertainStateSpace):

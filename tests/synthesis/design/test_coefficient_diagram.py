@@ -114,6 +114,7 @@ def test_what_has_no_design_is_refused_in_words():
         ({"G": of([1.0, 0.0], [1.0, 1.0]), "tau": 1.0}, "strictly proper"),
         ({"G": lag.discretize(0.1), "tau": 1.0}, "continuous"),
         ({"G": lag, "tau": 0.0}, "tau"),
+        ({"G": of([1.0], [1.0, 1.0, 1.0]), "tau": 1e300}, "proportion"),
         ({"G": lag, "tau": 1.0, "indices": (-1.0,)}, "> 0"),
         ({"G": of([1.0], [1.0, 0, 0, 0]), "tau": 1.0, "indices": (0.9,)}, "not stable"),
     ):
