@@ -103,12 +103,12 @@ def cdm(
         raise InputError(f"indices {g.tolist()}: their polynomial is not stable; raise them")
     with np.errstate(over="ignore", invalid="ignore"):  # refused below
         numerator, denominator = _fraction(tau * G.A, tau * G.B, G.C)
+    if not np.isfinite([*numerator, *denominator]).all():
+        raise InputError(f"tau: {tau:g} s is out of all proportion to the poles of the plant")
     size = np.abs(numerator).max(initial=0.0)
     powers_a, powers_b = range(order, int(integral) - 1, -1), range(order - roll_off, -1, -1)
     columns = [_shifted(denominator, k, n + order) for k in powers_a]
     columns += [_shifted(numerator / (size or 1.0), k, n + order) for k in powers_b]
-    if not np.isfinite(columns).all():
-        raise InputError(f"tau: {tau:g} s is out of all proportion to the poles of the plant")
     x = _solved(np.array(columns).T, P)
     if x is None:
         near = f"{_common(numerator, denominator) / tau:.4g} 1/s"
