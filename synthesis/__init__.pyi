@@ -51,6 +51,8 @@ from synthesis.loops.sampled_loop import certify_sampled as certify_sampled
 from synthesis.loops.wrong_parameter import with_wrong_parameter as with_wrong_parameter
 from synthesis.lpv.estimator import Estimator as Estimator
 from synthesis.lpv.estimator import estimator as estimator
+from synthesis.lpv.linear_quadratic import lqg as lqg
+from synthesis.lpv.linear_quadratic import lqr as lqr
 from synthesis.lpv.multiobjective import multiobjective as multiobjective
 from synthesis.lpv.objectives import (
     H2 as H2,
@@ -71,6 +73,7 @@ from synthesis.lpv.output_feedback import (
     output_feedback as output_feedback,
 )
 from synthesis.lpv.state_feedback import state_feedback as state_feedback
+from synthesis.lti.coefficient_diagram import cdm as cdm
 from synthesis.lti.h2 import h2 as h2
 from synthesis.lti.hinf import hinf as hinf
 from synthesis.lti.loop_shaping import ncf as ncf
@@ -87,6 +90,10 @@ from synthesis.structures.design import StructuredController as StructuredContro
 from synthesis.structures.design import structured as structured
 from synthesis.structures.structure import Gain as Gain
 from synthesis.structures.structure import Structure as Structure
+from synthesis.switching.dwell_time import DwellTime as DwellTime
+from synthesis.switching.dwell_time import dwell_time as dwell_time
+from synthesis.switching.switched import SwitchedController as SwitchedController
+from synthesis.switching.switched import switched as switched
 from synthesis.worst.frozen import frozen_gain as frozen_gain
 from synthesis.worst.lft import frozen_box_gain as frozen_box_gain
 from synthesis.worst.lower_bound import Search as Search

@@ -42,7 +42,8 @@ ARGUMENTS = (
     option(
         "--only",
         "NAME",
-        "only the controllers of the study whose names begin so; may be repeated",
+        "only the controllers whose names begin so, of the study or of 'regulator behind servos',"
+        " 'LQG' and 'H-infinity of one airspeed'; may be repeated",
         None,
         [],
         action="append",
@@ -130,7 +131,7 @@ def kept(arguments: argparse.Namespace) -> str:
 
 def _controllers(arguments: argparse.Namespace, of: Any) -> tuple[dict[str, Any], dict[str, str]]:
     """Return the controllers by name, and why others are missing."""
-    from studies.controllers.designs import NAMES
+    from studies.controllers.designs import FURTHER, NAMES
     from symheli import TableController
 
     if arguments.controller:
@@ -138,10 +139,11 @@ def _controllers(arguments: argparse.Namespace, of: Any) -> tuple[dict[str, Any]
             raise InputError("--only is about the controllers of the study: leave out --controller")
         tables = {path.stem: TableController.load(path) for path in arguments.controller}
         return {name: table.model for name, table in tables.items()}, {}
+    known = (*NAMES, *FURTHER) if arguments.only else NAMES
     for start in arguments.only:
-        if not any(name.startswith(start) for name in NAMES):
-            raise UnknownNameError("controller of the study", start, NAMES)
-    names = [n for n in NAMES if not arguments.only or any(n.startswith(s) for s in arguments.only)]
+        if not any(name.startswith(start) for name in known):
+            raise UnknownNameError("controller of the study", start, known)
+    names = [n for n in known if not arguments.only or any(n.startswith(s) for s in arguments.only)]
     made = list(of.designs(names))
     missing = {d.name: d.reason for d in made if d.controller is None}
     found = {d.name: d.controller for d in made if d.controller is not None}

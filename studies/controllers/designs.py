@@ -39,13 +39,18 @@ from symheli.flight import XCELL_SERVOS, gain_scheduled_lqr
 from synthesis import Plant
 from synthesis.loops.controller import Controller
 from synthesis.loops.reduction import fewest
+from synthesis.lpv.linear_quadratic import lqg, lqr
 from synthesis.lpv.output_feedback import lft_feedback, output_feedback
 from synthesis.lpv.point_schedule import hinf_schedule
+from synthesis.lti.hinf import hinf
 from synthesis.worst.frozen import norm
 
 LQR, HINF, LFT = "LQR schedule", "H-infinity schedule", "LFT"
 BASELINE, IDENTIFIED = "LPV from the baseline", "LPV from the identified model"
 NAMES = (LQR, HINF, LFT, BASELINE, IDENTIFIED)
+REGULATOR, LQG, ONE_POINT = "regulator behind servos", "LQG", "H-infinity of one airspeed"
+FURTHER = (REGULATOR, LQG, ONE_POINT)
+"""Classical designs beside those of the study, on the same plant; made where they are asked for."""
 
 FASTEST = np.pi / PERIOD
 """Largest modulus of a pole of the controller, rad/s: half the sample frequency."""
@@ -138,6 +143,29 @@ def from_equations(
         HINF: partial(hinf_schedule, plant, np.linspace(0.0, TOP, points), BACK_OFF),
         LFT: partial(lft_feedback, plant, **SLOW),
         BASELINE: partial(output_feedback, plant, RATE, **SLOW),
+    }
+
+
+def classical(base: LPVStateSpace) -> dict[str, Callable[[], Controller]]:
+    """How each of `FURTHER` is made."""
+    plant = design_plant(base)
+
+    def of_one_airspeed() -> Controller:
+        one = plant.nominal.at(TOP / 2)
+        found = hinf(
+            one,
+            plant.controls,
+            plant.measurements,
+            disturbances=plant.disturbances,
+            performance=plant.performance,
+            back_off=BACK_OFF,
+        )
+        return Controller.of(plant, found.controller, ONE_POINT)
+
+    return {
+        REGULATOR: partial(lqr, plant),
+        LQG: partial(lqg, plant),
+        ONE_POINT: of_one_airspeed,
     }
 
 

@@ -23,6 +23,7 @@ from studies.controllers.designs import (
     IDENTIFIED,
     NAMES,
     Design,
+    classical,
     design,
     from_data,
     from_equations,
@@ -82,11 +83,14 @@ class OfVehicle:
         return dict(zip(map(str, self.heli.inputs), map(float, self.heli.travel), strict=True))
 
     def designs(self, names: Sequence[str] = NAMES) -> Iterator[Design]:
-        """Return the controllers of the study by these names, one after the other; one without a
-        controller says why.
+        """Return the controllers of the study, or further ones, by these names, one after the
+        other; one without a controller says why.
         """
         base = baseline(self.heli)
-        ways: dict[str, Callable[[], Any]] = dict(from_equations(self.heli, base))
+        ways: dict[str, Callable[[], Any]] = {
+            **from_equations(self.heli, base),
+            **classical(base),
+        }
         ways[IDENTIFIED] = self._identified
         plant = flown_plant(base)
         for name in tracked("designing", names, len(names)):

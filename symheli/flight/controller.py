@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,16 +10,18 @@ from math import comb
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from symheli.dynamics import INPUTS
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.linear_model import LinearModel, is_control_system
 from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.lpv.mixing import ERROR, turned
-from symheli.lpv.scheduling import Scheduling
-from symheli.values.arrays import Array
+from symheli.lpv.scheduling import UNSCHEDULED, Scheduling
+from symheli.values.arrays import Array, frozen
 from symheli.values.controllers import PureController, StatefulController
 from symheli.values.named_vector import NamedVector
+from symheli.values.numbers import positive
 from symheli.values.signal import Signal, indices, signals
 from symheli.values.summary import summarized
 
@@ -80,8 +83,8 @@ class ScheduledController:
     model : LPVStateSpace
         Sampled; its inputs are measured states (u v w p q r phi theta; Om om_i), its outputs
         helicopter inputs (d_lon d_lat d_col d_ped), both as deviations, its parameters `airspeed`,
-        `acceleration` or both. An input `<name>_error` is reference minus measured, and becomes
-        `<name>`; of a `synthesis.Controller` its model.
+        `acceleration` or both, or none. An input `<name>_error` is reference minus measured, and
+        becomes `<name>`; of a `synthesis.Controller` its model.
     follow : {"command", "reading"}
         Whether p is what is commanded, or the airspeed as its sensor reads it.
 
@@ -122,6 +125,9 @@ class ScheduledController:
             )
         require_names("measured signal", self.model.inputs, CONTROLLER_INPUTS)
         require_names("helicopter input", self.model.outputs, INPUTS)
+        if [s.name for s in self.model.parameters] == [UNSCHEDULED.name]:
+            one = self.model.at(UNSCHEDULED.middle)
+            object.__setattr__(self, "model", LPVStateSpace.constant(one, EVERY_SPEED))
         names = tuple(s.name for s in self.model.parameters)
         require_parameters(
             "a controller flies over airspeed (m/s) and acceleration (m/s^2)", self.model
@@ -144,13 +150,18 @@ class ScheduledController:
         return len(self.model.states)
 
     @cached_property
+    def rows(self) -> list[int]:
+        """Position of each output among the helicopter inputs."""
+        return indices(self.model.outputs, INPUTS, "output")
+
+    @cached_property
     def coefficients(self) -> Array:
         """(n, order + 4, order + 10): [A B; C D] of each function of the basis, with a column for
         every measured state and a row for every input of the helicopter.
         """
         m, n = self.model, self.order
         out = np.zeros((m.basis.size, n + len(INPUTS), n + len(CONTROLLER_INPUTS)))
-        rows = [n + i for i in indices(m.outputs, INPUTS, "output")]
+        rows = [n + i for i in self.rows]
         columns = [n + i for i in indices(m.inputs, CONTROLLER_INPUTS, "input")]
         out[:, :n, :n] = m.A
         out[:, :n, columns] = m.B
@@ -193,14 +204,32 @@ class ScheduledController:
         """Position of each parameter among airspeed and acceleration."""
         return indices([s.name for s in self.model.parameters], SCHEDULING, "scheduling parameter")
 
-    def init(self) -> Array:
-        """The states x (n,) before a flight: zero."""
-        return _held(np.zeros(self.order))
+    def init(self, command: ArrayLike | None = None, *, fade: float = 1.0) -> Array | Entered:
+        """The states x (n,) before a flight: zero.
+
+        With `command` (ny,), rad, the one in force now for each output of the model: the first step
+        answers just that, whatever is measured then, and what it differs by from the controller's
+        own fades away with the time constant `fade`, s. Such a flight is an `Entered` one.
+
+        Raises `InputError` for another number of commands, or no positive time.
+        """
+        x = _held(np.zeros(self.order))
+        if command is None:
+            return x
+        told = frozen(command, "command", (len(self.model.outputs),))
+        left = math.exp(-self.dt / positive(fade, "fade"))
+        return Entered(x, np.zeros(len(INPUTS)), told, left)
 
     def step(
-        self, state: Array, measured: NamedVector, reference: NamedVector, p: NamedVector
-    ) -> tuple[Array, Array]:
+        self,
+        state: Array | Entered,
+        measured: NamedVector,
+        reference: NamedVector,
+        p: NamedVector,
+    ) -> tuple[Array, Array | Entered]:
         """Commands (4,), rad, and the states x (n,) of the next sample; see `PureController`."""
+        if isinstance(state, Entered):
+            return self._after_entry(state, measured, reference, p)
         if np.shape(state) != (self.order,):
             raise InputError(
                 f"state: expected the {self.order} numbers of init() or of the step before, got"
@@ -213,6 +242,29 @@ class ScheduledController:
         M, n = self.matrices(np.array([at]))[0], self.order
         answer = M @ np.concatenate([state, error])
         return np.array([reference[s] for s in INPUTS]) + answer[n:], _held(answer[:n].copy())
+
+    def _after_entry(
+        self, state: Entered, measured: NamedVector, reference: NamedVector, p: NamedVector
+    ) -> tuple[Array, Entered]:
+        u, x = self.step(state.x, measured, reference, p)
+        offset = state.offset
+        if state.command is not None:
+            offset = np.zeros(len(INPUTS))
+            offset[self.rows] = state.command - u[self.rows]
+        assert not isinstance(x, Entered)  # noqa: S101 - the step of plain states
+        return u + offset, Entered(x, _held(state.left * offset), None, state.left)
+
+
+class Entered(NamedTuple):
+    """State of a controller that took over in flight: its states `x` (n,), what is left of the
+    `offset` (4,), rad, of its commands, of which the part `left` is there a sample later, and the
+    `command` (ny,), rad, to begin with; None once it has begun.
+    """
+
+    x: Array
+    offset: Array
+    command: Array | None
+    left: float
 
 
 def _held(state: Array) -> Array:

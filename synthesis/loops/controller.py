@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from numpy.typing import ArrayLike
+
 from symheli.errors import InputError
 from symheli.lpv import LinearModel, LPVStateSpace, UncertainStateSpace
 from symheli.values.arrays import Array
@@ -15,6 +17,7 @@ from symheli.values.summary import as_table, summarized
 from synthesis.certificate import Attempt, Certificate
 from synthesis.forms import Spline
 from synthesis.impose import Bernstein
+from synthesis.plant.as_controller import as_controller
 from synthesis.plant.diagnosis import decided
 from synthesis.plant.refusals import conditions
 from synthesis.program.cone_program import LYAPUNOV, Solver
@@ -110,6 +113,24 @@ class Controller:
 
     __repr__ = summarized
     _repr_html_ = as_table
+
+    @classmethod
+    def of(cls, plant: Plant, given: Any, method: str = "given") -> Controller:
+        """Return a controller of a plant that was made in another way: gains set by hand, the
+        controller of a point design, a `Structure` with its gains; whatever `Plant.close` takes.
+
+        Raises `InputError` for anything else, `UnknownNameError` for signals of another plant.
+
+        Examples
+        --------
+        >>> high = synthesis.Controller.of(plant, {("u", "y"): -10.0}, "by hand")
+        >>> high.certify(search=None).verified
+        True
+        """
+        K = as_controller(given, plant.controls, plant.measurements)
+        if isinstance(K, LinearModel):
+            K = LPVStateSpace.constant(K, plant.parameters)
+        return Controller(model=K, plant=plant, promised=math.nan, method=method)
 
     def at(self, *p: float) -> LinearModel:
         """Return the controller frozen at p, one value a parameter."""
@@ -254,14 +275,16 @@ class Controller:
 
         return ScheduledController(self.model)
 
-    def init(self) -> Array:
-        """Return the states (n,) before a flight: zero."""
-        return self.scheduled_controller.init()
+    def init(self, command: ArrayLike | None = None, *, fade: float = 1.0) -> Any:
+        """Return the states (n,) before a flight: zero; with `command` (nu,), rad, the state from
+        which the first step answers just that, see `ScheduledController.init`.
+        """
+        return self.scheduled_controller.init(command, fade=fade)
 
     def step(
-        self, state: Array, measured: NamedVector, reference: NamedVector, p: NamedVector
-    ) -> tuple[Array, Array]:
-        """Return the commands (4,), rad, at one sample and the states (n,) at the next; see
+        self, state: Any, measured: NamedVector, reference: NamedVector, p: NamedVector
+    ) -> tuple[Array, Any]:
+        """Return the commands (4,), rad, at one sample and the state at the next; see
         `symheli.PureController`.
         """
         return self.scheduled_controller.step(state, measured, reference, p)

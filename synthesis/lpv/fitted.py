@@ -10,6 +10,7 @@ import numpy as np
 
 from symheli.lpv import BSpline, FunctionSpace, LPVStateSpace, Scheduling
 from symheli.lpv.bases.polynomials import lobatto_points, piecewise_lobatto, polynomials
+from symheli.values.signal import signals
 from synthesis.loops.controller import Controller
 from synthesis.lpv.scaled_plant import ScaledPlant
 
@@ -132,24 +133,34 @@ def in_plant_units(
     """Return the controller in the units of the plant, for gains in scaled ones as
     functions of p.
     """
-    basis, M, misfit = fit
-    ny = len(plant.measurements)
-    n = M.shape[-1] - ny
+    M = fit.coefficients
+    n = M.shape[-1] - len(plant.measurements)
     pace = np.full(n, 1 / math.sqrt(c.time))
     rows = np.concatenate([pace, c.controls])
     columns = np.concatenate([pace, c.measurements])
-    M = rows[:, None] * M * columns
     names = tuple(f"k{i + 1}" for i in range(n))
+    return controller_from(
+        plant, fit._replace(coefficients=rows[:, None] * M * columns), names, gamma, method
+    )
+
+
+def controller_from(
+    plant: Plant, fit: Fitted, states: Sequence[str], promised: float, method: str
+) -> Controller:
+    """Return the controller [A B; C D] (n + nu, n + ny) that is a function of p, in the units of
+    its plant.
+    """
+    M, n = fit.coefficients, len(states)
     model = LPVStateSpace(
-        basis,
+        fit.basis,
         M[:, :n, :n],
         M[:, :n, n:],
         M[:, n:, :n],
         M[:, n:, n:],
         plant.parameters,
-        names,  # type: ignore[arg-type]
+        signals(states),
         plant.measurements,
         plant.controls,
         plant.dt,
     )
-    return Controller(model=model, plant=plant, promised=gamma, method=method, misfit=misfit)
+    return Controller(model=model, plant=plant, promised=promised, method=method, misfit=fit.misfit)

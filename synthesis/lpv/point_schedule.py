@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from symheli.errors import SynthesisError
-from symheli.lpv import LPVStateSpace
 from symheli.lpv.bases import PiecewiseLinear
 from symheli.values.arrays import Array
 from synthesis.loops.controller import Controller
+from synthesis.lpv.fitted import Fitted, controller_from
 from synthesis.lti.hinf import hinf
 from synthesis.plant.plant import Plant
 
@@ -42,14 +42,7 @@ def hinf_schedule(
             raise SynthesisError(f"no H-infinity design at {at}: {'; '.join(one.reasons)}")
         found.append((one.controller, one.hinf_norm))
     models = [model for model, _ in found]
-    A, B, C, D = (np.stack([getattr(model, part) for model in models]) for part in "ABCD")
-    basis, first = PiecewiseLinear(tuple(map(float, points))), models[0]
-    model = LPVStateSpace(
-        basis, A, B, C, D, plant.parameters, first.states, first.inputs, first.outputs
-    )
-    return Controller(
-        model=model,
-        plant=plant,
-        promised=max(norm for _, norm in found),
-        method=f"H-infinity at {len(models)} values of the parameter",
-    )
+    M = np.stack([np.block([[K.A, K.B], [K.C, K.D]]) for K in models])
+    fit = Fitted(PiecewiseLinear(tuple(map(float, points))), M, 0.0)
+    method = f"H-infinity at {len(models)} values of the parameter"
+    return controller_from(plant, fit, models[0].states, max(norm for _, norm in found), method)

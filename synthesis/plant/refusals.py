@@ -49,11 +49,13 @@ def conditions(plant: Plant) -> tuple[Array, list[str]]:
     return p, said
 
 
-def least_ranks(plant: Plant, *, controls: bool = True, measurements: bool = True) -> None:
+def least_ranks(
+    plant: Plant, *, controls: bool = True, measurements: bool = True, **others: bool
+) -> None:
     """Raise `InputError` where a control has no weight or a measurement no disturbance at some p,
-    and where the plant has none of these.
+    and where the plant has none of these, or of the `others`, see `require_channels`.
     """
-    named = require_channels(plant, controls=controls, measurements=measurements)
+    named = require_channels(plant, controls=controls, measurements=measurements, **others)
     at = plant.matrices(conditions(plant)[0])
     found: list[str] = []
     if controls:
@@ -64,12 +66,19 @@ def least_ranks(plant: Plant, *, controls: bool = True, measurements: bool = Tru
         raise InputError("; ".join(found))
 
 
-def require_channels(plant: Plant, *, controls: bool = True, measurements: bool = True) -> Channels:
+def require_channels(
+    plant: Plant,
+    *,
+    controls: bool = True,
+    measurements: bool = True,
+    disturbances: bool = True,
+    performance: bool = True,
+) -> Channels:
     """Return the channels of a plant; raise `InputError` where a group has none."""
     named = plant.channels
     for wanted, group in (
-        (True, "disturbances"),
-        (True, "performance"),
+        (disturbances, "disturbances"),
+        (performance, "performance"),
         (controls, "controls"),
         (measurements, "measurements"),
     ):

@@ -67,7 +67,7 @@ EXEMPT: dict[str, str] = {
     **{
         f"synthesis.{name}": RESULT
         for name in (
-            *("Certificate", "Controller"),
+            *("Certificate", "Controller", "DwellTime", "SwitchedController"),
             *(
                 "Estimator",
                 "GainCurve",
@@ -98,6 +98,8 @@ SLOW = {
     *("synthesis.proven_around", "synthesis.state_feedback", "synthesis.with_wrong_parameter"),
     *("synthesis.frozen_box_gain", "synthesis.generalized_h2", "synthesis.decay_rate"),
     *("synthesis.stability", "synthesis.lower_bound", "synthesis.lft_gain"),
+    *("synthesis.lqr", "synthesis.lqg", "synthesis.switched", "synthesis.dwell_time"),
+    *("synthesis.SwitchedController.certify", "synthesis.Controller.of"),
     *("synthesis.Certificate.verify", "synthesis.lft_stability", "synthesis.structured"),
 }
 """Entries that fly, sweep or solve: `FEW` inputs each."""
