@@ -71,7 +71,7 @@ MUTANTS = (
         "symheli/lpv/delay.py",
         "        np.eye(1, n),\n        np.zeros((1, 1)),\n",
         "        np.eye(1, n, k=min(1, n - 1)),\n        np.zeros((1, 1)),\n",
-        "tests/lpv/test_delay.py",
+        "tests/lpv/test_in_series.py",
     ),
     Mutant(
         "cross spectra lack a conjugate",
@@ -92,7 +92,7 @@ MUTANTS = (
         "identification/judge/coefficient_covariance.py",
         "full[..., : lags + 1]], axis=-1)",
         "full[..., : lags + 1]], axis=-1) * (np.arange(-lags, lags + 1) == 0)",
-        "tests/identification/test_covariance_of_coefficients.py",
+        "tests/identification/test_uncertainty_carried_along.py",
     ),
     Mutant(
         "sensitivities leave out the parameters",

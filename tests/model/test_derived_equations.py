@@ -85,6 +85,7 @@ def test_quaternion_kinematics_are_the_derived_ones():
         close(np.array(body_to_earth(*quaternion)) @ speeds[:3], rates[:3], np.abs(speeds).max())
 
 
+@pytest.mark.slow
 def test_rotor_and_body_share_yaw_and_differ_from_the_model_by_the_gyroscope_alone(pi):
     """Yaw and rotor speed as derived, -r' in Om' included. In roll and pitch a rigid rotor would
     add its gyroscopic moment I_rot (Om + r) (-q, p); the model, as its source, has the moments of

@@ -108,7 +108,7 @@ def test_a_trim_has_the_same_bits_whatever_is_computed_beside_it(heli):
     speeds = SPEEDS[:13] + 0.2
     together = symheli.trim_batch(heli, speeds, start=near)
     backwards = np.arange(13)[::-1]
-    turned = symheli.trim_batch(heli, speeds[backwards], start=near.at(backwards))
+    turned = symheli.trim_batch(heli, speeds[backwards], start=near[backwards])
     for k in range(13):
         alone = symheli.trim_batch(heli, speeds[k], start=near[k])
         for name in ("x", "u", "xdot", "residual", "wind", "torque"):

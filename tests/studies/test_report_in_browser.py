@@ -16,7 +16,7 @@ from studies.transition import report
 
 playwright = pytest.importorskip("playwright.sync_api", reason="wants playwright")
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="wants Chromium")
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(CHROMIUM is None, reason="wants Chromium")]
 OPTIONS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 A4 = 688
 """Width between the margins of the paper, CSS pixels."""
@@ -143,7 +143,6 @@ def test_the_slider_moves_poles_and_responses(opened, width):
     assert said == []
 
 
-@pytest.mark.slow
 def test_pointing_at_a_curve_tells_its_value(opened, full):
     """The first point of the first curve of the trim: hover, and its pitch attitude."""
     page, _ = opened(1280)
@@ -162,7 +161,6 @@ def test_pointing_at_a_curve_tells_its_value(opened, full):
     assert pitch == pytest.approx(math.degrees(full.baseline.nodes.trims[0].x["theta"]), abs=0.01)
 
 
-@pytest.mark.slow
 def test_pointing_at_a_curve_of_a_picture_tells_its_value(opened, full):
     """A figure too dense for curves in the page: the airspeed of the training flight midway."""
     page, _ = opened(1280)

@@ -89,6 +89,7 @@ def test_a_forged_tube_is_not_proven(proven, tmp_path, forgery):
     assert main(["verify", str(path)]) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "damage",
     [
