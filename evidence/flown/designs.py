@@ -4,11 +4,10 @@ controllers that `evidence.flown.tuning` found.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -23,16 +22,16 @@ from studies.controllers.asked import (
     RATE,
     SIZES,
     TOP,
-    Asked,
 )
-from studies.controllers.designs import AIRSPEEDS, SLOW, Design, design
+from studies.controllers.designs import AIRSPEEDS, Design, design
 from studies.controllers.identified_plant import identified_model
 from studies.controllers.plant import STUDY, baseline, design_plant, disturbed, flown_plant
 from studies.specs.of_vehicle import OfVehicle
-from symheli import Helicopter, LPVStateSpace, ScheduledController
+from symheli import Helicopter, LinearModel, LPVStateSpace
 from symheli.flight import XCELL_SERVOS
 from symheli.values.signal import Signal
-from synthesis import Controller, Plant, output_feedback
+from synthesis import Controller, Plant
+from synthesis.lpv.point_schedule import h2_schedule
 
 VEHICLE = "xcell60"
 PD, STRUCTURED = "PD", "structured"
@@ -54,6 +53,8 @@ PD_GAINS = {
 }
 """Of velocity, attitude and rate, one value at every airspeed, by hand."""
 
+Powers = tuple[float, ...]
+
 DRIFT = "drift_airspeed"
 """Disturbance: d/dt of the commanded airspeed, m/s^2, by which the trim moves away."""
 
@@ -61,12 +62,24 @@ VELOCITIES, RATES, ATTITUDES = ("u", "v", "w"), ("p", "q", "r"), ("phi", "theta"
 
 LQR_GROUPS = (VELOCITIES, RATES, ATTITUDES, CONTROLS)
 """Of the LQR, deviations whose sizes share a factor."""
-LPV_GROUPS = (VELOCITIES, (*RATES, *ATTITUDES), GUSTS, (DRIFT,))
-"""Of the LPV controllers: noise, noise, disturbances, the drift."""
+LPV_GROUPS = (MEASUREMENTS, CONTROLS, GUSTS, (DRIFT,))
+"""Of the LPV controllers: noise, and disturbances at the controls, gusts, drift."""
+
+SLOW_FOR = {
+    **dict.fromkeys(CONTROLS, 2.0),
+    **dict(zip(GUSTS, (8.0, 8.0, 2.0), strict=True)),
+    DRIFT: 1.0,
+}
+"""Time constants of the disturbances, s: of gusts about a scale of the turbulence at 20 m over the
+airspeed, of the drift about a quarter of a transition.
+"""
 
 FOUND_LQR = (0.0, 0.0, 0.0, 0.0)
 FOUND_LPV = (0.0, 0.0, 0.0, 0.0)
 """Powers of 2 of the factors on each group, from `python -m evidence.flown.tuning`."""
+
+KNOTS = 7
+"""Airspeeds of the LPV controllers."""
 
 
 def every(folder: Path | None = None) -> Iterator[Design]:
@@ -109,36 +122,52 @@ def pd() -> LPVStateSpace:
     )
 
 
-def retuned(heli: Helicopter, powers: tuple[float, ...] = FOUND_LQR) -> LPVStateSpace:
+def retuned(heli: Helicopter, powers: Powers = FOUND_LQR) -> LPVStateSpace:
     """The LQR schedule for the sizes of the study, each group of them times 2 to a power."""
-    sizes = _scaled(SIZES, LQR_GROUPS, powers)
+    sizes = _scaled(SIZES, powers, LQR_GROUPS)
     autopilot = symheli.gain_scheduled_lqr(heli, 0.0, TOP, PERIOD, AIRSPEEDS, XCELL_SERVOS, sizes)
     return autopilot.scheduled_controller.model
 
 
-def asked(powers: tuple[float, ...] = FOUND_LPV) -> Asked:
-    """The study's specification with the drift of the trim and, on every control, a disturbance
-    of the size of a command; noise and disturbances times 2 to a power.
-    """
-    noise = _scaled(STUDY.noise, LPV_GROUPS[:2], powers[:2])
-    sizes = _scaled({**STUDY.sizes, DRIFT: RATE}, LPV_GROUPS[2:], powers[2:])
-    return replace(STUDY, disturbances=(*GUSTS, DRIFT, *CONTROLS), sizes=sizes, noise=noise)
+def told(heli: Helicopter, powers: Powers = FOUND_LPV) -> Controller:
+    """H2 controllers of the baseline over airspeed, for what a transition in turbulence does."""
+    model = baseline(heli).with_trim_drift()
+    return h2_schedule(told_plant(model, powers), np.linspace(0.0, TOP, KNOTS))
 
 
-def told(heli: Helicopter, powers: tuple[float, ...] = FOUND_LPV, **options: Any) -> Controller:
-    """Output feedback on the baseline for `asked`."""
-    wanted = asked(powers)
-    model = disturbed(baseline(heli).with_trim_drift(), wanted)
-    return output_feedback(design_plant(model, asked=wanted), RATE, **(SLOW | options))
-
-
-def told_identified(powers: tuple[float, ...] = FOUND_LPV, seed: int = 0) -> Controller:
-    """The same on the identified model of the study, whose drift is that of u alone: its trim in
+def told_identified(powers: Powers = FOUND_LPV, seed: int = 0) -> Controller:
+    """The same of the identified model of the study, whose drift is that of u alone: the trim of
     the other states moves little.
     """
-    wanted = asked(powers)
-    model = disturbed(with_drift_of_airspeed(identified_model(identified(VEHICLE, seed))), wanted)
-    return output_feedback(design_plant(model, 0.0, wanted), RATE, **SLOW)
+    model = with_drift_of_airspeed(identified_model(identified(VEHICLE, seed)))
+    return h2_schedule(told_plant(model, powers, 0.0), np.linspace(0.0, TOP, KNOTS))
+
+
+def told_plant(model: LPVStateSpace, powers: Powers = FOUND_LPV, held: float = PERIOD / 2) -> Plant:
+    """The study's plant with the drift of the trim and a disturbance at every control, of the size
+    of a command; all disturbances are slow (`SLOW_FOR`), of their size in root mean square, and
+    times 2 to a power.
+    """
+    sampled = np.sqrt(PERIOD)  # of a sequence of variance 1, as white noise in continuous time
+    asked = replace(
+        STUDY,
+        disturbances=(*GUSTS, DRIFT, *CONTROLS),
+        sizes={**STUDY.sizes, DRIFT: RATE},
+        noise={y: size * sampled for y, size in _scaled(STUDY.noise, powers).items()},
+    )
+    plant = design_plant(disturbed(model, asked), held, asked)
+    factors = _scaled(dict.fromkeys(SLOW_FOR, 1.0), powers)
+    colours = {n: slow(asked.disturbance(n), factors[n], SLOW_FOR[n]) for n in SLOW_FOR}
+    return plant.weighted({asked.disturbance(n): one for n, one in colours.items()})
+
+
+def slow(name: str, size: float, seconds: float) -> LinearModel:
+    """White noise of intensity 1 to a signal of this root mean square and time constant."""
+    a = 1 / seconds
+    signal = (Signal(name, "1"),)
+    state = (Signal(f"{name}_slow", "1"),)
+    b = size * np.sqrt(2 * a)
+    return LinearModel([[-a]], [[b]], [[1.0]], [[0.0]], state, signal, signal)
 
 
 def with_drift_of_airspeed(model: LPVStateSpace) -> LPVStateSpace:
@@ -155,14 +184,8 @@ def with_drift_of_airspeed(model: LPVStateSpace) -> LPVStateSpace:
     )
 
 
-def scheduled(found: Design) -> ScheduledController:
-    """What flies of a design that exists."""
-    assert found.controller is not None  # noqa: S101
-    return ScheduledController(found.controller)
-
-
 def _scaled(
-    values: Mapping[str, float], groups: tuple[tuple[str, ...], ...], powers: tuple[float, ...]
+    values: Mapping[str, float], powers: Powers, groups: Sequence[Sequence[str]] = LPV_GROUPS
 ) -> dict[str, float]:
     factors = {n: 2.0**k for group, k in zip(groups, powers, strict=True) for n in group}
     return {name: value * factors.get(name, 1.0) for name, value in values.items()}

@@ -115,7 +115,7 @@ class Autopilot:
 
 
 INPUT_SCALE_FACTORS = (1.0, 0.5, 0.25, 0.125)
-"""Factors on the sizes of the inputs tried in turn until the loop with servos and delay is stable."""
+"""Factors on the sizes of the inputs, in turn until the loop with servos and delay is stable."""
 
 
 def gain_scheduled_lqr(

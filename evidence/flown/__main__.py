@@ -1,0 +1,261 @@
+"""`python -m evidence.flown`: the campaign, its tables, and where the specifications conflict.
+
+--write puts the tables into docs/flown.md; --out keeps designs and finished cases: the same command
+goes on after a stop.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from evidence.flown import campaign as flown
+from evidence.flown import designs
+from evidence.flown.tuning import SIZES_OF_GUSTS
+from evidence.tables import DOCS, keep, markdown
+from studies.campaigns.dataset import CampaignDataset
+from studies.campaigns.run import run
+from studies.campaigns.runners import Here
+from studies.controllers.certified import proofs
+from studies.controllers.designs import LQR, Design
+from studies.controllers.flown import WINDS
+from studies.controllers.plant import baseline, closed, flown_plant
+from studies.specs.flown import ACCELERATIONS, SHARE
+from studies.specs.of_vehicle import OfVehicle, digest_of
+from symheli import LPVStateSpace
+from synthesis import SpecificationTable
+from synthesis.sheet.evaluation import margin, worst
+
+PAGE = DOCS / "flown.md"
+POINTS = 14
+"""Airspeeds of the frozen entries."""
+RIVALS = (LQR, designs.RETUNED)
+AGGRESSIVE = max(ACCELERATIONS)
+
+Row = Mapping[str, float]
+
+
+class Cases:
+    """Results by controller, wind (m/s) and acceleration (m/s^2)."""
+
+    def __init__(self, dataset: CampaignDataset, names: Mapping[str, str]):
+        values, units = dataset.values, list(dataset.units)
+        self._rows: dict[tuple[str, float, float], Row] = {}
+        for case, row in zip(dataset.cases, values, strict=True):
+            p = case.parameters
+            if p["controller"] in names:
+                key = (names[str(p["controller"])], float(p["wind"]), float(p["acceleration"]))
+                self._rows[key] = dict(zip(units, row.tolist(), strict=True))
+
+    def of(self, name: str, wind: float, acceleration: float = AGGRESSIVE) -> Row:
+        """The quantities of a case."""
+        return self._rows[name, wind, acceleration]
+
+
+def ratios(cases: Cases, names: Sequence[str], winds: Sequence[float]) -> str:
+    """Median energy ratio by size of gusts, the least of a column bold."""
+    rows = [[cases.of(n, w) for w in winds] for n in names]
+    found = np.array(
+        [[r["energy ratio, median"] if not r["lost"] else np.inf for r in line] for line in rows]
+    )
+    cells = []
+    for name, line, of in zip(names, rows, found, strict=True):
+        shown = []
+        for k, row in enumerate(line):
+            text = f"{row['energy ratio, median']:.3f}"
+            text = f"**{text}**" if of[k] == found[:, k].min() else text
+            lost = f" ({row['lost']:.1%} lost)" if row["lost"] else ""
+            shown.append(text + lost)
+        cells.append([name, *shown])
+    return markdown(["controller", *(f"{w:g} m/s" for w in winds)], cells)
+
+
+def certificates(made: Mapping[str, Design], table: SpecificationTable, vehicle: OfVehicle) -> str:
+    """States, frozen and proven gain, and how many frozen entries are met."""
+    plant = flown_plant(baseline(vehicle.heli))
+    rows = []
+    for name, one in made.items():
+        assert one.controller is not None  # noqa: S101
+        what = f"proof of {name}, {digest_of(one.controller)}"
+        bounds = vehicle.kept(
+            "proof", what, lambda n=name, k=one: proofs(n, closed(plant, k.controller))
+        )
+        proven = min(
+            (b.certificate.gamma for b in bounds if b.certificate.verified), default=math.inf
+        )
+        counted = [
+            r
+            for r in table.reached(name)
+            if r.specification.counts
+            and not math.isnan(r.margin)
+            and r.specification.kind == "frozen"
+        ]
+        inside = sum(r.margin >= 0 for r in counted)
+        rows.append(
+            [
+                name,
+                str(one.order),
+                f"{one.frozen:.3g}",
+                f"{proven:.4g}" if math.isfinite(proven) else "none",
+                f"{inside} of {len(counted)}",
+            ]
+        )
+    return markdown(
+        ["controller", "states", "frozen gain", "proven, to 3 m/s^2", "frozen entries in Level 1"],
+        rows,
+    )
+
+
+def entries(cases: Cases, names: Sequence[str], winds: Sequence[float]) -> str:
+    """What `SHARE` of the flights keep to, and how many flights meet every entry."""
+    specs = flown.flown_entries(flown.of_the_vehicle())
+    transition = [s for s in specs if s.axis == "transition"]
+    controls = {m: [s for s in specs if s.measure == m] for m in ("effort", "stops")}
+    rows = []
+    for name in names:
+        for a in ACCELERATIONS:
+            for wind in winds:
+                row = cases.of(name, wind, a)
+                most = [
+                    max(row[f"{flown.entry(s)}, {SHARE:.0%}"] for s in of)
+                    for of in controls.values()
+                ]
+                kept = [row[f"{flown.entry(s)}, {SHARE:.0%}"] for s in transition]
+                rows.append(
+                    [
+                        f"{name}, {a:g} m/s^2, {wind:g} m/s",
+                        f"{row['lost']:.1%}",
+                        *(_short(v) for v in (*kept, *most)),
+                        f"{row['hypotheses']:.0%}",
+                        f"{row['outside, median']:.0%}, {row['faster, median']:.0%}",
+                        f"{row['every entry met']:.1%}",
+                    ]
+                )
+    bounds = [f"{s.name.removesuffix(' error')} ({s.unit}) <= {s.level_1:.3g}" for s in transition]
+    bounds += [f"{m} ({of[0].unit}) <= {of[0].level_1:.3g}" for m, of in controls.items()]
+    head = [
+        "controller, transition, wind",
+        "lost",
+        *bounds,
+        "hypotheses hold",
+        "samples outside, faster",
+        "every entry met",
+    ]
+    return markdown(head, rows)
+
+
+def conflicts(table: SpecificationTable, cases: Cases) -> str:
+    """Every counted entry that no controller meets, or that the controllers that meet it pay for:
+    who comes nearest.
+    """
+    rows = []
+    every = {name: table.reached(name) for name in table.controllers}
+    for k, spec in enumerate(table.sheet.specifications):
+        if not spec.counts:
+            continue
+        if spec.kind == "frozen":
+            reached = {n: of[k] for n, of in every.items() if not math.isnan(of[k].margin)}
+            if not reached:
+                continue
+            inside = [n for n, r in reached.items() if r.margin >= 0]
+            best = max(reached, key=lambda n: reached[n].margin)
+            if len(inside) < len(reached):
+                rows.append(
+                    [
+                        spec.axis,
+                        spec.name,
+                        f"{len(inside)} of {len(reached)}",
+                        best,
+                        worst(reached[best]),
+                        margin(reached[best]),
+                    ]
+                )
+        elif spec in flown.flown_entries(table.sheet):
+            name = f"{flown.entry(spec)}"
+            at = {
+                n: min(cases.of(n, WINDS[0], a)[f"{name}, met"] for a in ACCELERATIONS)
+                for n in every
+            }
+            value = {
+                n: max(cases.of(n, WINDS[0], a)[f"{name}, {SHARE:.0%}"] for a in ACCELERATIONS)
+                for n in every
+            }
+            inside = [n for n, share in at.items() if share >= SHARE]
+            best = min(value, key=lambda n: value[n])
+            if len(inside) < len(at):
+                rows.append(
+                    [
+                        spec.axis,
+                        spec.name,
+                        f"{len(inside)} of {len(at)}",
+                        best,
+                        f"{_short(value[best])} {spec.unit}",
+                        f"{spec.design_margin(value[best]):.0f}",
+                    ]
+                )
+    return markdown(
+        ["axis", "entry", "controllers that meet it", "nearest", "its value", "its margin, %"], rows
+    )
+
+
+def _short(value: float) -> str:
+    return "inf" if math.isinf(value) else f"{value:.3g}"
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Fly what is missing, and print or keep the tables."""
+    parser = argparse.ArgumentParser(prog="python -m evidence.flown", description=__doc__)
+    parser.add_argument("--write", action="store_true", help=f"keep the tables in {PAGE.name}")
+    parser.add_argument("--out", type=Path, help="folder of designs and finished cases")
+    parser.add_argument("--flights", type=int, default=flown.FLIGHTS)
+    given = parser.parse_args(argv)
+    with tempfile.TemporaryDirectory() as temporary:
+        sections = tables(given.out or Path(temporary), given.flights)
+    for name, text in sections.items():
+        print(f"\n{name}\n\n{text}")
+        if given.write:
+            keep(PAGE, name, text)
+    return 0
+
+
+def tables(folder: Path, flights: int) -> dict[str, str]:
+    """Every table by its section."""
+    vehicle = OfVehicle(name=designs.VEHICLE, points=POINTS, folder=folder / "designs")
+    made = {d.name: d for d in designs.every(folder / "designs") if d.controller is not None}
+    cases = fly(made, folder / "flights.zarr", flights)
+    table = vehicle.frozen({name: d.controller for name, d in made.items()})
+    names = list(made)
+    about = f"{flights} flights each, seeds from {flown.SEEDS_FROM} on."
+    return {
+        "energy ratios": f"{about}\n\n{ratios(cases, names, SIZES_OF_GUSTS)}",
+        "controllers": certificates(made, table, vehicle),
+        "flown entries": f"{about}\n\n{entries(cases, names, WINDS[:1])}",
+        "conflicts": conflicts(table, cases),
+    }
+
+
+def fly(made: Mapping[str, Design], path: Path, flights: int) -> Cases:
+    """The campaign: all sizes of gusts at the permitted acceleration, those of the study at the
+    gentle one too. A case is named after the controller and its matrices.
+    """
+    models: dict[str, LPVStateSpace] = {}
+    names = {}
+    for name, one in made.items():
+        assert one.controller is not None  # noqa: S101
+        key = f"{name} {digest_of(one.controller)[:8]}"
+        models[key], names[key] = one.controller, name
+    with Here() as here:
+        for a in ACCELERATIONS:
+            winds = SIZES_OF_GUSTS if a == AGGRESSIVE else WINDS
+            asked = flown.cases(models, winds, [a], flights)
+            dataset = run(asked, path, here)
+    return Cases(dataset, names)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
