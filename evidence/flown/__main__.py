@@ -20,7 +20,7 @@ from studies.campaigns.dataset import CampaignDataset
 from studies.campaigns.run import run
 from studies.campaigns.runners import Here
 from studies.controllers.certified import proofs
-from studies.controllers.designs import BASELINE, IDENTIFIED, LQR, Design
+from studies.controllers.designs import LQR, Design
 from studies.controllers.flown import BEYOND, WINDS
 from studies.controllers.plant import baseline, closed, flown_plant
 from studies.specs.flown import ACCELERATIONS, SHARE
@@ -32,7 +32,7 @@ from synthesis.sheet.evaluation import margin, worst
 PAGE = DOCS / "flown.md"
 POINTS = 14
 """Airspeeds of the frozen entries."""
-COMPARED = (LQR, designs.RETUNED, BASELINE, IDENTIFIED, designs.TOLD, designs.TOLD_IDENTIFIED)
+COMPARED = (LQR, designs.RETUNED, designs.TOLD, designs.TOLD_IDENTIFIED)
 """Controllers that fly in gusts of every size."""
 AGGRESSIVE = max(ACCELERATIONS)
 
