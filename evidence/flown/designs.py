@@ -4,6 +4,7 @@ controllers that `evidence.flown.tuning` found.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -13,6 +14,7 @@ import numpy as np
 
 import symheli
 from evidence import gain_table
+from evidence.tables import DOCS
 from studies.campaigns.trials.control import identified
 from studies.controllers.asked import (
     CONTROLS,
@@ -60,6 +62,9 @@ DRIFT = "drift_airspeed"
 
 VELOCITIES, RATES, ATTITUDES = ("u", "v", "w"), ("p", "q", "r"), ("phi", "theta")
 
+GAINS = r"\| (\w+_[PI]) " + 3 * r"\| (\S+) "
+"""A row of the gain table on its page: a name and its values at the ends and the middle."""
+
 LQR_GROUPS = (VELOCITIES, RATES, ATTITUDES, CONTROLS)
 """Of the LQR, deviations whose sizes share a factor."""
 LPV_GROUPS = (MEASUREMENTS, CONTROLS, GUSTS, (DRIFT,))
@@ -96,7 +101,7 @@ def every(folder: Path | None = None) -> Iterator[Design]:
 def _made(name: str, heli: Helicopter, plant: Plant) -> list[Design]:
     ways = {
         PD: pd,
-        STRUCTURED: lambda: gain_table.tuned(heli).model,
+        STRUCTURED: lambda: structured(plant),
         RETUNED: lambda: retuned(heli),
         TOLD: lambda: told(heli),
         TOLD_IDENTIFIED: told_identified,
@@ -120,6 +125,18 @@ def pd() -> LPVStateSpace:
         outputs=CONTROLS,
         dt=PERIOD,
     )
+
+
+def structured(plant: Plant) -> LPVStateSpace:
+    """The gain table as docs/structured.md has it: three values of a gain are its parabola."""
+    free = gain_table.structure(plant)
+    assert free.basis is not None
+    text = (DOCS / "structured.md").read_text(encoding="utf-8")
+    cells = {row[0]: row[1:] for row in re.findall(GAINS, text)}
+    values = {gain.name: np.array(cells[gain.name], float) for gain in free.gains}
+    V = np.linspace(0.0, TOP, gain_table.DEGREE + 1)
+    gains = {name: free.basis.fit(V, of) for name, of in values.items()}
+    return free.controller(gains, plant.parameters)
 
 
 def retuned(heli: Helicopter, powers: Powers = FOUND_LQR) -> LPVStateSpace:
