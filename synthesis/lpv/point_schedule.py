@@ -34,7 +34,8 @@ def hinf_schedule(
 
 def h2_schedule(plant: Plant, points: Sequence[float] | Array) -> Controller:
     """Design H2 controllers at values of the one parameter of a plant and interpolate them as
-    `hinf_schedule` does; `promised` is the largest H2 norm at the points. Raises `SynthesisError` where a point has no design.
+    `hinf_schedule` does; `promised` is the largest H2 norm at the points. Raises
+    `SynthesisError` where a point has no design.
     """
     return _schedule("H2", h2, plant, points)
 
