@@ -97,9 +97,7 @@ class AtPoint:
     @cached_property
     def drawn(self) -> LinearModels | None:
         """Those of the draws; None without a covariance."""
-        return (
-            None if self.thetas is None else self.plant.of_each(self.thetas, *self._values)
-        )
+        return None if self.thetas is None else self.plant.of_each(self.thetas, *self._values)
 
     @cached_property
     def margin(self) -> float:
@@ -126,9 +124,7 @@ class AtPoint:
         """The largest to another estimate, NaN without one."""
         if not self.second:
             return float("nan")
-        return float(
-            self.gaps_to([other.at(*self._values) for other in self.second]).max()
-        )
+        return float(self.gaps_to([other.at(*self._values) for other in self.second]).max())
 
     @cached_property
     def lost(self) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import solve_discrete_are
 
 from symheli.dynamics import INPUTS
-from symheli.errors import InputError
+from symheli.errors import InputError, UnknownNameError
 from symheli.flight.controller import ScheduledController
 from symheli.flight.servo import Servo
 from symheli.helicopter import Helicopter
@@ -20,7 +20,7 @@ from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.lpv.scheduling import Scheduling
 from symheli.steady.airspeed_sweep import design_family
 from symheli.values.arrays import frozen
-from symheli.values.numbers import whole
+from symheli.values.numbers import positive, whole
 from symheli.values.signal import Signal, signals
 from symheli.values.summary import summarized
 
@@ -39,6 +39,8 @@ SCALE = {
 }
 """Deviation of each state (SI) that counts as much as 0.01 rad of an input in the LQR weights."""
 INPUT_SCALE = 0.01
+SIZES = {**SCALE, **dict.fromkeys(INPUTS, INPUT_SCALE)}
+"""Deviation of each state and input (SI) that counts as 1 in the LQR weights."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +115,7 @@ class Autopilot:
 
 
 INPUT_SCALE_FACTORS = (1.0, 0.5, 0.25, 0.125)
-"""Factors on `INPUT_SCALE` tried in turn until the loop with servos and delay is stable."""
+"""Factors on the sizes of the inputs, in turn until the loop with servos and delay is stable."""
 
 
 def gain_scheduled_lqr(
@@ -123,6 +125,7 @@ def gain_scheduled_lqr(
     dt: float,
     points: int = 14,
     servos: Mapping[str, Servo] | None = None,
+    sizes: Mapping[str, float] | None = None,
 ) -> Autopilot:
     """Design an LQR at several airspeeds on the model with quasi-steady flapping.
 
@@ -141,6 +144,9 @@ def gain_scheduled_lqr(
         Airspeeds, evenly from `low` to `high`.
     servos : mapping of str to Servo, optional
         By input.
+    sizes : mapping of str to float, optional
+        Deviations of states and inputs (SI) that count as 1 in the weights, for those that shall
+        not have the default one.
 
     Returns
     -------
@@ -150,7 +156,10 @@ def gain_scheduled_lqr(
     Raises
     ------
     InputError
-        No softening makes it stable, or a sample period at which there is no LQR.
+        No softening makes it stable, a sample period at which there is no LQR, or a size that is
+        not positive.
+    UnknownNameError
+        A size of what is neither state nor input.
 
     References
     ----------
@@ -164,6 +173,11 @@ def gain_scheduled_lqr(
     >>> bool(np.abs(record["phi"]).max() < 0.2)
     True
     """
+    for name, size in (sizes or {}).items():
+        if name not in SIZES:
+            raise UnknownNameError("state or input", name, SIZES)
+        positive(size, f"size of {name}")
+    counting = {**SIZES, **(sizes or {})}
     family = design_family(heli, np.linspace(low, high, whole(points, "points", 2)))
     design = family.residualize([s for s in UNMEASURED if s in family.states])
     designs, plants = (
@@ -172,7 +186,7 @@ def gain_scheduled_lqr(
     )
     radius = np.inf
     for softer in INPUT_SCALE_FACTORS:
-        gains = np.stack([_lqr(model, softer * INPUT_SCALE) for model in designs])
+        gains = np.stack([_lqr(model, counting, softer) for model in designs])
         radius = max(
             _closed_loop_radius(plant, K, design.states)
             for plant, K in zip(plants, gains, strict=True)
@@ -185,8 +199,9 @@ def gain_scheduled_lqr(
     )
 
 
-def _lqr(model: LinearModel, input_scale: float) -> np.ndarray:
-    Q, R = np.diag([1 / SCALE[s] ** 2 for s in model.states]), np.eye(4) / input_scale**2
+def _lqr(model: LinearModel, sizes: Mapping[str, float], softer: float) -> np.ndarray:
+    Q = np.diag([1 / sizes[s] ** 2 for s in model.states])
+    R = np.diag([1 / (softer * sizes[u]) ** 2 for u in model.inputs])
     try:
         with np.errstate(all="ignore"):
             P = solve_discrete_are(model.A, model.B, Q, R)

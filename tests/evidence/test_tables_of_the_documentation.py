@@ -15,11 +15,16 @@ import pytest
 import synthesis
 from evidence import gain_table, logs, responses, specs, structured, tuning, two_bands
 from evidence.bracket.measured import GAINS, bracket
+from evidence.flown import campaign, designs
+from evidence.flown import tuning as sizes
 from evidence.jerk.measured import TransitionPlan, fastest
 from evidence.marks import calibrated, guarantee, measured
 from evidence.public_files import fetched
 from evidence.reach.measured import gains
 from evidence.tables import DOCS
+from studies.controllers.designs import LQR, design, lqr_schedule
+from studies.controllers.flown import WINDS
+from studies.controllers.plant import baseline, flown_plant
 from studies.loops.exact_lateral import ExactLateral
 from studies.loops.lateral import lateral_loop
 from studies.loops.longitudinal import longitudinal_loop
@@ -249,7 +254,71 @@ def scheduled_lqr_beside_the_gain_table():
         assert same(old, float(number), rel=1e-2)  # a proof of another machine ends elsewhere
 
 
+def first_sizes_of_the_lqr():
+    """The first evaluation of its search."""
+    ideal, heli = _xcell(), Helicopter.load("xcell60", governor="pi")
+    (found,) = sizes.searched(lambda powers: designs.retuned(ideal, powers), heli, 1)
+    _, _, *shown = KEPT["flown.md", "tuning"].cells(designs.RETUNED)
+    for cell, ratio in zip(shown, found.ratios, strict=True):
+        assert same(cell, ratio)
+
+
+def flown_case(name, controller):
+    """What the trial finds of a controller in light turbulence at the permitted acceleration."""
+    return campaign.trial_of({name: controller}).run(controller=name)
+
+
+def ratio_of_the_lqr_in_light_turbulence():
+    light = sizes.SIZES_OF_GUSTS.index(WINDS[0])
+    shown = KEPT["flown.md", "energy ratios"].cells(LQR)[light].strip("*")
+    assert same(shown, flown_case(LQR, lqr_schedule(_xcell()))["energy ratio, median"])
+
+
+def frozen_gain_of_the_retuned_lqr():
+    heli = _xcell()
+    (found,) = design(designs.RETUNED, lambda: designs.retuned(heli), flown_plant(baseline(heli)))
+    states, frozen, *_ = KEPT["flown.md", "controllers"].cells(designs.RETUNED)
+    assert int(states) == found.order
+    assert same(frozen, found.frozen)
+
+
+def entries_of_the_lqr():
+    """Every entry at the permitted acceleration, to the digits shown."""
+    row = flown_case(LQR, lqr_schedule(_xcell()))
+    lost, *shown, _, _, every = KEPT["flown.md", "flown entries"].cells(f"{LQR}, 3 m/s^2, 7.7 m/s")
+    specs = [s for s in campaign.flown_entries(campaign.of_the_vehicle()) if s.axis == "transition"]
+    assert lost == f"{row['lost']:.1%}"
+    assert every == f"{row['every entry met']:.1%}"
+    for cell, spec in zip(shown, specs, strict=False):
+        assert float(cell) == pytest.approx(row[f"{campaign.entry(spec)}, 95%"], rel=6e-3)
+
+
+def frozen_entries_that_static_controllers_come_nearest_to():
+    """Their margins, evaluated again, to a percent."""
+    heli, vehicle = _xcell(), specs.OfVehicle(name="xcell60", points=specs.POINTS)
+    static = {
+        LQR: lqr_schedule(heli),
+        designs.RETUNED: designs.retuned(heli),
+        designs.PD: designs.pd(),
+    }
+    table = vehicle.frozen(static)
+    reached = {n: {r.specification: r for r in table.reached(n)} for n in static}
+    looked_at = 0
+    for line in KEPT["flown.md", "conflicts"].text.splitlines()[2:]:
+        axis, entry, _, nearest, _, shown = (cell.strip() for cell in line.strip("|").split("|"))
+        spec = table.sheet.of(axis, entry)
+        if nearest in static and spec.kind == "frozen":
+            assert abs(float(shown) - reached[nearest][spec].margin) <= 1.0
+            looked_at += 1
+    assert looked_at
+
+
 ROWS = {
+    ("flown.md", "tuning"): first_sizes_of_the_lqr,
+    ("flown.md", "energy ratios"): ratio_of_the_lqr_in_light_turbulence,
+    ("flown.md", "controllers"): frozen_gain_of_the_retuned_lqr,
+    ("flown.md", "flown entries"): entries_of_the_lqr,
+    ("flown.md", "conflicts"): frozen_entries_that_static_controllers_come_nearest_to,
     ("controllers.md", "specification sheet"): margins_of_the_lqr_schedule,
     ("gains.md", "interpolated"): lambda: proven_by_p_alone("interpolated", lateral_loop(_xcell())),
     ("gains.md", "exact"): lambda: proven_by_p_alone("exact", ExactLateral.of(_xcell()).loop()),

@@ -8,6 +8,7 @@ from flight.flown import EVERYTHING, INPUTS, SHORT, SLOW, InPython, differences,
 import symheli
 from symheli import InputError, LinearModel, fly
 from symheli.flight import XCELL_SERVOS, Autopilot, ScheduledController, gain_scheduled_lqr
+from symheli.flight.autopilot import SIZES
 
 
 @pytest.fixture(scope="module")
@@ -18,6 +19,24 @@ def pilot():
 @pytest.fixture(scope="module")
 def at_one_speed(pilot):
     return LinearModel.gain(-pilot.gain(5.0), pilot.states, INPUTS)
+
+
+def test_only_the_ratios_of_the_sizes_of_an_lqr_matter(ideal):
+    """All sizes three times as large are the same weights but for a factor."""
+    given = {"points": 2, "dt": 0.02}
+    usual = gain_scheduled_lqr(ideal, 5.0, 6.0, **given)
+    larger = gain_scheduled_lqr(
+        ideal, 5.0, 6.0, sizes={s: 3 * v for s, v in SIZES.items()}, **given
+    )
+    assert np.allclose(larger.gains, usual.gains, rtol=1e-9)  # of two Riccati equations
+    softer = gain_scheduled_lqr(ideal, 5.0, 6.0, sizes={"d_ped": 1e-4}, **given)
+    assert np.abs(softer.gains[:, 3]).max() < 0.1 * np.abs(usual.gains[:, 3]).max()
+
+
+@pytest.mark.parametrize(("sizes", "said"), [({"psi": 1.0}, "psi"), ({"u": 0.0}, "size of u")])
+def test_a_size_that_an_lqr_cannot_have_is_named(ideal, sizes, said):
+    with pytest.raises(InputError, match=said):
+        gain_scheduled_lqr(ideal, 5.0, 6.0, 0.02, 2, sizes=sizes)
 
 
 @pytest.mark.slow(only=("ideal-table", "pi-table"))
