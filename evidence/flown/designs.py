@@ -32,8 +32,7 @@ from studies.specs.of_vehicle import OfVehicle
 from symheli import Helicopter, LinearModel, LPVStateSpace
 from symheli.flight import XCELL_SERVOS
 from symheli.values.signal import Signal
-from synthesis import Controller, Plant
-from synthesis.lpv.point_schedule import h2_schedule
+from synthesis import Controller, Plant, lqg
 
 VEHICLE = "xcell60"
 PD, STRUCTURED = "PD", "structured"
@@ -147,9 +146,9 @@ def retuned(heli: Helicopter, powers: Powers = FOUND_LQR) -> LPVStateSpace:
 
 
 def told(heli: Helicopter, powers: Powers = FOUND_LPV) -> Controller:
-    """H2 controllers of the baseline over airspeed, for what a transition in turbulence does."""
+    """LQG controllers of the baseline over airspeed, for what a transition in turbulence does."""
     model = baseline(heli).with_trim_drift()
-    return h2_schedule(told_plant(model, powers), np.linspace(0.0, TOP, KNOTS))
+    return lqg(told_plant(model, powers), np.linspace(0.0, TOP, KNOTS))
 
 
 def told_identified(powers: Powers = FOUND_LPV, seed: int = 0) -> Controller:
@@ -157,7 +156,7 @@ def told_identified(powers: Powers = FOUND_LPV, seed: int = 0) -> Controller:
     the other states moves little.
     """
     model = with_drift_of_airspeed(identified_model(identified(VEHICLE, seed)))
-    return h2_schedule(told_plant(model, powers, 0.0), np.linspace(0.0, TOP, KNOTS))
+    return lqg(told_plant(model, powers, 0.0), np.linspace(0.0, TOP, KNOTS))
 
 
 def told_plant(model: LPVStateSpace, powers: Powers = FOUND_LPV, held: float = PERIOD / 2) -> Plant:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -12,9 +11,7 @@ from symheli.lpv.bases import PiecewiseLinear
 from symheli.values.arrays import Array
 from synthesis.loops.controller import Controller
 from synthesis.lpv.fitted import Fitted, controller_from
-from synthesis.lti.h2 import h2
 from synthesis.lti.hinf import hinf
-from synthesis.lti.point_design import PointDesign
 from synthesis.plant.plant import Plant
 
 
@@ -29,39 +26,23 @@ def hinf_schedule(
     `promised` is the largest of the norms at the points; between them nothing is promised. Raises
     `SynthesisError` where a point has no design.
     """
-    return _schedule("H-infinity", partial(hinf, back_off=back_off), plant, points)
-
-
-def h2_schedule(plant: Plant, points: Sequence[float] | Array) -> Controller:
-    """Design H2 controllers at values of the one parameter of a plant and interpolate them as
-    `hinf_schedule` does; `promised` is the largest H2 norm at the points. Raises
-    `SynthesisError` where a point has no design.
-    """
-    return _schedule("H2", h2, plant, points)
-
-
-def _schedule(
-    method: str,
-    design: Callable[..., PointDesign],
-    plant: Plant,
-    points: Sequence[float] | Array,
-) -> Controller:
     found = []
     for p in points:
-        one = design(
+        one = hinf(
             plant.nominal.at(float(p)),
             [str(s) for s in plant.controls],
             [str(s) for s in plant.measurements],
             disturbances=plant.disturbances,
             performance=plant.performance,
+            back_off=back_off,
         )
         if one.controller is None:
             (parameter,) = plant.parameters
             at = f"{parameter.name} {p:g} {parameter.unit}"
-            raise SynthesisError(f"no {method} design at {at}: {'; '.join(one.reasons)}")
+            raise SynthesisError(f"no H-infinity design at {at}: {'; '.join(one.reasons)}")
         found.append((one.controller, one.hinf_norm))
     models = [model for model, _ in found]
     M = np.stack([np.block([[K.A, K.B], [K.C, K.D]]) for K in models])
     fit = Fitted(PiecewiseLinear(tuple(map(float, points))), M, 0.0)
-    method = f"{method} at {len(models)} values of the parameter"
+    method = f"H-infinity at {len(models)} values of the parameter"
     return controller_from(plant, fit, models[0].states, max(norm for _, norm in found), method)
