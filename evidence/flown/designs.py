@@ -37,8 +37,8 @@ from synthesis import Controller, Plant, lqg
 VEHICLE = "xcell60"
 PD, STRUCTURED = "PD", "structured"
 RETUNED = "LQR schedule, retuned"
-TOLD, TOLD_IDENTIFIED = "LPV, slow disturbances", "LPV, slow disturbances, identified model"
-OWN = (PD, STRUCTURED, RETUNED, TOLD, TOLD_IDENTIFIED)
+SLOW, SLOW_IDENTIFIED = "LPV, slow disturbances", "LPV, slow disturbances, identified model"
+OWN = (PD, STRUCTURED, RETUNED, SLOW, SLOW_IDENTIFIED)
 """Those that are not of the study."""
 
 PD_GAINS = {
@@ -102,8 +102,8 @@ def _made(name: str, heli: Helicopter, plant: Plant) -> list[Design]:
         PD: pd,
         STRUCTURED: lambda: structured(plant),
         RETUNED: lambda: retuned(heli),
-        TOLD: lambda: told(heli),
-        TOLD_IDENTIFIED: told_identified,
+        SLOW: lambda: lpv_for_slow(heli),
+        SLOW_IDENTIFIED: lpv_for_slow_identified,
     }
     return design(name, ways[name], plant)
 
@@ -145,21 +145,23 @@ def retuned(heli: Helicopter, powers: Powers = FOUND_LQR) -> LPVStateSpace:
     return autopilot.scheduled_controller.model
 
 
-def told(heli: Helicopter, powers: Powers = FOUND_LPV) -> Controller:
+def lpv_for_slow(heli: Helicopter, powers: Powers = FOUND_LPV) -> Controller:
     """LQG controllers of the baseline over airspeed, for what a transition in turbulence does."""
     model = baseline(heli).with_trim_drift()
-    return lqg(told_plant(model, powers), np.linspace(0.0, TOP, KNOTS))
+    return lqg(plant_for_slow(model, powers), np.linspace(0.0, TOP, KNOTS))
 
 
-def told_identified(powers: Powers = FOUND_LPV, seed: int = 0) -> Controller:
+def lpv_for_slow_identified(powers: Powers = FOUND_LPV, seed: int = 0) -> Controller:
     """The same of the identified model of the study, whose drift is that of u alone: the trim of
     the other states moves little.
     """
     model = with_drift_of_airspeed(identified_model(identified(VEHICLE, seed)))
-    return lqg(told_plant(model, powers, 0.0), np.linspace(0.0, TOP, KNOTS))
+    return lqg(plant_for_slow(model, powers, 0.0), np.linspace(0.0, TOP, KNOTS))
 
 
-def told_plant(model: LPVStateSpace, powers: Powers = FOUND_LPV, held: float = PERIOD / 2) -> Plant:
+def plant_for_slow(
+    model: LPVStateSpace, powers: Powers = FOUND_LPV, held: float = PERIOD / 2
+) -> Plant:
     """The study's plant with the drift of the trim and a disturbance at every control, of the size
     of a command; all disturbances are slow (`SLOW_FOR`), of their size in root mean square, and
     times 2 to a power.

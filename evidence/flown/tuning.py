@@ -72,7 +72,7 @@ def best(found: Sequence[Evaluation]) -> Evaluation:
 
 def lpv(heli: Helicopter, powers: designs.Powers) -> LPVStateSpace:
     """The LPV controller of all states, sampled."""
-    return designs.told(heli, powers).discretize(PERIOD).model
+    return designs.lpv_for_slow(heli, powers).discretize(PERIOD).model
 
 
 def _evaluated(
@@ -104,7 +104,7 @@ def main() -> None:
     heli = Helicopter.load(designs.VEHICLE, governor="pi")
     ways = {
         designs.RETUNED: lambda powers: designs.retuned(ideal, powers),
-        designs.TOLD: lambda powers: lpv(ideal, powers),
+        designs.SLOW: lambda powers: lpv(ideal, powers),
     }
     rows = []
     for name, make in ways.items():

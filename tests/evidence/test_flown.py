@@ -1,4 +1,4 @@
-"""Flights of `evidence.flown`: what its trial counts, how its designs are told of disturbances, and
+"""Flights of `evidence.flown`: what its trial counts, which disturbances its designs expect, and
 its search.
 """
 
@@ -75,7 +75,7 @@ def test_a_slow_disturbance_has_its_size_in_root_mean_square():
 
 def test_a_plant_is_told_of_every_disturbance_once(ideal):
     model = baseline(ideal).with_trim_drift()
-    plant = designs.told_plant(model)
+    plant = designs.plant_for_slow(model)
     own = {*designs.GUSTS, designs.DRIFT, *(f"{u}_disturbance" for u in designs.CONTROLS)}
     noise = {f"{y}_noise" for y in designs.MEASUREMENTS}
     assert {str(w) for w in plant.disturbances} == own | noise
