@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import sys
 import time
 from collections.abc import Iterable, Sequence
@@ -52,14 +53,17 @@ def keep(page: Path, section: str, text: str, machine: str = "", command: str = 
 
 
 def own_command() -> str:
-    """What started this process, as one would type it in a clone."""
+    """What started this process, as one would type it in a clone; without --out DIR and --processes
+    N, which decide where results are kept and how fast, not what they are.
+    """
     specification = getattr(sys.modules["__main__"], "__spec__", None)
     script = (
         f"-m {specification.name.removesuffix('.__main__')}"
         if specification
         else f"{Path(sys.argv[0]).parent.name}/{Path(sys.argv[0]).name}"
     )
-    return " ".join(["python", script, *sys.argv[1:]])
+    typed = " ".join(["python", script, *sys.argv[1:]])
+    return re.sub(r" --(out|processes)[ =]\S+", "", typed)
 
 
 def parsed(parser: argparse.ArgumentParser, page: str, *, timed: bool = True) -> argparse.Namespace:
