@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import reduce
 from typing import Any
 
@@ -27,10 +29,10 @@ Names = Sequence[str] | None
 def lpv_of(
     matrices: Sequence[Given],
     scheduling: Scheduling | Sequence[Scheduling],
-    dt: float | None,
-    states: Names,
-    inputs: Names,
-    outputs: Names,
+    dt: float | None = None,
+    states: Names = None,
+    inputs: Names = None,
+    outputs: Names = None,
 ) -> LPVStateSpace:
     """See `LPVStateSpace.from_expressions`."""
     sympy = _sympy()
@@ -53,7 +55,7 @@ def lpv_of(
     for k, s in enumerate(given):
         found = {functions[k] for entry in terms for _, functions in entry}
         used = sorted(found | {sympy.Integer(1)}, key=sympy.default_sort_key)
-        factors.append((used, _functions(used, s)))
+        factors.append((used, functions_of_one(used, s)))
     basis = factors[0][1] if len(given) == 1 else Product(tuple(one for _, one in factors))
     known = basis.indices if isinstance(basis, Product) else [(k,) for k in range(basis.size)]
     M = np.zeros((basis.size, len(whole)))
@@ -112,30 +114,32 @@ def lft_of(
 
 def _matrices(given: Sequence[Given], known: Sequence[Scheduling]) -> list[Expression]:
     """A, B, C, D with exact numbers and the parameters' own symbols."""
-    sympy = _sympy()
-
-    own = {s.name: s.symbol for s in known}
-    found = []
-    for name, M in zip("ABCD", given, strict=True):
-        try:
-            M = sympy.Matrix(M)
-        except (TypeError, ValueError) as error:
-            raise InputError(f"{name}: expected a matrix of expressions ({error})") from None
-        for symbol in sorted(M.free_symbols, key=str):
-            if str(symbol) not in own:
-                raise UnknownNameError("scheduling parameter", str(symbol), list(own))
-        exact = {number: sympy.Rational(number) for number in M.atoms(sympy.Float)}
-        same = {symbol: own[str(symbol)] for symbol in M.free_symbols}
-        found.append(M.xreplace({**exact, **same}))
-        if bad := [e for e in found[-1] if e.has(sympy.nan, sympy.oo, sympy.zoo, sympy.I)]:
-            raise InputError(f"{name}: expected real, finite entries, got {bad[0]}")
-    A, B, C, D = found
+    A, B, C, D = (_matrix(name, M, known) for name, M in zip("ABCD", given, strict=True))
     if A.rows != A.cols or B.rows != A.rows or C.cols != A.rows or D.shape != (C.rows, B.cols):
         raise InputError(
             "expected A (nx, nx), B (nx, nu), C (ny, nx), D (ny, nu), got"
             f" {A.shape}, {B.shape}, {C.shape}, {D.shape}"
         )
-    return found
+    return [A, B, C, D]
+
+
+def _matrix(name: str, given: Given, known: Sequence[Scheduling]) -> Expression:
+    sympy = _sympy()
+
+    own = {s.name: s.symbol for s in known}
+    try:
+        M = sympy.Matrix(given)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name}: expected a matrix of expressions ({error})") from None
+    for symbol in sorted(M.free_symbols, key=str):
+        if str(symbol) not in own:
+            raise UnknownNameError("scheduling parameter", str(symbol), list(own))
+    exact = {number: sympy.Rational(number) for number in M.atoms(sympy.Float)}
+    same = {symbol: own[str(symbol)] for symbol in M.free_symbols}
+    M = M.xreplace({**exact, **same})
+    if bad := [e for e in M if e.has(sympy.nan, sympy.oo, sympy.zoo, sympy.I)]:
+        raise InputError(f"{name}: expected real, finite entries, got {bad[0]}")
+    return M
 
 
 def _by_powers(M: Expression, symbols: Sequence[Expression]) -> dict[tuple[int, ...], Any]:
@@ -167,14 +171,22 @@ def _by_parameter(
     return number * rest, functions
 
 
-def _functions(used: Sequence[Expression], s: Scheduling) -> UserFunctions:
+def functions_of_one(used: Sequence[Expression], s: Scheduling) -> UserFunctions:
+    """See `UserFunctions.from_expressions`."""
     sympy = _sympy()
 
     def compiled(f: Expression) -> Callable[[np.ndarray], np.ndarray]:
         function = sympy.lambdify(s.symbol, f, "numpy")
         return lambda p: function(p) + 0.0 * p  # a constant too has the shape of p
 
-    return UserFunctions(tuple(map(compiled, used)), s.low, s.high, tuple(map(str, used)))
+    used = list(_matrix("functions", [list(used)], [s]))
+    basis = UserFunctions(tuple(map(compiled, used)), s.low, s.high, tuple(map(str, used)))
+    slopes = [sympy.diff(f, s.symbol) for f in used]
+    if any(f.has(sympy.Derivative) for f in slopes):
+        return basis
+    with contextlib.suppress(InputError):  # a slope that is not finite, as that of sqrt(p) at 0
+        return replace(basis, derivatives=tuple(map(compiled, slopes)))
+    return basis
 
 
 def _static(expression: Expression, symbols: dict[Expression, Scheduling]) -> LFT:

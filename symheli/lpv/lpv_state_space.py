@@ -20,6 +20,7 @@ from symheli.lpv.linear_model import LinearModel, feedback_matrix
 from symheli.lpv.monomials import as_blocks
 from symheli.lpv.recentred import centre, recentred
 from symheli.lpv.scheduling import (
+    RANGE_SLACK,
     UNSCHEDULED,
     Rates,
     Scheduling,
@@ -100,7 +101,7 @@ class LPVStateSpace:
     dt : float, optional
         Sample period in s; None in continuous time.
     trim : TrimSchedule, optional
-        x0(p), u0(p) about which the model holds.
+        x0(p), u0(p), y0(p) about which the model holds.
     residuals : Residuals, optional
         Where the model was fitted or sampled: fit minus what it was fitted to, at its nodes.
 
@@ -155,7 +156,7 @@ class LPVStateSpace:
                 f" {len(self.parameters)}: {', '.join(s.name for s in self.parameters)}"
             )
         for s, (low, high) in zip(self.parameters, self.basis.ranges, strict=True):
-            slack = 1e-9 * (s.high - s.low)
+            slack = RANGE_SLACK * (s.high - s.low)
             if low > s.low + slack or high < s.high - slack:
                 raise InputError(
                     f"the basis covers [{low}, {high}] but scheduling {s.name} ranges over"
@@ -392,7 +393,7 @@ class LPVStateSpace:
             states=tuple(self.states[i] for i in ix),
             inputs=tuple(self.inputs[i] for i in iu),
             outputs=tuple(self.outputs[i] for i in iy),
-            trim=self.trim and self.trim.select(ix, iu),
+            trim=self.trim and self.trim.select(ix, iu, iy),
             residuals=self.residuals
             and Residuals(self.residuals.nodes, *keep(*self.residuals.matrices)),
         )
@@ -580,11 +581,14 @@ class LPVStateSpace:
         *,
         dt: float | None = None,
         drift: object | None = None,
+        offsets: bool = False,
     ) -> tuple[Array, Array]:
-        """States (n, nx) and outputs (n, ny) along p (n,) or (n, d); see `symheli.lpv.simulate`."""
+        """States (n, nx) and outputs (n, ny) along p (n,) or (n, d), or with p(t, x, u) a function;
+        see `symheli.lpv.simulate`.
+        """
         from symheli.lpv.simulate import simulate
 
-        return simulate(self, p, u, x0, dt=dt, drift=drift)
+        return simulate(self, p, u, x0, dt=dt, drift=drift, offsets=offsets)
 
     def predict(
         self,

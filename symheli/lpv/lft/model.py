@@ -415,6 +415,16 @@ class LFT:
             self, K, np.eye(len(self.inputs)), np.eye(len(self.outputs)), self.inputs, self.outputs
         )
 
+    def simulate(
+        self, p: object, u: object, x0: object | None = None, *, dt: float | None = None
+    ) -> tuple[Array, Array]:
+        """States (n, nx) and outputs (n, ny) along p (n,) or (n, d), or with p(t, x, u) a function;
+        see `symheli.lpv.simulate`.
+        """
+        from symheli.lpv.simulate import simulate
+
+        return simulate(self, p, u, x0, dt=dt)
+
     def discretize(self, dt: float) -> LFT:
         """Tustin's rule, exact in the parameters: the trapezoidal rule of the time-varying model at
         samples `dt` s apart.
