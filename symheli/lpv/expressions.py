@@ -1,4 +1,4 @@
-"""LPV and LFT models from matrices of SymPy expressions in the scheduling parameters."""
+"""LPV and LFT models from matrices of SymPy or CasADi expressions in the scheduling parameters."""
 
 from __future__ import annotations
 
@@ -21,7 +21,9 @@ from symheli.lpv.scheduling import Scheduling, parameters
 from symheli.values.signal import Signal, signals
 
 Given = Any
-"""A matrix of numbers and SymPy expressions: nested lists, a NumPy array or a SymPy matrix."""
+"""A matrix of numbers and expressions of SymPy or CasADi: nested lists, a NumPy array, or a
+matrix of SymPy or CasADi.
+"""
 Expression = Any
 Names = Sequence[str] | None
 
@@ -44,13 +46,10 @@ def lpv_of(
     if all(entry.is_polynomial(*symbols) for entry in entries):
         a, b, c, d = (_by_powers(M, symbols) for M in (A, B, C, D))
         return LPVStateSpace.polynomial(a, b, c, d, given, dt, states, inputs, outputs)
-    if wrong := [e for e in entries if e.is_rational_function(*symbols) and not e.is_polynomial()]:
-        raise InputError(
-            f"{wrong[0]} is a rational function, which no basis of an LPVStateSpace holds exactly:"
-            " LFT.from_expressions does"
-        )
     whole = sympy.Matrix(sympy.BlockMatrix([[A, B], [C, D]])).applyfunc(sympy.expand)
-    terms = [[_by_parameter(t, symbols) for t in sympy.Add.make_args(entry)] for entry in whole]
+    terms = [
+        [_by_parameter(t, symbols) for t in sympy.Add.make_args(entry) if t != 0] for entry in whole
+    ]
     factors = []
     for k, s in enumerate(given):
         found = {functions[k] for entry in terms for _, functions in entry}
@@ -128,6 +127,15 @@ def _matrix(name: str, given: Given, known: Sequence[Scheduling]) -> Expression:
 
     own = {s.name: s.symbol for s in known}
     try:
+        if _is_casadi(given):
+            given = _of_casadi(given)
+        elif isinstance(given, list | tuple):
+            given = [
+                [_of_casadi(e)[0] if _is_casadi(e) else e for e in row]
+                if isinstance(row, list | tuple)
+                else row
+                for row in given
+            ]
         M = sympy.Matrix(given)
     except (TypeError, ValueError) as error:
         raise InputError(f"{name}: expected a matrix of expressions ({error})") from None
@@ -140,6 +148,26 @@ def _matrix(name: str, given: Given, known: Sequence[Scheduling]) -> Expression:
     if bad := [e for e in M if e.has(sympy.nan, sympy.oo, sympy.zoo, sympy.I)]:
         raise InputError(f"{name}: expected real, finite entries, got {bad[0]}")
     return M
+
+
+def _is_casadi(given: Given) -> bool:
+    return type(given).__module__.partition(".")[0] == "casadi"
+
+
+def _of_casadi(given: Given) -> Expression:
+    """The same matrix in SymPy, with symbols of the same names."""
+    import casadi
+
+    from symheli.equations.arithmetic import SYMPY
+    from symheli.equations.tape import Tape
+
+    sympy = _sympy()
+    given = casadi.SX(given) if isinstance(given, casadi.DM) else given
+    used = casadi.symvar(given)
+    if vectors := [s.name() for s in used if not s.is_scalar()]:
+        raise InputError(f"{vectors[0]} is a vector: expected one scalar symbol a parameter")
+    arguments = [[[sympy.Symbol(s.name())]] for s in used]
+    return sympy.Matrix(Tape.of(casadi.Function("f", used, [given])).run(arguments, SYMPY)[0])
 
 
 def _by_powers(M: Expression, symbols: Sequence[Expression]) -> dict[tuple[int, ...], Any]:
@@ -166,7 +194,7 @@ def _by_parameter(
         if own.free_symbols - {symbol}:
             raise InputError(
                 f"{own} is no product of functions of one parameter each, which a basis over"
-                " several parameters needs"
+                " several parameters needs; LFT.from_expressions holds any rational function"
             )
     return number * rest, functions
 

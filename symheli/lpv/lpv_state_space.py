@@ -221,13 +221,15 @@ class LPVStateSpace:
         outputs: Sequence[str] | None = None,
     ) -> LPVStateSpace:
         """Return a model from matrices of SymPy expressions in the symbols of the parameters
-        (`Scheduling.symbol`, in their units), and numbers; exact.
+        (`Scheduling.symbol`, in their units), or of CasADi expressions in scalar symbols of their
+        names, and numbers; exact.
 
         Polynomials in any number of parameters get a polynomial basis; other functions, such as
-        sin(p) or sqrt(p), are functions of a `UserFunctions` basis, in several parameters products
-        of functions of one each. Names default to x1.., u1.., y1... Raises `InputError` for
-        rational functions, which `LFT.from_expressions` holds, and for shapes that do not fit,
-        `UnknownNameError` for another symbol.
+        sin(p), sqrt(p) or 1/p, are functions of a `UserFunctions` basis, in several parameters
+        products of functions of one each: such a model is simulated, drawn, connected and designed
+        for, but has no certificate. `LFT.from_expressions` holds rational functions so that there
+        are certificates. Names default to x1.., u1.., y1... Raises `InputError` for shapes that do
+        not fit, `UnknownNameError` for another symbol.
 
         Examples
         --------

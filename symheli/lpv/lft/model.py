@@ -186,9 +186,9 @@ class LFT:
         inputs: Sequence[str] | None = None,
         outputs: Sequence[str] | None = None,
     ) -> LFT:
-        """Return the LFT of matrices of rational SymPy expressions in the symbols of the parameters
-        (`Scheduling.symbol`, in their units), and numbers; exact, with as many copies of each
-        parameter as `reduce` leaves.
+        """Return the LFT of matrices of rational expressions, written as for
+        `LPVStateSpace.from_expressions`; exact, with as many copies of each parameter as `reduce`
+        leaves.
 
         Names default to x1.., u1.., y1... Raises `InputError` for other functions and for shapes
         that do not fit, `UnknownNameError` for another symbol.
