@@ -208,7 +208,12 @@ def functions_of_one(used: Sequence[Expression], s: Scheduling) -> UserFunctions
         return lambda p: function(p) + 0.0 * p  # a constant too has the shape of p
 
     used = list(_matrix("functions", [list(used)], [s]))
-    basis = UserFunctions(tuple(map(compiled, used)), s.low, s.high, tuple(map(str, used)))
+
+    def name(f: Expression) -> str:
+        long = {number: sympy.Float(number, 6) for number in f.atoms(sympy.Rational)}
+        return str(f.xreplace({number: short for number, short in long.items() if number.q > 1000}))
+
+    basis = UserFunctions(tuple(map(compiled, used)), s.low, s.high, tuple(map(name, used)))
     slopes = [sympy.diff(f, s.symbol) for f in used]
     if any(f.has(sympy.Derivative) for f in slopes):
         return basis

@@ -518,6 +518,25 @@ class LPVStateSpace:
             )
         return model.with_residuals(p, sampled)
 
+    def fitted(self, basis: FunctionSpace) -> LPVStateSpace:
+        """Return the model with its entries fitted by the functions of another basis, such as
+        `Polynomial(8, low, high)`, and the misfit in `.residuals`: certificates are of polynomials
+        and piecewise polynomials.
+        """
+        p = lobatto_points(41 if len(self.parameters) == 1 else 13, self.box)
+        p = np.concatenate([p, basis.samples(self.box)])
+        exact = self.matrices(p)
+        model = replace(
+            self,
+            basis=basis,
+            **{name: basis.fit(p, M) for name, M in exact._asdict().items()},
+            residuals=None,
+        )
+        if (origin := self.fitted_to) is not None:
+            p = np.concatenate([p, origin.nodes])
+            exact = Matrices(*map(np.concatenate, zip(exact, origin.matrices, strict=True)))
+        return model.with_residuals(p, exact)
+
     @property
     def fitted_to(self) -> Residuals | None:
         """Data of the fit at its nodes: fit minus residuals; None for a model that is not a fit."""
