@@ -46,7 +46,8 @@ def gain_on_grid(
         raise InputError("P in one's own functions is for continuous time: take form=Spline(...)")
     start = time.perf_counter()
     points = Existence(_plant(model, moving, basis, 1.0), basis, None, impose).points
-    gains = [norm(*each, model.dt)[0] for each in zip(*_matrices(model, points), strict=True)]
+    frozen_at = zip(*_matrices(model, points), strict=True)
+    gains = [norm(A, B, C, D, model.dt)[0] for A, B, C, D in frozen_at]
     frozen, found, attempts = max(gains), math.inf, ()
     if math.isfinite(frozen):
         channel = frozen or 1.0
