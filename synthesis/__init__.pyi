@@ -49,6 +49,7 @@ from synthesis.loops.margins import (
 )
 from synthesis.loops.sampled_loop import certify_sampled as certify_sampled
 from synthesis.loops.wrong_parameter import with_wrong_parameter as with_wrong_parameter
+from synthesis.lpv.bounded_truncation import bounded_truncation as bounded_truncation
 from synthesis.lpv.estimator import Estimator as Estimator
 from synthesis.lpv.estimator import estimator as estimator
 from synthesis.lpv.multiobjective import multiobjective as multiobjective

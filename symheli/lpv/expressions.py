@@ -158,8 +158,8 @@ def _of_casadi(given: Given) -> Expression:
     """The same matrix in SymPy, with symbols of the same names."""
     import casadi
 
-    from symheli.equations.arithmetic import SYMPY
-    from symheli.equations.tape import Tape
+    from symheli.values.arithmetic import SYMPY
+    from symheli.values.tape import Tape
 
     sympy = _sympy()
     given = casadi.SX(given) if isinstance(given, casadi.DM) else given

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
-    from symheli.lpv.balanced_truncation import BalancedTruncation
+    from symheli.lpv.balanced_truncation import Balance, BalancedTruncation
     from symheli.lpv.lft import LFT
     from symheli.lpv.prediction import Prediction
 
@@ -563,7 +563,13 @@ class LPVStateSpace:
         return Matrices(*(np.stack([getattr(model, name) for model in frozen]) for name in "ABCD"))
 
     def truncate(
-        self, order: int, *, nodes: int = 21, input_scale: object = 1.0, output_scale: object = 1.0
+        self,
+        order: int,
+        *,
+        balance: Balance = "factors",
+        nodes: int = 21,
+        input_scale: object = 1.0,
+        output_scale: object = 1.0,
     ) -> BalancedTruncation[LPVStateSpace]:
         """`order` states by one projection balanced over p, with the error it makes; see
         `symheli.lpv.balanced_truncation`.
@@ -571,7 +577,12 @@ class LPVStateSpace:
         from symheli.lpv.balanced_truncation import balanced_truncation
 
         return balanced_truncation(
-            self, order, nodes=nodes, input_scale=input_scale, output_scale=output_scale
+            self,
+            order,
+            balance=balance,
+            nodes=nodes,
+            input_scale=input_scale,
+            output_scale=output_scale,
         )
 
     def save(self, path: str | os.PathLike[str]) -> Path:
