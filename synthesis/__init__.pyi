@@ -35,6 +35,8 @@ from synthesis.lft.multipliers import SCALINGS as SCALINGS
 from synthesis.loops.controller import Controller as Controller
 from synthesis.loops.frozen_reading import proven_around as proven_around
 from synthesis.loops.handling_qualities import bandwidth as bandwidth
+from synthesis.loops.margin_table import MarginTable as MarginTable
+from synthesis.loops.margin_table import margin_table as margin_table
 from synthesis.loops.margins import (
     Margins as Margins,
 )

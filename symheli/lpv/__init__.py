@@ -46,6 +46,7 @@ from symheli.lpv.minimal_realization import minimal_realization
 from symheli.lpv.nu_gap import chordal_distance, nu_gap, nu_gaps
 from symheli.lpv.scheduling import Scheduling
 from symheli.lpv.simulate import simulate
+from symheli.lpv.slider import slider
 from symheli.lpv.stability_margin import stability_margin
 from symheli.lpv.step_response import StepResponse
 from symheli.lpv.trim_schedule import TrimSchedule
@@ -97,6 +98,7 @@ __all__ = [
     "series",
     "sigma",
     "simulate",
+    "slider",
     "stability_margin",
     "step",
 ]

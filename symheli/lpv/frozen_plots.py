@@ -355,8 +355,13 @@ def damping(model: Model, p: object = None) -> Damping:
             rows.append(
                 (one.p, complex(pole), float(size), float(-pole.real / size if size else 1))
             )
+    return Damping(parameters_of(model), tuple(rows))
+
+
+def parameters_of(model: Model) -> tuple[Signal, ...]:
+    """Names and units of the parameters at which a model is frozen."""
     names = model.axes if isinstance(model, LinearFamily) else getattr(model, "parameters", ())
-    return Damping(tuple(Signal(getattr(s, "name", s), s.unit) for s in names), tuple(rows))
+    return tuple(Signal(getattr(s, "name", s), s.unit) for s in names)
 
 
 def step(
