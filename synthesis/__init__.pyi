@@ -11,6 +11,8 @@ from synthesis.analysis.questions import (
 from synthesis.analysis.questions import (
     stability as stability,
 )
+from synthesis.analysis.robust_margin import RobustMargin as RobustMargin
+from synthesis.analysis.robust_margin import robust_margin as robust_margin
 from synthesis.certificate import Certificate as Certificate
 from synthesis.certificate import Status as Status
 from synthesis.forms import HigherOrder as HigherOrder
