@@ -71,7 +71,9 @@ EXEMPT: dict[str, str] = {
             *(
                 "Estimator",
                 "GainCurve",
+                "MarginTable",
                 "Margins",
+                "RobustMargin",
                 "SpecificationTable",
                 "StructuredController",
                 "Tube",
@@ -99,6 +101,7 @@ SLOW = {
     *("synthesis.frozen_box_gain", "synthesis.generalized_h2", "synthesis.decay_rate"),
     *("synthesis.stability", "synthesis.lower_bound", "synthesis.lft_gain"),
     *("synthesis.Certificate.verify", "synthesis.lft_stability", "synthesis.structured"),
+    *("synthesis.bounded_truncation", "synthesis.robust_margin"),
 }
 """Entries that fly, sweep or solve: `FEW` inputs each."""
 LARGER = {"synthesis.multiobjective", "synthesis.output_feedback", "synthesis.lft_feedback"}

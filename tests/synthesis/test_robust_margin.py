@@ -40,11 +40,13 @@ def found():
     return robust_margin(page())
 
 
+@pytest.mark.slow
 def test_the_page_of_robstab_is_met_by_one_call(found):
     assert 1.5960 <= found.upper <= 1.5993
     assert 0.99 * found.upper <= found.lower < found.upper
 
 
+@pytest.mark.slow
 def test_the_upper_bound_is_where_brute_force_loses_the_loop(found):
     """|M_k(j omega)| 0.5 r = 1 for the worst k within r 40 % of 10, over grids of both."""
     omega = np.geomspace(1.0, 100.0, 20001)
@@ -58,6 +60,18 @@ def test_the_upper_bound_is_where_brute_force_loses_the_loop(found):
 
     assert lost(1.0005 * found.upper)  # both grids are fine
     assert not lost(0.9995 * found.upper)
+
+
+def test_the_closed_form_of_one_state():
+    """x' = -(1 - delta) x - k x, |delta| <= 1/2, k = 1 within 1/2: lost where 2 = r/2 + r/2."""
+    k = Scheduling("k", "1", low=0.5, high=1.5)
+    model = LPVStateSpace.from_expressions(
+        [[-1 - k.symbol]], [[1]], [[1]], [[0]], k, inputs=["d"], outputs=["v"]
+    )
+    margin = robust_margin(UncertainStateSpace(model, ["d"], ["v"], 0.5, 1.0, "an example"))
+    assert margin.upper == pytest.approx(2.0, rel=1e-5)
+    assert 1.99 < margin.lower < margin.upper
+    assert margin.p == pytest.approx(0.0, abs=1e-5)
 
 
 def test_what_is_never_lost_and_what_always_is():
