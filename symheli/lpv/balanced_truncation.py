@@ -214,10 +214,14 @@ def _of_response(model: LinearModel, su: Array, sy: Array, p: Array) -> tuple[Ar
             f"the frozen model{_where(p)} is not stable: its response has no Gramians; balance the"
             ' coprime factors, balance="factors"'
         )
-    B, C = model.B * su, model.C / sy[:, None]
-    solve = solve_continuous_lyapunov if model.dt is None else solve_discrete_lyapunov
-    sign = -1.0 if model.dt is None else 1.0
-    return solve(model.A.T, sign * C.T @ C), solve(model.A, sign * B @ B.T)
+    return response_gramians(model.A, model.B * su, model.C / sy[:, None], model.dt)
+
+
+def response_gramians(A: Array, B: Array, C: Array, dt: float | None) -> tuple[Array, Array]:
+    """Observability and reachability Gramians (n, n) of a stable model."""
+    solve = solve_continuous_lyapunov if dt is None else solve_discrete_lyapunov
+    sign = -1.0 if dt is None else 1.0
+    return solve(A.T, sign * C.T @ C), solve(A, sign * B @ B.T)
 
 
 def _where(p: Array) -> str:

@@ -133,5 +133,5 @@ class UserFunctions(Basis):
         """Raises `InputError`: these functions are not known to be polynomials."""
         raise InputError(
             "user-supplied functions are not known to be piecewise polynomial; identify with a"
-            " polynomial or spline basis"
+            " polynomial or spline basis, or fit the model, lpv.fitted(Polynomial(8, low, high))"
         )
