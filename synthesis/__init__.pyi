@@ -11,6 +11,8 @@ from synthesis.analysis.questions import (
 from synthesis.analysis.questions import (
     stability as stability,
 )
+from synthesis.analysis.robust_margin import RobustMargin as RobustMargin
+from synthesis.analysis.robust_margin import robust_margin as robust_margin
 from synthesis.certificate import Certificate as Certificate
 from synthesis.certificate import Status as Status
 from synthesis.forms import HigherOrder as HigherOrder
@@ -35,6 +37,8 @@ from synthesis.lft.multipliers import SCALINGS as SCALINGS
 from synthesis.loops.controller import Controller as Controller
 from synthesis.loops.frozen_reading import proven_around as proven_around
 from synthesis.loops.handling_qualities import bandwidth as bandwidth
+from synthesis.loops.margin_table import MarginTable as MarginTable
+from synthesis.loops.margin_table import margin_table as margin_table
 from synthesis.loops.margins import (
     Margins as Margins,
 )
@@ -49,6 +53,7 @@ from synthesis.loops.margins import (
 )
 from synthesis.loops.sampled_loop import certify_sampled as certify_sampled
 from synthesis.loops.wrong_parameter import with_wrong_parameter as with_wrong_parameter
+from synthesis.lpv.bounded_truncation import bounded_truncation as bounded_truncation
 from synthesis.lpv.estimator import Estimator as Estimator
 from synthesis.lpv.estimator import estimator as estimator
 from synthesis.lpv.linear_quadratic import lqg as lqg

@@ -37,6 +37,7 @@ OPTIONAL = {
     "distributed": "campaigns on all cores and on clusters",
     "zarr": "datasets of campaigns",
     "shtab": "completion in a shell: symheli completion bash|zsh|tcsh",
+    "ipywidgets": "sliders in notebooks",
     "python-flint": "fast exact verification of certificates",
     "scs": "a second solver to cross-check",
     "jsbsim": "flying the AH-1S, a helicopter from elsewhere",

@@ -14,8 +14,8 @@ import mpmath
 import numpy as np
 import sympy
 
-from symheli.equations.arithmetic import MPMATH, SYMPY, is_condition
-from symheli.equations.tape import Arithmetic, Tape
+from symheli.values.arithmetic import MPMATH, SYMPY, is_condition
+from symheli.values.tape import Arithmetic, Tape
 
 
 def evaluate(function: casadi.Function | Tape, *arguments: Any, digits: int = 50) -> list[Any]:

@@ -42,9 +42,11 @@ from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.linear_models import LinearModels
 from symheli.lpv.lower_feedback import lower_feedback
 from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
+from symheli.lpv.minimal_realization import minimal_realization
 from symheli.lpv.nu_gap import chordal_distance, nu_gap, nu_gaps
 from symheli.lpv.scheduling import Scheduling
 from symheli.lpv.simulate import simulate
+from symheli.lpv.slider import slider
 from symheli.lpv.stability_margin import stability_margin
 from symheli.lpv.step_response import StepResponse
 from symheli.lpv.trim_schedule import TrimSchedule
@@ -85,6 +87,7 @@ __all__ = [
     "feedback",
     "lagged",
     "lower_feedback",
+    "minimal_realization",
     "nu_gap",
     "nu_gaps",
     "nyquist",
@@ -95,6 +98,7 @@ __all__ = [
     "series",
     "sigma",
     "simulate",
+    "slider",
     "stability_margin",
     "step",
 ]

@@ -5,21 +5,28 @@ unstable models.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Generic, TypeVar
+from typing import Generic, Literal, TypeVar
 
 import numpy as np
-from scipy.linalg import solve_continuous_are, solve_discrete_are
+from scipy.linalg import (
+    solve_continuous_are,
+    solve_continuous_lyapunov,
+    solve_discrete_are,
+    solve_discrete_lyapunov,
+)
 
-from symheli.errors import InputError
+from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.bases.function_space import tensor_grid
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.lpv_state_space import LPVStateSpace
-from symheli.lpv.nu_gap import angles, channel_scales, nu_gap
+from symheli.lpv.nu_gap import angles, channel_scales, nu_gap, sampled_alike
 from symheli.values.arrays import Array
 from symheli.values.signal import Signal
 from symheli.values.summary import summarized
 
 Model = TypeVar("Model", LPVStateSpace, LinearModel)
+
+Balance = Literal["factors", "response"]
 
 NEGLIGIBLE = 1e-7
 """A state with a singular value below this fraction of the largest counts as absent: the square
@@ -36,7 +43,10 @@ class BalancedTruncation(Generic[Model]):
     out. `nu_gap` (K,) in [0, 1] between truncated and full model. `error` (K,): largest gain of
     their difference over frequency by that of the full model, NaN where one of them is unstable.
     Both with scaled channels, on a frequency grid. With d scheduling parameters `p` is (K, d).
-    Nothing is promised for p that moves.
+    Nothing is promised for p that moves. `bound`, of a linear model: neither the nu-gap (balanced
+    for feedback) nor the largest gain of the difference (balanced for the response, in the units of
+    the scaled channels) is above it; NaN over a parameter, of `synthesis.bounded_truncation` for
+    any motion of p.
     """
 
     model: Model
@@ -44,6 +54,7 @@ class BalancedTruncation(Generic[Model]):
     p: Array
     nu_gap: Array
     error: Array
+    bound: float
 
     __repr__ = summarized
 
@@ -52,6 +63,7 @@ def balanced_truncation(
     model: Model,
     order: int,
     *,
+    balance: Balance = "factors",
     nodes: int = 21,
     input_scale: object = 1.0,
     output_scale: object = 1.0,
@@ -59,10 +71,12 @@ def balanced_truncation(
     """Reduce the number of states by one constant projection that balances the means over p of the
     frozen Gramians.
 
-    The Gramians are those of the normalised coprime factors, solutions of the Riccati equations of
-    u'u + y'y: they exist for unstable models and belong to the nu-gap. One projection for all p
-    keeps the dependence on p in its basis and adds no terms where p moves. Poles on the stability
-    boundary (a heading) are refused by the nu-gap: leave such states out first.
+    For use in feedback the Gramians are those of the normalised coprime factors, solutions of the
+    Riccati equations of u'u + y'y: they exist for unstable models and belong to the nu-gap, but
+    modes that a controller moves anyway count little. For the open-loop response they are those of
+    a stable model itself. One projection for all p keeps the dependence on p in its basis and adds
+    no terms where p moves. Poles on the stability boundary (a heading) are refused by the nu-gap:
+    leave such states out first.
 
     Parameters
     ----------
@@ -70,6 +84,8 @@ def balanced_truncation(
         With nx states.
     order : int
         States to keep.
+    balance : str
+        "factors" (of normalised coprime factors, for feedback) or "response" (open loop).
     nodes : int
         Values of p over which the Gramians are averaged.
     input_scale, output_scale : float or array
@@ -85,12 +101,13 @@ def balanced_truncation(
     ------
     InputError
         An order that is not below the number of states that matter, or a frozen model that is not
-        stabilisable and detectable.
+        stabilisable and detectable, for the response not stable.
 
     References
     ----------
-    Jonckheere and Silverman (1983), IEEE Trans. Automatic Control 28; Meyer (1990), 35; means of
-    frozen Gramians after Wood, Goddard and Glover (1996), CDC.
+    Jonckheere and Silverman (1983), IEEE Trans. Automatic Control 28; Meyer (1990), 35; the bounds
+    of Enns (1984), IEEE CDC, and Glover (1984), Int. J. Control 39; means of frozen Gramians after
+    Wood, Goddard and Glover (1996), CDC.
 
     Examples
     --------
@@ -99,33 +116,79 @@ def balanced_truncation(
     >>> small.model.at(0.5).A.shape, bool(small.nu_gap.max() < 1)
     ((1, 1), True)
     """
+    check_order(order, model)
+    su = channel_scales(input_scale, "input_scale", len(model.inputs))
+    sy = channel_scales(output_scale, "output_scale", len(model.outputs))
+    gramians = mean_gramians(model, balance, nodes, su, sy)
+    found = truncated_by(gramians, model, order, balance, nodes, su, sy)
+    return found if isinstance(model, LinearModel) else replace(found, bound=np.nan)
+
+
+def balancing(gramians: tuple[Array, Array]) -> tuple[Array, Array, Array]:
+    """left, right (n, n) with left' right = I, and the singular values (n,), falling, which both
+    Gramians have on their diagonals in the coordinates left' x; those that are rounding count as
+    `NEGLIGIBLE` of the largest.
+    """
+    Lx, Ly = map(_root, gramians)
+    U, values, V = np.linalg.svd(Lx.T @ Ly)
+    size = np.sqrt(np.maximum(values, NEGLIGIBLE * values[0]))
+    return Lx @ U / size, Ly @ V.T / size, values
+
+
+def mean_gramians(
+    model: LPVStateSpace | LinearModel, balance: Balance, nodes: int, su: Array, sy: Array
+) -> tuple[Array, Array]:
+    """The means over frozen p of the Gramians of observability and reachability, or of those of
+    control and filtering; raises `InputError` where there are none.
+    """
+    if balance not in (rules := {"factors": _of_factors, "response": _of_response}):
+        raise UnknownNameError("balance", balance, list(rules))
+    each = [rules[balance](m, su, sy, p) for p, m in _nodes(model, nodes)]
+    X, Y = (np.mean(parts, axis=0) for parts in zip(*each, strict=True))
+    return X, Y
+
+
+def check_order(order: int, model: LPVStateSpace | LinearModel) -> None:
+    """Raises `InputError` unless there are more states than `order`."""
     nx = len(model.states)
     if not isinstance(order, int) or isinstance(order, bool) or not 0 < order < nx:
         raise InputError(
             f"order: expected an integer from 1 to {nx - 1} (the model has {nx} states), got"
             f" {order!r}"
         )
-    su = channel_scales(input_scale, "input_scale", len(model.inputs))
-    sy = channel_scales(output_scale, "output_scale", len(model.outputs))
-    balanced = _nodes(model, nodes)
-    gramians = [_gramians(m, su, sy, p) for p, m in balanced]
-    X, Y = (np.mean(parts, axis=0) for parts in zip(*gramians, strict=True))
-    Lx, Ly = _root(X), _root(Y)
-    U, values, V = np.linalg.svd(Lx.T @ Ly)
+
+
+def truncated_by(
+    gramians: tuple[Array, Array],
+    model: Model,
+    order: int,
+    balance: Balance,
+    nodes: int,
+    su: Array,
+    sy: Array,
+) -> BalancedTruncation[Model]:
+    """Project on the states of the largest singular values of these Gramians, of observability (of
+    factors: of control) and of reachability (of filtering); `bound` is twice the tail, which is one
+    for all p where the Gramians are.
+    """
+    left, right, values = balancing(gramians)
     if values[order - 1] <= NEGLIGIBLE * values[0]:
         count = int(np.sum(values > NEGLIGIBLE * values[0]))
         raise InputError(
-            f"order: only {count} of the {nx} states can be excited and seen; keep {count} or fewer"
+            f"order: only {count} of the {len(values)} states can be excited and seen; keep"
+            f" {count} or fewer"
         )
-    size = np.sqrt(values[:order])
-    left, right = Lx @ U[:, :order] / size, Ly @ V[:order].T / size
-    small = _projected(model, left, right)
+    small = projected(model, left[:, :order], right[:, :order])
     pairs = list(zip(_between(model, nodes), _between(small, nodes), strict=True))
-    compared = [_comparable(full, reduced) for (_, full), (_, reduced) in pairs]
-    gaps = [nu_gap(*pair, input_scale=su, output_scale=sy) for pair in compared]
-    errors = [_relative_error(*pair, su, sy) for pair in compared]
+    compared = [sampled_alike(full, reduced) for (_, full), (_, reduced) in pairs]
+    gaps = [nu_gap(full, reduced, input_scale=su, output_scale=sy) for full, reduced in compared]
+    errors = [_relative_error(full, reduced, su, sy) for full, reduced in compared]
     p = np.array([np.squeeze(p) for (p, _), _ in pairs])
-    return BalancedTruncation(small, values, p, np.array(gaps), np.array(errors))
+    tail = values[order:]
+    if balance == "factors":
+        tail = tail / np.sqrt(1 + tail**2)  # Hankel singular values of the factors
+    bound = 2.0 * float(tail.sum())
+    return BalancedTruncation(small, values, p, np.array(gaps), np.array(errors), bound)
 
 
 def _nodes(model: LPVStateSpace | LinearModel, count: int) -> list[tuple[Array, LinearModel]]:
@@ -144,7 +207,28 @@ def _between(model: LPVStateSpace | LinearModel, count: int) -> list[tuple[Array
     return [(p, model.at(*p)) for p in tensor_grid(axes)]
 
 
-def _gramians(model: LinearModel, su: Array, sy: Array, p: Array) -> tuple[Array, Array]:
+def _of_response(model: LinearModel, su: Array, sy: Array, p: Array) -> tuple[Array, Array]:
+    """Observability and reachability Gramians with scaled channels."""
+    if not model.is_stable():
+        raise InputError(
+            f"the frozen model{_where(p)} is not stable: its response has no Gramians; balance the"
+            ' coprime factors, balance="factors"'
+        )
+    return response_gramians(model.A, model.B * su, model.C / sy[:, None], model.dt)
+
+
+def response_gramians(A: Array, B: Array, C: Array, dt: float | None) -> tuple[Array, Array]:
+    """Observability and reachability Gramians (n, n) of a stable model."""
+    solve = solve_continuous_lyapunov if dt is None else solve_discrete_lyapunov
+    sign = -1.0 if dt is None else 1.0
+    return solve(A.T, sign * C.T @ C), solve(A, sign * B @ B.T)
+
+
+def _where(p: Array) -> str:
+    return "" if np.isnan(p).any() else f" at p = {', '.join(f'{v:.4g}' for v in np.ravel(p))}"
+
+
+def _of_factors(model: LinearModel, su: Array, sy: Array, p: Array) -> tuple[Array, Array]:
     """Solutions of the control and filter Riccati equations with scaled channels."""
     A, B, C, D = model.A, model.B * su, model.C / sy[:, None], model.D * su / sy[:, None]
     solve = solve_continuous_are if model.dt is None else solve_discrete_are
@@ -152,9 +236,8 @@ def _gramians(model: LinearModel, su: Array, sy: Array, p: Array) -> tuple[Array
         X = solve(A, B, C.T @ C, np.eye(B.shape[1]) + D.T @ D, s=C.T @ D)
         Y = solve(A.T, C.T, B @ B.T, np.eye(C.shape[0]) + D @ D.T, s=B @ D.T)
     except (np.linalg.LinAlgError, ValueError) as error:
-        where = "" if np.isnan(p).any() else f" at p = {', '.join(f'{v:.4g}' for v in p)}"
         raise InputError(
-            f"the frozen model{where} is not stabilisable and detectable, it cannot be balanced"
+            f"the frozen model{_where(p)} is not stabilisable and detectable, it cannot be balanced"
             f" ({error})"
         ) from error
     return X, Y
@@ -165,30 +248,14 @@ def _root(M: Array) -> Array:
     return vectors * np.sqrt(np.maximum(values, 0.0))
 
 
-def _projected(model: Model, left: Array, right: Array) -> Model:
+def projected(model: Model, left: Array, right: Array) -> Model:
+    """The model of the states left' x, with x = right times these."""
     states = tuple(Signal(f"x{i + 1}") for i in range(right.shape[1]))
     parts = dict(A=left.T @ model.A @ right, B=left.T @ model.B, C=model.C @ right, states=states)
     if isinstance(model, LinearModel):
         return replace(model, **parts, point=None)
     trim = model.trim and model.trim.projected(left)
     return replace(model, **parts, trim=trim, residuals=None)
-
-
-def _comparable(full: LinearModel, small: LinearModel) -> tuple[LinearModel, LinearModel]:
-    """Return both as discrete models: continuous ones by the same bilinear transformation, which
-    preserves gains and the nu-gap.
-    """
-    if full.dt is not None:
-        return full, small
-    fastest = float(np.abs(full.poles()).max(initial=0.0))
-    dt = 2.0 / fastest if fastest > 0 else 1.0  # maps the fastest pole to a quarter of the circle
-    return _bilinear(full, dt), _bilinear(small, dt)
-
-
-def _bilinear(model: LinearModel, dt: float) -> LinearModel:
-    inverse = np.linalg.inv(np.eye(len(model.A)) - 0.5 * dt * model.A)
-    A, B = inverse @ (np.eye(len(model.A)) + 0.5 * dt * model.A), inverse @ model.B * dt
-    return replace(model, A=A, B=B, C=model.C @ inverse, D=model.D + 0.5 * model.C @ B, dt=dt)
 
 
 def _relative_error(one: LinearModel, two: LinearModel, su: Array, sy: Array) -> float:

@@ -1,8 +1,10 @@
-"""LPV and LFT models from matrices of SymPy expressions in the scheduling parameters."""
+"""LPV and LFT models from matrices of SymPy or CasADi expressions in the scheduling parameters."""
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import reduce
 from typing import Any
 
@@ -19,7 +21,9 @@ from symheli.lpv.scheduling import Scheduling, parameters
 from symheli.values.signal import Signal, signals
 
 Given = Any
-"""A matrix of numbers and SymPy expressions: nested lists, a NumPy array or a SymPy matrix."""
+"""A matrix of numbers and expressions of SymPy or CasADi: nested lists, a NumPy array, or a
+matrix of SymPy or CasADi.
+"""
 Expression = Any
 Names = Sequence[str] | None
 
@@ -27,10 +31,10 @@ Names = Sequence[str] | None
 def lpv_of(
     matrices: Sequence[Given],
     scheduling: Scheduling | Sequence[Scheduling],
-    dt: float | None,
-    states: Names,
-    inputs: Names,
-    outputs: Names,
+    dt: float | None = None,
+    states: Names = None,
+    inputs: Names = None,
+    outputs: Names = None,
 ) -> LPVStateSpace:
     """See `LPVStateSpace.from_expressions`."""
     sympy = _sympy()
@@ -42,18 +46,15 @@ def lpv_of(
     if all(entry.is_polynomial(*symbols) for entry in entries):
         a, b, c, d = (_by_powers(M, symbols) for M in (A, B, C, D))
         return LPVStateSpace.polynomial(a, b, c, d, given, dt, states, inputs, outputs)
-    if wrong := [e for e in entries if e.is_rational_function(*symbols) and not e.is_polynomial()]:
-        raise InputError(
-            f"{wrong[0]} is a rational function, which no basis of an LPVStateSpace holds exactly:"
-            " LFT.from_expressions does"
-        )
     whole = sympy.Matrix(sympy.BlockMatrix([[A, B], [C, D]])).applyfunc(sympy.expand)
-    terms = [[_by_parameter(t, symbols) for t in sympy.Add.make_args(entry)] for entry in whole]
+    terms = [
+        [_by_parameter(t, symbols) for t in sympy.Add.make_args(entry) if t != 0] for entry in whole
+    ]
     factors = []
     for k, s in enumerate(given):
         found = {functions[k] for entry in terms for _, functions in entry}
         used = sorted(found | {sympy.Integer(1)}, key=sympy.default_sort_key)
-        factors.append((used, _functions(used, s)))
+        factors.append((used, functions_of_one(used, s)))
     basis = factors[0][1] if len(given) == 1 else Product(tuple(one for _, one in factors))
     known = basis.indices if isinstance(basis, Product) else [(k,) for k in range(basis.size)]
     M = np.zeros((basis.size, len(whole)))
@@ -112,30 +113,61 @@ def lft_of(
 
 def _matrices(given: Sequence[Given], known: Sequence[Scheduling]) -> list[Expression]:
     """A, B, C, D with exact numbers and the parameters' own symbols."""
-    sympy = _sympy()
-
-    own = {s.name: s.symbol for s in known}
-    found = []
-    for name, M in zip("ABCD", given, strict=True):
-        try:
-            M = sympy.Matrix(M)
-        except (TypeError, ValueError) as error:
-            raise InputError(f"{name}: expected a matrix of expressions ({error})") from None
-        for symbol in sorted(M.free_symbols, key=str):
-            if str(symbol) not in own:
-                raise UnknownNameError("scheduling parameter", str(symbol), list(own))
-        exact = {number: sympy.Rational(number) for number in M.atoms(sympy.Float)}
-        same = {symbol: own[str(symbol)] for symbol in M.free_symbols}
-        found.append(M.xreplace({**exact, **same}))
-        if bad := [e for e in found[-1] if e.has(sympy.nan, sympy.oo, sympy.zoo, sympy.I)]:
-            raise InputError(f"{name}: expected real, finite entries, got {bad[0]}")
-    A, B, C, D = found
+    A, B, C, D = (_matrix(name, M, known) for name, M in zip("ABCD", given, strict=True))
     if A.rows != A.cols or B.rows != A.rows or C.cols != A.rows or D.shape != (C.rows, B.cols):
         raise InputError(
             "expected A (nx, nx), B (nx, nu), C (ny, nx), D (ny, nu), got"
             f" {A.shape}, {B.shape}, {C.shape}, {D.shape}"
         )
-    return found
+    return [A, B, C, D]
+
+
+def _matrix(name: str, given: Given, known: Sequence[Scheduling]) -> Expression:
+    sympy = _sympy()
+
+    own = {s.name: s.symbol for s in known}
+    try:
+        if _is_casadi(given):
+            given = _of_casadi(given)
+        elif isinstance(given, list | tuple):
+            given = [
+                [_of_casadi(e)[0] if _is_casadi(e) else e for e in row]
+                if isinstance(row, list | tuple)
+                else row
+                for row in given
+            ]
+        M = sympy.Matrix(given)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name}: expected a matrix of expressions ({error})") from None
+    for symbol in sorted(M.free_symbols, key=str):
+        if str(symbol) not in own:
+            raise UnknownNameError("scheduling parameter", str(symbol), list(own))
+    exact = {number: sympy.Rational(number) for number in M.atoms(sympy.Float)}
+    same = {symbol: own[str(symbol)] for symbol in M.free_symbols}
+    M = M.xreplace({**exact, **same})
+    if bad := [e for e in M if e.has(sympy.nan, sympy.oo, sympy.zoo, sympy.I)]:
+        raise InputError(f"{name}: expected real, finite entries, got {bad[0]}")
+    return M
+
+
+def _is_casadi(given: Given) -> bool:
+    return type(given).__module__.partition(".")[0] == "casadi"
+
+
+def _of_casadi(given: Given) -> Expression:
+    """The same matrix in SymPy, with symbols of the same names."""
+    import casadi
+
+    from symheli.values.arithmetic import SYMPY
+    from symheli.values.tape import Tape
+
+    sympy = _sympy()
+    given = casadi.SX(given) if isinstance(given, casadi.DM) else given
+    used = casadi.symvar(given)
+    if vectors := [s.name() for s in used if not s.is_scalar()]:
+        raise InputError(f"{vectors[0]} is a vector: expected one scalar symbol a parameter")
+    arguments = [[[sympy.Symbol(s.name())]] for s in used]
+    return sympy.Matrix(Tape.of(casadi.Function("f", used, [given])).run(arguments, SYMPY)[0])
 
 
 def _by_powers(M: Expression, symbols: Sequence[Expression]) -> dict[tuple[int, ...], Any]:
@@ -162,19 +194,32 @@ def _by_parameter(
         if own.free_symbols - {symbol}:
             raise InputError(
                 f"{own} is no product of functions of one parameter each, which a basis over"
-                " several parameters needs"
+                " several parameters needs; LFT.from_expressions holds any rational function"
             )
     return number * rest, functions
 
 
-def _functions(used: Sequence[Expression], s: Scheduling) -> UserFunctions:
+def functions_of_one(used: Sequence[Expression], s: Scheduling) -> UserFunctions:
+    """See `UserFunctions.from_expressions`."""
     sympy = _sympy()
 
     def compiled(f: Expression) -> Callable[[np.ndarray], np.ndarray]:
         function = sympy.lambdify(s.symbol, f, "numpy")
         return lambda p: function(p) + 0.0 * p  # a constant too has the shape of p
 
-    return UserFunctions(tuple(map(compiled, used)), s.low, s.high, tuple(map(str, used)))
+    used = list(_matrix("functions", [list(used)], [s]))
+
+    def name(f: Expression) -> str:
+        long = {number: sympy.Float(number, 6) for number in f.atoms(sympy.Rational)}
+        return str(f.xreplace({number: short for number, short in long.items() if number.q > 1000}))
+
+    basis = UserFunctions(tuple(map(compiled, used)), s.low, s.high, tuple(map(name, used)))
+    slopes = [sympy.diff(f, s.symbol) for f in used]
+    if any(f.has(sympy.Derivative) for f in slopes):
+        return basis
+    with contextlib.suppress(InputError):  # a slope that is not finite, as that of sqrt(p) at 0
+        return replace(basis, derivatives=tuple(map(compiled, slopes)))
+    return basis
 
 
 def _static(expression: Expression, symbols: dict[Expression, Scheduling]) -> LFT:

@@ -355,8 +355,13 @@ def damping(model: Model, p: object = None) -> Damping:
             rows.append(
                 (one.p, complex(pole), float(size), float(-pole.real / size if size else 1))
             )
+    return Damping(parameters_of(model), tuple(rows))
+
+
+def parameters_of(model: Model) -> tuple[Signal, ...]:
+    """Names and units of the parameters at which a model is frozen."""
     names = model.axes if isinstance(model, LinearFamily) else getattr(model, "parameters", ())
-    return Damping(tuple(Signal(getattr(s, "name", s), s.unit) for s in names), tuple(rows))
+    return tuple(Signal(getattr(s, "name", s), s.unit) for s in names)
 
 
 def step(
@@ -383,7 +388,7 @@ def step(
     duration : float, optional
         s; by default five times the slowest decaying pole's time constant.
     along : array_like (n,) or (n, d), optional
-        Values of the parameters at even times over the duration, of an LPVStateSpace.
+        Values of the parameters at even times over the duration, of an LPVStateSpace or LFT.
     ax : Axes, optional
         To draw into.
 
@@ -413,8 +418,8 @@ def step(
             found.time, found.values[:, i, j], color=BLUE, alpha=strength, label=one.words or None
         )
     if along is not None:
-        if not isinstance(model, LPVStateSpace):
-            raise InputError("along: expected an LPVStateSpace, whose parameter can move")
+        if not isinstance(model, LPVStateSpace | LFT):
+            raise InputError("along: expected an LPVStateSpace or an LFT, whose parameter can move")
         path = np.asarray(along, float)
         dt = model.dt or seconds / (len(path) - 1)
         i, j = _places(models[0].model, input, output)

@@ -34,8 +34,8 @@ def over(lpv: LPVStateSpace, given: Sequence[Scheduling]) -> LPVStateSpace:
     trim, residuals = lpv.trim, lpv.residuals
     if trim is not None:
         other, own = _over(trim.basis, lpv.parameters, given)
-        rates = None if trim.xdot is None else trim.xdot[own]
-        trim = replace(trim, basis=other, x=trim.x[own], u=trim.u[own], xdot=rates)
+        rates, y = (None if M is None else M[own] for M in (trim.xdot, trim.y))
+        trim = replace(trim, basis=other, x=trim.x[own], u=trim.u[own], xdot=rates, y=y)
     return replace(
         lpv,
         basis=basis,

@@ -195,8 +195,10 @@ def connect(
 
     Parameters
     ----------
-    *systems : LinearModel, LPVStateSpace, LFT, UncertainStateSpace or a system of python-control
-        Units of connected signals must agree.
+    *systems : LinearModel, LPVStateSpace, LFT, UncertainStateSpace, python-control system or dict
+        {(inputs, outputs): system} gives names, one or a sequence of them, to systems, transfer
+        functions, numbers and matrices. Units of connected signals must agree; transfer functions
+        and gains take those of the signals with their names.
     inputs : sequence of str
         The external ones.
     outputs : sequence of str
@@ -228,8 +230,20 @@ def connect(
     >>> loop.at(0.0).A.round(6) + 0.0
     array([[ 0.,  1.],
            [-4., -1.]])
+
+    The same with the controller as a block:
+
+    >>> same = lpv.connect(
+    ...     spring,
+    ...     {("error", "u1"): 2.0},
+    ...     inputs=["r"],
+    ...     outputs=["y1", "error"],
+    ...     sums={"error": {"r": 1.0, "y1": -1.0}},
+    ... )
+    >>> np.allclose(same.at(0.0).A, loop.at(0.0).A)
+    True
     """
-    both = _Together.of(systems, by_name=True)
+    both = _Together.of(_blocks(systems), by_name=True)
     fed, given = (list(chain(*(group[side] for group in both.groups))) for side in (0, 1))
     if twice := sorted({str(y) for y in given if given.count(y) > 1}):
         raise InputError(
@@ -415,6 +429,50 @@ def _open(unc: UncertainStateSpace) -> LPVStateSpace:
     return unc.model.select(inputs=inputs, outputs=(*unc.outputs, *unc.perturbation_outputs))
 
 
+def _blocks(systems: Sequence[System]) -> list[System]:
+    """The systems, those of a dictionary under the names that it gives; what has no units gets
+    those of the signals that have its names.
+    """
+    plain = [s for s in systems if not isinstance(s, Mapping) and not is_control_system(s)]
+    units = {
+        str(name): name.unit
+        for s in plain
+        for name in (*getattr(s, "inputs", ()), *getattr(s, "outputs", ()))
+        if isinstance(name, Signal)
+    }
+    found = []
+    for given in systems:
+        for key, block in (given if isinstance(given, Mapping) else {None: given}).items():
+            if key is not None and not (isinstance(key, tuple) and len(key) == 2):
+                raise InputError(f"expected {{(inputs, outputs): system}}, got the key {key!r}")
+            if key is None and not is_control_system(block):
+                found.append(block)
+                continue
+            model = _system(block, by_name=False)
+            own = model is block
+            u, y = (
+                tuple(
+                    Signal(new, old.unit if own else units.get(new))
+                    for new, old in zip(_as_many(names, known), known, strict=True)
+                )
+                for names, known in zip(
+                    key or (model.inputs, model.outputs), (model.inputs, model.outputs), strict=True
+                )
+            )
+            found.append(replace(model, inputs=u, outputs=y))
+    return found
+
+
+def _as_many(names: str | Sequence[str], known: Sequence[Signal]) -> Sequence[str]:
+    given = [names] if isinstance(names, str) else list(names)
+    if len(given) != len(known):
+        raise InputError(
+            f"expected {len(known)} name(s), for {', '.join(known) or 'nothing'}, got"
+            f" {', '.join(given)}"
+        )
+    return given
+
+
 def _system(given: System, *, by_name: bool) -> Any:
     """A value of this package: a gain and a system of python-control as a `LinearModel`."""
     if isinstance(given, LinearModel | LPVStateSpace | LFT | UncertainStateSpace):
@@ -429,7 +487,7 @@ def _system(given: System, *, by_name: bool) -> Any:
     if by_name:
         raise InputError(
             "a bare gain has no names to connect it by: write it into sums={input: {signal: gain}},"
-            " or name its signals with LinearModel.gain(matrix, inputs, outputs)"
+            " or give names to its signals, {(inputs, outputs): gain}"
         )
     gain = np.atleast_2d(frozen(given, "gain"))
     ny, nu = gain.shape

@@ -276,7 +276,13 @@ class LinearModel:
         if not hasattr(system, "A"):
             import control
 
-            system = control.ss(system)
+            try:
+                system = control.ss(system)
+            except (TypeError, ValueError, NotImplementedError) as error:
+                raise InputError(
+                    f"this {type(system).__name__} has no realization that python-control finds"
+                    f" ({error})"
+                ) from error
         if system.dt is True:
             raise InputError(
                 "the system is discrete with a sample period of unknown length (dt = True); set .dt"

@@ -39,7 +39,10 @@ def save(model: LPVStateSpace, path: str | os.PathLike[str]) -> Path:
             "basis": described_basis(trim.basis),
             "x": _written(trim.x),
             "u": _written(trim.u),
-            "xdot": None if trim.xdot is None else _written(trim.xdot),
+            **{
+                name: None if (M := getattr(trim, name)) is None else _written(M)
+                for name in ("xdot", "y")
+            },
         },
         "residuals": None if residuals is None else [_written(each) for each in residuals],
     }
@@ -67,7 +70,7 @@ def load(path: str | os.PathLike[str], basis: FunctionSpace | None) -> LPVStateS
                 basis_of(trim["basis"], None, path),
                 _read(trim["x"]),
                 _read(trim["u"]),
-                None if trim["xdot"] is None else _read(trim["xdot"]),
+                *(None if (M := trim.get(name)) is None else _read(M) for name in ("xdot", "y")),
             ),
             residuals=None if residuals is None else Residuals(*map(_read, residuals)),
         )

@@ -20,6 +20,7 @@ from symheli.lpv.linear_model import LinearModel, feedback_matrix
 from symheli.lpv.monomials import as_blocks
 from symheli.lpv.recentred import centre, recentred
 from symheli.lpv.scheduling import (
+    RANGE_SLACK,
     UNSCHEDULED,
     Rates,
     Scheduling,
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
-    from symheli.lpv.balanced_truncation import BalancedTruncation
+    from symheli.lpv.balanced_truncation import Balance, BalancedTruncation
     from symheli.lpv.lft import LFT
     from symheli.lpv.prediction import Prediction
 
@@ -100,7 +101,7 @@ class LPVStateSpace:
     dt : float, optional
         Sample period in s; None in continuous time.
     trim : TrimSchedule, optional
-        x0(p), u0(p) about which the model holds.
+        x0(p), u0(p), y0(p) about which the model holds.
     residuals : Residuals, optional
         Where the model was fitted or sampled: fit minus what it was fitted to, at its nodes.
 
@@ -155,7 +156,7 @@ class LPVStateSpace:
                 f" {len(self.parameters)}: {', '.join(s.name for s in self.parameters)}"
             )
         for s, (low, high) in zip(self.parameters, self.basis.ranges, strict=True):
-            slack = 1e-9 * (s.high - s.low)
+            slack = RANGE_SLACK * (s.high - s.low)
             if low > s.low + slack or high < s.high - slack:
                 raise InputError(
                     f"the basis covers [{low}, {high}] but scheduling {s.name} ranges over"
@@ -220,13 +221,15 @@ class LPVStateSpace:
         outputs: Sequence[str] | None = None,
     ) -> LPVStateSpace:
         """Return a model from matrices of SymPy expressions in the symbols of the parameters
-        (`Scheduling.symbol`, in their units), and numbers; exact.
+        (`Scheduling.symbol`, in their units), or of CasADi expressions in scalar symbols of their
+        names, and numbers; exact.
 
         Polynomials in any number of parameters get a polynomial basis; other functions, such as
-        sin(p) or sqrt(p), are functions of a `UserFunctions` basis, in several parameters products
-        of functions of one each. Names default to x1.., u1.., y1... Raises `InputError` for
-        rational functions, which `LFT.from_expressions` holds, and for shapes that do not fit,
-        `UnknownNameError` for another symbol.
+        sin(p), sqrt(p) or 1/p, are functions of a `UserFunctions` basis, in several parameters
+        products of functions of one each: such a model is simulated, drawn, connected and designed
+        for, but has no certificate. `LFT.from_expressions` holds rational functions so that there
+        are certificates. Names default to x1.., u1.., y1... Raises `InputError` for shapes that do
+        not fit, `UnknownNameError` for another symbol.
 
         Examples
         --------
@@ -392,7 +395,7 @@ class LPVStateSpace:
             states=tuple(self.states[i] for i in ix),
             inputs=tuple(self.inputs[i] for i in iu),
             outputs=tuple(self.outputs[i] for i in iy),
-            trim=self.trim and self.trim.select(ix, iu),
+            trim=self.trim and self.trim.select(ix, iu, iy),
             residuals=self.residuals
             and Residuals(self.residuals.nodes, *keep(*self.residuals.matrices)),
         )
@@ -515,6 +518,25 @@ class LPVStateSpace:
             )
         return model.with_residuals(p, sampled)
 
+    def fitted(self, basis: FunctionSpace) -> LPVStateSpace:
+        """Return the model with its entries fitted by the functions of another basis, such as
+        `Polynomial(8, low, high)`, and the misfit in `.residuals`: certificates are of polynomials
+        and piecewise polynomials.
+        """
+        p = lobatto_points(41 if len(self.parameters) == 1 else 13, self.box)
+        p = np.concatenate([p, basis.samples(self.box)])
+        exact = self.matrices(p)
+        model = replace(
+            self,
+            basis=basis,
+            **{name: basis.fit(p, M) for name, M in exact._asdict().items()},
+            residuals=None,
+        )
+        if (origin := self.fitted_to) is not None:
+            p = np.concatenate([p, origin.nodes])
+            exact = Matrices(*map(np.concatenate, zip(exact, origin.matrices, strict=True)))
+        return model.with_residuals(p, exact)
+
     @property
     def fitted_to(self) -> Residuals | None:
         """Data of the fit at its nodes: fit minus residuals; None for a model that is not a fit."""
@@ -541,7 +563,13 @@ class LPVStateSpace:
         return Matrices(*(np.stack([getattr(model, name) for model in frozen]) for name in "ABCD"))
 
     def truncate(
-        self, order: int, *, nodes: int = 21, input_scale: object = 1.0, output_scale: object = 1.0
+        self,
+        order: int,
+        *,
+        balance: Balance = "factors",
+        nodes: int = 21,
+        input_scale: object = 1.0,
+        output_scale: object = 1.0,
     ) -> BalancedTruncation[LPVStateSpace]:
         """`order` states by one projection balanced over p, with the error it makes; see
         `symheli.lpv.balanced_truncation`.
@@ -549,7 +577,12 @@ class LPVStateSpace:
         from symheli.lpv.balanced_truncation import balanced_truncation
 
         return balanced_truncation(
-            self, order, nodes=nodes, input_scale=input_scale, output_scale=output_scale
+            self,
+            order,
+            balance=balance,
+            nodes=nodes,
+            input_scale=input_scale,
+            output_scale=output_scale,
         )
 
     def save(self, path: str | os.PathLike[str]) -> Path:
@@ -580,11 +613,14 @@ class LPVStateSpace:
         *,
         dt: float | None = None,
         drift: object | None = None,
+        offsets: bool = False,
     ) -> tuple[Array, Array]:
-        """States (n, nx) and outputs (n, ny) along p (n,) or (n, d); see `symheli.lpv.simulate`."""
+        """States (n, nx) and outputs (n, ny) along p (n,) or (n, d), or with p(t, x, u) a function;
+        see `symheli.lpv.simulate`.
+        """
         from symheli.lpv.simulate import simulate
 
-        return simulate(self, p, u, x0, dt=dt, drift=drift)
+        return simulate(self, p, u, x0, dt=dt, drift=drift, offsets=offsets)
 
     def predict(
         self,

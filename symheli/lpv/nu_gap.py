@@ -38,9 +38,11 @@ def nu_gap(
     output_scale: object = 1.0,
     points: int = 2000,
 ) -> float:
-    """Return the nu-gap of two discrete models with equal sample period, inputs and outputs.
+    """Return the nu-gap of two models, both continuous or with one sample period, of equal inputs
+    and outputs.
 
-    1 where the winding-number condition fails: no controller is known to suit both. Evaluated on
+    1 where the winding-number condition fails: no controller is known to suit both. Continuous
+    models are compared after the bilinear transformation of both, which preserves it. Evaluated on
     frequencies up to Nyquist, logarithmic, from a thousandth of the slowest pole, at the poles and
     around them, and between them where the response turns by more than an eighth of a circle.
 
@@ -61,8 +63,8 @@ def nu_gap(
     Raises
     ------
     InputError
-        Models with poles on the unit circle, as far as rounding can tell, or with other signals;
-        scales that are not positive.
+        Models with poles on the stability boundary, as far as rounding can tell, or with other
+        signals or sample periods; scales that are not positive.
 
     References
     ----------
@@ -74,11 +76,7 @@ def nu_gap(
     >>> lpv.nu_gap(soft, soft) < 1e-6, round(lpv.nu_gap(soft, stiff), 2)
     (True, 0.16)
     """
-    if first.dt is None or not same_period(first.dt, second.dt):
-        raise InputError(
-            f"nu_gap compares discrete models with one sample period, got {first.dt} and"
-            f" {second.dt} s; discretize them"
-        )
+    first, second = sampled_alike(first, second)
     require_same_signals(first, second)
     su = channel_scales(input_scale, "input_scale", len(first.inputs))
     sy = channel_scales(output_scale, "output_scale", len(first.outputs))
@@ -86,7 +84,7 @@ def nu_gap(
     for model in (first, second):
         found = model.poles()
         if np.any(np.abs(np.abs(found) - 1) < ON_THE_CIRCLE):
-            raise InputError("nu_gap: a pole lies on the unit circle")
+            raise InputError("nu_gap: a pole lies on the stability boundary")
         unstable.append(int(np.sum(np.abs(found) > 1)))
         poles.append(found)
     angle = angles(np.concatenate(poles), points)
@@ -113,6 +111,24 @@ def nu_gap(
     if _winding(P1, P2) + unstable[0] - unstable[1] != 0:
         return 1.0
     return float(_chordal(P1, P2).max())
+
+
+def sampled_alike(*models: LinearModel) -> tuple[LinearModel, ...]:
+    """Return discrete models as they are, continuous ones after one bilinear transformation, which
+    preserves gains and the nu-gap; raise `InputError` unless they have one sample period.
+    """
+    periods = [m.dt for m in models]
+    if not all(same_period(dt, periods[0]) for dt in periods):
+        raise InputError(
+            "expected models with one sample period, or all continuous, got"
+            f" {', '.join('continuous' if dt is None else f'{dt:g} s' for dt in periods)};"
+            " discretize them"
+        )
+    if periods[0] is not None:
+        return models
+    fastest = float(np.abs(np.concatenate([m.poles() for m in models])).max(initial=0.0))
+    dt = 1.0 / fastest if fastest > 0 else 1.0  # no pole is at 2/dt, which would go to infinity
+    return tuple(m.discretize(dt, "tustin") for m in models)
 
 
 def channel_scales(given: object, name: str, channels: int) -> Array:
@@ -216,7 +232,7 @@ def nu_gaps(
     output_scale: object = 1.0,
     points: int = 100,
 ) -> Array:
-    """Return the nu-gap from one discrete model to each of many, as `nu_gap` does for two.
+    """Return the nu-gap from one model to each of many, as `nu_gap` does for two.
 
     All on the frequencies of the one model's poles, then closer around the largest distance of
     each. A model in which the winding number cannot be told on these goes through `nu_gap` itself.
@@ -224,7 +240,7 @@ def nu_gaps(
     Parameters
     ----------
     model : LinearModel
-        Discrete.
+        Discrete, or continuous, which goes through `nu_gap` itself.
     others : LinearModels
         K of them, with its signals and sample period; their states may be others.
     input_scale, output_scale : float or array
@@ -248,6 +264,10 @@ def nu_gaps(
     >>> lpv.nu_gaps(ladder[0], ladder).round(2)
     array([0.  , 0.09, 0.16])
     """
+    if model.dt is None and others.dt is None:
+        each = (others[k] for k in range(len(others)))
+        su, sy = input_scale, output_scale
+        return np.array([nu_gap(model, m, input_scale=su, output_scale=sy) for m in each])
     if model.dt is None or not same_period(model.dt, others.dt):
         raise InputError(
             f"nu_gaps compares discrete models with one sample period, got {model.dt} and"

@@ -16,6 +16,9 @@ from symheli.values.units import per_second, ratio
 if TYPE_CHECKING:
     import sympy
 
+RANGE_SLACK = 1e-9
+"""Fraction of a range by which p may leave it: rounding."""
+
 Limit = float | str
 """Rate bound of a parameter: a number in its unit per second (math.inf: arbitrarily fast), or the
 name of the parameter that is its rate.
@@ -116,7 +119,7 @@ class Scheduling:
         rounding.
         """
         p = frozen(p, self.name)
-        slack = 1e-9 * (self.high - self.low)
+        slack = RANGE_SLACK * (self.high - self.low)
         if p.size and (p.min() < self.low - slack or p.max() > self.high + slack):
             raise InputError(
                 f"{self.name} spans [{p.min():.4g}, {p.max():.4g}] {self.unit} but the model holds"

@@ -11,7 +11,7 @@ from scipy.linalg import block_diag
 from symheli.errors import InputError
 from symheli.lpv.equilibration import loop_inverse
 from symheli.lpv.linear_model import LinearModel, feedback_matrix
-from symheli.lpv.nu_gap import angles, channel_scales
+from symheli.lpv.nu_gap import angles, channel_scales, sampled_alike
 from symheli.values.arrays import Array
 from symheli.values.sample_period import same_period
 from symheli.values.signal import indices
@@ -40,10 +40,11 @@ def stability_margin(
     Parameters
     ----------
     plant : LinearModel
-        P, discrete, without a direct way from u to y that makes the loop singular.
+        P, without a direct way from u to y that makes the loop singular.
     feedback : mapping or LinearModel
-        {(input, output): gain} as in `LinearModel.feedback`; or C, discrete with the same period,
-        from outputs of the plant to inputs of it. What is not named is not fed back.
+        {(input, output): gain} as in `LinearModel.feedback`; or C, with the same period or
+        continuous as P, from outputs of the plant to inputs of it. What is not named is not fed
+        back.
     input_scale, output_scale : float or array
         Inputs and outputs are divided by it, as in `nu_gap`: the margin depends on it.
 
@@ -55,7 +56,7 @@ def stability_margin(
     Raises
     ------
     InputError
-        A continuous plant, or a controller with another sample period.
+        A controller with another sample period.
     UnknownNameError
         A signal that the plant does not have.
 
@@ -65,18 +66,20 @@ def stability_margin(
 
     Examples
     --------
-    The graphs of a plant of gain 1 and of u = -y are orthogonal:
+    Of an integrator with u = -y, and of a plant of gain 1, whose graph is orthogonal to that of
+    u = -y:
 
+    >>> lag = lpv.LinearModel([[0.0]], [[1.0]], [[1.0]], [[0.0]], ["x"], ["u"], ["y"])
+    >>> round(lpv.stability_margin(lag, {("u", "y"): -1.0}), 6)
+    0.707107
     >>> one = lpv.LinearModel([[0.0]], [[0.0]], [[0.0]], [[1.0]], ["x"], ["u"], ["y"], dt=0.1)
     >>> round(lpv.stability_margin(one, {("u", "y"): -1.0}), 6)
     1.0
     """
-    if plant.dt is None:
-        raise InputError("stability_margin: expected a discrete plant; discretize it")
     nu, ny = len(plant.inputs), len(plant.outputs)
     su = channel_scales(input_scale, "input_scale", nu)
     sy = channel_scales(output_scale, "output_scale", ny)
-    controller = as_controller(feedback, plant)
+    plant, controller = sampled_alike(plant, as_controller(feedback, plant))
     A, B, C, D = closed_loop(plant, controller)
     poles = np.linalg.eigvals(A)
     if np.any(np.abs(poles) >= 1):

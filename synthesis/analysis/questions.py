@@ -4,8 +4,10 @@ decay rate and energy-to-peak gain (generalised H2 norm).
 
 from __future__ import annotations
 
+from symheli.lpv import FunctionSpace
 from symheli.threads import with_one_thread
 from synthesis.analysis.certify import certify
+from synthesis.analysis.on_grid import gain_on_grid
 from synthesis.analysis.problem import Model, pose
 from synthesis.certificate import Certificate
 from synthesis.forms import LyapunovForm, Spline
@@ -20,7 +22,7 @@ def l2_gain(
     model: Model,
     rate: Rate = None,
     *,
-    form: LyapunovForm | None = None,
+    form: LyapunovForm | FunctionSpace | None = None,
     impose: Imposed | None = None,
     solver: Solver | str | None = None,
     search: Search | None = THOROUGH,
@@ -39,8 +41,9 @@ def l2_gain(
     rate : float, sequence or mapping, optional
         Largest |dp/dt| in units of p per second: one for all parameters, one each, or by name; by
         default the model's own. math.inf: p may jump, and P is constant; 0: every frozen model.
-    form : Spline, Memory or HigherOrder, optional
-        The form of the Lyapunov function.
+    form : Spline, Memory or FunctionSpace, optional
+        The form of the Lyapunov function. Functions of one's own, a `FunctionSpace`, are for
+        `impose=Grid(n)` in continuous time, where nothing is proven.
     impose : Bernstein, SumOfSquares, Vertices or Grid, optional
         How the inequalities are imposed for every p; Bernstein coefficients by default.
     solver : Solver or str, optional
@@ -78,6 +81,8 @@ def l2_gain(
     >>> print(f"{cert.frozen:.3f} <= gain <= {cert.gamma:.3f}")
     1.000 <= gain <= 1.000
     """
+    if isinstance(form, FunctionSpace):
+        return gain_on_grid(model, rate, form, impose)
     return certify(pose(model, rate, "l2 gain", form, impose, solver, search))
 
 

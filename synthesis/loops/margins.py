@@ -12,6 +12,7 @@ from scipy.linalg import eigvals
 from symheli.errors import InputError
 from symheli.lpv import LinearModel
 from symheli.lpv.linear_model import feedback_matrix
+from symheli.lpv.lower_feedback import PREFIX, apart
 from symheli.values.signal import indices
 from synthesis.worst.frozen import crossings, norm, of_one_size, pace_of, to_continuous
 
@@ -142,7 +143,7 @@ def _dynamic_loop(plant: LinearModel, controller: LinearModel, at: str) -> Linea
         B[:, [k]],
         -C[[k]],
         np.zeros((1, 1)),
-        (*P.states, *controller.states),
+        (*P.states, *apart(controller.states, P.states, PREFIX)),
         (controls[k],),
         (controls[k],),
         plant.dt,

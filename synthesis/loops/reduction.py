@@ -15,10 +15,10 @@ from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
-from scipy import linalg
 
 from symheli.errors import InputError, SynthesisError
-from symheli.lpv import LPVStateSpace, Matrices
+from symheli.lpv import LPVStateSpace
+from symheli.lpv.balanced_truncation import response_gramians
 from symheli.lpv.bases.polynomials import lobatto_points
 from synthesis.loops.controller import Controller
 from synthesis.worst.frozen import norm, stable
@@ -157,19 +157,12 @@ def gramians(controller: Controller) -> tuple[Array, Array]:
     A, B, C, _ = closed.matrices(_conditions(closed))
     P, Q = np.zeros((n, n)), np.zeros((n, n))
     for each in zip(A, B, C, strict=True):
-        reach, seen = _gramians(Matrices(*each, np.zeros(0)), closed.dt)
+        if not stable(np.linalg.eigvals(each[0]), closed.dt):
+            raise SynthesisError(NOT_STABLE)
+        seen, reach = response_gramians(*each, closed.dt)
         P += reach[-n:, -n:]
         Q += seen[-n:, -n:]
     return P / len(A), Q / len(A)
-
-
-def _gramians(loop: Matrices, dt: float | None) -> tuple[Array, Array]:
-    A, B, C, _ = loop
-    if not stable(np.linalg.eigvals(A), dt):
-        raise SynthesisError(NOT_STABLE)
-    solve = linalg.solve_continuous_lyapunov if dt is None else linalg.solve_discrete_lyapunov
-    sign = -1.0 if dt is None else 1.0
-    return solve(A, sign * B @ B.T), solve(A.T, sign * C.T @ C)
 
 
 def _conditions(loop: LPVStateSpace) -> Array:

@@ -15,8 +15,9 @@ from symheli.threads import with_one_thread
 from symheli.values.signal import Signal
 from symheli.values.summary import as_table, summarized
 from synthesis.certificate import Attempt, Certificate
+from synthesis.impose import Grid
 from synthesis.lpv.bases import Bases, Dependence, dependence
-from synthesis.lpv.existence import Existence, Solution
+from synthesis.lpv.existence import Existence, Solution, imposed_at
 from synthesis.lpv.fitted import Fitted
 from synthesis.lpv.frozen_stability import frozen_stability
 from synthesis.lpv.output_feedback import USUAL
@@ -78,6 +79,7 @@ def estimator(
     X: Dependence | None = None,
     back_off: float | Sequence[float] = BACK_OFF,
     divisions: int = 1,
+    impose: Grid | None = None,
 ) -> Estimator:
     """Design an observer whose error has the least L2 gain, for every p(t) within its range and
     rates.
@@ -99,6 +101,8 @@ def estimator(
         Multiples of the least gamma at which X is settled, tried in turn.
     divisions : int
         In so many parts every range is cut where the inequalities are imposed.
+    impose : Grid, optional
+        As in `output_feedback`: at these points and nowhere else.
 
     Returns
     -------
@@ -131,7 +135,7 @@ def estimator(
     def every(degree: int) -> list[Bases]:
         return [Bases(dependence(X, parameters, "X", matters, degree, still=still), None)]
 
-    start = best(plant, every, divisions, USUAL, attempts)
+    start = best(plant, every, imposed_at(divisions, impose), USUAL, attempts)
     factors = levels_above(back_off)
     for design in settled(start, factors, _recover, USUAL, attempts, _error):
         model, error = _observer(plant, design.scaled, design.fit)

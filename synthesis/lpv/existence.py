@@ -2,9 +2,9 @@
 whose blocks are imposed at points of the range of p.
 
 The points are few at first; between them the blocks are checked on a finer grid, and where one is
-violated a point is added. This proves nothing, and need not: the proof is the certificate of the
-closed loop. Points do not raise gamma, as the hull of Bernstein coefficients would where an entry
-of B2 or C2 passes through zero.
+violated a point is added, unless a `Grid` was asked for. This proves nothing, and need not: the
+proof is the certificate of the closed loop. Points do not raise gamma, as the hull of Bernstein
+coefficients would where an entry of B2 or C2 passes through zero.
 """
 
 from __future__ import annotations
@@ -17,10 +17,11 @@ from typing import NamedTuple
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv import FunctionSpace
+from symheli.lpv import FunctionSpace, UserFunctions
 from symheli.lpv.bases.function_space import tensor_grid
 from symheli.lpv.bases.polynomials import factors_of, piecewise_lobatto
 from symheli.values.numbers import whole
+from synthesis.impose import Grid
 from synthesis.lpv.bases import moves, used
 from synthesis.lpv.elimination import Half, controlled, observed
 from synthesis.lpv.scaled_plant import ScaledPlant
@@ -31,6 +32,9 @@ from synthesis.program.cone_program import Solver
 from synthesis.program.lyapunov_program import LyapunovBlocks, Sizes
 
 Array = np.ndarray
+
+Divisions = int | Grid
+"""In how many parts every range is cut at first, or the points themselves."""
 
 MATRIX_BOUNDS = (1e8, 1e10)
 """X and Y are kept below this multiple of the identity, in scaled coordinates; the second bound is
@@ -74,6 +78,15 @@ ROUNDING = 1e-8
 """Eigenvalue up to which a block counts as negative there, in scaled coordinates."""
 
 
+def imposed_at(divisions: int, impose: Grid | None) -> Divisions:
+    """Where the inequalities of a design are imposed; raises `InputError` for what is no `Grid`."""
+    if impose is not None and not isinstance(impose, Grid):
+        raise InputError(
+            f"impose: expected a Grid, or None for points where they are needed, got {impose!r:.60}"
+        )
+    return divisions if impose is None else impose
+
+
 @dataclass(frozen=True, eq=False)
 class ExistenceProgram:
     """minimise cost g subject to blocks <= 0, for `interior_point.minimise`."""
@@ -100,7 +113,7 @@ class Solution(NamedTuple):
 
 class Existence:
     """The program of a plant with X and Y of these bases, its ranges cut in so many parts; `p` (m,)
-    is one of the points at which blocks are imposed.
+    is one of the points at which blocks are imposed. Of a `Grid` they are all points.
     """
 
     def __init__(
@@ -108,7 +121,7 @@ class Existence:
         plant: ScaledPlant,
         X: FunctionSpace | None,
         Y: FunctionSpace | None,
-        divisions: int = 1,
+        divisions: Divisions = 1,
         largest: float = MATRIX_BOUNDS[0],
         p: Array | None = None,
     ):
@@ -122,6 +135,11 @@ class Existence:
         self.S: UnknownFunction | None = each.pop(0) if each else self.Y
         self.count = sum(b.size for b in both)
         self.states = plant.at(np.array([[s.middle for s in plant.parameters]])).A.shape[-1]
+        self.fixed = isinstance(divisions, Grid)
+        if isinstance(divisions, Grid):
+            ends = ((b[0], b[-1]) for b in plant.breaks)
+            self.points = tensor_grid([np.linspace(*pair, divisions.points) for pair in ends])
+            return
         first = self._first(divisions)
         self.points = first if p is None else np.unique(np.vstack([first, p]), axis=0)
 
@@ -134,6 +152,9 @@ class Existence:
         most = np.zeros(m, int)
         for basis in (u.basis for u in (self.X, self.Y) if u is not None):
             for i, factor in enumerate(factors_of(basis)):
+                if isinstance(factor, UserFunctions):
+                    most[i] = max(most[i], factor.size)
+                    continue
                 for piece in factor.pieces():
                     most[i] = max(most[i], piece.bernstein.shape[1] - 1)
                     if min(breaks[i]) < piece.high < max(breaks[i]):
@@ -153,6 +174,8 @@ class Existence:
         """Minimise g, adding points where a block is violated between them."""
         if len(self.points) == 1:
             return self._least(solver)
+        if self.fixed:
+            return self._least(replace(solver, tolerance=FINE_TOLERANCE))
         start = None
         for _ in range(MAX_ROUNDS):
             found = self._least(replace(solver, tolerance=COARSE_TOLERANCE), start)
@@ -235,7 +258,7 @@ class Existence:
         for _ in range(MAX_ROUNDS):
             blocks = [*self._halves(gamma, margin), *self._coupling(True, largest)]
             found = self._solved(blocks, -1.0, solver)
-            if not np.any(found.coefficients) or len(self.points) == 1:
+            if not np.any(found.coefficients) or len(self.points) == 1 or self.fixed:
                 break
             if not self._added(found, gamma):
                 break

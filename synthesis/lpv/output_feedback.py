@@ -12,10 +12,11 @@ from symheli.lpv import UncertainStateSpace
 from symheli.lpv.bases.polynomials import lobatto_points
 from symheli.threads import with_one_thread
 from synthesis.certificate import Attempt
+from synthesis.impose import Grid
 from synthesis.loops.controller import Controller
 from synthesis.lpv.at_rest import at_rest
 from synthesis.lpv.bases import DEGREES, Bases, Dependence, both_moving, candidates, used
-from synthesis.lpv.existence import MATRIX_BOUNDS, Existence, Solution
+from synthesis.lpv.existence import MATRIX_BOUNDS, Divisions, Existence, Solution, imposed_at
 from synthesis.lpv.fitted import in_plant_units
 from synthesis.lpv.frozen_stability import frozen_stability
 from synthesis.lpv.recovery import controller, sampled_controller, split
@@ -60,6 +61,7 @@ def output_feedback(
     back_off: float | Sequence[float] = BACK_OFF,
     fastest: float = math.inf,
     divisions: int = 1,
+    impose: Grid | None = None,
 ) -> Controller:
     """Design a dynamic controller from the measurements, of the order of the plant, for every p(t)
     within its range and rates.
@@ -81,7 +83,8 @@ def output_feedback(
     rate : float, sequence or mapping, optional
         Largest |dp/dt|, as for `l2_gain`; by default the plant's own; math.inf: p may jump.
     X, Y : int, tuple or FunctionSpace, optional
-        Degree in every parameter, one each, or functions; by default one of the two moves, with a
+        Degree in every parameter, one each, or functions, such as
+        `UserFunctions.from_expressions([1, cos(t)], t)`; by default one of the two moves, with a
         degree that rises from 2 while that lowers gamma and gamma is above the worst optimum of the
         frozen models, which no controller can beat. Where both are given and move with a parameter
         of a bounded rate, the controller neglects dp/dt, as above.
@@ -94,6 +97,9 @@ def output_feedback(
     divisions : int
         In so many parts every range is cut at first where the inequalities are imposed; where they
         are violated between, points are added.
+    impose : Grid, optional
+        The inequalities hold at these points and are asked for nowhere else, as published designs
+        were made: `promised` is then no bound between the points, `certify` tells.
 
     Returns
     -------
@@ -128,6 +134,7 @@ def output_feedback(
     factors = levels_above(back_off)
     attempts: list[Attempt] = []
     matters = depends(plant)
+    cut = imposed_at(divisions, impose)
 
     def every(degree: int) -> list[Bases]:
         return candidates(parameters, X, Y, plant.dt is not None, matters, degree)
@@ -137,9 +144,9 @@ def output_feedback(
         return both_moving(parameters, matters, degree) if free else []
 
     if isinstance(plant.model, UncertainStateSpace):
-        return _robust(plant, every(DEGREES[1][0]), factors, fastest, divisions, attempts)
+        return _robust(plant, every(DEGREES[1][0]), factors, fastest, cut, attempts)
     free = X is None and Y is None
-    return _nominal(plant, every, both, factors, fastest, divisions, attempts, free=free)
+    return _nominal(plant, every, both, factors, fastest, cut, attempts, free=free)
 
 
 @with_one_thread
@@ -194,7 +201,7 @@ def _robust(
     every: Sequence[Bases],
     factors: Sequence[float],
     fastest: float,
-    divisions: int,
+    divisions: Divisions,
     attempts: list[Attempt],
 ) -> Controller:
     """Design for all models of the set, with the shape that is best for the nominal one."""
@@ -217,7 +224,7 @@ def _nominal(
     both: Callable[[int], Sequence[Bases]],
     factors: Sequence[float],
     fastest: float,
-    divisions: int,
+    divisions: Divisions,
     attempts: list[Attempt],
     *,
     free: bool = False,
@@ -252,7 +259,7 @@ def _controllers(
     both: Callable[[int], Sequence[Bases]],
     factors: Sequence[float],
     worst: FrozenOptimum,
-    divisions: int,
+    divisions: Divisions,
     attempts: list[Attempt],
     *,
     free: bool,

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from symheli.errors import InputError
-from symheli.lpv import FunctionSpace, LinearModel, Matrices, Scheduling
+from symheli.lpv import FunctionSpace, LinearModel, LPVStateSpace, Matrices, Scheduling
 from symheli.lpv.bases.function_space import tensor_grid
 from symheli.lpv.bases.polynomials import factors_of, interpolation_points
 from synthesis.lti.linear_quadratic import control_gains
@@ -147,14 +147,21 @@ class ScaledPlant:
     @property
     def breaks(self) -> list[list[float]]:
         """Breaks of the piecewise polynomials of each parameter, ends included."""
-        out = []
-        for s, factor in zip(self.parameters, factors_of(self.basis), strict=True):
-            try:
-                inner = [piece.low for piece in factor.pieces()[1:]]
-            except InputError:
-                inner = []
-            out.append([s.low, *(q for q in inner if s.low < q < s.high), s.high])
-        return out
+        return breaks_of(self)
+
+
+def breaks_of(model: ScaledPlant | LPVStateSpace) -> list[list[float]]:
+    """Return the breaks of the piecewise polynomials of each parameter, ends included; of functions
+    that are none the ends.
+    """
+    out = []
+    for s, factor in zip(model.parameters, factors_of(model.basis), strict=True):
+        try:
+            inner = [piece.low for piece in factor.pieces()[1:]]
+        except InputError:
+            inner = []
+        out.append([s.low, *(q for q in inner if s.low < q < s.high), s.high])
+    return out
 
 
 def _sizes(D: Array, axis: int) -> Array:

@@ -25,7 +25,7 @@ from symheli.lpv.bases.function_space import tensor_grid
 from symheli.progress import tracked
 from synthesis.certificate import Attempt
 from synthesis.lpv.bases import DEGREES, Bases, used
-from synthesis.lpv.existence import MATRIX_BOUNDS, Existence, Solution
+from synthesis.lpv.existence import MATRIX_BOUNDS, Divisions, Existence, Solution
 from synthesis.lpv.fitted import Fitted, cut_to_serve, fits
 from synthesis.lpv.scaled_plant import ScaledPlant, scaled_plant_of
 from synthesis.lpv.worst_optimum import FrozenOptimum
@@ -115,7 +115,7 @@ Recover = Callable[[ScaledPlant, Existence, Solution], Gains]
 def best(
     plant: Plant,
     every: Callable[[int], Sequence[Bases]],
-    divisions: int,
+    divisions: Divisions,
     solver: Solver,
     attempts: list[Attempt],
     worst: FrozenOptimum = NOTHING_KNOWN,
@@ -165,7 +165,7 @@ def best(
 def least(
     plant: Plant,
     shape: Bases,
-    divisions: int,
+    divisions: Divisions,
     solver: Solver,
     attempts: list[Attempt],
     channel: float = 1.0,
@@ -254,7 +254,9 @@ def _tried(
     """
     scaled, existence, *_ = start
     reached = found.gamma
-    points = check_points(existence.plant.parameters, existence.points)
+    points = existence.points
+    if not existence.fixed:
+        points = check_points(existence.plant.parameters, points)
     if neglecting:
         looped = closed(scaled, gains, points)
         reached = max(reached, level_kept(scaled, existence, found, looped, points))

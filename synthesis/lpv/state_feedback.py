@@ -10,9 +10,10 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.threads import with_one_thread
 from synthesis.certificate import Attempt
+from synthesis.impose import Grid
 from synthesis.loops.controller import Controller
 from synthesis.lpv.bases import Bases, Dependence, dependence
-from synthesis.lpv.existence import Existence, Solution
+from synthesis.lpv.existence import Existence, Solution, imposed_at
 from synthesis.lpv.fitted import in_plant_units
 from synthesis.lpv.frozen_stability import frozen_stability
 from synthesis.lpv.output_feedback import USUAL
@@ -37,6 +38,7 @@ def state_feedback(
     Y: Dependence | None = None,
     back_off: float | Sequence[float] = BACK_OFF,
     divisions: int = 1,
+    impose: Grid | None = None,
 ) -> Controller:
     """Design u = F(p) x for every p(t) within its range and rates; F does not depend on the rate of
     p.
@@ -53,6 +55,8 @@ def state_feedback(
         Multiples of the least gamma at which Y is settled, tried in turn.
     divisions : int
         In so many parts every range is cut where the inequalities are imposed.
+    impose : Grid, optional
+        As in `output_feedback`: at these points and nowhere else.
 
     Returns
     -------
@@ -90,7 +94,7 @@ def state_feedback(
     def every(degree: int) -> list[Bases]:
         return [Bases(None, dependence(Y, parameters, "Y", matters, degree))]
 
-    start = best(plant, every, divisions, USUAL, attempts)
+    start = best(plant, every, imposed_at(divisions, impose), USUAL, attempts)
     factors = levels_above(back_off)
     for design in settled(start, factors, _recover, USUAL, attempts):
         method = f"state feedback, {start.shape}"

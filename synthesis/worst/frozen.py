@@ -11,7 +11,7 @@ import numpy as np
 from scipy import linalg
 
 from symheli.errors import AccuracyError, InputError
-from symheli.lpv import LPVStateSpace
+from symheli.lpv import LPVStateSpace, UserFunctions
 from symheli.values.numbers import whole
 from synthesis.worst.over_box import worst_over
 from synthesis.worst.scheduled import Scheduled
@@ -65,7 +65,7 @@ def frozen_gain(lpv: Scheduled, *, points: int = 61, tolerance: float = 1e-8) ->
     if not 0 < tolerance < 1:
         raise InputError(f"tolerance: expected a number between 0 and 1, got {tolerance!r:.60}")
     grid = np.linspace(low, high, whole(points, "points", 2))
-    if isinstance(lpv, LPVStateSpace):
+    if isinstance(lpv, LPVStateSpace) and not isinstance(lpv.basis, UserFunctions):
         ends = [p for piece in lpv.basis.pieces() for p in (piece.low, piece.high)]
         grid = np.unique([*grid, *(p for p in ends if low < p < high)])
 

@@ -31,6 +31,28 @@ def lti(n=6, seed=0, dt=None, shift=0.0):
     )  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("dt", [None, 0.1])
+@pytest.mark.parametrize("seed", range(4))
+def test_the_stated_bound_holds_for_both_kinds_of_balance(seed, dt):
+    """Enns and Glover: |G - G_r| <= twice the tail, and the same of the coprime factors, whose
+    difference is no smaller than the nu-gap; of unstable models too.
+    """
+    full = lti(seed=seed, dt=dt)
+    found = balanced_truncation(full, 4, balance="response")
+    omega = np.concatenate([[0.0], np.geomspace(1e-3, np.pi / dt if dt else 1e3, 2000)])
+    G, R = (m.frequency_response(omega) for m in (full, found.model))
+    error = np.linalg.norm(G - R, 2, axis=(1, 2)).max()
+    # below by the frequency grid at most
+    assert found.singular_values[4] * (1 - 1e-3) <= error <= found.bound
+    assert found.model.is_stable()
+    unstable = lti(seed=seed, dt=dt, shift=0.4 if dt is None else 1.1)
+    assert not unstable.is_stable()
+    factors = balanced_truncation(unstable, 5)
+    assert 0 < factors.nu_gap[0] <= factors.bound + 1e-9
+    with pytest.raises(InputError, match=r'not stable.*balance="factors"'):
+        balanced_truncation(unstable, 4, balance="response")
+
+
 @pytest.mark.parametrize("shift", [0.0, 0.9])
 @pytest.mark.parametrize("order", [2, 4])
 def test_nu_gap_stays_below_twice_the_tail_of_the_coprime_factors(order, shift):

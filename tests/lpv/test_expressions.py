@@ -1,11 +1,14 @@
 """Models written down as expressions are those expressions, exactly."""
 
+from dataclasses import replace
+
+import casadi
 import numpy as np
 import pytest
 import sympy
 
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv import LFT, LPVStateSpace, Scheduling
+from symheli.lpv import LFT, LPVStateSpace, Scheduling, UserFunctions
 from synthesis import l2_gain
 
 P = Scheduling("rho", "1", low=-0.5, high=2.0, rate=1.0)
@@ -24,7 +27,7 @@ RATIONAL = (
 OTHER = (
     [[-2 + sympy.sin(p), p], [0.1, -sympy.sqrt(q)]],
     [[0], [p * q]],
-    [[1, sympy.cos(p) * q]],
+    [[1, sympy.cos(p) * q + 1 / (1 + q)]],
     [[0]],
 )
 
@@ -62,6 +65,35 @@ def test_one_parameter_and_sympy_matrices():
     same(decaying, ([[sympy.exp(-p) - 3]], [[1]], [[1]], [[0]]))
 
 
+@pytest.mark.parametrize("kind", [casadi.SX, casadi.MX])
+def test_casadi_expressions_are_the_same_models(kind):
+    """As a matrix, and as entries of a list; numbers of CasADi too."""
+    v = kind.sym("rho")
+    A = casadi.vertcat(casadi.horzcat(-2 + casadi.sin(v), v), casadi.horzcat(0.1, -casadi.exp(v)))
+    model = LPVStateSpace.from_expressions(A, [[0], [v**2]], [[1, 1 / (3 + v)]], casadi.DM(0.5), P)
+    expected = [[-2 + sympy.sin(p), p], [0.1, -sympy.exp(p)]]
+    same(model, (expected, [[0], [p**2]], [[1, 1 / (3 + p)]], [[0.5]]))
+    assert "0" not in model.basis.names
+    rational = LFT.from_expressions([[-1 / (1 + v**2)]], [[1]], [[1]], [[0]], P)
+    same(rational, ([[-1 / (1 + p**2)]], [[1]], [[1]], [[0]]))
+
+
+def test_expressions_of_a_basis_know_their_slopes_in_any_unit():
+    basis = UserFunctions.from_expressions([1, sympy.sin(p), 1 / (3 + p)], P)
+    at = POINTS[:, 0]
+    slopes = np.column_stack([0 * at, np.cos(at), -1 / (3 + at) ** 2])
+    np.testing.assert_allclose(basis(at, 1), slopes, rtol=1e-12, atol=1e-15)
+    model = LPVStateSpace(
+        basis, *np.ones((4, 3, 1, 1)), (replace(P, unit="m"),), ("x",), ("u",), ("y",)
+    )
+    in_cm = model.with_scheduling(Scheduling("rho", "cm", low=-50.0, high=200.0))
+    np.testing.assert_allclose(in_cm.basis(100 * at, 1), slopes / 100, rtol=1e-12, atol=1e-15)
+    root = UserFunctions.from_expressions([1, sympy.sqrt(p + 0.5)], P)  # its slope has a pole
+    for later in (lambda: root(at, 1), lambda: basis(at, 2)):
+        with pytest.raises(InputError, match="no known derivative of this order"):
+            later()
+
+
 @pytest.mark.slow
 def test_a_textbook_model_is_certified_as_it_is_written_down():
     """x' = -(1 + p) x + u: the gain is one over the slowest pole."""
@@ -74,6 +106,18 @@ def test_a_textbook_model_is_certified_as_it_is_written_down():
     ("kind", "matrices", "error", "message"),
     [
         (LPVStateSpace, RATIONAL, InputError, "LFT.from_expressions"),
+        (
+            LPVStateSpace,
+            ([[casadi.sum1(casadi.MX.sym("rho", 2))]], [[1]], [[1]], [[0]]),
+            InputError,
+            "rho is a vector",
+        ),
+        (
+            LPVStateSpace,
+            ([[casadi.SX.sym("mas")]], [[1]], [[1]], [[0]]),
+            UnknownNameError,
+            "did you mean 'mass'",
+        ),
         (LFT, OTHER, InputError, "no rational function"),
         (LPVStateSpace, ([[sympy.sin(p * q)]], [[1]], [[1]], [[0]]), InputError, "no product"),
         (LFT, ([[-1.0]], [[1]], [[1]], [[0]]), InputError, "a LinearModel holds"),

@@ -23,6 +23,7 @@ from symheli.lpv import (
     series,
 )
 from symheli.values import Signal
+from synthesis import hinf
 
 OMEGA = np.array([0.05, 0.7, 9.0])
 NODES = (0.0, 3.0, 5.0, 9.0, 13.0)
@@ -112,6 +113,54 @@ def test_sums_are_signals_of_their_own():
     ):
         with pytest.raises(InputError, match=message):
             connect(plant, inputs=["r"], outputs=["y"], sums=sums)
+
+
+def test_transfer_functions_and_gains_are_blocks_under_names_that_are_given_to_them():
+    """BasicAffine of fdbianchi/lpv_synthesis_toolbox, weighted, as it stands in a book; the
+    frozen optima are those found with the weights realized by hand.
+    """
+    s = control.tf("s")
+    p1, p2 = (Scheduling(name, "1", low=0.0, high=1.0) for name in ("p1", "p2"))
+    a, b = p1.symbol, p2.symbol
+    plant = LPVStateSpace.from_expressions(
+        [[-2 - 1.3 * a - 0.5 * b, 1 + 0.1 * a], [-1 - 0.1 * a, -2 - 1.3 * a - 0.5 * b]],
+        [[1], [1]],
+        [[10, 10]],
+        [[0]],
+        (p1, p2),
+        inputs=["u"],
+        outputs=[Signal("y", "m")],
+    )
+    weighted = connect(
+        plant,
+        {("e", "z1"): 10 / (s + 0.01), ("u", "z2"): (0.04 * s + 0.1) / (0.004 * s + 1)},
+        inputs=["r", "u"],
+        outputs=["z1", "z2", "e"],
+        sums={"e": {"r": 1, "y": -1}},
+    )
+    for at, optimum in (((0.0, 0.0), 0.763786), ((1.0, 1.0), 0.766273)):
+        design = hinf(weighted.at(*at), controls=["u"], measurements=["e"])
+        assert design.optimum == pytest.approx(optimum, rel=1e-4)  # to the accuracy of the search
+
+
+def test_names_of_blocks_and_the_units_they_take():
+    plant = LinearModel(
+        [[-1.0]], [[2.0]], [[1.0]], [[0.0]], ("x",), (Signal("u", "N"),), (Signal("y", "m"),)
+    )
+    labelled = control.tf([1], [1, 1], inputs="y", outputs="w", name="lag")
+    gains = {("w", ("u", "v")): [[-3.0], [4.0]]}
+    loop = connect(plant, labelled, gains, inputs=[], outputs=["w", "v", "y"])
+    root = 1j * np.sqrt(6.0)  # x' = -x - 6 w, w' = x - w
+    np.testing.assert_allclose(np.sort_complex(loop.poles()), [-1 - root, -1 + root])
+    assert [y.unit for y in loop.outputs] == ["m/s", "m/s", "m"]  # w and v are known
+    for block, message in (
+        ({"K": 2.0}, "got the key 'K'"),
+        ({("y", ("v", "w")): 2.0}, "expected 1 name"),
+        ({("y", "v"): control.tf([1, 0], [1])}, "non-proper"),
+        ({("y", "z"): plant}, "y is in N on one side and in m"),
+    ):
+        with pytest.raises(InputError, match=message):
+            connect(plant, block, inputs=["u"], outputs=["y"])
 
 
 def test_a_loop_through_feedthrough_that_depends_on_p_needs_an_lft():

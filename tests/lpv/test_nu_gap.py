@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from symheli import InputError, LinearModel
-from symheli.lpv import chordal_distance, nu_gap
+from symheli.lpv import LinearModels, chordal_distance, nu_gap, nu_gaps
 from symheli.values import signals
 
 
@@ -76,8 +76,22 @@ def test_models_that_cannot_be_compared_are_refused():
             pole(0.9),
             model(np.array([[0.9]]), np.ones((1, 1)), np.ones((1, 1)), np.zeros((1, 1)), dt=0.2),
         )
-    with pytest.raises(InputError, match="unit circle"):
+    with pytest.raises(InputError, match="stability boundary"):
         nu_gap(pole(1.0), pole(0.5))
+
+
+def test_continuous_models_are_as_far_apart_as_their_closed_forms():
+    """1/(s - a) and 1/(s + a), MATLAB's example of gapmetric with .0020, differ most at rest."""
+    one, other = (
+        replace(model(np.array([[a]]), np.eye(1), np.eye(1), np.zeros((1, 1)), 0.1), dt=None)
+        for a in (1e-3, -1e-3)
+    )
+    assert nu_gap(one, other) == pytest.approx(2e3 / (1 + 1e6), rel=1e-9)
+    assert nu_gaps(one, LinearModels.of([one, other])) == pytest.approx(
+        [0, 2e3 / (1 + 1e6)], abs=1e-7
+    )
+    with pytest.raises(InputError, match=r"continuous, 0\.1 s"):
+        nu_gap(one, pole(0.5))
 
 
 def lag(dt, slow=0.01):

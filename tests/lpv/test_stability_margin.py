@@ -55,6 +55,15 @@ def test_it_is_the_norm_that_level_sets_find():
     assert stability_margin(plant, GAINS) == pytest.approx(expected, rel=1e-6)
 
 
+def test_continuous_loops_have_the_margins_of_their_closed_forms():
+    """1/s with u = -y: 1/sqrt(2). 1/(s - 1) with u = -(1 + sqrt(2)) y, its best controller:
+    sin(pi/8).
+    """
+    for pole, k, b in ((0.0, -1.0, np.sqrt(0.5)), (1.0, -1 - np.sqrt(2.0), np.sin(np.pi / 8))):
+        plant = model([[pole]], [[1.0]], [[1.0]], [[0.0]], dt=None)
+        assert stability_margin(plant, {("u", "y"): k}) == pytest.approx(b, rel=1e-9)
+
+
 def test_a_loop_that_is_unstable_has_none():
     integrator = model([[1.0]], [[1.0]], [[1.0]], [[0.0]])
     assert stability_margin(integrator, {("u", "y"): 0.1}) == 0.0
@@ -88,8 +97,8 @@ def test_a_controller_with_states_counts_as_the_gain_it_is_at_every_frequency():
 
 
 def test_what_cannot_be_closed_is_refused():
-    with pytest.raises(InputError, match="discretize"):
-        stability_margin(replace(gain(1.0), dt=None), {("u", "y"): -1.0})
+    with pytest.raises(InputError, match="sample period"):
+        stability_margin(replace(gain(1.0), dt=None), gain(1.0))
     with pytest.raises(InputError, match="sample period"):
         stability_margin(gain(1.0), replace(gain(1.0), dt=0.2))
     with pytest.raises(UnknownNameError):

@@ -10,7 +10,7 @@ import mpmath
 import numpy as np
 
 from symheli.equations import evaluate
-from symheli.equations.tape import Tape
+from symheli.values.tape import Tape
 
 DIGITS = 50
 STEP = mpmath.mpf(10) ** -20

@@ -71,7 +71,9 @@ EXEMPT: dict[str, str] = {
             *(
                 "Estimator",
                 "GainCurve",
+                "MarginTable",
                 "Margins",
+                "RobustMargin",
                 "SpecificationTable",
                 "StructuredController",
                 "Tube",
@@ -101,6 +103,7 @@ SLOW = {
     *("synthesis.lqr", "synthesis.lqg", "synthesis.switched", "synthesis.dwell_time"),
     *("synthesis.SwitchedController.certify", "synthesis.Controller.of"),
     *("synthesis.Certificate.verify", "synthesis.lft_stability", "synthesis.structured"),
+    *("synthesis.bounded_truncation", "synthesis.robust_margin"),
 }
 """Entries that fly, sweep or solve: `FEW` inputs each."""
 LARGER = {"synthesis.multiobjective", "synthesis.output_feedback", "synthesis.lft_feedback"}

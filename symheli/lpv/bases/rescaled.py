@@ -50,8 +50,9 @@ def _rescaled(basis: Space, size: float) -> Space:
             return replace(basis, breaks=all_of(basis.breaks))
         case UserFunctions():
             functions = tuple(partial(_at, f, size) for f in basis.functions)
+            slopes = tuple(partial(_slope, f, size) for f in basis.derivatives)
             low, high = all_of((basis.low, basis.high))
-            return replace(basis, functions=functions, low=low, high=high)
+            return replace(basis, functions=functions, derivatives=slopes, low=low, high=high)
     raise InputError(
         f"functions of kind {type(basis).__name__} are not converted to another unit: give the"
         " range in the unit of the model"
@@ -60,3 +61,7 @@ def _rescaled(basis: Space, size: float) -> Space:
 
 def _at(function: Any, size: float, p: Array) -> Array:
     return function(size * p)
+
+
+def _slope(derivative: Any, size: float, p: Array) -> Array:
+    return size * derivative(size * p)

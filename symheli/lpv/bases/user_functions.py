@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from symheli.errors import InputError
 from symheli.lpv.bases.basis import Basis, check_range
 from symheli.lpv.bases.function_space import Piece
 from symheli.values.arrays import Array
+
+if TYPE_CHECKING:
+    from symheli.lpv.scheduling import Scheduling
 
 
 @dataclass(frozen=True)
@@ -30,6 +33,9 @@ class UserFunctions(Basis):
         The range, in the unit of p.
     names : tuple of str
         Label them (default f0, f1, ...).
+    derivatives : tuple of callable
+        df_j/dp, one a function; without them what needs a slope is refused. `from_expressions`
+        finds them.
 
     Raises
     ------
@@ -49,6 +55,7 @@ class UserFunctions(Basis):
     low: float
     high: float
     names: tuple[str, ...] = ()
+    derivatives: tuple[Callable[[Array], Array], ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "functions", tuple(self.functions))
@@ -64,7 +71,32 @@ class UserFunctions(Basis):
             raise InputError(
                 f"expected {len(self.functions)} names, one a function, got {len(self.names)}"
             )
-        self(np.linspace(self.low, self.high, 33))
+        object.__setattr__(self, "derivatives", tuple(self.derivatives))
+        if self.derivatives and len(self.derivatives) != len(self.functions):
+            raise InputError(
+                f"derivatives: expected {len(self.functions)}, one a function, got"
+                f" {len(self.derivatives)}"
+            )
+        for derivative in range(1 + bool(self.derivatives)):
+            self(np.linspace(self.low, self.high, 33), derivative)
+
+    @classmethod
+    def from_expressions(cls, expressions: Sequence[Any], scheduling: Scheduling) -> UserFunctions:
+        """Return a basis of SymPy expressions, or numbers, in the symbol of the parameter, with
+        their derivatives.
+
+        Examples
+        --------
+        >>> import sympy
+        >>> from symheli.lpv import Scheduling, UserFunctions
+        >>> angle = Scheduling("angle", "rad", low=0.0, high=1.5)
+        >>> basis = UserFunctions.from_expressions([1, sympy.cos(angle.symbol)], angle)
+        >>> basis(0.0), basis(0.0, 1) + 0.0
+        (array([1., 1.]), array([0., 0.]))
+        """
+        from symheli.lpv.expressions import functions_of_one
+
+        return functions_of_one(expressions, scheduling)
 
     @property
     def size(self) -> int:
@@ -77,13 +109,16 @@ class UserFunctions(Basis):
         return self.size
 
     def _values(self, p: Array, derivative: Any) -> Array:
-        if derivative:
+        if derivative > bool(self.derivatives):
             raise InputError(
-                "user-supplied functions have no known derivative; use a polynomial or spline basis"
+                "user-supplied functions have no known derivative of this order: give"
+                " `derivatives`, write them by UserFunctions.from_expressions, or use a polynomial"
+                " or spline basis"
             )
+        functions = self.derivatives if derivative else self.functions
         out = np.empty((*p.shape, self.size))
         with np.errstate(all="ignore"):
-            for j, (function, name) in enumerate(zip(self.functions, self.names, strict=True)):
+            for j, (function, name) in enumerate(zip(functions, self.names, strict=True)):
                 values = np.asarray(function(p), dtype=float)
                 if values.shape not in (p.shape, ()) or not np.isfinite(values).all():
                     raise InputError(
@@ -98,5 +133,5 @@ class UserFunctions(Basis):
         """Raises `InputError`: these functions are not known to be polynomials."""
         raise InputError(
             "user-supplied functions are not known to be piecewise polynomial; identify with a"
-            " polynomial or spline basis"
+            " polynomial or spline basis, or fit the model, lpv.fitted(Polynomial(8, low, high))"
         )

@@ -186,9 +186,9 @@ class LFT:
         inputs: Sequence[str] | None = None,
         outputs: Sequence[str] | None = None,
     ) -> LFT:
-        """Return the LFT of matrices of rational SymPy expressions in the symbols of the parameters
-        (`Scheduling.symbol`, in their units), and numbers; exact, with as many copies of each
-        parameter as `reduce` leaves.
+        """Return the LFT of matrices of rational expressions, written as for
+        `LPVStateSpace.from_expressions`; exact, with as many copies of each parameter as `reduce`
+        leaves.
 
         Names default to x1.., u1.., y1... Raises `InputError` for other functions and for shapes
         that do not fit, `UnknownNameError` for another symbol.
@@ -414,6 +414,16 @@ class LFT:
         return close(
             self, K, np.eye(len(self.inputs)), np.eye(len(self.outputs)), self.inputs, self.outputs
         )
+
+    def simulate(
+        self, p: object, u: object, x0: object | None = None, *, dt: float | None = None
+    ) -> tuple[Array, Array]:
+        """States (n, nx) and outputs (n, ny) along p (n,) or (n, d), or with p(t, x, u) a function;
+        see `symheli.lpv.simulate`.
+        """
+        from symheli.lpv.simulate import simulate
+
+        return simulate(self, p, u, x0, dt=dt)
 
     def discretize(self, dt: float) -> LFT:
         """Tustin's rule, exact in the parameters: the trapezoidal rule of the time-varying model at

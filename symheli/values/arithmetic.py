@@ -12,7 +12,7 @@ import numpy as np
 import sympy
 from sympy.logic.boolalg import BooleanAtom, BooleanFunction
 
-from symheli.equations.tape import Arithmetic
+from symheli.values.tape import Arithmetic
 
 # --- numbers with many digits --------------------------------------------------------------------
 
