@@ -9,12 +9,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from symheli.lpv import Matrices
 from symheli.lpv.bases.polynomials import lobatto_points
 from synthesis.assemble.box import Shape, coefficients_of
 from synthesis.assemble.lyapunov_blocks import of_state
 from synthesis.polynomial.bernstein import blossom
-from synthesis.polynomial.pieces import Pieces
-from synthesis.polynomial.regions import Region, model_on
+from synthesis.polynomial.regions import Region
 from synthesis.polynomial.symmetric import extended
 from synthesis.program.lyapunov_program import LyapunovBlocks
 from synthesis.proof.inequalities import Demand
@@ -30,12 +30,12 @@ def points_of(region: Region, count: int) -> Array:
 
 
 def at_points(
-    model: Pieces, demand: Demand, shape: Shape, region: Region, points: Array, weight: Array
+    system: Matrices, demand: Demand, shape: Shape, region: Region, points: Array, weight: Array
 ) -> LyapunovBlocks:
     """Return the inequalities of a region at `points` (K, m), one block for each and extreme motion
-    of p; for scaled data, the state blocks in coordinates changed by `weight`.
+    of p; for the scaled `system` there, the state blocks in coordinates changed by `weight`.
     """
-    A, B, C, D = (M(points) for M in model_on(model, region, float))
+    A, B, C, D = system
     flow, state = np.concatenate([A, B], axis=2), of_state(A, B)
     seen = np.concatenate([C, D], axis=2)
     value, slopes = _spline(shape, region, points)

@@ -180,7 +180,7 @@ class Program(Protocol):
 @dataclass(frozen=True, eq=False)
 class LyapunovProgram:
     """The problem: minimise g subject to every block <= -margin diag(I, 0) and every coefficient of
-    P >= floor I, every one of a multiplier >= 0.
+    P >= floor I (free where that is None), every one of a multiplier >= 0.
 
     Without inputs: maximise t subject to blocks <= -t I and 0 <= P <= I; t > 0 proves stability.
     """
@@ -188,7 +188,7 @@ class LyapunovProgram:
     blocks: tuple[LyapunovBlocks, ...]
     sizes: Sizes
     margin: float
-    floor: float
+    floor: float | None
 
     @property
     def cost(self) -> float:
@@ -210,4 +210,6 @@ class LyapunovProgram:
     @property
     def bounds(self) -> tuple[tuple[float, float], ...]:
         """(sign, constant) of every sign P + constant I >= 0."""
-        return ((1.0, -self.floor),) if self.sizes.inputs else ((1.0, 0.0), (-1.0, 1.0))
+        if not self.sizes.inputs:
+            return ((1.0, 0.0), (-1.0, 1.0))
+        return () if self.floor is None else ((1.0, -self.floor),)
