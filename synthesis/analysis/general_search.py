@@ -27,7 +27,7 @@ from synthesis.polynomial.regions import model_on, regions
 from synthesis.polynomial.symmetric import extended, length, smat
 from synthesis.program import interior_point
 from synthesis.program.cone_program import LYAPUNOV, Answer, Candidate, general_solver, solve
-from synthesis.program.interior_point import Early, Minimum
+from synthesis.program.interior_point import Minimum
 from synthesis.program.lyapunov_program import LyapunovBlocks, LyapunovProgram, Sizes
 from synthesis.program.scaling import Scaling, dissipative, model_scaling
 from synthesis.proof.box import Evidence
@@ -41,14 +41,14 @@ parameters: 3).
 """
 
 
-CANDIDATE_POINTS, INITIAL_POINTS = {1: 81, 2: 25}, {1: 9, 2: 5}
+CANDIDATE_POINTS, INITIAL_POINTS = {1: 81, 2: 25}, {1: 9, 2: 7}
 """Points of each parameter in a region at which inequalities may be added to a program (more
 parameters: 5), and those in the first program (more parameters: 2).
 """
 MAX_ROUNDS = 8
 """Largest number of rounds in which violated inequalities are added."""
 MAX_ADDED = 24
-"""Largest number of inequalities added per region and round."""
+"""Largest number of points added per region and round."""
 BOUND_TOLERANCE = 3e-3
 """Relative difference of the proven bound from the level of its program below which no further
 points are added.
@@ -258,12 +258,11 @@ class General(Ladder):
         the whole box is near their level; return it with the outcome in words.
         """
         best, n, nu = Found(math.inf), *self.problem.model.sizes[:2]
-        every, rounds, early = self._inequalities(shape), 0, None
+        every, rounds = self._inequalities(shape), 0
         active = [self._first(shape, at.blocks) for at in every]
         while True:
             rounds += 1
-            candidate = self._of_points(every, active, shape, margin, early)
-            early = candidate.early
+            candidate = self._of_points(every, active, shape, margin)
             best = best.or_better(self._verified(candidate, shape), 1.0)
             if candidate.x is None or rounds == MAX_ROUNDS:
                 break
@@ -276,11 +275,14 @@ class General(Ladder):
             level, added = np.diag(np.r_[np.zeros(n), np.full(nu, g)]), 0
             for at, which in zip(every, active, strict=True):
                 values = at.blocks.linear(P) + at.blocks.constant
+                # of a point with all motions
                 excess = np.linalg.eigvalsh(values - level)[:, -1]
-                excess[which] = 0.0
+                excess = excess.reshape(-1, at.blocks.places).max(axis=0)
+                places = which.reshape(-1, at.blocks.places)
+                excess[places[0]] = 0.0
                 worst = np.argsort(excess)[-MAX_ADDED:]
                 worst = worst[excess[worst] > 0]
-                which[worst] = True
+                places[:, worst] = True
                 added += len(worst)
             if not added:
                 break
@@ -317,9 +319,8 @@ class General(Ladder):
         active: list[Array],
         shape: Shape,
         margin: float,
-        early: Early | None = None,
     ) -> Minimum:
-        """Solve the program of the active inequalities, from a point of one with fewer of them.
+        """Solve the program of the active inequalities.
 
         P > 0 follows where the frozen models are stable and P falls both ways p may move: it is
         imposed on all coefficients, which is much more, only where p moves one way.
@@ -339,7 +340,7 @@ class General(Ladder):
         program = LyapunovProgram(tuple(chosen), Sizes(n, nu, unknowns), margin, floor)
         given = self.problem.solver
         coarse = max(MIN_POINT_TOLERANCE, given.options["tolerance"])
-        candidate = interior_point.minimise(program, replace(given, tolerance=coarse), early)
+        candidate = interior_point.minimise(program, replace(given, tolerance=coarse))
         self.spent[1] += candidate.seconds
         return candidate
 

@@ -39,26 +39,32 @@ def at_points(
     flow, state = np.concatenate([A, B], axis=2), of_state(A, B)
     seen = np.concatenate([C, D], axis=2)
     value, slopes = _spline(shape, region, points)
-    drifts = [
-        sum(
-            (
-                (rate if tie is None else points[:, tie, None]) * demand.time * slope
-                for rate, tie, slope in zip(drift.rates, drift.ties, slopes, strict=True)
-                if rate or tie is not None
-            ),
-            np.zeros_like(value),
-        )
-        for drift in demand.motion.drifts(demand.moving(shape.degrees))
+    drifts = list(demand.motion.drifts(demand.moving(shape.degrees)))
+    moving = [
+        i
+        for i in range(len(slopes))
+        if any(drift.rates[i] or drift.ties[i] is not None for drift in drifts)
     ]
-    # of P and, where it moves, of dP/dt at every point and motion
-    weights = np.concatenate([np.stack([value, d], axis=2) for d in drifts])
-    beside = np.stack([flow, np.broadcast_to(0.5 * state, flow.shape)], axis=1)
-    if not np.any(weights[..., 1]):
-        weights, beside = weights[..., :1], beside[:, :1]
+    # of P and of its derivatives where p moves, at every point
+    weights = np.stack([value, *(slopes[i] for i in moving)], axis=2)
+    paces = [
+        [
+            np.broadcast_to(drift.rates[i] if tie is None else points[:, tie], len(points))
+            for i in moving
+            for tie in [drift.ties[i]]
+        ]
+        for drift in drifts
+    ]
+    beside = np.concatenate(
+        [
+            np.stack([flow, *(0.5 * demand.time * pace[:, None, None] * state for pace in each)], 1)
+            for each in paces
+        ]
+    )
     blocks = LyapunovBlocks(
         coefficients_of(shape, region.segment).ravel(),
         state[None],
-        np.tile(beside, (len(drifts), 1, 1, 1))[:, None],
+        beside[:, None],
         np.tile(np.swapaxes(seen, 1, 2) @ seen, (len(drifts), 1, 1)),
         weights=weights,
     )

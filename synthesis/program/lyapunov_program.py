@@ -122,10 +122,14 @@ class LyapunovBlocks(NamedTuple):
         return self._replace(varying=wide.reshape(m, R, k, n, N), weights=None)
 
     def keep(self, which: Array) -> LyapunovBlocks:
-        """Return these blocks only; without a `supply` or a level of their own."""
+        """Return these blocks only, places with all their blocks once; without a `supply` or a
+        level of their own.
+        """
         weights = self.weights
         if weights is not None:
-            weights = weights[np.arange(len(self.constant))[which] % len(weights)]
+            each = which.reshape(-1, len(weights))
+            whole = bool(np.all(each == each[0]))
+            weights = weights[each[0] if whole else np.nonzero(each)[1]]
         return self._replace(
             varying=self.varying[which], constant=self.constant[which], weights=weights
         )
