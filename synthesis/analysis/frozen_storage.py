@@ -107,7 +107,7 @@ def _too_fast(
     if ends[0] is None or ends[1] is None:
         return True
     drift = problem.scaled_rate * (ends[1] - ends[0]) / (knots[k + 1] - knots[k])
-    for p, P in zip(knots[k : k + 2], ends, strict=True):
+    for p, P in zip(knots[k : k + 2], (ends[0], ends[1]), strict=True):
         model = _frozen(problem, float(p))
         if not all(_definite(_dissipation(model, P, level, nu)) for nu in (-drift, drift)):
             return True
