@@ -62,7 +62,7 @@ def of_frozen_models(problem: ScaledProblem, level: float) -> SplineLyapunov | N
     with task("storage functions of the frozen models") as progress:
         first = []
         for p in knots:
-            P = _any(problem, p, level)
+            P = _any(_frozen(problem, p), level)
             if P is None:
                 return None
             first.append(P)
@@ -107,13 +107,10 @@ def _too_fast(
     if ends[0] is None or ends[1] is None:
         return True
     drift = problem.scaled_rate * (ends[1] - ends[0]) / (knots[k + 1] - knots[k])
-    for p, P in zip(knots[k : k + 2], ends, strict=True):
-        A, B, C, D = _frozen(problem, float(p))
-        g = level**2 * np.eye(B.shape[1])
-        for nu in (-drift, drift):
-            top, side = P @ A + A.T @ P + C.T @ C + nu, P @ B + C.T @ D
-            if not _definite(-np.block([[top, side], [side.T, D.T @ D - g]])):
-                return True
+    for p, P in zip(knots[k : k + 2], (ends[0], ends[1]), strict=True):
+        model = _frozen(problem, float(p))
+        if not all(_definite(_dissipation(model, P, level, nu)) for nu in (-drift, drift)):
+            return True
     return False
 
 
@@ -121,13 +118,30 @@ def _frozen(problem: ScaledProblem, p: float) -> Matrices:
     return problem.units.of_model(problem.lpv.at(min(p, problem.lpv.scheduling.high)))
 
 
-def _any(problem: ScaledProblem, p: float, level: float) -> Array | None:
-    """Return a storage function of the model frozen at p, None where rounding leaves none."""
-    storage = strict_storage(*_frozen(problem, p), level, discrete=False)
+def _any(model: Matrices, level: float) -> Array | None:
+    """Return a storage function of a frozen model, None where rounding leaves none."""
+    storage = strict_storage(*model, level, discrete=False)
     if storage is None:
         return None
     back = linalg.inv(storage.T)
     return back.T @ back
+
+
+def central_dissipation(model: Matrices, level: float) -> Array:
+    """Return what the analytic centre of the storage functions of a frozen model dissipates, a
+    quadratic form (n + m, n + m) of state and input; zero where rounding leaves none.
+    """
+    n, m = model.B.shape
+    P = _any(model, level)
+    if P is not None:
+        P = analytic_centre(*model, level, MAX_SIZE * float(linalg.eigvalsh(P)[-1]), P)
+    return np.zeros((n + m, n + m)) if P is None else _dissipation(model, P, level)
+
+
+def _dissipation(model: Matrices, P: Array, level: float, drift: Array | float = 0.0) -> Array:
+    A, B, C, D = model
+    top, side = P @ A + A.T @ P + C.T @ C + drift, P @ B + C.T @ D
+    return -np.block([[top, side], [side.T, D.T @ D - level**2 * np.eye(B.shape[1])]])
 
 
 def _central(
@@ -139,7 +153,7 @@ def _central(
         P = analytic_centre(*model, level, bound, start)
         if P is not None:
             return P
-    start = _any(problem, p, level)
+    start = _any(model, level)
     return None if start is None else analytic_centre(*model, level, bound, start)
 
 

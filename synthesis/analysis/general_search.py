@@ -6,10 +6,12 @@ import math
 import time
 from dataclasses import replace
 from functools import reduce
+from typing import NamedTuple
 
 import numpy as np
 
 from symheli.lpv import LinearModel, Matrices
+from synthesis.analysis.frozen_storage import central_dissipation
 from synthesis.analysis.ladder import CLOSE_TO_LOWER, NO_MARGIN, Found, Ladder
 from synthesis.analysis.problem import Problem
 from synthesis.assemble.box import Shape, affine_inequalities, assemble
@@ -21,10 +23,11 @@ from synthesis.lyapunov.box import BoxLyapunov
 from synthesis.lyapunov.spline import graded_knots
 from synthesis.polynomial.matrix import PolynomialMatrix
 from synthesis.polynomial.pieces import Pieces
-from synthesis.polynomial.regions import regions
-from synthesis.polynomial.symmetric import length, smat
+from synthesis.polynomial.regions import model_on, regions
+from synthesis.polynomial.symmetric import extended, length, smat
 from synthesis.program import interior_point
 from synthesis.program.cone_program import LYAPUNOV, Answer, Candidate, general_solver, solve
+from synthesis.program.interior_point import Minimum
 from synthesis.program.lyapunov_program import LyapunovBlocks, LyapunovProgram, Sizes
 from synthesis.program.scaling import Scaling, dissipative, model_scaling
 from synthesis.proof.box import Evidence
@@ -32,20 +35,20 @@ from synthesis.worst.frozen import norm
 
 Array = np.ndarray
 
-SAMPLES_PER_REGION = {1: 17, 2: 7}
+SAMPLES_PER_REGION = {1: 17, 2: 13}
 """Samples of each parameter in a region at which the bound that P admits is first computed (more
 parameters: 3).
 """
 
 
-CANDIDATE_POINTS, INITIAL_POINTS = {1: 81, 2: 25}, {1: 9, 2: 4}
+CANDIDATE_POINTS, INITIAL_POINTS = {1: 81, 2: 25}, {1: 9, 2: 7}
 """Points of each parameter in a region at which inequalities may be added to a program (more
 parameters: 5), and those in the first program (more parameters: 2).
 """
 MAX_ROUNDS = 8
 """Largest number of rounds in which violated inequalities are added."""
 MAX_ADDED = 24
-"""Largest number of inequalities added per region and round."""
+"""Largest number of points added per region and round."""
 BOUND_TOLERANCE = 3e-3
 """Relative difference of the proven bound from the level of its program below which no further
 points are added.
@@ -54,6 +57,39 @@ MIN_POINT_TOLERANCE = 2e-3
 """Least relative gap to which a program of points is solved: its P is proven by other means, and a
 P well inside the constraints holds between the points too.
 """
+CENTRAL_LEVEL = 1.05
+"""Multiple of the expected gain at which frozen models have the central storage functions whose
+dissipation is the measure of how far inside the inequalities a P that varies with p is kept.
+"""
+CENTRAL_SHARE = 0.1
+"""That distance as a share of this dissipation. By convexity it costs a parameter at rest this
+share of what the level is above the worst frozen gain, and P holds between the points as well.
+"""
+
+
+class _AtPoints(NamedTuple):
+    """The inequalities of a region at single p: the `system` there, the `blocks`, a block for each
+    and extreme motion of p, and the dissipations found so far by the number of the point.
+    """
+
+    system: Matrices
+    blocks: LyapunovBlocks
+    found: dict[int, Array]
+
+    def inside(self, which: Array, share: float, level: float, weight: Array) -> LyapunovBlocks:
+        """Return the blocks `which`, held below zero by this share of the dissipation of the
+        central storage functions of the frozen models at a level of the gain.
+        """
+        blocks = self.blocks.keep(which)
+        if share == 0.0:
+            return blocks
+        W = extended(weight, self.system.B.shape[2])
+        places = np.flatnonzero(which) % len(self.system.A)
+        for k in set(places.tolist()) - set(self.found):
+            model = Matrices(*(M[k] for M in self.system))
+            self.found[k] = W.T @ central_dissipation(model, level) @ W
+        back_off = share * np.array([self.found[k] for k in places.tolist()])
+        return blocks._replace(constant=blocks.constant + back_off)
 
 
 class General(Ladder):
@@ -67,6 +103,7 @@ class General(Ladder):
     def expect(self, bound: float) -> float:
         """Set the units for this expected gain; return the unit of gains."""
         model, kind = self.problem.model, self.problem.demand.kind
+        self.expected = bound
         frozen, scale = _scaling(model, kind, bound)
         self.choices = [scale]
         other = dissipative(scale, frozen, bound) if kind == "l2 gain" else None
@@ -199,7 +236,8 @@ class General(Ladder):
         problem, start = self.problem, time.perf_counter()
         if problem.by_points:
             every = self._inequalities(shape)
-            return self._of_points(every, [np.ones(len(b.constant), bool) for b in every], margin)
+            whole = [np.ones(len(at.blocks.constant), bool) for at in every]
+            return self._of_points(every, whole, shape, margin)
         inequalities = affine_inequalities(
             self.scaled,
             self.scaled_demand,
@@ -221,10 +259,10 @@ class General(Ladder):
         """
         best, n, nu = Found(math.inf), *self.problem.model.sizes[:2]
         every, rounds = self._inequalities(shape), 0
-        active = [self._first(shape, block) for block in every]
+        active = [self._first(shape, at.blocks) for at in every]
         while True:
             rounds += 1
-            candidate = self._of_points(every, active, margin)
+            candidate = self._of_points(every, active, shape, margin)
             best = best.or_better(self._verified(candidate, shape), 1.0)
             if candidate.x is None or rounds == MAX_ROUNDS:
                 break
@@ -235,26 +273,32 @@ class General(Ladder):
                 break
             P = smat(candidate.x[:-1].reshape(-1, length(n)), n)
             level, added = np.diag(np.r_[np.zeros(n), np.full(nu, g)]), 0
-            for block, which in zip(every, active, strict=True):
-                excess = np.linalg.eigvalsh(block.linear(P) + block.constant - level)[:, -1]
-                excess[which] = 0.0
+            for at, which in zip(every, active, strict=True):
+                values = at.blocks.linear(P) + at.blocks.constant
+                # of a point with all motions
+                excess = np.linalg.eigvalsh(values - level)[:, -1]
+                excess = excess.reshape(-1, at.blocks.places).max(axis=0)
+                places = which.reshape(-1, at.blocks.places)
+                excess[places[0]] = 0.0
                 worst = np.argsort(excess)[-MAX_ADDED:]
                 worst = worst[excess[worst] > 0]
-                which[worst] = True
+                places[:, worst] = True
                 added += len(worst)
             if not added:
                 break
         return best, f"{candidate.message} ({rounds} round(s))"
 
-    def _inequalities(self, shape: Shape) -> list[LyapunovBlocks]:
+    def _inequalities(self, shape: Shape) -> list[_AtPoints]:
         """Return the inequalities that may be added, one object a region."""
         start, demand = time.perf_counter(), self.scaled_demand
         count = CANDIDATE_POINTS.get(len(shape.knots), 5)
         moving = demand.moving(shape.degrees)
-        every = [
-            at_points(self.scaled, demand, shape, region, points_of(region, count), self.weight)
-            for region in regions(self.scaled, shape.knots, demand.motion, moving)
-        ]
+        every = []
+        for region in regions(self.scaled, shape.knots, demand.motion, moving):
+            points = points_of(region, count)
+            system = Matrices(*(M(points) for M in model_on(self.scaled, region, float)))
+            blocks = at_points(system, demand, shape, region, points, self.weight)
+            every.append(_AtPoints(system, blocks, {}))
         self.spent[0] += time.perf_counter() - start
         return every
 
@@ -270,14 +314,30 @@ class General(Ladder):
         return np.resize(grid.ravel(), len(block.constant))
 
     def _of_points(
-        self, every: list[LyapunovBlocks], active: list[Array], margin: float
-    ) -> Candidate:
+        self,
+        every: list[_AtPoints],
+        active: list[Array],
+        shape: Shape,
+        margin: float,
+    ) -> Minimum:
+        """Solve the program of the active inequalities.
+
+        P > 0 follows where the frozen models are stable and P falls both ways p may move: it is
+        imposed on all coefficients, which is much more, only where p moves one way.
+        """
         n, nu, _ = self.problem.model.sizes
-        chosen = [b.keep(which) for b, which in zip(every, active, strict=True) if which.any()]
-        unknowns = 1 + max(int(b.columns.max()) for b in every)
-        program = LyapunovProgram(
-            tuple(chosen), Sizes(n, nu, unknowns), margin, self.problem.impose.least
-        )
+        start, level = time.perf_counter(), CENTRAL_LEVEL * self.evidence.in_units(self.expected)
+        share = CENTRAL_SHARE if self.varies(shape) else 0.0
+        chosen = [
+            at.inside(which, share, level, self.weight)
+            for at, which in zip(every, active, strict=True)
+            if which.any()
+        ]
+        self.spent[0] += time.perf_counter() - start
+        unknowns = 1 + max(int(at.blocks.columns.max()) for at in every)
+        tied = self.varies(shape) and self.scaled_demand.motion.tied
+        floor = self.problem.impose.least if tied or not self.varies(shape) else None
+        program = LyapunovProgram(tuple(chosen), Sizes(n, nu, unknowns), margin, floor)
         given = self.problem.solver
         coarse = max(MIN_POINT_TOLERANCE, given.options["tolerance"])
         candidate = interior_point.minimise(program, replace(given, tolerance=coarse))

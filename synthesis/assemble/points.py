@@ -9,12 +9,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from symheli.lpv import Matrices
 from symheli.lpv.bases.polynomials import lobatto_points
 from synthesis.assemble.box import Shape, coefficients_of
 from synthesis.assemble.lyapunov_blocks import of_state
 from synthesis.polynomial.bernstein import blossom
-from synthesis.polynomial.pieces import Pieces
-from synthesis.polynomial.regions import Region, model_on
+from synthesis.polynomial.regions import Region
 from synthesis.polynomial.symmetric import extended
 from synthesis.program.lyapunov_program import LyapunovBlocks
 from synthesis.proof.inequalities import Demand
@@ -30,35 +30,41 @@ def points_of(region: Region, count: int) -> Array:
 
 
 def at_points(
-    model: Pieces, demand: Demand, shape: Shape, region: Region, points: Array, weight: Array
+    system: Matrices, demand: Demand, shape: Shape, region: Region, points: Array, weight: Array
 ) -> LyapunovBlocks:
     """Return the inequalities of a region at `points` (K, m), one block for each and extreme motion
-    of p; for scaled data, the state blocks in coordinates changed by `weight`.
+    of p; for the scaled `system` there, the state blocks in coordinates changed by `weight`.
     """
-    A, B, C, D = (M(points) for M in model_on(model, region, float))
+    A, B, C, D = system
     flow, state = np.concatenate([A, B], axis=2), of_state(A, B)
     seen = np.concatenate([C, D], axis=2)
     value, slopes = _spline(shape, region, points)
-    drifts = [
-        sum(
-            (
-                (rate if tie is None else points[:, tie, None]) * demand.time * slope
-                for rate, tie, slope in zip(drift.rates, drift.ties, slopes, strict=True)
-                if rate or tie is not None
-            ),
-            np.zeros_like(value),
-        )
-        for drift in demand.motion.drifts(demand.moving(shape.degrees))
+    drifts = list(demand.motion.drifts(demand.moving(shape.degrees)))
+    moving = [
+        i
+        for i in range(len(slopes))
+        if any(drift.rates[i] or drift.ties[i] is not None for drift in drifts)
     ]
-    # of P and, where it moves, of dP/dt at every point and motion
-    weights = np.concatenate([np.stack([value, d], axis=2) for d in drifts])
-    beside = np.stack([flow, np.broadcast_to(0.5 * state, flow.shape)], axis=1)
-    if not np.any(weights[..., 1]):
-        weights, beside = weights[..., :1], beside[:, :1]
+    # of P and of its derivatives where p moves, at every point
+    weights = np.stack([value, *(slopes[i] for i in moving)], axis=2)
+    paces = [
+        [
+            np.broadcast_to(drift.rates[i] if tie is None else points[:, tie], len(points))
+            for i in moving
+            for tie in [drift.ties[i]]
+        ]
+        for drift in drifts
+    ]
+    beside = np.concatenate(
+        [
+            np.stack([flow, *(0.5 * demand.time * pace[:, None, None] * state for pace in each)], 1)
+            for each in paces
+        ]
+    )
     blocks = LyapunovBlocks(
         coefficients_of(shape, region.segment).ravel(),
         state[None],
-        np.tile(beside, (len(drifts), 1, 1, 1))[:, None],
+        beside[:, None],
         np.tile(np.swapaxes(seen, 1, 2) @ seen, (len(drifts), 1, 1)),
         weights=weights,
     )

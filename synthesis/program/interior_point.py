@@ -26,6 +26,7 @@ import math
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -383,11 +384,23 @@ def _on_vectors(K: Array, n: int) -> Array:
     """Return the map V -> the symmetric part of sum L V R as matrices on vectors, where K = sum
     vec(L) vec(R)' by rows, (..., n^2, n^2).
     """
-    a, b, _ = indices(n)
-    K = np.moveaxis(K.reshape(-1, n, n, n, n), -1, 1)
-    rows = K[:, a, b] + K[:, b, a]
-    scale = np.where(a == b, 0.5, np.sqrt(0.5))
-    return (rows[:, :, a, b] + rows[:, :, b, a]) * scale[:, None] * scale
+    terms, scale = _entries(n)
+    out = np.empty((K.size // n**4, len(scale), len(scale)))
+    for flat, each in zip(K.reshape(-1, n**4), out, strict=True):
+        np.multiply(sum(flat[at] for at in terms), scale[:, None], out=each)
+    return np.multiply(out, scale, out=out)
+
+
+@lru_cache(maxsize=2)
+def _entries(n: int) -> tuple[Array, Array]:
+    """Return where in K, flat, the four terms of every entry stand, and the weights of rows and
+    columns of the entries.
+    """
+    rows, columns, weight = indices(n)
+    i, k = rows.astype(np.int32), columns.astype(np.int32)
+    outer = ((i[:, None], k[:, None]), (k[:, None], i[:, None]))
+    terms = [((a * n + p) * n + q) * n + b for a, b in outer for p, q in ((i, k), (k, i))]
+    return np.array(terms), weight / 2.0
 
 
 class _Cones:

@@ -122,10 +122,14 @@ class LyapunovBlocks(NamedTuple):
         return self._replace(varying=wide.reshape(m, R, k, n, N), weights=None)
 
     def keep(self, which: Array) -> LyapunovBlocks:
-        """Return these blocks only; without a `supply` or a level of their own."""
+        """Return these blocks only, places with all their blocks once; without a `supply` or a
+        level of their own.
+        """
         weights = self.weights
         if weights is not None:
-            weights = weights[np.arange(len(self.constant))[which] % len(weights)]
+            each = which.reshape(-1, len(weights))
+            whole = bool(np.all(each == each[0]))
+            weights = weights[each[0] if whole else np.nonzero(each)[1]]
         return self._replace(
             varying=self.varying[which], constant=self.constant[which], weights=weights
         )
@@ -180,7 +184,7 @@ class Program(Protocol):
 @dataclass(frozen=True, eq=False)
 class LyapunovProgram:
     """The problem: minimise g subject to every block <= -margin diag(I, 0) and every coefficient of
-    P >= floor I, every one of a multiplier >= 0.
+    P >= floor I (free where that is None), every one of a multiplier >= 0.
 
     Without inputs: maximise t subject to blocks <= -t I and 0 <= P <= I; t > 0 proves stability.
     """
@@ -188,7 +192,7 @@ class LyapunovProgram:
     blocks: tuple[LyapunovBlocks, ...]
     sizes: Sizes
     margin: float
-    floor: float
+    floor: float | None
 
     @property
     def cost(self) -> float:
@@ -210,4 +214,6 @@ class LyapunovProgram:
     @property
     def bounds(self) -> tuple[tuple[float, float], ...]:
         """(sign, constant) of every sign P + constant I >= 0."""
-        return ((1.0, -self.floor),) if self.sizes.inputs else ((1.0, 0.0), (-1.0, 1.0))
+        if not self.sizes.inputs:
+            return ((1.0, 0.0), (-1.0, 1.0))
+        return () if self.floor is None else ((1.0, -self.floor),)

@@ -30,10 +30,11 @@ def test_polynomials_stand_for_sine_and_cosine(half):
 
 
 @pytest.mark.slow
-def test_the_loop_of_the_disks_is_proven_near_what_its_design_promised():
-    made = output_feedback(spinning_disks(math.inf))
-    # the printed optimum has five digits, a design is within a thousandth of it
-    assert made.optimum == pytest.approx(1.1299, rel=1e-3)
+@pytest.mark.parametrize(("rate", "printed"), [(1.0, 0.8315), (math.inf, 1.1299)])
+def test_the_loop_of_the_disks_is_proven_near_what_its_design_promised(rate, printed):
+    made = output_feedback(spinning_disks(rate))
+    # the printed optimum has five digits, a design is within a thousandth of it or below
+    assert made.optimum <= printed * 1.001
     certificate = made.certify(search=None)
     assert certificate.frozen <= certificate.gamma <= 1.05 * made.promised
     assert certificate.verify()
