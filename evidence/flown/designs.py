@@ -185,7 +185,8 @@ def slow(name: str, size: float, seconds: float) -> LinearModel:
     signal = (Signal(name, "1"),)
     state = (Signal(f"{name}_slow", "1"),)
     b = size * np.sqrt(2 * a)
-    return LinearModel([[-a]], [[b]], [[1.0]], [[0.0]], state, signal, signal)
+    A, B, C, D = (np.array([[entry]]) for entry in (-a, b, 1.0, 0.0))
+    return LinearModel(A, B, C, D, state, signal, signal)
 
 
 def with_drift_of_airspeed(model: LPVStateSpace) -> LPVStateSpace:

@@ -54,6 +54,7 @@ from symheli import (
 from symheli.dynamics import INPUTS
 from symheli.errors import CompilerWarning, InputError, SynthesisError, ValidityWarning
 from symheli.flight import TableState
+from symheli.flight.controller import Entered
 from symheli.flight.flight_data import FlightData
 from symheli.progress import task
 from symheli.values.arrays import Array
@@ -124,17 +125,17 @@ class BesideAutopilot:
         """Sample period, s."""
         return self.own.dt
 
-    def init(self) -> tuple[TableState, Array]:
+    def init(self) -> tuple[TableState, Array | Entered]:
         """The states of both."""
         return self.own.init(), self.autopilot.init()
 
     def step(
         self,
-        state: tuple[TableState, Array],
+        state: tuple[TableState, Array | Entered],
         measured: NamedVector,
         reference: NamedVector,
         p: NamedVector,
-    ) -> tuple[Array, tuple[TableState, Array]]:
+    ) -> tuple[Array, tuple[TableState, Array | Entered]]:
         """Commands (4,), rad, and the states of both."""
         u, autopilot = self.autopilot.step(state[1], measured, reference, p)
         command, own = self.own.step(state[0], measured, reference, p)
