@@ -99,7 +99,7 @@ def margin_table(
     >>> p = Scheduling("p", "1", 0.0, 1.0)
     >>> lag = LPVStateSpace.polynomial([[[0.0]]], [[[1.0]], [[1.0]]], [[[1.0]]], [[[0.0]]], p)
     >>> found = margin_table(lag, {("u1", "y1"): -2.0}, "u1", [0.0, 1.0])  # 2(1 + p)/s
-    >>> [float(m.crossover[0].round(6)) for _, m in found.rows]
+    >>> [round(float(m.crossover[0]), 6) for _, m in found.rows]
     [2.0, 4.0]
     """
     rows = []
