@@ -145,6 +145,7 @@ def test_every_path_that_the_report_names_is_in_results_json(full, results, page
         assert at(results, path), path
 
 
+@pytest.mark.slow
 def test_every_link_leads_somewhere_and_every_number_is_given_once(page):
     identifiers = re.findall(r'\bid="([^"]+)"', page)
     assert len(identifiers) == len(set(identifiers))
