@@ -113,6 +113,8 @@ LONG = (
     "identification-fit_for_control",
     "identification-unseen_flight",
     "symheli.lpv-balanced_truncation",
+    "symheli.lpv-simulate",
+    "synthesis-robust_margin",
     "symheli.records-check_kinematics",
 )
 """Examples that take more than a second."""

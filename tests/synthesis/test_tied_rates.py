@@ -54,6 +54,7 @@ def test_the_gain_does_not_increase_as_the_jerk_falls(gains):
     assert found[-1] < 0.7 * found[0]
 
 
+@pytest.mark.slow
 def test_it_never_exceeds_the_gain_where_the_rate_is_bounded_alone_and_equals_it_at_infinite_jerk(
     gains,
 ):
