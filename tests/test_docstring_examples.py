@@ -115,6 +115,12 @@ LONG = (
     "symheli.lpv-balanced_truncation",
     "symheli.lpv-simulate",
     "synthesis-robust_margin",
+    "synthesis-DwellTime",
+    "synthesis-SwitchedController",
+    "synthesis-bounded_truncation",
+    "synthesis-dwell_time",
+    "synthesis-generalized_h2",
+    "synthesis-lqg",
     "symheli.records-check_kinematics",
 )
 """Examples that take more than a second."""

@@ -267,6 +267,7 @@ def test_the_value_rooms_know_no_physics(room, below):
     assert not wrong, "\n".join(wrong)
 
 
+@pytest.mark.slow
 def test_no_import_runs_in_a_circle():
     """Between files, counting only what is imported when the file is loaded."""
     files = {

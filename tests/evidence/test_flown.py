@@ -55,6 +55,7 @@ def test_a_controller_of_the_wrong_sign_is_lost_and_meets_nothing(lqr):
     assert "energy ratio, median" not in row
 
 
+@pytest.mark.slow
 def test_a_finished_campaign_flies_nothing_again(lqr, tmp_path, monkeypatch):
     """And a lost flight is no best energy ratio."""
     made = {name: Design(name=name, controller=lqr) for name in (LQR,)}

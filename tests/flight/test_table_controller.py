@@ -176,6 +176,7 @@ def test_a_saturated_integral_turns_at_once_with_anti_windup_and_late_without():
     assert flown["without"].min() == flown["without"].max()  # at the limit: 5 up, 3.6 back, - 0.06
 
 
+@pytest.mark.slow(but="pi")
 def test_the_states_follow_saturated_commands_stably_whichever_saturate(heli):
     for t in (table(), TableController.of(dynamic(heli).model, 5)):
         n, own = t.order, t.order + len(t.inputs)

@@ -103,6 +103,7 @@ def test_steps_end_where_the_equations_change_their_form(ideal, pair):
                 assert not 0.02 < share < 0.98, (k, name)  # 0.01, and what normalising moves
 
 
+@pytest.mark.slow(but="method0")
 @pytest.mark.parametrize("method", [CashKarp(1e-6, 1e-6), DormandPrince(1e-6, 1e-6)])
 def test_without_a_compiler_the_same_switches_are_stepped_to(ideal, monkeypatch, method):
     x0, u = transition(ideal)

@@ -32,6 +32,7 @@ def around(model, size, count=20):
     )
 
 
+@pytest.mark.slow(only=("0.3-0.9", "0.3-0.9995", "0.3-1.02"))
 @pytest.mark.parametrize("radius", [0.9, 0.9995, 1.02])
 @pytest.mark.parametrize("size", [1e-4, 1e-2, 0.3])
 def test_each_is_the_nu_gap_of_the_pair(radius, size):

@@ -61,6 +61,7 @@ def test_every_parameter_a_component_uses_occurs_in_its_equations(pi):
             assert p.symbol in text or p.entry in unused, p.entry
 
 
+@pytest.mark.slow
 def test_printed_forms_change_what_is_printed():
     """Each option that changes an equation changes its line; the relaxed iteration has the same
     root and the same line.

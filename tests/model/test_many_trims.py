@@ -103,6 +103,7 @@ def test_the_residual_of_every_trim_holds_in_the_equations_with_their_numbers_wr
         assert np.abs(xdot).max() < TOLERANCE
 
 
+@pytest.mark.slow(but="ideal")
 def test_a_trim_has_the_same_bits_whatever_is_computed_beside_it(heli):
     near = symheli.trim_batch(heli, SPEEDS[:13])
     speeds = SPEEDS[:13] + 0.2

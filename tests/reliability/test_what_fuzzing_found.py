@@ -566,6 +566,7 @@ def test_an_operating_point_has_an_airspeed(ideal):
             replace(point, airspeed=speed)
 
 
+@pytest.mark.slow
 def test_the_misfit_of_a_table_is_a_number(ideal):
     lqr = symheli.gain_scheduled_lqr(ideal, 0.0, 4.0, dt=0.02, points=3)
     table = symheli.TableController.of(lqr.scheduled_controller.model, 5)

@@ -400,6 +400,7 @@ def test_a_cluster_gives_the_numbers_of_one_process(tmp_path, cluster):
     same_numbers(tmp_path, cluster)
 
 
+@pytest.mark.slow
 def test_a_worker_killed_under_a_case_costs_nothing(tmp_path, cluster):
     assert not deaths(tmp_path, cluster, 1)
 

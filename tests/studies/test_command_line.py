@@ -111,6 +111,7 @@ def test_a_saved_certificate_is_proven_again_from_its_file(answer, run, tmp_path
     assert "damaged" in err
 
 
+@pytest.mark.slow(only="options0-not both")
 @pytest.mark.parametrize(
     ("options", "said"),
     [

@@ -67,6 +67,7 @@ def test_leaving_by_an_exception_ends_what_is_under_way():
     assert time.monotonic() - begin < 30
 
 
+@pytest.mark.slow
 def test_a_script_without_a_guard_may_ask(tmp_path):
     """Nothing of the script is imported again, so that it need not guard its main part."""
     script = tmp_path / "script.py"

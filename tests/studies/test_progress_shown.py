@@ -33,6 +33,7 @@ def run(steps, pause, **streams):
     )
 
 
+@pytest.mark.slow
 def test_on_a_terminal_there_are_bars_and_what_is_printed_stays_whole():
     pty = pytest.importorskip("pty", reason="a terminal of POSIX")
     ours, theirs = pty.openpty()

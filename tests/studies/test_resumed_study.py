@@ -135,6 +135,7 @@ def test_stages_of_another_seed_or_vehicle_are_computed_again(stopped, short, ca
     assert said.count("is of another version, vehicle, effort or seed: not taken") == 2
 
 
+@pytest.mark.slow
 def test_stages_of_other_code_are_computed_again(stopped, short, monkeypatch):
     monkeypatch.setattr(stored_stages, "code_digest", lambda: "another day")
     run(stopped, resume=True)
@@ -336,6 +337,7 @@ def test_proofs_that_were_found_are_not_proven_again(tmp_path, monkeypatch):
     assert [p.name for p in (tmp_path / "stages").iterdir()] == ["gust.stage"]
 
 
+@pytest.mark.slow
 def test_a_stage_whose_file_is_removed_is_computed_again_alone(stopped, short):
     run(stopped, resume=True)
     short.clear()

@@ -140,6 +140,7 @@ def test_a_gain_thirty_times_too_large_is_called_unstable(tune, ideal, loops, fo
     assert "# After the change the loops are UNSTABLE" in written.read_text()
 
 
+@pytest.mark.slow
 def test_responses_are_shown_before_and_after_and_written_with_a_figure(tune, ideal, loops, folder):
     pytest.importorskip("matplotlib")
     out = folder / "figures"

@@ -132,6 +132,7 @@ def test_the_certificate_itself_is_accepted(form):
     assert cert.verify(rigorous=True)
 
 
+@pytest.mark.slow(only=("sampled", "memory", "uncertain", "uncertain, sampled"))
 @pytest.mark.parametrize("form", FORMS)
 @settings(max_examples=25, derandomize=True, deadline=None, suppress_health_check=list(HealthCheck))
 @given(data=st.data())
@@ -155,6 +156,18 @@ def test_junk_in_any_field_is_refused(form, data):
     assert refused(lambda: exchanged(cert, path, junk)), f"{path} = {junk!r}"
 
 
+@pytest.mark.slow(
+    only=(
+        "memory",
+        "uncertain, sampled",
+        "box",
+        "box stability",
+        "energy to peak",
+        "decay",
+        "lft, D",
+        "lft, full block",
+    )
+)
 @pytest.mark.parametrize("form", FORMS)
 @settings(max_examples=40, derandomize=True, deadline=None, suppress_health_check=list(HealthCheck))
 @given(data=st.data())
@@ -201,6 +214,7 @@ def test_numbers_of_the_proof_that_were_changed_are_refused(form, data):
     assert refused(lambda: exchanged(cert, path, array)), f"{change} of {path}"
 
 
+@pytest.mark.slow(only=("sampled", "memory", "uncertain", "uncertain, sampled"))
 @pytest.mark.parametrize("form", FORMS)
 def test_a_bound_beyond_the_proof_is_refused(form):
     cert = genuine(form)

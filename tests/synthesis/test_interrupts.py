@@ -111,6 +111,7 @@ def vanish(code):
     os._exit(code)
 
 
+@pytest.mark.slow
 def test_another_process_answers_fails_or_ends_and_says_which(capfd):
     assert in_process(loud, 3) == 9
     assert capfd.readouterr().out == ""

@@ -164,6 +164,7 @@ def test_richer_multipliers_prove_smaller_gains(seed, dt):
     assert D <= small * (1 + CLOSE)
 
 
+@pytest.mark.slow(but="5")
 @pytest.mark.parametrize("seed", [5, 7])
 def test_for_one_parameter_d_and_g_lose_nothing_against_any_constant_p(seed):
     lpv = random_stable(seed)

@@ -431,6 +431,7 @@ def lag_and_its_inverse(weights, parameters):
     return LPVStateSpace.polynomial(A, {one: [[1.0]]}, C, {one: [[0.0]]}, parameters)
 
 
+@pytest.mark.slow
 def test_two_parameters_that_act_through_their_sum_have_the_gain_of_the_sum():
     two = [Scheduling(name, "1", 0.0, 0.5, rate=0.1) for name in ("a", "b")]
     sum_of_them = [Scheduling("q", "1", 0.0, 1.0, rate=0.2)]

@@ -120,6 +120,7 @@ def test_the_fractions_of_the_standard_library_prove_the_same(monkeypatch):
     assert not replace(cert, gamma=0.9, frozen=0.0, lower=0.0).verify(rigorous=True)
 
 
+@pytest.mark.slow
 def test_an_infeasible_problem_says_so_and_promises_nothing():
     cert = l2_gain(spring(), math.inf, search=None)
     assert cert.status is Status.INFEASIBLE
@@ -128,6 +129,7 @@ def test_an_infeasible_problem_says_so_and_promises_nothing():
     assert "may still be stable" in cert.details
 
 
+@pytest.mark.slow
 def test_a_certificate_reads_like_a_statement():
     cert = l2_gain(spring(), 0.02, form=COARSE, search=None)
     text = cert.details

@@ -79,6 +79,7 @@ def test_the_gain_does_not_fall_when_p_may_move_faster(dt):
     assert gains[-1] > 1.02 * gains[0]
 
 
+@pytest.mark.slow
 def test_a_finer_spline_does_not_prove_less():
     gains = [
         l2_gain(spring(), 0.03, form=Spline(segments=(k,), grading=1.0), search=None).gamma
@@ -143,6 +144,7 @@ def test_the_search_for_bad_trajectories_is_deterministic():
     assert a.gain == b.gain
 
 
+@pytest.mark.slow
 def test_a_rate_of_zero_leaves_the_frozen_gain():
     found = lower_bound(spring(), 0.0)
     assert found.trajectory is None

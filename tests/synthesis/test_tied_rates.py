@@ -81,6 +81,7 @@ def test_what_is_found_from_below_keeps_to_rate_and_jerk_and_does_not_beat_the_p
         assert cert.lower > 1.01 * cert.frozen
 
 
+@pytest.mark.slow
 def test_a_cycle_along_which_the_state_grows_is_shown_as_it_moves():
     """Unstable while V moves, stable at rest."""
     V = Scheduling("V", "1", 0.0, 1.0, rate="a")
@@ -220,6 +221,7 @@ def replace_fault(cert, evidence):
     return str(evidence.fault(cert.proof.lyapunov, cert.kind, cert.rates))
 
 
+@pytest.mark.slow
 def test_stability_and_what_is_refused():
     assert stability(tied(0.1), form=BOTH).verified
     with pytest.raises(InputError, match="a range with 0 inside"):

@@ -95,6 +95,7 @@ def by_lmi(P):
     return float(gamma.value)
 
 
+@pytest.mark.slow(but=("3", "7"))
 @pytest.mark.parametrize("seed", SEEDS)
 def test_random_controllers_nearby_do_not_undercut_the_optimum(seed):
     design_of = random_plant(seed)
@@ -105,6 +106,7 @@ def test_random_controllers_nearby_do_not_undercut_the_optimum(seed):
         assert norm(*P.closed(*K))[0] >= design.optimum * (1 - 1e-7)
 
 
+@pytest.mark.slow(only=("1", "7"))
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_sampled_plant_has_the_optimum_of_its_bilinear_image(seed):
     model, u, y = random_plant(seed, 0.1)
@@ -128,6 +130,7 @@ def test_the_bilinear_image_of_a_loop_has_its_norm(seed):
     )
 
 
+@pytest.mark.slow(only=("1-None", "1-0.1", "7-0.1"))
 @pytest.mark.parametrize("dt", [None, 0.1])
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_transposed_plant_has_the_same_optimum(seed, dt):

@@ -103,6 +103,7 @@ def test_return_differences_of_a_regulator_are_at_least_one():
         assert abs(1 + L[0, 0]) >= 1 - 1e-9  # rounding
 
 
+@pytest.mark.slow(but="None")
 @pytest.mark.parametrize("dt", [None, 0.1])
 def test_lqg_at_every_p_is_the_h2_optimum(dt):
     plant = random_plant(1)
@@ -168,6 +169,7 @@ def lateral_designs(heli):
     return (synthesis.lqr(plant), 2), (synthesis.lqg(noisy), 5)
 
 
+@pytest.mark.slow
 def test_it_is_the_same_object_as_every_other_design(tmp_path):
     """Sampled, in a table, in C, and flown."""
     heli = symheli.Helicopter.load("xcell60", governor="ideal")

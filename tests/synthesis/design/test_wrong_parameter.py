@@ -173,6 +173,7 @@ def test_the_bound_is_that_of_the_exact_analysis_over_parameter_and_error():
     assert wrong.frozen <= both.gamma
 
 
+@pytest.mark.slow
 def test_an_error_of_zero_leaves_the_loop():
     K = scheduled(PiecewiseLinear((0.0, 0.4, 1.0)), seed=3)
     K = replace(K, D=np.full_like(K.D, -1.0))
