@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import argparse
 import hashlib
-import sys
 import time
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -15,7 +14,7 @@ from typing import Any
 
 from studies.campaigns.runners import results, runner
 from studies.output import progress
-from studies.transition.stored_stages import NotUsable, Stored, StoredStages, code_digest
+from studies.transition.stored_stages import PACKAGES, Stored, StoredStages, code_digest
 
 
 def parser_of(about: str | None, seeds: str, quick: int = 2) -> argparse.ArgumentParser:
@@ -51,9 +50,10 @@ def over_seeds(options: argparse.Namespace, calls: Sequence[partial[Any]]) -> It
     names a folder, each is stored there when it is due, and what the same code has stored of the
     same call is read instead.
     """
-    keys = {key[:16]: key for key in map(_key, calls)} if options.out else {}
-    stages = StoredStages(options.out or Path(), keys)
-    known = {i: stored for i, name in enumerate(keys) if (stored := _found(stages, name))}
+    keys = [_key(call) for call in calls] if options.out else []
+    names = [key[:16] for key in keys]
+    stages = StoredStages(options.out or Path(), dict(zip(names, keys, strict=True)))
+    known = {i: stored for i, name in enumerate(names) if (stored := stages.usable(name))}
     progress(f"{len(calls)} to compute" + f", {len(known)} of them are there" * bool(known))
     begin = time.perf_counter()
     with runner(options.processes) as on:
@@ -62,21 +62,13 @@ def over_seeds(options: argparse.Namespace, calls: Sequence[partial[Any]]) -> It
             if i not in known:
                 known[i] = Stored(result=next(computed), seconds=time.perf_counter() - begin)
                 if options.out:
-                    stages.save(list(keys)[i], known[i])
+                    stages.save(names[i], known[i])
                 progress(f"{i + 1} of {len(calls)}")
             yield known.pop(i).result
 
 
-def _found(stages: StoredStages, name: str) -> Stored | None:
-    try:
-        return stages.load(name)
-    except NotUsable as reason:
-        progress(f"{reason}; computed again")
-        return None
-
-
 def _key(call: partial[Any]) -> str:
-    """A digest of the code, the program and the arguments of the call."""
-    source = Path(sys.modules[call.func.__module__].__file__ or "").read_bytes()
-    text = f"{code_digest()}\n{call.func.__qualname__}\n{call.args!r}\n{call.keywords!r}\n"
-    return hashlib.sha256(text.encode() + source).hexdigest()
+    """A digest of the code, these programs too, and of the call."""
+    function = f"{call.func.__module__}.{call.func.__qualname__}"
+    text = f"{code_digest((*PACKAGES, 'evidence'))}\n{function}\n{call.args!r}\n{call.keywords!r}"
+    return hashlib.sha256(text.encode()).hexdigest()

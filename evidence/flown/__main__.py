@@ -11,6 +11,7 @@ import math
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from evidence.flown import campaign as flown
 from evidence.flown import designs
@@ -28,6 +29,7 @@ from studies.specs.of_vehicle import OfVehicle, digest_of
 from symheli import LPVStateSpace
 from synthesis import Plant, SpecificationTable
 from synthesis.sheet.evaluation import Reached, margin, worst
+from synthesis.sheet.sheet import Specification
 
 PAGE = DOCS / "flown.md"
 POINTS = 14
@@ -68,7 +70,8 @@ def ratios(cases: Cases, names: Sequence[str]) -> str:
     columns = []
     for wind in SIZES_OF_GUSTS:
         rows = {n: cases.of(n, wind) for n in names if n in COMPARED or wind in WINDS}
-        least = min(r["energy ratio, median"] for r in rows.values() if not r["lost"])
+        safe = [r["energy ratio, median"] for r in rows.values() if not r["lost"]]
+        least = min(safe, default=math.nan)
         columns.append({n: _ratio(row, least) for n, row in rows.items()})
     cells = [[name, *(column.get(name, "") for column in columns)] for name in names]
     return markdown(["controller", *(f"{w:g} m/s" for w in SIZES_OF_GUSTS)], cells)
@@ -158,57 +161,54 @@ def entries(cases: Cases, names: Sequence[str], winds: Sequence[float]) -> str:
 
 
 def conflicts(table: SpecificationTable, cases: Cases) -> str:
-    """Every counted entry that no controller meets, or that the controllers that meet it pay for:
-    who comes nearest.
-    """
+    """Every counted entry that a controller misses: how many meet it, and who comes nearest."""
     rows = []
-    every = {name: table.reached(name) for name in table.controllers}
     for k, spec in enumerate(table.sheet.specifications):
-        if not spec.counts:
-            continue
-        if spec.kind == "frozen":
-            reached = {n: of[k] for n, of in every.items() if not math.isnan(of[k].margin)}
-            if not reached:
-                continue
-            inside = [n for n, r in reached.items() if r.margin >= 0]
-            best = max(reached, key=lambda n: reached[n].margin)
-            if len(inside) < len(reached):
-                rows.append(
-                    [
-                        spec.axis,
-                        spec.name,
-                        f"{len(inside)} of {len(reached)}",
-                        best,
-                        worst(reached[best]),
-                        margin(reached[best]),
-                    ]
-                )
+        if spec.counts and spec.kind == "frozen":
+            found = _frozen(table, k)
         elif spec in flown.flown_entries(table.sheet):
-            name = f"{flown.entry(spec)}"
-            at = {
-                n: min(cases.of(n, WINDS[0], a)[f"{name}, met"] for a in ACCELERATIONS)
-                for n in every
-            }
-            value = {
-                n: max(cases.of(n, WINDS[0], a)[f"{name}, {SHARE:.0%}"] for a in ACCELERATIONS)
-                for n in every
-            }
-            inside = [n for n, share in at.items() if share >= SHARE]
-            best = min(value, key=lambda n: value[n])
-            if len(inside) < len(at):
-                rows.append(
-                    [
-                        spec.axis,
-                        spec.name,
-                        f"{len(inside)} of {len(at)}",
-                        best,
-                        f"{_short(value[best])} {spec.unit}",
-                        f"{spec.design_margin(value[best]):.0f}",
-                    ]
-                )
+            found = _flown(spec, table.controllers, cases)
+        else:
+            continue
+        if found.met < found.of:
+            met = f"{found.met} of {found.of}"
+            rows.append([spec.axis, spec.name, met, found.nearest, found.value, found.margin])
     return markdown(
         ["axis", "entry", "controllers that meet it", "nearest", "its value", "its margin, %"], rows
     )
+
+
+class _Entry(NamedTuple):
+    """How many controllers, `of` those it is defined for, meet an entry; the one nearest to it, its
+    value and margin.
+    """
+
+    met: int
+    of: int
+    nearest: str = ""
+    value: str = ""
+    margin: str = ""
+
+
+def _frozen(table: SpecificationTable, k: int) -> _Entry:
+    each = {name: table.reached(name)[k] for name in table.controllers}
+    each = {name: r for name, r in each.items() if not math.isnan(r.margin)}
+    if not each:
+        return _Entry(0, 0)
+    best = max(each, key=lambda name: each[name].margin)
+    met = sum(r.margin >= 0 for r in each.values())
+    return _Entry(met, len(each), best, worst(each[best]), margin(each[best]))
+
+
+def _flown(spec: Specification, names: Sequence[str], cases: Cases) -> _Entry:
+    """Of the transition in which a controller does worse."""
+    of = {name: [cases.of(name, WINDS[0], a) for a in ACCELERATIONS] for name in names}
+    entry = flown.entry(spec)
+    met = sum(min(row[f"{entry}, met"] for row in rows) >= SHARE for rows in of.values())
+    values = {name: max(row[f"{entry}, {SHARE:.0%}"] for row in rows) for name, rows in of.items()}
+    best = min(values, key=lambda name: values[name])
+    value, off = values[best], spec.design_margin(values[best])
+    return _Entry(met, len(of), best, f"{_short(value)} {spec.unit}", f"{off:.0f}")
 
 
 def _short(value: float) -> str:
@@ -233,10 +233,12 @@ def main(argv: Sequence[str] | None = None) -> int:
 def tables(folder: Path, flights: int) -> Iterator[tuple[str, str]]:
     """Every section with its table, as they are done: the proofs last."""
     vehicle = OfVehicle(name=designs.VEHICLE, points=POINTS, folder=folder / "designs")
-    made = {d.name: d for d in designs.every(folder / "designs") if d.controller is not None}
+    every = list(designs.every(folder / "designs"))
+    made = {d.name: d for d in every if d.controller is not None}
     cases = fly(made, folder / "flights.zarr", flights)
     names = list(made)
     about = f"{flights} flights each, seeds from {flown.SEEDS_FROM} on."
+    about += "".join(f" No {d.name}: {d.reason}." for d in every if d.controller is None)
     yield "energy ratios", f"{about}\n\n{ratios(cases, names)}"
     yield "flown entries", f"{about}\n\n{entries(cases, names, WINDS[:1])}"
     table = vehicle.frozen({name: d.controller for name, d in made.items()})

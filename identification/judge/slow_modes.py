@@ -13,6 +13,7 @@ from scipy.optimize import nnls
 from identification.design.excitation import column_scale
 from identification.judge.uncertainty import uncertainty
 from identification.model.lpvarx_model import LPVARXModel
+from identification.model.realization import held_value
 from identification.structure.regressors import Regression, as_records, stacked
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
@@ -225,7 +226,7 @@ def _compensated(model: LPVARXModel, data: Regression) -> list[Array]:
 
 def _poles(model: LPVARXModel, p: Array) -> Array:
     """Of the model with the scheduling held at p, complex, those at zero left out."""
-    A = model.coefficients.at(_argument(p)).A
+    A = model.coefficients.at(held_value(p)).A
     na, ny = A.shape[0], A.shape[1]
     companion = np.eye(na * ny, k=-ny)
     companion[:ny] = -A.transpose(1, 0, 2).reshape(ny, na * ny)
@@ -239,8 +240,8 @@ def _standard_error(model: LPVARXModel, joint: Array, p: Array, z: complex) -> f
     """
     arx, A, f = (
         model.structure,
-        model.coefficients.at(_argument(p)).A,
-        np.ravel(model.structure.basis(_argument(p))),
+        model.coefficients.at(held_value(p)).A,
+        np.ravel(model.structure.basis(held_value(p))),
     )
     powers = [z ** -float(i) for i in range(1, len(A) + 1)]
     M = np.eye(arx.ny) + sum(a * w for a, w in zip(A, powers, strict=True))
@@ -256,8 +257,3 @@ def _standard_error(model: LPVARXModel, joint: Array, p: Array, z: complex) -> f
     gradient /= left @ slope @ right
     variance = np.einsum("yi,yizj,zj->", gradient, joint, gradient.conj()).real
     return float(np.sqrt(max(variance, 0.0)) / abs(z) / model.dt)
-
-
-def _argument(p: Array) -> Array:
-    """One parameter as a number, several as they are."""
-    return p[0] if len(p) == 1 else p

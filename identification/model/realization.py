@@ -5,6 +5,7 @@ exact.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -111,7 +112,7 @@ def direct(
     return LPVStateSpace(basis, A, B, C, D, parameters, tuple(states), inputs, outputs, dt)
 
 
-def held_value(p: Sequence[object]) -> object:
+def held_value(p: Sequence[Any] | Array) -> Any:
     """The value of one parameter, or those of several, as `at(*p)` takes them."""
     return p[0] if len(p) == 1 else p
 

@@ -41,8 +41,7 @@ from synthesis.loops.controller import Controller
 from synthesis.loops.reduction import fewest
 from synthesis.lpv.linear_quadratic import lqg, lqr
 from synthesis.lpv.output_feedback import lft_feedback, output_feedback
-from synthesis.lpv.point_schedule import hinf_schedule
-from synthesis.lti.hinf import hinf
+from synthesis.lpv.point_schedule import hinf_at, hinf_schedule
 from synthesis.worst.frozen import norm
 
 LQR, HINF, LFT = "LQR schedule", "H-infinity schedule", "LFT"
@@ -151,15 +150,7 @@ def classical(base: LPVStateSpace) -> dict[str, Callable[[], Controller]]:
     plant = design_plant(base)
 
     def of_one_airspeed() -> Controller:
-        one = plant.nominal.at(TOP / 2)
-        found = hinf(
-            one,
-            plant.controls,
-            plant.measurements,
-            disturbances=plant.disturbances,
-            performance=plant.performance,
-            back_off=BACK_OFF,
-        )
+        found = hinf_at(plant, [TOP / 2], BACK_OFF)
         return Controller.of(plant, found.controller, ONE_POINT)
 
     return {

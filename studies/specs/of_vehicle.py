@@ -4,7 +4,6 @@ the study, and what is kept of long work.
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import math
 import time
@@ -32,7 +31,7 @@ from studies.controllers.in_airspeed import of_degree
 from studies.controllers.plant import baseline, flown_plant
 from studies.known_kinematics import flights, models
 from studies.transition.flights import autopilot_for
-from studies.transition.stored_stages import NotUsable, Stored, StoredStages, content_key
+from studies.transition.stored_stages import Stored, StoredStages, content_key
 from symheli import Helicopter, LinearFamily, LPVStateSpace
 from symheli.flight import XCELL_SERVOS
 from symheli.progress import task, tracked
@@ -158,9 +157,8 @@ class OfVehicle:
             return make()
         name = f"{kind}-{hashlib.sha256(what.encode()).hexdigest()[:12]}"
         stages = StoredStages(self.folder, {name: self._key(what)})
-        with contextlib.suppress(NotUsable):
-            if (stored := stages.load(name)) is not None:
-                return stored.result
+        if (stored := stages.usable(name)) is not None:
+            return stored.result
         begin = time.perf_counter()
         with task(f"{kind}: {what}"):
             result = make()

@@ -98,12 +98,14 @@ class StoredStages:
 
     def parts(self, name: str, count: int) -> dict[int, Stored]:
         """The answers that are there and whole, of `count`, by number."""
-        known = {}
-        for i in range(count):
-            with contextlib.suppress(NotUsable):
-                if (answer := self.load(name, i)) is not None:
-                    known[i] = answer
-        return known
+        each = ((i, self.usable(name, i)) for i in range(count))
+        return {i: answer for i, answer in each if answer is not None}
+
+    def usable(self, name: str, part: int | None = None) -> Stored | None:
+        """The stored result; None where there is none that can be used."""
+        with contextlib.suppress(NotUsable):
+            return self.load(name, part)
+        return None
 
 
 def loaded(configuration: Configuration) -> Helicopter:
@@ -147,10 +149,10 @@ def _digest(parts: Iterable[str]) -> str:
 
 
 @cache
-def code_digest() -> str:
-    """Return a digest of every source file of the four packages, and of the packaged vehicles."""
+def code_digest(packages: tuple[str, ...] = PACKAGES) -> str:
+    """Return a digest of every source file of the packages, and of the packaged vehicles."""
     root, digest = Path(__file__).resolve().parents[2], hashlib.sha256()
-    for package in PACKAGES:
+    for package in packages:
         for path in sorted((root / package).rglob("*")):
             if path.suffix in (".py", ".c", ".h", ".toml"):
                 digest.update(f"{path.relative_to(root)}\n".encode() + path.read_bytes())

@@ -12,7 +12,23 @@ from symheli.values.arrays import Array
 from synthesis.loops.controller import Controller
 from synthesis.lpv.fitted import Fitted, controller_from
 from synthesis.lti.hinf import hinf
+from synthesis.lti.point_design import PointDesign
 from synthesis.plant.plant import Plant
+
+
+def hinf_at(plant: Plant, p: Sequence[float], back_off: float = 1.01) -> PointDesign:
+    """Design the H-infinity controller of a plant frozen at p, one value a parameter; `back_off` as
+    in `hinf`.
+    """
+    named = plant.channels
+    return hinf(
+        plant.nominal.at(*p),
+        named.controls,
+        named.measurements,
+        disturbances=named.disturbances,
+        performance=named.performance,
+        back_off=back_off,
+    )
 
 
 def hinf_schedule(
@@ -28,14 +44,7 @@ def hinf_schedule(
     """
     found = []
     for p in points:
-        one = hinf(
-            plant.nominal.at(float(p)),
-            [str(s) for s in plant.controls],
-            [str(s) for s in plant.measurements],
-            disturbances=plant.disturbances,
-            performance=plant.performance,
-            back_off=back_off,
-        )
+        one = hinf_at(plant, [float(p)], back_off)
         if one.controller is None:
             (parameter,) = plant.parameters
             at = f"{parameter.name} {p:g} {parameter.unit}"

@@ -20,9 +20,9 @@ from symheli.values.numbers import whole
 from symheli.values.summary import summarized
 from synthesis.loops.controller import Controller
 from synthesis.lpv.objectives import L2
+from synthesis.lpv.point_schedule import hinf_at
 from synthesis.lpv.search import check_points
 from synthesis.lpv.worst_optimum import worst_optimum
-from synthesis.lti.hinf import hinf
 from synthesis.plant.diagnosis import modes_out_of_reach, unpriced
 from synthesis.plant.plant import Plant, require_plant
 from synthesis.plant.refusals import conditions, require_channels
@@ -469,15 +469,7 @@ class _Search:
             notes.append(f"the least gain is that with noise of {SMALL_NOISE:g} on measurements")
         if len(self.points) > 1:
             return worst_optimum(plant).level or None
-        names = plant.channels
-        model = plant.nominal.at(*self.points[0])
-        found = hinf(
-            model,
-            names.controls,
-            names.measurements,
-            disturbances=names.disturbances,
-            performance=names.performance,
-        )
+        found = hinf_at(plant, self.points[0])
         return found.optimum if found.optimum > 0 else None
 
 
