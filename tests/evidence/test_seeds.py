@@ -39,6 +39,8 @@ def test_what_was_finished_before_a_failure_is_not_computed_again(tmp_path):
     assert COMPUTED == [4]
     assert found(["--seeds", "4,2,1", *out]) == [[4.0], [2.0], [1.0]]
     assert COMPUTED == []
+    assert found(["--seeds", "2,2,1", *out]) == [[2.0], [2.0], [1.0]]
+    assert COMPUTED == []
 
 
 def test_other_arguments_and_damaged_files_are_computed(tmp_path):
