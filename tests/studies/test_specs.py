@@ -11,7 +11,7 @@ import pytest
 
 from studies.controllers.designs import LQR
 from studies.controllers.flown import plan
-from studies.specs.flown import flown, measured
+from studies.specs.flown import at_a_switch, flown, measured, quickness
 from studies.specs.of_vehicle import OfVehicle, share_met
 from symheli import (
     AirspeedSchedule,
@@ -133,6 +133,44 @@ def test_a_flight_along_its_reference_misses_nothing(lqr):
     for key in (("altitude", ""), ("track", ""), ("rotor_speed", ""), ("effort", "d_lat")):
         assert found[key] == pytest.approx(0.0, abs=1e-9)
         assert flew[key] > 1e-4
+
+
+def test_taking_over_from_oneself_changes_little_and_from_others_more(vehicle, monkeypatch):
+    """The first command of who takes over is the one in force: a sample late, and no more of
+    oneself. A regulator with half as much gain again changes more, within the entries.
+    """
+    monkeypatch.setattr("studies.specs.flown.HELD_AT", (6.5,))
+    own = gain_scheduled_lqr(vehicle.heli, 0.0, 13.0, 0.02).scheduled_controller.model
+    heli = Helicopter.load("xcell60", governor="pi")
+    found, harder = at_a_switch(heli, own), at_a_switch(heli, replace(own, D=1.5 * own.D))
+    assert 0 < found["switch_attitude"] < 0.5
+    assert found["switch_attitude"] < harder["switch_attitude"] < 3
+    assert 0 < found["switch_acceleration"] < 0.05
+    assert found["switch_acceleration"] < harder["switch_acceleration"]
+
+
+@pytest.mark.parametrize(
+    ("axis", "step", "gain"),
+    [("yaw", 0.05, 20.0), pytest.param("roll", 0.1745, 1.0, marks=pytest.mark.slow)],
+)
+def test_quickness_in_flight_is_that_of_the_frozen_loop(lqr, axis, step, gain, monkeypatch):
+    """Within 10 %: servos move in steps and the governed rotor's speed varies. A pulse of two
+    samples is nearly the impulse of the frozen loop. The pedal's gain is raised to where it moves
+    by many steps of the servo.
+    """
+    monkeypatch.setattr("studies.specs.flown.HELD_AT", (6.5,))
+    monkeypatch.setattr("studies.specs.flown.PULSE", 0.04)
+    sheet = Sheet.load()
+    vehicle = OfVehicle(name="xcell60", points=3, sheet=sheet.select([axis]))
+    D = np.array(lqr.D)
+    D[:, lqr.outputs.index("d_ped")] *= gain
+    K = replace(lqr, D=D)
+    flew = quickness(
+        Helicopter.load("xcell60", governor="pi"), K, replace(sheet.axes[axis], step=step)
+    )
+    (spec,) = (s for s in vehicle.scaled.specifications if s.name.startswith("quickness, linear"))
+    _, frozen, _ = vehicle.frozen({NAME: K}).over(NAME, axis, spec.name)
+    assert flew == pytest.approx(frozen, rel=0.1)
 
 
 @pytest.mark.slow
