@@ -103,7 +103,9 @@ def designs_of(folder: Path) -> tuple[Configuration, Designs]:
     return configuration, found.result
 
 
-def stored_of(configuration: Configuration, heli: Helicopter, every: Sequence[Stage]) -> StoredStages:
+def stored_of(
+    configuration: Configuration, heli: Helicopter, every: Sequence[Stage]
+) -> StoredStages:
     """Return the stored stages of a run."""
     content = content_key(heli, configuration.vehicle, configuration.seed)
     keys = stage_keys(every, content, configuration.effort)
