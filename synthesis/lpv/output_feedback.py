@@ -20,6 +20,7 @@ from synthesis.lpv.existence import MATRIX_BOUNDS, Divisions, Existence, Solutio
 from synthesis.lpv.fitted import in_plant_units
 from synthesis.lpv.frozen_stability import frozen_stability
 from synthesis.lpv.recovery import controller, sampled_controller, split
+from synthesis.lpv.regular import regular
 from synthesis.lpv.robust import robust_plant
 from synthesis.lpv.scaled_plant import ScaledPlant, depends
 from synthesis.lpv.search import (
@@ -36,7 +37,7 @@ from synthesis.lpv.search import (
 )
 from synthesis.lpv.worst_optimum import FrozenOptimum, worst_optimum
 from synthesis.plant.plant import Plant, require_plant
-from synthesis.plant.refusals import NOTHING_WRONG, failed, least_ranks, levels_above
+from synthesis.plant.refusals import NOTHING_WRONG, failed, levels_above, require_channels
 from synthesis.program.cone_program import LYAPUNOV, Solver
 from synthesis.worst.rates import Rate, limits
 
@@ -78,8 +79,9 @@ def output_feedback(
     Parameters
     ----------
     plant : Plant
-        With disturbances, performance, controls and measurements; every control must cost (D12 of
-        full column rank), every measurement be disturbed (D21 of full row rank).
+        With disturbances, performance, controls and measurements. A control without a cost (D12
+        not of full column rank), or a measurement without noise (D21 not of full row rank), gets a
+        little of it for the design, which `notes` say.
     rate : float, sequence or mapping, optional
         Largest |dp/dt|, as for `l2_gain`; by default the plant's own; math.inf: p may jump.
     X, Y : int, tuple or FunctionSpace, optional
@@ -129,9 +131,10 @@ def output_feedback(
     """
     require_plant(plant)
     parameters = limits(plant.parameters, rate)
-    plant = plant.with_scheduling(parameters)
-    least_ranks(plant)
+    given = plant.with_scheduling(parameters)
+    require_channels(given)
     factors = levels_above(back_off)
+    plant, added = regular(given)
     attempts: list[Attempt] = []
     matters = depends(plant)
     cut = imposed_at(divisions, impose)
@@ -144,9 +147,11 @@ def output_feedback(
         return both_moving(parameters, matters, degree) if free else []
 
     if isinstance(plant.model, UncertainStateSpace):
-        return _robust(plant, every(DEGREES[1][0]), factors, fastest, cut, attempts)
-    free = X is None and Y is None
-    return _nominal(plant, every, both, factors, fastest, cut, attempts, free=free)
+        made = _robust(plant, every(DEGREES[1][0]), factors, fastest, cut, attempts)
+    else:
+        free = X is None and Y is None
+        made = _nominal(plant, every, both, factors, fastest, cut, attempts, free=free)
+    return replace(made, plant=given, notes=(*added, *made.notes)) if added else made
 
 
 @with_one_thread
