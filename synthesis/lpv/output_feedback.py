@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from symheli.errors import SynthesisError
 from symheli.lpv import UncertainStateSpace
 from symheli.lpv.bases.polynomials import lobatto_points
 from symheli.threads import with_one_thread
@@ -134,24 +135,33 @@ def output_feedback(
     given = plant.with_scheduling(parameters)
     require_channels(given)
     factors = levels_above(back_off)
-    plant, added = regular(given)
     attempts: list[Attempt] = []
-    matters = depends(plant)
+    matters = depends(given)
     cut = imposed_at(divisions, impose)
 
     def every(degree: int) -> list[Bases]:
-        return candidates(parameters, X, Y, plant.dt is not None, matters, degree)
+        return candidates(parameters, X, Y, given.dt is not None, matters, degree)
 
     def both(degree: int) -> list[Bases]:
-        free = X is None and Y is None and plant.dt is None
+        free = X is None and Y is None and given.dt is None
         return both_moving(parameters, matters, degree) if free else []
 
-    if isinstance(plant.model, UncertainStateSpace):
-        made = _robust(plant, every(DEGREES[1][0]), factors, fastest, cut, attempts)
-    else:
-        free = X is None and Y is None
-        made = _nominal(plant, every, both, factors, fastest, cut, attempts, free=free)
-    return replace(made, plant=given, notes=(*added, *made.notes)) if added else made
+    failure = None
+    for plant, added in regular(given):
+        try:
+            if isinstance(plant.model, UncertainStateSpace):
+                made = _robust(plant, every(DEGREES[1][0]), factors, fastest, cut, attempts)
+            else:
+                free = X is None and Y is None
+                made = _nominal(plant, every, both, factors, fastest, cut, attempts, free=free)
+        except SynthesisError as error:
+            failure = error
+            if error.reasons != (NOTHING_WRONG,):
+                break
+        else:
+            return replace(made, plant=given, notes=(*added, *made.notes)) if added else made
+    assert failure is not None  # noqa: S101 - at least one plant was tried
+    raise failure
 
 
 @with_one_thread

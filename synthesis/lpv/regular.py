@@ -4,7 +4,8 @@ needs.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from synthesis.plant.refusals import conditions
 
 Array = np.ndarray
 
-SHARES = (1e-2, 1e-3, 1e-4, 1e-5)
+SHARES = (1e-2, 1e-3, 1e-4)
 """Noise in shares of what the disturbances do to a measurement, and costs in shares of what a
 control does to the performance: the first that counts for little.
 """
@@ -26,43 +27,43 @@ LITTLE = 1.005
 """By so much a share may raise the worst frozen optimum, beside a tenth of it."""
 
 
-def regular(plant: Plant) -> tuple[Plant, tuple[str, ...]]:
-    """Return the plant with a noise on every measurement that has none, and a cost of every control
-    that has none, and a sentence on each; the plant itself where nothing is missing.
+def regular(plant: Plant) -> Iterator[tuple[Plant, tuple[str, ...]]]:
+    """Yield the plant with a noise on every measurement that has none, and a cost of every control
+    that has none, and a sentence on each; only the plant itself where nothing is missing. First as
+    little as matters, then more, for where solvers run out of digits.
 
-    The performance of a controller with the plant is not worse than with the one returned, which
-    has more disturbances and outputs. The Riccati equations and the formulas of the controller want
-    D21 of full row rank and D12 of full column rank.
+    The performance of a controller with the plant is not worse than with the one yielded, which has
+    more disturbances and outputs. The Riccati equations and the formulas of the controller want D21
+    of full row rank and D12 of full column rank.
     """
     p, _ = conditions(plant)
     at = plant.matrices(p)
     free = _named(at.D12, plant.controls)
     silent = _named(np.swapaxes(at.D21, 1, 2), plant.measurements)
     if not free and not silent:
-        return plant, ()
+        yield plant, ()
+        return
     each = [Generalized(*(M[k] for M in at)) for k in range(len(p))]
     costs = _sizes([P.dual for P in each], plant.controls, free, plant.dt)
     noises = _sizes(each, plant.measurements, silent, plant.dt)
-    found = [_with(plant, costs, noises, share) for share in SHARES]
-    levels: dict[int, float] = {}
-
-    def level(k: int) -> float:
-        if k not in levels:
-            levels[k] = worst_optimum(found[k]).level
-        return levels[k]
-
-    last = len(SHARES) - 1
-    k = next((k for k in range(last) if 0 < level(k) <= LITTLE * level(k + 1)), last)
-    share = SHARES[k]
-    said = [
-        f"{y} had no noise: the design has one of {share * size:.2g} {y.unit} on it"
-        for y, size in noises.items()
-    ]
-    said += [
-        f"{u} had no cost: the design has {share * size:.2g} {u} in the performance"
-        for u, size in costs.items()
-    ]
-    return found[k], tuple(said)
+    tried = [(share, _with(plant, costs, noises, share)) for share in SHARES]
+    before = math.inf
+    for least, (_, changed) in enumerate(tried):
+        level = worst_optimum(changed).level
+        if level > 0 and before <= LITTLE * level:
+            tried = tried[:least]
+            break
+        before = level or math.inf
+    for share, changed in reversed(tried):
+        noisy = (
+            f"{y} had no noise: the design has one of {share * size:.2g} {y.unit} on it"
+            for y, size in noises.items()
+        )
+        costly = (
+            f"{u} had no cost: the design has {share * size:.2g} {u} in the performance"
+            for u, size in costs.items()
+        )
+        yield changed, (*noisy, *costly)
 
 
 def _named(D: Array, names: Sequence[Signal]) -> list[Signal]:
