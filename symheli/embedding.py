@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import combinations, product
 
 import casadi
 import numpy as np
@@ -37,6 +37,10 @@ CONSTANT_ENTRY = 1e-11
 """An entry that changes over the samples by less than this fraction of its size is constant."""
 MIN_PIVOT = 1e-10
 """Fraction of the first pivot below which an entry is an affine function of the preceding ones."""
+MAX_OPEN = 12
+"""Largest number of variables, in products with others only, of which the fewest are looked for by
+trying all sets of them; of more all are taken.
+"""
 RANGE_MARGIN = 0.02
 """The ranges of the parameters are those of the samples, widened by this fraction at both ends."""
 
@@ -135,7 +139,7 @@ def embed(
         zero where not given.
     scheduled_by : sequence of str, optional
         The only states and inputs on which the parameters may depend; f must be affine in the
-        others. Default: all that enter f nonlinearly.
+        others. Default: the fewest, states rather than inputs.
     tolerance : float
         Largest relative misfit that is taken.
 
@@ -167,11 +171,14 @@ def embed(
     >>> round(float(found.parameters([0.5, 0.0], [0.0])[0]), 4)  # -9.81 sin(0.5)/0.5
     -9.4063
     """
-    x_names, u_names = signals(states), signals(inputs)
-    names = (*x_names, *u_names)
-    pairs = [*states.values(), *inputs.values()]
+    pairs = [
+        *(states.values() if isinstance(states, Mapping) else [None]),
+        *(inputs.values() if isinstance(inputs, Mapping) else [None]),
+    ]
     if any(np.shape(pair) != (2,) for pair in pairs):
         raise InputError("states and inputs: expected {name: (low, high)}, two numbers a name")
+    x_names, u_names = signals(states), signals(inputs)
+    names = (*x_names, *u_names)
     ranges = np.array(pairs, float).reshape(-1, 2)
     if np.any(ranges[:, 0] >= ranges[:, 1]) or not np.all(np.isfinite(ranges)):
         raise InputError("states and inputs: expected {name: (low, high)} with low < high, finite")
@@ -186,7 +193,7 @@ def embed(
     rng = np.random.default_rng(0)
     samples = ranges[:, :1] + rng.random((len(names), SAMPLES)) * np.ptp(ranges, axis=1)[:, None]
     rows = (*x_names, *y_names)
-    moving = _moving(whole, names, rows, scheduled_by, samples)
+    moving = _moving(whole, names, rows, len(x_names), scheduled_by, samples)
     average = _averaged(whole, names, rows, moving, samples, z0, tolerance)
     corners = (
         np.array(list(product(*ranges))).T if 2 ** len(names) <= MAX_CORNERS else samples[:, :0]
@@ -224,6 +231,7 @@ def _moving(
     whole: casadi.Function,
     names: Sequence[Signal],
     rows: Sequence[Signal],
+    nx: int,
     wanted: Sequence[str] | None,
     samples: Array,
 ) -> list[int]:
@@ -231,8 +239,9 @@ def _moving(
     z = casadi.SX.sym("z", len(names))  # type: ignore[arg-type]
     J = casadi.jacobian(whole(z), z)
     if wanted is None:
-        depends = np.array(casadi.DM(casadi.jacobian_sparsity(J, z), 1.0))
-        return np.flatnonzero(depends.any(axis=0)).tolist()
+        depends = np.array(casadi.DM(casadi.jacobian_sparsity(J, z), 1.0), bool)
+        curved = depends.reshape(len(names), len(rows), len(names)).any(axis=1)
+        return _fewest(curved | curved.T, nx)
     allowed = sorted({_index(name, names) for name in wanted})
     others = [j for j in range(len(names)) if j not in allowed]
     if others:
@@ -248,6 +257,26 @@ def _moving(
                 " depend; name one of them in scheduled_by too"
             )
     return allowed
+
+
+def _fewest(curved: Array, nx: int) -> list[int]:
+    """Return the smallest set of variables without which no second derivative `curved` (nz, nz) is
+    left; of equal ones that with the fewest inputs, the variables from `nx` on.
+    """
+    chosen = np.flatnonzero(np.diag(curved))
+    open_ = curved.copy()
+    open_[chosen] = open_[:, chosen] = False
+    rest = np.flatnonzero(open_.any(axis=0))
+    if len(rest) > MAX_OPEN:
+        return sorted([*chosen, *rest])
+
+    def cost(some: tuple[int, ...]) -> tuple[int, int]:
+        left = np.setdiff1d(rest, some)
+        uncovered = open_[np.ix_(left, left)].any()
+        return (len(some) if not uncovered else len(rest) + 1, sum(j >= nx for j in some))
+
+    sets = (some for n in range(len(rest) + 1) for some in combinations(rest.tolist(), n))
+    return sorted([*chosen, *min(sets, key=cost)])
 
 
 def _averaged(

@@ -2,12 +2,14 @@
 
 import importlib
 import itertools
+import json
 import re
 import shlex
 import subprocess
 import sys
 
 import executed
+import notebook
 import numpy as np
 import pytest
 import reference
@@ -45,6 +47,21 @@ def test_every_command_that_a_page_shows_is_one_of_the_command_line(page):
             assert words[0] in cli.VERBS
         else:
             cli.parser().parse_args(words)
+
+
+@pytest.mark.parametrize("page", notebook.PAGES)
+def test_a_notebook_is_its_page(page):
+    """`python docs/site/notebook.py` writes it again. Its cells are the blocks that run, its output
+    what they print.
+    """
+    text = (DOCS / page).read_text(encoding="utf-8")
+    kept = notebook.path_of(page).read_text(encoding="utf-8")
+    assert kept == notebook.notebook(text)
+    cells = [cell for cell in json.loads(kept)["cells"] if cell["cell_type"] == "code"]
+    ran = [b for b in executed.blocks(text) if b.kind in ("python", "sh")]
+    assert len(cells) == len(ran)
+    for cell, block in zip(cells, ran, strict=True):
+        assert "".join(cell["source"]).lstrip("!") == block.code.rstrip("\n")
 
 
 PAGE = """# A page

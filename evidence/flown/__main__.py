@@ -24,12 +24,12 @@ from studies.controllers.certified import proofs
 from studies.controllers.designs import LQR, Design
 from studies.controllers.flown import BEYOND, WINDS
 from studies.controllers.plant import baseline, closed, flown_plant
-from studies.specs.flown import ACCELERATIONS, SHARE
+from studies.specs.flown import ACCELERATIONS, OF_A_SWITCH, SHARE, in_still_air
 from studies.specs.of_vehicle import OfVehicle, digest_of
-from symheli import LPVStateSpace
+from symheli import Helicopter, LPVStateSpace
 from synthesis import Plant, SpecificationTable
 from synthesis.sheet.evaluation import Reached, margin, worst
-from synthesis.sheet.sheet import Specification
+from synthesis.sheet.sheet import Sheet, Specification
 
 PAGE = DOCS / "flown.md"
 POINTS = 14
@@ -41,6 +41,7 @@ PROVEN = (*COMPARED, designs.SLOW_IDENTIFIED)
 AGGRESSIVE = max(ACCELERATIONS)
 
 Row = Mapping[str, float]
+Calm = Mapping[tuple[str, str], float]
 
 
 class Cases:
@@ -160,7 +161,7 @@ def entries(cases: Cases, names: Sequence[str], winds: Sequence[float]) -> str:
     return markdown(head, rows)
 
 
-def conflicts(table: SpecificationTable, cases: Cases) -> str:
+def conflicts(table: SpecificationTable, cases: Cases, calm: Mapping[str, Calm]) -> str:
     """Every counted entry that a controller misses: how many meet it, and who comes nearest."""
     rows = []
     for k, spec in enumerate(table.sheet.specifications):
@@ -168,6 +169,8 @@ def conflicts(table: SpecificationTable, cases: Cases) -> str:
             found = _frozen(table, k)
         elif spec in flown.flown_entries(table.sheet):
             found = _flown(spec, table.controllers, cases)
+        elif spec.counts and spec.measure in OF_A_SWITCH:
+            found = _of_values(spec, {n: [calm[n][spec.axis, spec.name]] for n in calm})
         else:
             continue
         if found.met < found.of:
@@ -202,13 +205,32 @@ def _frozen(table: SpecificationTable, k: int) -> _Entry:
 
 def _flown(spec: Specification, names: Sequence[str], cases: Cases) -> _Entry:
     """Of the transition in which a controller does worse."""
-    of = {name: [cases.of(name, WINDS[0], a) for a in ACCELERATIONS] for name in names}
-    entry = flown.entry(spec)
-    met = sum(min(row[f"{entry}, met"] for row in rows) >= SHARE for rows in of.values())
-    values = {name: max(row[f"{entry}, {SHARE:.0%}"] for row in rows) for name, rows in of.items()}
+    entry = f"{flown.entry(spec)}, {SHARE:.0%}"
+    return _of_values(
+        spec, {n: [cases.of(n, WINDS[0], a)[entry] for a in ACCELERATIONS] for n in names}
+    )
+
+
+def _of_values(spec: Specification, of: Mapping[str, Sequence[float]]) -> _Entry:
+    """Of the largest value of each controller, where `spec` is an upper bound."""
+    values = {name: max(each) for name, each in of.items()}
+    met = sum(spec.design_margin(value) >= 0 for value in values.values())
     best = min(values, key=lambda name: values[name])
     value, off = values[best], spec.design_margin(values[best])
     return _Entry(met, len(of), best, f"{_short(value)} {spec.unit}", f"{off:.0f}")
+
+
+def still_air(calm: Mapping[str, Calm], sheet: Sheet) -> str:
+    """Every flown entry that needs no turbulence, a row a controller."""
+    specs = {(s.axis, s.name): s for s in sheet.specifications}
+    keys = list(next(iter(calm.values())))
+    head = [
+        f"{axis}, {name.removesuffix(', flown')} ({specs[axis, name].unit})"
+        + (f" <= {specs[axis, name].level_1:.3g}" if specs[axis, name].counts else "")
+        for axis, name in keys
+    ]
+    rows = [[name, *(_short(found[key]) for key in keys)] for name, found in calm.items()]
+    return markdown(["controller", *head], rows)
 
 
 def _short(value: float) -> str:
@@ -241,8 +263,19 @@ def tables(folder: Path, flights: int) -> Iterator[tuple[str, str]]:
     about += "".join(f" No {d.name}: {d.reason}." for d in every if d.controller is None)
     yield "energy ratios", f"{about}\n\n{ratios(cases, names)}"
     yield "flown entries", f"{about}\n\n{entries(cases, names, WINDS[:1])}"
-    table = vehicle.frozen({name: d.controller for name, d in made.items()})
-    yield "conflicts", conflicts(table, cases)
+    controllers = {name: d.controller for name, d in made.items() if d.controller is not None}
+    heli = Helicopter.load(vehicle.name, governor="pi")
+    calm = {
+        name: vehicle.kept(
+            "flown",
+            f"in still air: {digest_of(K)}",
+            lambda K=K: in_still_air(heli, K, vehicle.scaled),
+        )
+        for name, K in controllers.items()
+    }
+    yield "still air", still_air(calm, vehicle.scaled)
+    table = vehicle.frozen(controllers)
+    yield "conflicts", conflicts(table, cases, calm)
     yield "controllers", certificates(made, table, cases, vehicle)
 
 

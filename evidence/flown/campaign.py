@@ -15,7 +15,7 @@ from studies.campaigns.campaign import Campaign
 from studies.campaigns.trial import Trial
 from studies.controllers.flown import HIGH, LOW, WINDS, plan
 from studies.controllers.measures import Measures, of_flight
-from studies.specs.flown import ACCELERATIONS, SHARE, measured
+from studies.specs.flown import ACCELERATIONS, OF_A_SWITCH, SHARE, measured
 from studies.specs.of_vehicle import share_met
 from symheli import AirspeedSchedule, Helicopter, LPVStateSpace, fly_batch
 from symheli.errors import UnknownNameError, ValidityWarning
@@ -42,7 +42,7 @@ def flown_entries(sheet: Sheet) -> list[Specification]:
     """The entries of the sheet that transitions are held against: those that count and whose
     measure a transition has.
     """
-    without = ("quickness", "switch_attitude", "switch_acceleration")
+    without = ("quickness", *OF_A_SWITCH)
     return [
         s
         for s in sheet.specifications

@@ -16,9 +16,14 @@ from studies.output import Output, columns, progress
 from symheli.errors import InputError, UnknownNameError
 
 if TYPE_CHECKING:
+    from studies.controllers.designs import Design
+    from studies.specs.of_vehicle import OfVehicle
     from synthesis.sheet.evaluation import SpecificationTable
 
 HELP = "specification sheet over airspeed: design margins of controllers, frozen, proven and flown"
+
+PAGE = "specs.html"
+"""Page of the sheet in the folder of a study."""
 
 LEGEND = """\
 margin: 0 % at the boundary of Level 1, -100 % at that of Levels 2 and 3, at most 100 %; in
@@ -28,7 +33,9 @@ worst: over all airspeeds; of an entry without boundaries, the range; flown: wha
 
 ARGUMENTS = (
     positional(
-        "vehicle", "packaged airframe or TOML file (default: xcell60)", nargs="?", default="xcell60"
+        "vehicle",
+        "packaged airframe or TOML file (default: xcell60, or that of the study)",
+        nargs="?",
     ),
     option(
         "--controller",
@@ -47,6 +54,13 @@ ARGUMENTS = (
         None,
         [],
         action="append",
+    ),
+    option(
+        "--study",
+        "DIR",
+        "the controllers of this finished study, as they are there; the page goes beside its"
+        " report, as specs.html",
+        Path,
     ),
     option("--sheet", "FILE", "specification sheet (default: that of a small helicopter)", Path),
     option("--axes", "A,B", "axes of the sheet (default: all)", options.names),
@@ -75,16 +89,17 @@ def run(arguments: argparse.Namespace) -> Output:
     if not 0 <= low < high or arguments.points < 2:
         raise InputError("expected 0 <= LOW < HIGH and at least two points")
     sheet = Sheet.load(arguments.sheet).select(arguments.axes)
+    vehicle, of_study = _study(arguments)
     of = OfVehicle(
-        name=arguments.vehicle,
+        name=vehicle,
         sheet=sheet,
         airspeeds=(low, high),
         points=arguments.points,
         folder=arguments.out,
     )
     begin = time.perf_counter()
-    progress(f"controllers of {arguments.vehicle}")
-    controllers, missing = _controllers(arguments, of)
+    progress(f"controllers of {vehicle}")
+    controllers, missing = _controllers(arguments, of, of_study)
     designing = time.perf_counter() - begin
     progress(f"{len(controllers)} controllers at {arguments.points} airspeeds")
     table = of.frozen(controllers)
@@ -100,7 +115,7 @@ def run(arguments: argparse.Namespace) -> Output:
             flown(of, controllers, arguments.flights), time.perf_counter() - begin
         )
     lead = (
-        f"{arguments.vehicle}, {low:g} to {high:g} m/s, {arguments.points} airspeeds, servos, 20 ms"
+        f"{vehicle}, {low:g} to {high:g} m/s, {arguments.points} airspeeds, servos, 20 ms"
         " of delay, 50 Hz"
     )
     head = f"{sheet.title}: {lead}"
@@ -129,7 +144,21 @@ def kept(arguments: argparse.Namespace) -> str:
     return "nothing was kept; with --out DIR what is finished is"
 
 
-def _controllers(arguments: argparse.Namespace, of: Any) -> tuple[dict[str, Any], dict[str, str]]:
+def _study(arguments: argparse.Namespace) -> tuple[str, tuple[Design, ...] | None]:
+    """Return the vehicle, and the designs of the study that is asked about, if one is."""
+    if arguments.study is None:
+        return arguments.vehicle or "xcell60", None
+    if arguments.vehicle or arguments.controller:
+        raise InputError("--study has its own vehicle and controllers: leave out others")
+    from studies.transition.study import designs_of
+
+    configuration, found = designs_of(arguments.study)
+    return configuration.vehicle, found.designs
+
+
+def _controllers(
+    arguments: argparse.Namespace, of: OfVehicle, of_study: tuple[Design, ...] | None
+) -> tuple[dict[str, Any], dict[str, str]]:
     """Return the controllers by name, and why others are missing."""
     from studies.controllers.designs import FURTHER, NAMES
     from symheli import TableController
@@ -139,12 +168,12 @@ def _controllers(arguments: argparse.Namespace, of: Any) -> tuple[dict[str, Any]
             raise InputError("--only is about the controllers of the study: leave out --controller")
         tables = {path.stem: TableController.load(path) for path in arguments.controller}
         return {name: table.model for name, table in tables.items()}, {}
-    known = (*NAMES, *FURTHER) if arguments.only else NAMES
+    known = (*NAMES, *FURTHER) if arguments.only and of_study is None else NAMES
     for start in arguments.only:
         if not any(name.startswith(start) for name in known):
             raise UnknownNameError("controller of the study", start, known)
     names = [n for n in known if not arguments.only or any(n.startswith(s) for s in arguments.only)]
-    made = list(of.designs(names))
+    made = [d for d in of_study if d.name in names] if of_study else list(of.designs(names))
     missing = {d.name: d.reason for d in made if d.controller is None}
     found = {d.name: d.controller for d in made if d.controller is not None}
     if not found:
@@ -190,10 +219,13 @@ def _written(
     written = []
     if arguments.figure is not None:
         written.append(save(table, arguments.figure))
-    if arguments.page is not None:
+    path = arguments.page
+    if path is None and arguments.study is not None:
+        path = arguments.study / PAGE
+    if path is not None:
         about = _about(arguments.rate)
         title = f"Specification sheet: {table.sheet.title}"
-        written.append(page.write(table, arguments.page, title, f"{lead}.", missing, about))
+        written.append(page.write(table, path, title, f"{lead}.", missing, about))
     return written
 
 

@@ -1,12 +1,12 @@
 """Flown entries of the specification sheet: transitions of the nonlinear helicopter in light
-turbulence, and steps of attitude.
+turbulence, steps of attitude, and entries of a controller in flight.
 """
 
 from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,6 +17,7 @@ from studies.controllers.flown import HIGH, LOW, WINDS, plan
 from studies.controllers.measures import AT_THE_STOP, heading, noise_of, of_flight, rms, to_body
 from studies.controllers.measures import MEASUREMENTS as MEASURED
 from studies.specs.of_vehicle import FLIGHTS_FROM, OfVehicle, digest_of, share_met
+from studies.transition.flights import autopilot_for
 from symheli import (
     AirspeedSchedule,
     FlightPlan,
@@ -32,7 +33,7 @@ from symheli.progress import tracked
 from symheli.values.arrays import Array
 from symheli.values.named_vector import NamedVector
 from synthesis.sheet.measures import rate_over_change
-from synthesis.sheet.sheet import Axis
+from synthesis.sheet.sheet import Axis, Sheet
 
 ACCELERATIONS = (1.0, 3.0)
 """Of the transitions, gentle and aggressive, m/s^2."""
@@ -40,12 +41,26 @@ ACCELERATIONS = (1.0, 3.0)
 SHARE = 0.95
 """Of the flights that meet a value: the value shown is the one they do not exceed."""
 
-STEP_AT, STEP_FOR = 1.0, 3.0
+STEP_AT, STEP_FOR = 1.0, 4.0
 """When an attitude is commanded, and how long the flight goes on, s."""
+
+PULSE = 0.2
+"""How long a yaw rate is commanded, s, so that the heading changes by what a second of the axis's
+size gives.
+"""
+
+SWITCH_AT, SWITCH_FOR = 1.5, 2.0
+"""When a controller takes over, and how long the flight is watched, s."""
+
+GRAVITY = 9.81
+"""Unit of the acceleration at a switch, m/s^2."""
 
 OF_A_FLIGHT = ("speed", "track", "altitude", "heading", "attitude", "rotor_speed")
 OF_A_CONTROL = ("effort", "stops")
 """What is measured of a transition."""
+
+OF_A_SWITCH = ("switch_attitude", "switch_acceleration")
+"""What is measured where a controller takes over in flight."""
 
 HELD_AT = (0.0, 6.5, 13.0)
 """Airspeeds of the steps, m/s."""
@@ -83,15 +98,24 @@ def _of(vehicle: OfVehicle, K: LPVStateSpace, seeds: int) -> dict[tuple[str, str
     each = [measured(one) for one in data]
     by_measure = {key: share_met(np.array([m[key] for m in each]), SHARE) for key in each[0]}
     axes = vehicle.scaled.axes
-    quick = {a.name: quickness(heli, K, a) for a in axes.values() if a.type == "attitude"}
-    found: dict[tuple[str, str], float] = {}
+    found = in_still_air(heli, K, vehicle.scaled)
     for spec in vehicle.scaled.specifications:
         control = axes[spec.axis].control if spec.axis in axes else ""
-        key = (spec.measure, control) if control else (spec.measure, "")
-        if spec.kind == "flown" and key in by_measure:
-            found[spec.axis, spec.name] = by_measure[key]
-        if spec.kind == "flown" and spec.measure == "quickness" and spec.axis in quick:
-            found[spec.axis, spec.name] = quick[spec.axis]
+        if spec.kind == "flown" and (spec.measure, control) in by_measure:
+            found[spec.axis, spec.name] = by_measure[spec.measure, control]
+    return found
+
+
+def in_still_air(heli: Helicopter, K: LPVStateSpace, sheet: Sheet) -> dict[tuple[str, str], float]:
+    """Return {(axis, name): value} of the flown entries that need no turbulence: quickness, and
+    what changes where the controller takes over.
+    """
+    found, switched = {}, at_a_switch(heli, K)
+    for spec in sheet.specifications:
+        if spec.kind == "flown" and spec.measure in switched:
+            found[spec.axis, spec.name] = switched[spec.measure]
+        if spec.kind == "flown" and spec.measure == "quickness":
+            found[spec.axis, spec.name] = quickness(heli, K, sheet.axes[spec.axis])
     return found
 
 
@@ -135,11 +159,12 @@ def measured(one: FlightData) -> dict[tuple[str, str], float]:
 
 @dataclass(frozen=True, eq=False)
 class Stepped:
-    """A controller whose command of one signal steps by `size` after `STEP_AT` s."""
+    """A controller whose command of one signal is `size` larger from `STEP_AT` to `until`, s."""
 
     controller: ScheduledController
     signal: str
     size: float
+    until: float = math.inf
 
     @property
     def dt(self) -> float:
@@ -155,7 +180,7 @@ class Stepped:
     ) -> tuple[Array, tuple[int, Any]]:
         """Commands (4,), rad, and the state at the next sample."""
         k, inner = state
-        if k * self.dt >= STEP_AT:
+        if STEP_AT <= k * self.dt < self.until:
             values = np.array(measured.array)
             values[measured.signals.index(self.signal)] -= self.size
             measured = NamedVector(measured.signals, values)
@@ -163,32 +188,110 @@ class Stepped:
         return u, (k + 1, inner)
 
 
+@dataclass(frozen=True, eq=False)
+class Handover:
+    """Two controllers: the second takes over from the commands in force after `SWITCH_AT` s."""
+
+    before: ScheduledController
+    after: ScheduledController
+
+    @property
+    def dt(self) -> float:
+        """Sample period, s."""
+        return self.after.dt
+
+    def init(self) -> tuple[int, Array, Any]:
+        """Samples so far, the commands in force (4,), rad, and the state of who flies."""
+        return 0, np.zeros(len(CONTROLS)), self.before.init()
+
+    def step(
+        self,
+        state: tuple[int, Array, Any],
+        measured: NamedVector,
+        reference: NamedVector,
+        p: NamedVector,
+    ) -> tuple[Array, tuple[int, Array, Any]]:
+        """Commands (4,), rad, and the state at the next sample."""
+        k, command, inner = state
+        switch = round(SWITCH_AT / self.dt)
+        if k == switch:
+            inner = self.after.init(command[self.after.rows])
+        flying = self.after if k >= switch else self.before
+        u, inner = flying.step(inner, measured, reference, p)
+        return u, (k + 1, u, inner)
+
+
 def quickness(heli: Helicopter, K: LPVStateSpace, axis: Axis) -> float:
     """Return peak rate over peak change of an attitude, 1/s, after a step of its command in still
     air: the least over `HELD_AT` and both signs; NaN where a flight is lost.
+
+    Of an axis whose response is a rate, of its integral after a pulse of `PULSE` s.
     """
-    low, high = K.box[0]
+    pulse = axis.type == "rate"
+    size, until = (axis.step / PULSE, STEP_AT + PULSE) if pulse else (axis.step, math.inf)
     least = math.inf
-    for plan_ in _steps(K, axis, [v for v in HELD_AT if low <= v <= high]):
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ValidityWarning)
-            warnings.simplefilter("ignore", CompilerWarning)  # steps are few, and made in Python
-            (one,) = fly_batch(heli, [plan_], seeds=[0], workers=1).data
-        if one.lost >= 0:
-            return math.nan
-        y = one.column(axis.response)
-        least = min(least, rate_over_change(y, PERIOD))
+    for airspeed in _held(K):
+        still = AirspeedSchedule((airspeed,), (1.0,), (STEP_AT + STEP_FOR,), airspeed, lead=0.0)
+        for signed in (size, -size):
+            stepped = Stepped(ScheduledController(K), axis.response, signed, until)
+            flight = _calm(heli, still, stepped)
+            if flight.lost >= 0:
+                return math.nan
+            y = flight.column(axis.response)[round(STEP_AT / PERIOD) :]
+            change = np.cumsum(y) * PERIOD if pulse else y
+            least = min(least, rate_over_change(change, PERIOD))
     return least
 
 
-def _steps(K: LPVStateSpace, axis: Axis, airspeeds: Sequence[float]) -> Iterator[FlightPlan]:
-    for airspeed in airspeeds:
-        for sign in (1.0, -1.0):
-            yield FlightPlan(
-                AirspeedSchedule((airspeed,), (1.0,), (STEP_AT + STEP_FOR,), airspeed, lead=0.0),
-                dt=PERIOD,
-                controller=Stepped(ScheduledController(K), axis.response, sign * axis.step),
-                servos={u: replace(XCELL_SERVOS[u], rate=SERVO_RATE) for u in CONTROLS},
-                sensors={},
-                delay=DELAY,
-            )
+def at_a_switch(heli: Helicopter, K: LPVStateSpace) -> dict[str, float]:
+    """Return {measure: value} of what taking over from the scheduled LQR changes: attitude,
+    deg, and load factor, g, beside the flight in which the LQR goes on, within `SWITCH_FOR` s.
+
+    The airspeed rises from each of `HELD_AT`, or falls from the highest, at the gentle
+    acceleration in still air: the largest of all; inf where a flight is lost.
+    """
+    pilot, taking = autopilot_for(heli).scheduled_controller, ScheduledController(K)
+    attitude, load = [], []
+    for start in _held(K):
+        end = start + 4.0 if start + 4.0 <= K.box[0][1] else start - 4.0
+        course = AirspeedSchedule((end,), ACCELERATIONS[:1], (0.0,), start, lead=0.5)
+        usual, switched = (
+            _calm(heli, course, flying) for flying in (pilot, Handover(pilot, taking))
+        )
+        if usual.lost >= 0 or switched.lost >= 0:
+            return dict.fromkeys(OF_A_SWITCH, math.inf)
+        after = slice(round(SWITCH_AT / PERIOD), round((SWITCH_AT + SWITCH_FOR) / PERIOD))
+        for angle in ("phi", "theta"):
+            gone = switched.column(angle) - usual.column(angle)
+            attitude.append(math.degrees(np.abs(gone[after]).max()))
+        load.append(float(np.abs(_load_factor(switched) - _load_factor(usual))[after].max()))
+    return dict(zip(OF_A_SWITCH, (max(attitude), max(load)), strict=True))
+
+
+def _load_factor(flight: FlightData) -> Array:
+    """Acceleration along the body axis that gravity does not give, g."""
+    column = flight.columns()
+    w = np.gradient(column["w"], PERIOD) + column["p"] * column["v"] - column["q"] * column["u"]
+    return w / GRAVITY - np.cos(column["phi"]) * np.cos(column["theta"])
+
+
+def _held(K: LPVStateSpace) -> list[float]:
+    low, high = K.box[0]
+    return [v for v in HELD_AT if low <= v <= high]
+
+
+def _calm(heli: Helicopter, schedule: AirspeedSchedule, controller: Any) -> FlightData:
+    """Return a flight in still air without noise."""
+    plan_ = FlightPlan(
+        schedule,
+        dt=PERIOD,
+        controller=controller,
+        servos={u: replace(XCELL_SERVOS[u], rate=SERVO_RATE) for u in CONTROLS},
+        sensors={},
+        delay=DELAY,
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ValidityWarning)
+        warnings.simplefilter("ignore", CompilerWarning)  # flights are few, and made in Python
+        (one,) = fly_batch(heli, [plan_], seeds=[0], workers=1).data
+    return one

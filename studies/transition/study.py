@@ -11,8 +11,10 @@ from concurrent.futures import Executor, Future
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
+from studies.controllers.designs import Designs
 from studies.processes import Processes
 from studies.transition.configuration import KEPT, Configuration
 from studies.transition.effort import Effort
@@ -31,6 +33,8 @@ from studies.transition.stored_stages import (
     stage_keys,
 )
 from studies.transition.summary import summary
+from symheli import Helicopter
+from symheli.errors import InputError
 from symheli.progress import Task, task, tracked
 
 REPORT = 10.0
@@ -68,8 +72,7 @@ def run_study(configuration: Configuration, *, resume: bool = False) -> Study:
         effort=effort,
         heli=heli,
     )
-    content = content_key(heli, study.vehicle, study.seed)
-    stored = StoredStages(out / STAGES, stage_keys(every, content, effort))
+    stored = stored_of(configuration, heli, every)
     configuration.write(out / KEPT)
     for stage in every if resume else ():
         if (found := _taken(stored, stage)) is not None:
@@ -83,6 +86,30 @@ def run_study(configuration: Configuration, *, resume: bool = False) -> Study:
             write_report(study, out)
         progress.to(whole)
     return study
+
+
+def designs_of(folder: Path) -> tuple[Configuration, Designs]:
+    """Return what a run was asked for, and its controllers, from its folder.
+
+    Raises `InputError` where it has none yet, `NotUsable` for those of another version.
+    """
+    configuration = replace(Configuration.read(folder / KEPT, {}), out=folder)
+    every = stages(configuration.effort)
+    found = stored_of(configuration, loaded(configuration), every).load("controllers")
+    if found is None:
+        raise InputError(
+            f"{folder} has no finished controllers; symheli study --out {folder} makes them"
+        )
+    return configuration, found.result
+
+
+def stored_of(
+    configuration: Configuration, heli: Helicopter, every: Sequence[Stage]
+) -> StoredStages:
+    """Return the stored stages of a run."""
+    content = content_key(heli, configuration.vehicle, configuration.seed)
+    keys = stage_keys(every, content, configuration.effort)
+    return StoredStages(configuration.out / STAGES, keys)
 
 
 @dataclass

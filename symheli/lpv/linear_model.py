@@ -70,7 +70,10 @@ class LinearModel:
             object.__setattr__(self, group, signals(getattr(self, group)))
         nx, nu, ny = len(self.states), len(self.inputs), len(self.outputs)
         for name, shape in (("A", (nx, nx)), ("B", (nx, nu)), ("C", (ny, nx)), ("D", (ny, nu))):
-            object.__setattr__(self, name, frozen(getattr(self, name), name, shape))
+            given = getattr(self, name)
+            if 0 in shape and np.size(given) == 0:  # [] of a model without states, of any shape
+                given = np.zeros(shape)
+            object.__setattr__(self, name, frozen(given, name, shape))
         if self.dt is not None and not self.dt > 0:
             raise InputError(f"dt must be a positive number of seconds or None, got {self.dt}")
 

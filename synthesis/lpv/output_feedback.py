@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from symheli.errors import SynthesisError
 from symheli.lpv import UncertainStateSpace
 from symheli.lpv.bases.polynomials import lobatto_points
 from symheli.threads import with_one_thread
@@ -20,6 +21,7 @@ from synthesis.lpv.existence import MATRIX_BOUNDS, Divisions, Existence, Solutio
 from synthesis.lpv.fitted import in_plant_units
 from synthesis.lpv.frozen_stability import frozen_stability
 from synthesis.lpv.recovery import controller, sampled_controller, split
+from synthesis.lpv.regular import regular
 from synthesis.lpv.robust import robust_plant
 from synthesis.lpv.scaled_plant import ScaledPlant, depends
 from synthesis.lpv.search import (
@@ -36,7 +38,7 @@ from synthesis.lpv.search import (
 )
 from synthesis.lpv.worst_optimum import FrozenOptimum, worst_optimum
 from synthesis.plant.plant import Plant, require_plant
-from synthesis.plant.refusals import NOTHING_WRONG, failed, least_ranks, levels_above
+from synthesis.plant.refusals import NOTHING_WRONG, failed, levels_above, require_channels
 from synthesis.program.cone_program import LYAPUNOV, Solver
 from synthesis.worst.rates import Rate, limits
 
@@ -78,8 +80,9 @@ def output_feedback(
     Parameters
     ----------
     plant : Plant
-        With disturbances, performance, controls and measurements; every control must cost (D12 of
-        full column rank), every measurement be disturbed (D21 of full row rank).
+        With disturbances, performance, controls and measurements. A control without a cost (D12
+        not of full column rank), or a measurement without noise (D21 not of full row rank), gets a
+        little of it for the design, which `notes` say.
     rate : float, sequence or mapping, optional
         Largest |dp/dt|, as for `l2_gain`; by default the plant's own; math.inf: p may jump.
     X, Y : int, tuple or FunctionSpace, optional
@@ -129,24 +132,36 @@ def output_feedback(
     """
     require_plant(plant)
     parameters = limits(plant.parameters, rate)
-    plant = plant.with_scheduling(parameters)
-    least_ranks(plant)
+    given = plant.with_scheduling(parameters)
+    require_channels(given)
     factors = levels_above(back_off)
     attempts: list[Attempt] = []
-    matters = depends(plant)
+    matters = depends(given)
     cut = imposed_at(divisions, impose)
 
     def every(degree: int) -> list[Bases]:
-        return candidates(parameters, X, Y, plant.dt is not None, matters, degree)
+        return candidates(parameters, X, Y, given.dt is not None, matters, degree)
 
     def both(degree: int) -> list[Bases]:
-        free = X is None and Y is None and plant.dt is None
+        free = X is None and Y is None and given.dt is None
         return both_moving(parameters, matters, degree) if free else []
 
-    if isinstance(plant.model, UncertainStateSpace):
-        return _robust(plant, every(DEGREES[1][0]), factors, fastest, cut, attempts)
-    free = X is None and Y is None
-    return _nominal(plant, every, both, factors, fastest, cut, attempts, free=free)
+    failure = None
+    for plant, added in regular(given):
+        try:
+            if isinstance(plant.model, UncertainStateSpace):
+                made = _robust(plant, every(DEGREES[1][0]), factors, fastest, cut, attempts)
+            else:
+                free = X is None and Y is None
+                made = _nominal(plant, every, both, factors, fastest, cut, attempts, free=free)
+        except SynthesisError as error:
+            failure = error
+            if error.reasons != (NOTHING_WRONG,):
+                break
+        else:
+            return replace(made, plant=given, notes=(*added, *made.notes)) if added else made
+    assert failure is not None  # noqa: S101 - at least one plant was tried
+    raise failure
 
 
 @with_one_thread

@@ -257,6 +257,21 @@ class Plant:
             plant = plant._with_own_measurement(name)._with_disturbance(noise, {name: size})
         return plant
 
+    def with_cost(self, sizes: Mapping[str, float]) -> Plant:
+        """Add a performance signal `<control>_cost` (unit "1"), size times the control, for
+        {control: size} per unit of each: what a control costs beside what its weights ask.
+        """
+        plant = self
+        for name, size in sizes.items():
+            (i,) = indices([name], self.controls, "control")
+            cost, size = Signal(f"{name}_cost", "1"), parts.positive(size, f"the cost of {name}")
+            control = self.controls[i]
+            plant = plant._changed(
+                lambda model, new=cost, of={control: size}: with_row(model, new, {}, of),
+                performance=(*plant.performance, cost),
+            )
+        return plant
+
     def with_reference(self, signals: Sequence[str] | None = None) -> Plant:
         """With a disturbance `<name>_reference` for each of these performance signals and
         measurements (None: those that are both); they become `<name>_error` = reference - signal,

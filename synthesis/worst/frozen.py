@@ -5,13 +5,13 @@ model.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import linalg
 
 from symheli.errors import AccuracyError, InputError
-from symheli.lpv import LPVStateSpace, UserFunctions
+from symheli.lpv import LFT, LPVStateSpace, UserFunctions
 from symheli.values.numbers import whole
 from synthesis.worst.over_box import worst_over
 from synthesis.worst.scheduled import Scheduled
@@ -20,25 +20,28 @@ Array = np.ndarray
 
 
 class FrozenGain(NamedTuple):
-    """The largest frozen `gain`, with the `p` and frequency `omega` (rad/s) at which it occurs; inf
-    and NaN if unstable.
+    """The largest frozen `gain`, with the `p` (of several parameters their tuple) and frequency
+    `omega` (rad/s) at which it occurs; inf and NaN if unstable.
     """
 
     gain: float
-    p: float
+    p: Any
     omega: float
 
 
-def frozen_gain(lpv: Scheduled, *, points: int = 61, tolerance: float = 1e-8) -> FrozenGain:
+def frozen_gain(
+    lpv: Scheduled | LPVStateSpace | LFT, *, points: int = 61, tolerance: float = 1e-8
+) -> FrozenGain:
     """Return the largest H-infinity norm of the models frozen at each p, a lower bound on the gain
     of the LPV model.
 
     Parameters
     ----------
-    lpv : LPVStateSpace or LFT of one parameter
+    lpv : LPVStateSpace or LFT
         The model.
     points : int
-        Of the grid whose highest peaks are climbed; the breaks of a spline are on it too.
+        Of the grid whose highest peaks are climbed, of one parameter; the breaks of a spline are on
+        it too. Of two parameters 15 values each are, of more 7 or 3.
     tolerance : float
         Relative accuracy of each norm, from below; less than 1.
 
@@ -61,9 +64,11 @@ def frozen_gain(lpv: Scheduled, *, points: int = 61, tolerance: float = 1e-8) ->
     >>> frozen_gain(lag)  # 1/(1 + p), at p = 0
     FrozenGain(gain=1.0, p=0.0, omega=0.0)
     """
-    low, high = lpv.scheduling.low, lpv.scheduling.high
     if not 0 < tolerance < 1:
         raise InputError(f"tolerance: expected a number between 0 and 1, got {tolerance!r:.60}")
+    if isinstance(lpv, LPVStateSpace | LFT) and len(lpv.parameters) > 1:
+        return _over_a_box(lpv, tolerance)
+    low, high = lpv.scheduling.low, lpv.scheduling.high
     grid = np.linspace(low, high, whole(points, "points", 2))
     if isinstance(lpv, LPVStateSpace) and not isinstance(lpv.basis, UserFunctions):
         ends = [p for piece in lpv.basis.pieces() for p in (piece.low, piece.high)]
@@ -75,6 +80,18 @@ def frozen_gain(lpv: Scheduled, *, points: int = 61, tolerance: float = 1e-8) ->
     gamma, at = worst_over(size, [grid])
     p = float(at[0])
     return FrozenGain(gamma, p, norm(*lpv.matrices(p), lpv.dt, tolerance)[1])
+
+
+def _over_a_box(lpv: LPVStateSpace | LFT, tolerance: float) -> FrozenGain:
+    def at(p: Array) -> tuple[float, float]:
+        m = lpv.at(*map(float, p))
+        return norm(m.A, m.B, m.C, m.D, lpv.dt, tolerance)
+
+    points = {2: 15, 3: 7}.get(len(lpv.parameters), 3)
+    axes = [np.linspace(s.low, s.high, points) for s in lpv.parameters]
+    gamma, p = worst_over(lambda q: at(q)[0], axes)
+    omega = math.nan if math.isinf(gamma) else at(p)[1]
+    return FrozenGain(gamma, tuple(map(float, p)), omega)
 
 
 def norm(

@@ -28,6 +28,7 @@ from studies.controllers.plant import baseline, flown_plant
 from studies.loops.exact_lateral import ExactLateral
 from studies.loops.lateral import lateral_loop
 from studies.loops.longitudinal import longitudinal_loop
+from studies.specs.flown import in_still_air
 from studies.transition.flights import TOP, autopilot_for
 from studies.transition.guarantees import PERIOD, scaled
 from symheli import Helicopter
@@ -293,6 +294,14 @@ def entries_of_the_lqr():
         assert float(cell) == pytest.approx(row[f"{campaign.entry(spec)}, 95%"], rel=6e-3)
 
 
+def the_lqr_in_still_air():
+    sheet = campaign.of_the_vehicle()
+    heli = Helicopter.load("xcell60", governor="pi")
+    found = in_still_air(heli, lqr_schedule(_xcell()), sheet)
+    shown = KEPT["flown.md", "still air"].cells(LQR)
+    assert [float(cell) for cell in shown] == pytest.approx(list(found.values()), rel=6e-3)
+
+
 def frozen_entries_that_static_controllers_come_nearest_to():
     """Their margins, evaluated again, to a percent."""
     heli, vehicle = _xcell(), specs.OfVehicle(name="xcell60", points=specs.POINTS)
@@ -318,6 +327,7 @@ ROWS = {
     ("flown.md", "energy ratios"): ratio_of_the_lqr_in_light_turbulence,
     ("flown.md", "controllers"): frozen_gain_of_the_retuned_lqr,
     ("flown.md", "flown entries"): entries_of_the_lqr,
+    ("flown.md", "still air"): the_lqr_in_still_air,
     ("flown.md", "conflicts"): frozen_entries_that_static_controllers_come_nearest_to,
     ("controllers.md", "specification sheet"): margins_of_the_lqr_schedule,
     ("gains.md", "interpolated"): lambda: proven_by_p_alone("interpolated", lateral_loop(_xcell())),

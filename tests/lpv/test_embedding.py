@@ -39,7 +39,7 @@ def test_the_embedding_is_the_nonlinear_model(f, at):
             found.derivative(x, u), np.array(f(x, u)).ravel(), rtol=1e-11, atol=1e-12
         )
     assert found.error < 1e-12
-    assert str(found).startswith(f"{len(found.model.parameters)} scheduling parameters")
+    assert str(found).startswith(f"{len(found.model.parameters)} scheduling parameter")
 
 
 def test_the_parameters_may_be_told_to_depend_on_some_variables_only():
@@ -57,6 +57,29 @@ def test_the_parameters_may_be_told_to_depend_on_some_variables_only():
         symheli.embed(MIXED, BOX, INPUT, scheduled_by=["x1"])
     with pytest.raises(UnknownNameError, match="state or input"):
         symheli.embed(MIXED, BOX, INPUT, scheduled_by=["x3"])
+
+
+def test_parameters_depend_on_the_fewest_variables():
+    """A cart's pendulum, 9.81 sin x1 + u cos x1: affine in u and x2, so the parameters are
+    9.81 sin(x1)/x1 and cos x1; x1 x2 asks for one of both, u x2 for the state.
+    """
+    found = symheli.embed(
+        function(X[1], 9.81 * casadi.sin(X[0]) + casadi.cos(X[0]) * U), BOX, INPUT
+    )
+    assert [s.name for s in found.model.parameters] == ["A[x2, x1]", "B[x2, u]"]
+    for x1, x2, u in ((0.7, -0.5, 0.3), (-1.9, 2.0, -1.0)):
+        p = found.parameters([x1, x2], [u])
+        assert p == pytest.approx([9.81 * np.sin(x1) / x1, np.cos(x1)], rel=1e-12)
+    product = symheli.embed(function(X[0] * X[1], U), BOX, INPUT)
+    assert len(product.model.parameters) == 1
+    by_state = symheli.embed(function(X[0], U * X[1]), BOX, INPUT)
+    assert [s.name for s in by_state.model.parameters] == ["B[x2, u]"]
+
+
+def test_ranges_are_asked_for_by_name():
+    for given in (["u"], {"u": 1.0}, {"u": (-1.0, 0.0, 1.0)}):
+        with pytest.raises(InputError, match="two numbers a name"):
+            symheli.embed(VAN_DER_POL, BOX, given)
 
 
 def test_outputs_are_embedded_too():

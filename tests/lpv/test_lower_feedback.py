@@ -342,7 +342,7 @@ def test_what_cannot_be_closed_says_what_to_do():
         lower_feedback(P, knots)
     brought = controller(UserFunctions((np.ones_like, np.sqrt), 0.0, 13.0))
     with pytest.raises(InputError, match="no basis in common"):
-        lower_feedback(P, brought)
+        lower_feedback(plant(HATS), brought)
     with pytest.raises(InputError, match="controller: expected an LPVStateSpace"):
         lower_feedback(P, np.eye(2))
 

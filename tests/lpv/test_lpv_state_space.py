@@ -125,8 +125,12 @@ def test_a_spline_is_closed_where_its_products_stay_splines():
             stacked(squares.at(p)), stacked(moving.at(p).feedback({("u1", "y1"): 2.0})), atol=1e-13
         )
     brought = UserFunctions((np.ones_like, np.sin, np.cos, np.sqrt), 0.0, 13.0)
-    with pytest.raises(InputError, match="no basis in common"):
-        replace(moving, basis=brought).feedback({("u1", "y1"): 2.0})
+    sines = replace(moving, basis=brought)
+    closed = sines.feedback({("u1", "y1"): 2.0})
+    for p in (0.0, 2.9, 13.0):
+        np.testing.assert_allclose(
+            stacked(closed.at(p)), stacked(sines.at(p).feedback({("u1", "y1"): 2.0})), atol=1e-10
+        )
 
 
 def test_sampled_model_is_the_hold_equivalent_at_the_nodes_up_to_its_residuals():

@@ -94,13 +94,50 @@ def test_functions_over_ranges_that_differ_meet_where_both_are_known():
     np.testing.assert_allclose((M @ N)(p), M(p) @ N(p), atol=ROUNDING * 10)
 
 
-def test_functions_brought_along_have_no_products():
-    brought = UserFunctions((np.ones_like, np.sqrt), 0.0, 13.0)
-    M, N = random(brought, 2, 2), random(BASES[1], 2, 2)
-    for operation in (lambda: M @ N, lambda: M + N, lambda: M @ M):
+ROOT = UserFunctions(
+    (np.ones_like, lambda p: np.sqrt(p + 1)),
+    0.0,
+    13.0,
+    derivatives=(np.zeros_like, lambda p: 0.5 / np.sqrt(p + 1)),
+)
+
+
+def test_functions_of_any_kind_have_sums_and_products_with_their_slopes():
+    """sqrt(p + 1) beside itself, beside sines and beside polynomials: as many functions as are
+    independent, values to rounding. Without slopes there are none of the product.
+    """
+    sines = UserFunctions((np.sin, np.ones_like), 0.0, 13.0, derivatives=(np.cos, np.zeros_like))
+    p = np.linspace(0.0, 13.0, 40)
+    M = random(ROOT, 2, 2)
+    for basis, sums, products in ((ROOT, 2, 3), (sines, 3, 4), (Polynomial(2, 0.0, 13.0), 4, 6)):
+        N = random(basis, 2, 2, seed=1)
+        assert ((M + N).basis.size, (M @ N).basis.size) == (sums, products)
+        np.testing.assert_allclose((M + N)(p), M(p) + N(p), atol=1e-11)
+        np.testing.assert_allclose((M @ N)(p), M(p) @ N(p), atol=1e-10)
+        slope = np.tensordot((M @ N).basis(p, 1), (M @ N).coefficients, axes=1)
+        by_hand = M.basis(p, 1), N.basis(p, 1)
+        dM, dN = (
+            np.tensordot(d, X.coefficients, axes=1) for d, X in zip(by_hand, (M, N), strict=True)
+        )
+        np.testing.assert_allclose(slope, dM @ N(p) + M(p) @ dN, atol=1e-9)
+    bare = random(UserFunctions((np.ones_like, np.cbrt), 0.0, 13.0), 2, 2)
+    with pytest.raises(InputError, match="no known derivative"):
+        (bare @ M).basis(1.0, 1)
+
+
+def test_functions_that_are_nearly_dependent_count_once():
+    """p and p + 1e-14 sin p are one function to rounding; p + 1e-6 sin p is another one."""
+    for size, count in ((1e-14, 2), (1e-6, 3)):
+        near = UserFunctions((np.ones_like, lambda p, e=size: p + e * np.sin(p)), 0.0, 13.0)
+        assert sum_space(near, Polynomial(1, 0.0, 13.0)).size == count
+
+
+def test_user_functions_beside_splines_are_refused():
+    M, N = random(ROOT, 2, 2), random(BASES[2], 2, 2)
+    for operation in (lambda: M @ N, lambda: M + N):
         with pytest.raises(InputError, match=r"UserFunctions.* no basis in common"):
             operation()
-    assert (M + M).basis == brought
+    assert (M + M).basis == ROOT
 
 
 def test_matrices_without_rows_or_columns_are_matrices():

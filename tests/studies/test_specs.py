@@ -9,10 +9,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from studies.controllers.designs import LQR
+from studies.controllers.designs import LQR, Design, Designs
 from studies.controllers.flown import plan
-from studies.specs.flown import flown, measured
+from studies.specs.flown import at_a_switch, flown, measured, quickness
 from studies.specs.of_vehicle import OfVehicle, share_met
+from studies.transition import study
+from studies.transition.configuration import Configuration
+from studies.transition.stored_stages import NotUsable, Stored
 from symheli import (
     AirspeedSchedule,
     Helicopter,
@@ -20,6 +23,7 @@ from symheli import (
     fly_batch,
     gain_scheduled_lqr,
 )
+from symheli.errors import InputError
 from symheli.flight import XCELL_SERVOS
 from synthesis import Sheet
 from synthesis.sheet.evaluation import worst
@@ -89,6 +93,43 @@ def test_the_command_says_what_the_table_says(run, words, vehicle, file):
     assert data["verdict"] == table.verdict(NAME)
 
 
+@pytest.fixture(scope="module")
+def finished(lqr, vehicle, tmp_path_factory):
+    """Folder of a study of which only two controllers are stored, one that was not found."""
+    made = Configuration(out=tmp_path_factory.mktemp("study"), quick=True)
+    made.write(made.out / "study.toml")
+    none = Design(name="LFT", controller=None, reason="not feasible")
+    kept = Designs(designs=(Design(name=LQR, controller=lqr), none), plant=None)
+    stored = study.stored_of(made, vehicle.heli, study.stages(made.effort))
+    stored.save("controllers", Stored(result=kept, seconds=0.0))
+    return made.out
+
+
+def test_the_controllers_of_a_finished_study_are_found_in_its_folder(finished, tmp_path):
+    configuration, found = study.designs_of(finished)
+    assert configuration.vehicle == "xcell60"
+    assert [d.name for d in found.designs] == [LQR, "LFT"]
+    Configuration(out=tmp_path, quick=True).write(tmp_path / "study.toml")
+    with pytest.raises(InputError, match="no finished controllers"):
+        study.designs_of(tmp_path)
+    Configuration(out=finished, quick=True, seed=1).write(tmp_path / "study.toml")
+    shutil.copytree(finished / "stages", tmp_path / "stages")
+    with pytest.raises(NotUsable, match="another version, vehicle, effort or seed"):
+        study.designs_of(tmp_path)
+
+
+@pytest.mark.slow
+def test_the_sheet_of_a_study_goes_beside_its_report(run, answer, finished):
+    asked = ("specs", "--study", finished, "--points", "2", "--axes", "roll")
+    data = answer(*asked)
+    assert list(data["controllers"]) == [LQR]
+    assert data["missing"] == {"LFT": "not feasible"}
+    assert "LQR schedule" in (finished / "specs.html").read_text(encoding="utf-8")
+    status, _, err = run("specs", "xcell60", "--study", finished)
+    assert status == 1
+    assert "leave out" in err
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -133,6 +174,45 @@ def test_a_flight_along_its_reference_misses_nothing(lqr):
     for key in (("altitude", ""), ("track", ""), ("rotor_speed", ""), ("effort", "d_lat")):
         assert found[key] == pytest.approx(0.0, abs=1e-9)
         assert flew[key] > 1e-4
+
+
+def test_taking_over_from_oneself_changes_little_and_from_others_more(vehicle, monkeypatch):
+    """The first command of who takes over is the one in force: a sample late, and no more of
+    oneself. A regulator with half as much gain again changes more, within the entries.
+    """
+    monkeypatch.setattr("studies.specs.flown.HELD_AT", (6.5,))
+    own = gain_scheduled_lqr(vehicle.heli, 0.0, 13.0, 0.02).scheduled_controller.model
+    heli = Helicopter.load("xcell60", governor="pi")
+    found, harder = at_a_switch(heli, own), at_a_switch(heli, replace(own, D=1.5 * own.D))
+    assert 0 < found["switch_attitude"] < 0.5
+    assert found["switch_attitude"] < harder["switch_attitude"] < 3
+    assert 0 < found["switch_acceleration"] < 0.05
+    assert found["switch_acceleration"] < harder["switch_acceleration"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("axis", "step", "gain"),
+    [("yaw", 0.05, 20.0), ("roll", 0.1745, 1.0)],
+)
+def test_quickness_in_flight_is_that_of_the_frozen_loop(lqr, axis, step, gain, monkeypatch):
+    """Within 10 %: servos move in steps and the governed rotor's speed varies. A pulse of two
+    samples is nearly the impulse of the frozen loop. The pedal's gain is raised to where it moves
+    by many steps of the servo.
+    """
+    monkeypatch.setattr("studies.specs.flown.HELD_AT", (6.5,))
+    monkeypatch.setattr("studies.specs.flown.PULSE", 0.04)
+    sheet = Sheet.load()
+    vehicle = OfVehicle(name="xcell60", points=3, sheet=sheet.select([axis]))
+    D = np.array(lqr.D)
+    D[:, lqr.outputs.index("d_ped")] *= gain
+    K = replace(lqr, D=D)
+    flew = quickness(
+        Helicopter.load("xcell60", governor="pi"), K, replace(sheet.axes[axis], step=step)
+    )
+    (spec,) = (s for s in vehicle.scaled.specifications if s.name.startswith("quickness, linear"))
+    _, frozen, _ = vehicle.frozen({NAME: K}).over(NAME, axis, spec.name)
+    assert flew == pytest.approx(frozen, rel=0.1)
 
 
 @pytest.mark.slow

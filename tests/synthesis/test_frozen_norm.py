@@ -8,6 +8,7 @@ import pytest
 from models import lag, random_stable
 from scipy.linalg import block_diag
 
+from symheli import LPVStateSpace, Scheduling
 from synthesis import frozen_gain, l2_gain
 from synthesis.worst.frozen import norm
 
@@ -153,3 +154,17 @@ def test_a_gain_that_is_loose_for_its_sample_period_says_so(box):
         said = any("the bound may be loose for that alone" in line for line in proven.hypotheses)
         assert said or proven.gamma <= 1.01 * proven.lower
         assert not (said and dt > 0.01)
+
+
+def test_the_frozen_gain_over_a_box_is_the_worst_corner():
+    """1/(1 + p)(2 - q): 1/((1)(2 - 1)) at p = 0, q = 1; as an LFT the same."""
+    p, q = (Scheduling(name, "1", 0.0, 1.0) for name in ("p", "q"))
+    one, two = p.symbol, q.symbol
+    model = LPVStateSpace.from_expressions(
+        [[-(1 + one), 0], [1, -(2 - two)]], [[1], [0]], [[0, 1]], [[0]], [p, q]
+    )
+    for each in (model, model.to_lft()):
+        found = frozen_gain(each)
+        assert found.gain == pytest.approx(1.0, rel=1e-8)
+        assert found.p == pytest.approx((0.0, 1.0))
+        assert found.omega == 0.0

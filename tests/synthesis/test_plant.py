@@ -286,6 +286,20 @@ def test_noise_enters_the_measurement_and_not_the_performance():
         own.with_noise({"phi": 0.1})
 
 
+def test_a_cost_is_a_performance_signal_of_its_own():
+    own = plant().with_cost({"d_lat": 0.3})
+    assert own.performance == (*plant().performance, "d_lat_cost")
+    for p in SPEEDS:
+        G, before = own.at(p), plant().at(p)
+        np.testing.assert_allclose(G.D12, [*before.D12.tolist(), [0.3]], atol=1e-15)
+        np.testing.assert_allclose(G.C1[:-1], before.C1, atol=1e-15)
+        np.testing.assert_allclose(G.C1[-1], 0.0, atol=1e-15)
+    with pytest.raises(InputError, match="the cost of d_lat: expected a number > 0"):
+        plant().with_cost({"d_lat": -1.0})
+    with pytest.raises(UnknownNameError, match="unknown control 'd_lta'"):
+        plant().with_cost({"d_lta": 1.0})
+
+
 def test_an_input_disturbance_acts_where_the_control_does():
     """Before `with_servo` behind the servo, after it through it; the command that is performance
     stays the command alone.

@@ -14,6 +14,7 @@ from symheli.lpv.bases.patches import Patches
 from symheli.lpv.bases.polynomial import Polynomial
 from symheli.lpv.bases.polynomials import factors_of
 from symheli.lpv.bases.product import Product
+from symheli.lpv.bases.user_functions import UserFunctions
 from symheli.values.arrays import Array
 
 MERGE_ULPS = 4
@@ -30,7 +31,8 @@ def sum_space(a: FunctionSpace, b: FunctionSpace) -> FunctionSpace:
     """Return a space that contains every f + g, f in `a` and g in `b`, factor by factor.
 
     Polynomials stay polynomials, other piecewise polynomials become `Patches` over the breaks of
-    both. Raises `InputError` for functions that are neither, unless the other is a constant.
+    both; `UserFunctions` and polynomials become the `UserFunctions` of both. Raises `InputError`
+    for user functions beside piecewise polynomials.
     """
     return a if a == b else _combined(a, b, _sum)
 
@@ -63,18 +65,26 @@ def _combined(
 
 
 def _sum(f: FunctionSpace, g: FunctionSpace) -> Basis:
-    return _basis(f) if f == g else _either(f, g, max)
+    return _basis(f) if f == g else _either(f, g, products=False)
 
 
 def _product(f: FunctionSpace, g: FunctionSpace) -> Basis:
-    return _either(f, g, int.__add__)
+    return _either(f, g, products=True)
 
 
-def _either(f: FunctionSpace, g: FunctionSpace, degree: Callable[[int, int], int]) -> Basis:
-    """The factor for both, its degree that of the two degrees."""
+def _either(f: FunctionSpace, g: FunctionSpace, products: bool) -> Basis:
+    """The factor for both, or for their products: of the larger degree, or of their sum."""
+
+    def degree(first: int, second: int) -> int:
+        return first + second if products else max(first, second)
+
     for one, other in ((f, g), (g, f)):
         if one.degrees == (0,):
             return _basis(other)
+    if any(isinstance(h, UserFunctions) for h in (f, g)) and all(
+        isinstance(h, UserFunctions) or h.degrees is not None for h in (f, g)
+    ):
+        return UserFunctions.of_both(_basis(f), _basis(g), products)
     (low_f, high_f), (low_g, high_g) = f.ranges[0], g.ranges[0]
     low, high = max(low_f, low_g), min(high_f, high_g)
     if f.degrees is not None and g.degrees is not None:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.linalg import qr
 
 from symheli.errors import InputError
 from symheli.lpv.bases.basis import Basis, check_range
@@ -15,6 +16,13 @@ from symheli.values.arrays import Array
 
 if TYPE_CHECKING:
     from symheli.lpv.scheduling import Scheduling
+
+Function = Callable[[Array], Array]
+
+DEPENDENT = 1e-12
+"""A function is left out of a basis where others give it to this share of its size: a few times the
+rounding of what is fitted in that basis.
+"""
 
 
 @dataclass(frozen=True)
@@ -51,11 +59,11 @@ class UserFunctions(Basis):
            [1., 3.]])
     """
 
-    functions: tuple[Callable[[Array], Array], ...]
+    functions: tuple[Function, ...] = field(repr=False)
     low: float
     high: float
     names: tuple[str, ...] = ()
-    derivatives: tuple[Callable[[Array], Array], ...] = ()
+    derivatives: tuple[Function, ...] = field(default=(), repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "functions", tuple(self.functions))
@@ -98,6 +106,31 @@ class UserFunctions(Basis):
 
         return functions_of_one(expressions, scheduling)
 
+    @classmethod
+    def of_both(cls, f: Basis, g: Basis, products: bool) -> UserFunctions:
+        """Return a basis of the functions of both, or of their `products`: as many as are
+        independent on the range that they share, to `DEPENDENT`.
+        """
+        (low, high), (low_g, high_g) = f.ranges[0], g.ranges[0]
+        low, high = max(low, low_g), min(high, high_g)
+        one, other = _members(f), _members(g)
+        each = [a * b for a in one for b in other] if products else [*one, *other]
+        turn = np.cos(np.linspace(0.0, np.pi, 8 * len(each)))
+        p = 0.5 * (low + high) - 0.5 * (high - low) * turn
+        values = np.stack([np.broadcast_to(m.value(p), p.shape) for m in each], axis=-1)
+        sizes = np.linalg.norm(values, axis=0)
+        _, R, order = qr(values / np.where(sizes > 0, sizes, 1.0), mode="economic", pivoting=True)
+        rank = int(np.sum(np.abs(np.diag(R)) > DEPENDENT))
+        kept = [each[j] for j in sorted(order[:rank])]
+        slopes = [m.slope for m in kept if m.slope is not None]
+        return cls(
+            tuple(m.value for m in kept),
+            low,
+            high,
+            tuple(m.name for m in kept),
+            tuple(slopes) if len(slopes) == len(kept) else (),
+        )
+
     @property
     def size(self) -> int:
         """Number of functions."""
@@ -135,3 +168,62 @@ class UserFunctions(Basis):
             "user-supplied functions are not known to be piecewise polynomial; identify with a"
             " polynomial or spline basis, or fit the model, lpv.fitted(Polynomial(8, low, high))"
         )
+
+
+@dataclass(frozen=True)
+class _Member:
+    """A function of p, its slope if that is known, and what it is called."""
+
+    value: Function
+    slope: Function | None
+    name: str
+
+    def __mul__(self, other: _Member) -> _Member:
+        slope = None
+        if self.slope is not None and other.slope is not None:
+            slope = _Slope(self.value, self.slope, other.value, other.slope)
+        return _Member(_Product(self.value, other.value), slope, f"({self.name})*({other.name})")
+
+
+@dataclass(frozen=True)
+class _Product:
+    """f g."""
+
+    f: Function
+    g: Function
+
+    def __call__(self, p: Array) -> Array:
+        return self.f(p) * self.g(p)
+
+
+@dataclass(frozen=True)
+class _Slope:
+    """f' g + f g'."""
+
+    f: Function
+    df: Function
+    g: Function
+    dg: Function
+
+    def __call__(self, p: Array) -> Array:
+        return self.df(p) * self.g(p) + self.f(p) * self.dg(p)
+
+
+@dataclass(frozen=True)
+class _Column:
+    """A function of a basis, or its slope."""
+
+    basis: Basis
+    j: int
+    derivative: int = 0
+
+    def __call__(self, p: Array) -> Array:
+        return self.basis(p, self.derivative)[..., self.j]
+
+
+def _members(basis: Basis) -> list[_Member]:
+    if isinstance(basis, UserFunctions):
+        slopes = basis.derivatives or (None,) * basis.size
+        return [_Member(*each) for each in zip(basis.functions, slopes, basis.names, strict=True)]
+    names = [f"{type(basis).__name__} {j}" for j in range(basis.size)]
+    return [_Member(_Column(basis, j), _Column(basis, j, 1), name) for j, name in enumerate(names)]
