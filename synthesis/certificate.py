@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Array = np.ndarray
-Kind = Literal["l2 gain", "stability", "energy-to-peak gain", "decay rate"]
+Kind = Literal["l2 gain", "stability", "energy-to-peak gain", "h2 gain", "decay rate"]
 
 
 class Status(Enum):
