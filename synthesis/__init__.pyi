@@ -6,6 +6,9 @@ from synthesis.analysis.questions import (
     generalized_h2 as generalized_h2,
 )
 from synthesis.analysis.questions import (
+    h2_gain as h2_gain,
+)
+from synthesis.analysis.questions import (
     l2_gain as l2_gain,
 )
 from synthesis.analysis.questions import (

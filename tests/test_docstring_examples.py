@@ -120,6 +120,7 @@ LONG = (
     "synthesis-bounded_truncation",
     "synthesis-dwell_time",
     "synthesis-generalized_h2",
+    "synthesis-h2_gain",
     "synthesis-lqg",
     "symheli.records-check_kinematics",
 )

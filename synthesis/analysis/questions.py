@@ -264,8 +264,8 @@ def h2_gain(
     Returns
     -------
     Certificate
-        `gamma` bounds the root of E|y|^2, in units of y, for white noise of unit intensity (sampled:
-        of unit variance) at each input, independent of the others.
+        `gamma` bounds the root of E|y|^2, in units of y, for white noise of unit intensity
+        (sampled: of unit variance) at each input, independent of the others.
 
     Raises
     ------

@@ -68,6 +68,11 @@ def multiobjective(
     """Design a dynamic controller that minimises a weighted sum of squared gains within hard
     bounds.
 
+    `H2()` alone, of a continuous plant in which every control costs, every measurement is disturbed
+    and no disturbance is felt directly, separates into a state feedback and a filter: X and Y may
+    both depend on p, and what is promised is the mean power in white noise, see
+    `synthesis.h2_gain`.
+
     Parameters
     ----------
     plant : Plant
@@ -78,8 +83,9 @@ def multiobjective(
         Largest |dp/dt|; by default the plant's own.
     region : PoleRegion, optional
         For the poles of every frozen loop.
-    X, Y : int, tuple or FunctionSpace
-        Degrees in the parameters; only one of them may depend on a parameter that moves.
+    X, Y : int, tuple or FunctionSpace, optional
+        Degrees in the parameters, 0 by default; only one of them may depend on a parameter that
+        moves. Of `H2()` alone both may; by default their degree rises while that lowers gamma.
     gains : int, tuple or FunctionSpace, optional
         Of the controller's own variables; by default the degree of the plant plus that of X and Y.
     direct : bool
@@ -103,7 +109,7 @@ def multiobjective(
     References
     ----------
     Scherer, Gahinet and Chilali, IEEE Trans. Automatic Control 42 (1997); with X(p) or Y(p):
-    Apkarian and Adams (1998).
+    Apkarian and Adams (1998). `H2()` alone: Wu, Ph.D. thesis, Berkeley (1995).
 
     Examples
     --------

@@ -1,14 +1,19 @@
 """Output feedback of the least variance over p: state feedback on a filter, an inequality each.
 
-Let P(p) = Y^-1 satisfy the Riccati inequality of control with dP/dt, S(p) = X^-1 that of the filter
-with -dS/dt, and let F and L be their gains. Then u = F x^, x^' = A x^ + B2 u + L (C2 x^ + D22 u - y)
+Let P(p) = Y^-1 satisfy the Riccati inequality of control with dP/dt, S(p) = X^-1 that of the
+filter with -dS/dt, and let F and L be their gains. Then u = F x^ with
+
+    dx^/dt = A x^ + B2 u + L (C2 x^ + D22 u - y)
+
 knows p alone, and along every admissible p(t) white noise of unit intensity gives the performance a
 mean power of at most
 
     max over p of  tr B1'P B1 + tr R F S F',  R = D12'D12,
 
 by completing the square in x'P x, whose control error is F times the error of the estimate, of
-covariance at most S. Each is a convex program: first Y, then, for its F, X.
+covariance at most S. Each is a convex program: first Y, then, for its F, X. Of a frozen model the
+sum is tr L V L'P + tr C1 S C1', V = D21 D21', too: Y is found for the least of the first term, with
+the frozen filters, since every Y may serve, and this the best.
 
 Reference: Wu, "Control of Linear Parameter Varying Systems", Ph.D. thesis, Berkeley (1995), the
 stochastic LPV bound.
@@ -60,6 +65,8 @@ of the sum, at p (K, m).
 """
 
 USUAL = Solver(LYAPUNOV, tolerance=1e-7, iterations=100)
+CONTROL_SHARE = 0.1
+"""Share of the back-off that is the control's: it counts in both terms of the sum."""
 PARTS = {1: 4}
 """In how many parts the range of one parameter is cut where points are laid (more: 1)."""
 
@@ -184,70 +191,88 @@ class _Search:
     ) -> Iterator[Controller]:
         """Yield controllers whose frozen loops keep what is promised."""
 
-        def noise(p: Array) -> tuple[Array, Array]:
-            return self.scaled.at(p).B1, np.zeros(len(p))
+        def innovations(p: Array) -> tuple[Array, Array]:
+            each = zip(*self.scaled.at(p), strict=True)
+            return np.stack([_innovations(Generalized(*at)) for at in each]), np.zeros(len(p))
 
-        control, least = self._least(True, Y, noise, self.worst.control)
+        control, lowest = self._least(True, Y, innovations, self.worst.control)
+        feedback = self._feedback(control, lowest)
+        filtering, best = self._least(False, X, feedback, self.worst.variance)
+        optimum = self.unit * math.sqrt(best.gamma)
         for factor in tracked("backing off", factors):
-            # of all Y of nearly the least variance the largest: its gains are smooth
-            for chosen in islice(control.widest(factor**2 * least, USUAL), 1):
-                yield from self._filtered(control, chosen, X, factor)
+            # of all Y of nearly the least g the largest: its gains are smooth
+            near = (1 + CONTROL_SHARE * (factor - 1)) ** 2
+            for chosen in islice(control.widest(near * lowest.gamma, USUAL), 1):
+                own = self._variance(
+                    filtering.unknown.basis, False, self._feedback(control, chosen)
+                )
+                for settled in own.widest(factor**2 * own.least_gamma(USUAL).gamma, USUAL):
+                    made = self._controller(control, chosen, own, settled)
+                    if made is not None:
+                        yield replace(made, optimum=min(optimum, made.promised))
 
-    def _filtered(
-        self, control: Variance, chosen: Solution, X: Dependence | None, factor: float
-    ) -> Iterator[Controller]:
+    def _feedback(self, control: Variance, chosen: Solution) -> Cost:
+        """Return the cost of the error of an estimate under the gains of this Y."""
+
         def feedback(p: Array) -> tuple[Array, Array]:
             at, P = self.scaled.at(p), control.inverse(chosen, p)
-            F = _gains(at, P)
             root = np.linalg.cholesky(_t(at.D12) @ at.D12)
-            return _t(F) @ root, np.einsum("kni,knm,kmi->k", at.B1, P, at.B1)
+            return _t(_gains(at, P)) @ root, np.einsum("kni,knm,kmi->k", at.B1, P, at.B1)
 
-        filtering, least = self._least(False, X, feedback, self.worst.variance)
-        for settled in filtering.widest(factor**2 * least, USUAL):
+        return feedback
 
-            def gains(p: Array, settled: Solution = settled) -> Array:
-                at = self.scaled.at(p)
-                F = _gains(at, control.inverse(chosen, p))
-                L = _t(_gains(at.dual, filtering.inverse(settled, p)))
-                nothing = np.zeros((len(p), F.shape[-2], L.shape[-1]))
-                A = at.A + at.B2 @ F + L @ at.C2
-                return Gains(*given_direct_way(at.D22, A, -L, F, nothing)).packed
+    def _variance(self, basis: FunctionSpace, control: bool, cost: Cost) -> Variance:
+        return Variance(self.scaled, basis, control, cost, self.worst.p)
 
-            level = math.sqrt(filtering.worst(settled, self.points))
-            fit = self._kept(gains, level)
-            outcome = "no functions of p keep it" if fit is None else f"within {fit.misfit:.1e}"
-            name = f"back-off {factor:g}"
-            self.attempts.append(Attempt(name, 0.0, outcome, self.unit * level))
-            if fit is not None:
-                method = f"H2 output feedback, {Bases(filtering.unknown.basis, control.unknown.basis)}"
-                made = in_plant_units(self.plant, self.scaled, fit, self.unit * level, method)
-                yield replace(made, optimum=self.unit * math.sqrt(least))
+    def _controller(
+        self, control: Variance, chosen: Solution, filtering: Variance, settled: Solution
+    ) -> Controller | None:
+        """Return the controller of these Y and X; None where no functions of p keep its level."""
+
+        def gains(p: Array) -> Array:
+            at = self.scaled.at(p)
+            F = _gains(at, control.inverse(chosen, p))
+            L = _t(_gains(at.dual, filtering.inverse(settled, p)))
+            nothing = np.zeros((len(p), F.shape[-2], L.shape[-1]))
+            A = at.A + at.B2 @ F + L @ at.C2
+            return Gains(*given_direct_way(at.D22, A, -L, F, nothing)).packed
+
+        level = math.sqrt(filtering.worst(settled, self.points))
+        fit = self._kept(gains, level)
+        outcome = "no functions of p keep it" if fit is None else f"within {fit.misfit:.1e}"
+        self.attempts.append(Attempt("settled", 0.0, outcome, self.unit * level))
+        if fit is None:
+            return None
+        method = f"H2 output feedback, {Bases(filtering.unknown.basis, control.unknown.basis)}"
+        return in_plant_units(self.plant, self.scaled, fit, self.unit * level, method)
 
     def _least(
         self, control: bool, given: Dependence | None, cost: Cost, floor: float
-    ) -> tuple[Variance, float]:
-        """Return the program of the degree beyond which g hardly falls, and its least g; nothing
+    ) -> tuple[Variance, Solution]:
+        """Return the program of the degree beyond which g hardly falls, and its solution; nothing
         reaches the `floor`. Raises `SynthesisError` where there is none.
         """
         parameters, name = self.plant.parameters, "Y" if control else "X"
-        matters, best, least = depends(self.plant), None, math.inf
+        matters = depends(self.plant)
+        best: tuple[Variance, Solution] | None = None
         for degree in DEGREES.get(len(parameters), (2,)):
             basis = dependence(given, parameters, name, matters, degree)
-            if best is not None and basis.size == best.unknown.basis.size:
+            if best is not None and basis.size == best[0].unknown.basis.size:
                 break
-            program = Variance(self.scaled, basis, control, cost, self.worst.p)
+            program = self._variance(basis, control, cost)
             found = program.least_gamma(USUAL)
             bound = self.unit * math.sqrt(max(found.gamma, 0.0))
             shape = Bases(*(None, basis) if control else (basis, None))
             self.attempts.append(Attempt(f"least variance, {shape}", 0.0, found.message, bound))
-            before, (best, least) = least, min(
-                (best, least), (program, found.gamma), key=lambda each: each[1]
-            )
-            if found.gamma > MIN_IMPROVEMENT**2 * before or least <= CLOSE_TO_OPTIMUM**2 * floor:
+            before = math.inf if best is None else best[1].gamma
+            if found.gamma < before:
+                best = program, found
+            close = best is not None and best[1].gamma <= CLOSE_TO_OPTIMUM**2 * floor
+            if found.gamma > MIN_IMPROVEMENT**2 * before or close:
                 break
-        if best is None or not math.isfinite(least):
+        if best is None:
             raise failed(self.plant, self.attempts)
-        return best, least
+        return best
 
     def _kept(self, gains: Callable[[Array], Array], level: float) -> Fitted | None:
         """Return the first functions of p whose frozen loops keep the level; None without any."""
@@ -263,14 +288,12 @@ class _Search:
 
 def _gains(plant: Generalized, P: Array) -> Array:
     """Return F (K, nu, n) = -R^-1 (B2'P + D12'C1)."""
-    return -np.linalg.solve(
-        _t(plant.D12) @ plant.D12, _t(plant.B2) @ P + _t(plant.D12) @ plant.C1
-    )
+    return -np.linalg.solve(_t(plant.D12) @ plant.D12, _t(plant.B2) @ P + _t(plant.D12) @ plant.C1)
 
 
 class _Frozen(NamedTuple):
     """Largest least variance of the models frozen at some p, scaled, with that p (m,); and the
-    largest part of any that is the control's, with all states known.
+    largest least g of the program of Y at any.
     """
 
     variance: float
@@ -286,11 +309,18 @@ def _worst_frozen(scaled: ScaledPlant, points: Array) -> _Frozen | None:
         control, filtering = control_gains(P, None), control_gains(P.dual, None)
         if control is None or filtering is None:
             return None
-        error = control.F @ filtering.X @ control.F.T
-        parts.append((np.sum((control.X @ P.B1) * P.B1), np.sum(error * control.R)))
+        seen, driven = P.C1 @ filtering.X @ P.C1.T, _innovations(P)
+        parts.append((np.sum((control.X @ driven) * driven), np.trace(seen)))
     known, total = np.array(parts)[:, 0], np.sum(parts, axis=1)
     k = int(np.argmax(total))
     return _Frozen(max(float(total[k]), 0.0), points[k], float(known.max()))
+
+
+def _innovations(plant: Generalized) -> Array:
+    """Return L V^1/2 (n, ny), by which the frozen filter of one model is driven."""
+    found = control_gains(plant.dual, None)
+    assert found is not None  # noqa: S101 - `_worst_frozen` was asked before
+    return found.F.T @ np.linalg.cholesky(found.R)
 
 
 def _t(M: Array) -> Array:

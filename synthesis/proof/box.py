@@ -128,8 +128,8 @@ class Evidence(NamedTuple):
         """Return (P, the bound it admits at `points` values of each parameter in every region); inf
         (decay: -inf) where none.
 
-        For the energy-to-peak and H2 gain P is scaled so that its first inequality just holds; NaN for
-        stability.
+        For the energy-to-peak and H2 gain P is scaled so that its first inequality just holds; NaN
+        for stability.
         """
         kind = self.demand.kind
         model, demand = self.scaled

@@ -16,10 +16,10 @@ discrete time, P+ = P(p(k+1)):
     decay rate       A'P+A exp(2 alpha dt) - P < 0
 
 and P > 0; gain^2 = g; c_i is row i of C. P^-1 bounds the variance of the state in white noise, and
-g is then at least the trace of C P^-1 C'. Sources: Wu, Yang, Packard and Becker, Int. J. Robust and Nonlinear Control 6
-(1996), theorem 3.1; Rotea, "The generalized H2 control problem", Automatica 29 (1993); Boyd, El
-Ghaoui, Feron and Balakrishnan, "Linear Matrix Inequalities in System and Control Theory" (1994),
-sections 5.1 and 6.
+g is then at least the trace of C P^-1 C'. Sources: Wu, Yang, Packard and Becker, Int. J. Robust
+and Nonlinear Control 6 (1996), theorem 3.1; Rotea, "The generalized H2 control problem", Automatica
+29 (1993); Boyd, El Ghaoui, Feron and Balakrishnan, "Linear Matrix Inequalities in System and
+Control Theory" (1994), sections 5.1 and 6.
 """
 
 from __future__ import annotations
@@ -166,9 +166,7 @@ def output_form(
         return -block([[here, C.T], [C, C @ C.T * 0]])
     rows = [PolynomialMatrix(C.box, C.coefficients[..., i : i + 1, :]) for i in range(ny)]
     none = here * 0
-    copies = [
-        [here if i == j else none for j in range(ny)] + [row.T] for i, row in enumerate(rows)
-    ]
+    copies = [[here if i == j else none for j in range(ny)] + [row.T] for i, row in enumerate(rows)]
     return -block([*copies, [*rows, rows[0] @ rows[0].T * 0]])
 
 

@@ -193,8 +193,8 @@ def worst_tied(model: LPVStateSpace, demand: Demand, frozen: Worst, search: Sear
 def _peaks(
     line: LPVStateSpace, rate: float, search: Search, kind: Kind
 ) -> tuple[float, SchedulingTrajectory | None]:
-    """Return the energy-to-peak or H2 gain along waves: the Gramian of inputs held over each step, from
-    rest over some cycles.
+    """Return the energy-to-peak or H2 gain along waves: the Gramian of inputs held over each step,
+    from rest over some cycles.
     """
     family = WaveFamily(line, rate, search)
     best: tuple[float, SchedulingTrajectory | None] = (0.0, None)

@@ -98,7 +98,12 @@ SLOW = {
     *("synthesis.Controller.discretize", "synthesis.estimator", "synthesis.Estimator.certify"),
     *("synthesis.certify_sampled", "synthesis.lft_feedback", "synthesis.multiobjective"),
     *("synthesis.proven_around", "synthesis.state_feedback", "synthesis.with_wrong_parameter"),
-    *("synthesis.frozen_box_gain", "synthesis.generalized_h2", "synthesis.decay_rate"),
+    *(
+        "synthesis.frozen_box_gain",
+        "synthesis.generalized_h2",
+        "synthesis.h2_gain",
+        "synthesis.decay_rate",
+    ),
     *("synthesis.stability", "synthesis.lower_bound", "synthesis.lft_gain"),
     *("synthesis.lqr", "synthesis.lqg", "synthesis.switched", "synthesis.dwell_time"),
     *("synthesis.SwitchedController.certify", "synthesis.Controller.of"),

@@ -184,8 +184,8 @@ def grid_to_lft(rate):
 
 
 def noisy_spinning_disks(rate):
-    """The spinning disks with a strictly proper weight of the error, for the least variance in white
-    noise.
+    """The spinning disks with a strictly proper weight of the error, for the least variance in
+    white noise.
 
     The parameters are those of `spinning_disks`. Source: the page on stochastic LPV systems of
     LPVTools' documentation, after Wu, Ph.D. thesis, Berkeley (1995).
