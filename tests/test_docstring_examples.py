@@ -115,6 +115,8 @@ LONG = (
     "symheli.lpv-balanced_truncation",
     "symheli.lpv-simulate",
     "synthesis-robust_margin",
+    "synthesis-worst_case_gain",
+    "synthesis-loop_shaping",
     "synthesis-DwellTime",
     "synthesis-SwitchedController",
     "synthesis-bounded_truncation",

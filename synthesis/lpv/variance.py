@@ -278,9 +278,9 @@ class _Search:
         """Return the first functions of p whose frozen loops keep the level; None without any."""
         limit = level * (1 + LEVEL_TOLERANCE)
         for fit in fits(gains, self.scaled.parameters):
-            loop = closed(self.scaled, fit, self.points)
+            A, B, C, D = closed(self.scaled, fit, self.points)
             if fit.misfit <= ACCURACY and all(
-                of_gramian(*each, None, "h2 gain") <= limit for each in zip(*loop, strict=True)
+                of_gramian(A[k], B[k], C[k], D[k], None, "h2 gain") <= limit for k in range(len(A))
             ):
                 return fit
         return None

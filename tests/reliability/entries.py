@@ -108,7 +108,12 @@ SLOW = {
     *("synthesis.lqr", "synthesis.lqg", "synthesis.switched", "synthesis.dwell_time"),
     *("synthesis.SwitchedController.certify", "synthesis.Controller.of"),
     *("synthesis.Certificate.verify", "synthesis.lft_stability", "synthesis.structured"),
-    *("synthesis.bounded_truncation", "synthesis.robust_margin"),
+    *(
+        "synthesis.bounded_truncation",
+        "synthesis.robust_margin",
+        "synthesis.worst_case_gain",
+        "synthesis.loop_shaping",
+    ),
 }
 """Entries that fly, sweep or solve: `FEW` inputs each."""
 LARGER = {"synthesis.multiobjective", "synthesis.output_feedback", "synthesis.lft_feedback"}
