@@ -74,6 +74,8 @@ EXEMPT: dict[str, str] = {
                 "MarginTable",
                 "Margins",
                 "RobustMargin",
+                "WorstCaseGain",
+                "LoopShaping",
                 "SpecificationTable",
                 "StructuredController",
                 "Tube",
