@@ -188,7 +188,8 @@ class UncertainStateSpace:
         middle = 0.5 * (low + high)
         turned = model.feedback({pair: middle for pair in zip(d, v, strict=True)})
         source = f"static functions in the sector from {low:g} to {high:g}, or time-varying gains"
-        return cls(turned, d, v, 0.5 * (high - low), 1.0, source)
+        half = 0.5 * (high - low)
+        return cls(turned, signals(d), signals(v), half, 1.0, source)
 
     @property
     def states(self) -> tuple[Signal, ...]:
