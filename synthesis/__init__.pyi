@@ -6,6 +6,9 @@ from synthesis.analysis.questions import (
     generalized_h2 as generalized_h2,
 )
 from synthesis.analysis.questions import (
+    h2_gain as h2_gain,
+)
+from synthesis.analysis.questions import (
     l2_gain as l2_gain,
 )
 from synthesis.analysis.questions import (
@@ -13,6 +16,8 @@ from synthesis.analysis.questions import (
 )
 from synthesis.analysis.robust_margin import RobustMargin as RobustMargin
 from synthesis.analysis.robust_margin import robust_margin as robust_margin
+from synthesis.analysis.worst_case_gain import WorstCaseGain as WorstCaseGain
+from synthesis.analysis.worst_case_gain import worst_case_gain as worst_case_gain
 from synthesis.certificate import Certificate as Certificate
 from synthesis.certificate import Status as Status
 from synthesis.forms import HigherOrder as HigherOrder
@@ -58,6 +63,8 @@ from synthesis.lpv.estimator import Estimator as Estimator
 from synthesis.lpv.estimator import estimator as estimator
 from synthesis.lpv.linear_quadratic import lqg as lqg
 from synthesis.lpv.linear_quadratic import lqr as lqr
+from synthesis.lpv.loop_shaping import LoopShaping as LoopShaping
+from synthesis.lpv.loop_shaping import loop_shaping as loop_shaping
 from synthesis.lpv.multiobjective import multiobjective as multiobjective
 from synthesis.lpv.objectives import (
     H2 as H2,
@@ -88,6 +95,7 @@ from synthesis.plant.plant import Plant as Plant
 from synthesis.polynomial.matrix import PolynomialMatrix as PolynomialMatrix
 from synthesis.program.cone_program import Solver as Solver
 from synthesis.program.cone_program import installed_solvers as installed_solvers
+from synthesis.robust.structure import DynamicBlock as DynamicBlock
 from synthesis.sheet.evaluation import SpecificationTable as SpecificationTable
 from synthesis.sheet.evaluation import specifications as specifications
 from synthesis.sheet.sheet import Sheet as Sheet

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Array = np.ndarray
-Kind = Literal["l2 gain", "stability", "energy-to-peak gain", "decay rate"]
+Kind = Literal["l2 gain", "stability", "energy-to-peak gain", "h2 gain", "decay rate"]
 
 
 class Status(Enum):
@@ -139,12 +139,13 @@ class Certificate:
     """A bound that holds for every p(t) within its range and rates, with its proof and its
     hypotheses.
 
-    Made by `l2_gain`, `stability`, `decay_rate`, `generalized_h2`, `lft_gain` and `lft_stability`.
+    Made by `l2_gain`, `stability`, `decay_rate`, `generalized_h2`, `h2_gain`, `lft_gain` and
+    `lft_stability`.
 
     Attributes
     ----------
     kind : str
-        "l2 gain", "energy-to-peak gain", "decay rate" or "stability".
+        "l2 gain", "energy-to-peak gain", "h2 gain", "decay rate" or "stability".
     gamma : float
         Proven upper bound of a gain; inf where nothing was proven, NaN for the other kinds.
     lower : float

@@ -142,6 +142,55 @@ class UncertainStateSpace:
         source = f"{SAFETY:g} times the largest difference measured of the models that are covered"
         return cls(wide, signals(d), signals(v), 1.0, 1.0, source)
 
+    @classmethod
+    def in_sector(
+        cls,
+        model: LPVStateSpace,
+        inputs: Sequence[str],
+        outputs: Sequence[str],
+        low: float = 0.0,
+        high: float = 1.0,
+    ) -> UncertainStateSpace:
+        """Return the set of all loops of a model whose `inputs` are functions in a sector of its
+        `outputs`, each of its own: low v^2 <= d v <= high v^2 at every time.
+
+        A saturation is in the sector from 0 to 1; up to |v| = limit/low it is in that from `low`
+        on. d = (low + high)/2 v + Delta v with a diagonal Delta of norm (high - low)/2 that moves
+        in any way: what `l2_gain` and `stability` prove of the set is the circle criterion with a
+        multiplier that is a function of p; of several functions its Delta is any matrix of that
+        norm, which is more than need be. `perturbed(Delta)` has the gain (low + high)/2 + Delta.
+
+        Raises `InputError` for numbers of inputs and outputs that differ and for a low end that is
+        not below the high one, `UnknownNameError` for other names.
+
+        Examples
+        --------
+        x' = -x - sat(2 x) decays whatever the limit:
+
+        >>> import symheli, synthesis
+        >>> p = symheli.Scheduling("p", "1", low=0.0, high=1.0)
+        >>> lag = symheli.LPVStateSpace.polynomial(
+        ...     [[[-1.0]]], [[[-1.0]]], [[[2.0]]], [[[0.0]]], p, inputs=["held"], outputs=["asked"])
+        >>> loops = symheli.UncertainStateSpace.in_sector(lag, ["held"], ["asked"])
+        >>> synthesis.stability(loops).verified, loops.bound
+        (True, 0.5)
+        """
+        d, v = ((g,) if isinstance(g, str) else tuple(g) for g in (inputs, outputs))
+        if len(d) != len(v):
+            raise InputError(
+                f"in_sector: expected an output for each input, got {len(d)} inputs and {len(v)}"
+                " outputs"
+            )
+        if not -math.inf < low < high < math.inf:
+            raise InputError(
+                f"in_sector: expected finite numbers low < high, got {low!r:.40} and {high!r:.40}"
+            )
+        middle = 0.5 * (low + high)
+        turned = model.feedback({pair: middle for pair in zip(d, v, strict=True)})
+        source = f"static functions in the sector from {low:g} to {high:g}, or time-varying gains"
+        half = 0.5 * (high - low)
+        return cls(turned, signals(d), signals(v), half, 1.0, source)
+
     @property
     def states(self) -> tuple[Signal, ...]:
         """Names of the states."""

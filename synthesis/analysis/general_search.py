@@ -29,7 +29,7 @@ from synthesis.program import interior_point
 from synthesis.program.cone_program import LYAPUNOV, Answer, Candidate, general_solver, solve
 from synthesis.program.interior_point import Minimum
 from synthesis.program.lyapunov_program import LyapunovBlocks, LyapunovProgram, Sizes
-from synthesis.program.scaling import Scaling, dissipative, model_scaling
+from synthesis.program.scaling import Scaling, dissipative, gramian_units, model_scaling
 from synthesis.proof.box import Evidence
 from synthesis.worst.frozen import norm
 
@@ -105,7 +105,8 @@ class General(Ladder):
         model, kind = self.problem.model, self.problem.demand.kind
         self.expected = bound
         frozen, scale = _scaling(model, kind, bound)
-        self.choices = [scale]
+        of_gramian = self.problem.demand.of_gramian
+        self.choices = [gramian_units(scale, frozen) if of_gramian else scale]
         other = dissipative(scale, frozen, bound) if kind == "l2 gain" else None
         if other is not None:
             self.choices.insert(0, other)

@@ -38,6 +38,10 @@ MEANING: dict[Kind, str] = {
         "the gain is from zero initial state, max_t |y(t)| < gamma |u|_2, the Euclidean norm of"
         " all outputs"
     ),
+    "h2 gain": (
+        "the variance of all outputs together, E|y(t)|^2 at every t from zero initial state, is"
+        " below gamma^2 for white noise of unit intensity at all inputs"
+    ),
     "decay rate": "|x(t)| <= c exp(-alpha t) |x(0)| for some c, along every admissible p(t)",
 }
 

@@ -165,10 +165,10 @@ def _check_channels(problem: Problem) -> None:
         raise InputError(
             f"a gain needs inputs and outputs, got {nu} and {ny}; use stability() without channels"
         )
-    if problem.demand.kind == "energy-to-peak gain" and problem.model.passes_peaks:
+    if problem.demand.of_gramian and problem.model.passes_peaks:
         raise InputError(
-            "the energy-to-peak gain of a continuous model needs D = 0: feedthrough passes peaks of"
-            " any height"
+            f"the {problem.demand.kind} of a continuous model needs D = 0: feedthrough passes peaks"
+            " of any height and white noise of any variance"
         )
 
 

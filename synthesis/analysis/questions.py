@@ -1,5 +1,5 @@
-"""The four problems of one LPV model whose parameters move at bounded rates: L2 gain, stability,
-decay rate and energy-to-peak gain (generalised H2 norm).
+"""The problems of one LPV model whose parameters move at bounded rates: L2 gain, stability, decay
+rate, energy-to-peak gain (generalised H2 norm) and H2 norm.
 """
 
 from __future__ import annotations
@@ -234,3 +234,57 @@ def generalized_h2(
     0.707
     """
     return certify(pose(model, rate, "energy-to-peak gain", form, impose, solver, search))
+
+
+@with_one_thread
+def h2_gain(
+    model: Model,
+    rate: Rate = None,
+    *,
+    form: Spline | None = None,
+    impose: Imposed | None = None,
+    solver: Solver | str | None = None,
+    search: Search | None = THOROUGH,
+) -> Certificate:
+    """Certify an upper bound on the root of the variance of the outputs in white noise, over every
+    admissible p(t): of a frozen model the H2 norm.
+
+    P(p)^-1 bounds the variance of the state, from zero at the start; gamma^2 that of all outputs
+    together at every time, and so their mean power. Of one output it is `generalized_h2`.
+
+    Parameters
+    ----------
+    model : LPVStateSpace or LFT
+        The model, without feedthrough in continuous time.
+    rate, impose, solver, search
+        As of `l2_gain`.
+    form : Spline, optional
+        The form of the Lyapunov function.
+
+    Returns
+    -------
+    Certificate
+        `gamma` bounds the root of E|y|^2, in units of y, for white noise of unit intensity
+        (sampled: of unit variance) at each input, independent of the others.
+
+    Raises
+    ------
+    InputError, SolverError
+        As of `l2_gain`.
+
+    References
+    ----------
+    Wu, "Control of Linear Parameter Varying Systems", Ph.D. thesis, Berkeley (1995): the stochastic
+    LPV bound, `lpvnorm(P, 'LQG')` of LPVTools.
+
+    Examples
+    --------
+    >>> from symheli.lpv import LPVStateSpace, Scheduling
+    >>> p = Scheduling("p", "1", 0.0, 1.0, rate=0.5)
+    >>> lag = LPVStateSpace.polynomial(
+    ...     [[[-1.0]], [[-1.0]]], [[[1.0]]], [[[1.0], [1.0]]], [[[0.0], [0.0]]], p)
+    >>> cert = h2_gain(lag, search=None)  # two outputs of variance 1/2 each at p = 0
+    >>> print(f"{cert.gamma:.3f}")
+    1.000
+    """
+    return certify(pose(model, rate, "h2 gain", form, impose, solver, search))

@@ -1,7 +1,8 @@
-"""How many times the stated uncertainty a model bears: a parameter and a block grown together."""
+"""How many times the stated uncertainty a model bears: parameters and blocks grown together."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -9,8 +10,13 @@ import numpy as np
 from scipy.optimize import brentq
 
 from symheli.errors import InputError
-from symheli.lpv import LPVStateSpace, Polynomial, Scheduling, UncertainStateSpace
+from symheli.lpv import LFT, LPVStateSpace, Polynomial, Scheduling, UncertainStateSpace
+from symheli.threads import with_one_thread
+from symheli.values.summary import summarized
 from synthesis.analysis.questions import stability
+from synthesis.robust.lower_bound import best_reals, worst_closing
+from synthesis.robust.structure import DynamicBlock, Loop, loop_of
+from synthesis.robust.upper_bound import proven_level
 from synthesis.worst.frozen import frozen_gain
 
 SHARES = (0.9995, 0.998, 0.995, 0.99, 0.98, 0.95, 0.9, 0.75, 0.5)
@@ -19,35 +25,57 @@ MIN_SCALE = 1e-6
 """A model that does not bear this part of its uncertainty counts as unstable without any."""
 ACCURACY = 1e-6
 """Relative accuracy of the upper bound."""
+GROWTH = 1.001
+"""Factor by which a level is raised above the least at the frequency that decides."""
+ROUGH = 1e-4
+"""The same while real parameters are searched."""
+STEPS = 3
+"""Doublings of the factor in which the loss of a loop is looked for."""
 POINTS = 21
 """Values of the parameter whose highest peaks are climbed."""
 
 
 class RobustMargin(NamedTuple):
     """`lower` times the stated uncertainty is proven to be borne, `upper` times it is not: there a
-    stable perturbation of that norm makes the model with the parameter at `p` oscillate at `omega`
-    (rad/s; NaN where the model at p is unstable without any).
+    stable perturbation of that norm makes the model with the parameter at `p` (of several a tuple)
+    oscillate at `omega` (rad/s; NaN where the model at p is unstable without any).
+
+    `perturbation`: of several blocks, their response at `omega` from all their outputs to all their
+    inputs, in the order of the blocks.
     """
 
     lower: float
     upper: float
-    p: float
+    p: float | tuple[float, ...]
     omega: float
+    perturbation: np.ndarray | None = None
+
+    __repr__ = summarized
 
 
-def robust_margin(model: UncertainStateSpace, *, largest: float = 10.0) -> RobustMargin:
-    """Compute the factor by which the range of a constant parameter about its middle, and the bound
-    of a block of any dynamics, may grow together before a model of the set is unstable.
+@with_one_thread
+def robust_margin(
+    model: UncertainStateSpace | LFT | LPVStateSpace,
+    blocks: Sequence[DynamicBlock] = (),
+    *,
+    largest: float = 10.0,
+) -> RobustMargin:
+    """Compute the factor by which the ranges of constant parameters about their middles, and the
+    bounds of blocks of any linear dynamics, may grow together before a model of the set is
+    unstable.
 
-    The upper bound is attained: it is the factor r at which r bound |M_p| = 1 for the worst p of
-    the range grown by r, M_p from the inputs of the block to its outputs. The lower one is proven
-    by `stability` for that set.
+    The upper bound is attained by the parameters and the perturbation returned. The lower one, of
+    an `UncertainStateSpace`, is proven by `stability` for that set; of several blocks by D and G
+    scalings over intervals of frequency that leave none out, in floating point.
 
     Parameters
     ----------
-    model : UncertainStateSpace
-        The loop, continuous or sampled, polynomial in its one parameter, whose range is grown about
-        its middle.
+    model : UncertainStateSpace, LFT or LPVStateSpace
+        The loop, continuous or sampled. Of an `UncertainStateSpace`, polynomial in its one
+        parameter. An LFT may have any number of parameters, a polynomial model becomes one; its
+        other channels play no part.
+    blocks : sequence of DynamicBlock
+        Channels of an LFT or LPVStateSpace that unknown dynamics close.
     largest : float
         No larger factor is looked for.
 
@@ -59,11 +87,15 @@ def robust_margin(model: UncertainStateSpace, *, largest: float = 10.0) -> Robus
     Raises
     ------
     InputError
-        Several parameters, other functions of it, a bound of zero.
+        An uncertain model in several parameters, or other functions; a bound that is not > 0; a
+        signal of two blocks; nothing uncertain.
+    UnknownNameError
+        A channel that the model does not have.
 
     References
     ----------
-    `robstab` of MATLAB; Zhou, Doyle and Glover, Robust and Optimal Control (1996), ch. 9 and 11.
+    `robstab` of MATLAB; Zhou, Doyle and Glover, Robust and Optimal Control (1996), ch. 9 and 11;
+    Fan, Tits and Doyle, IEEE Trans. Automatic Control 36 (1991).
 
     Examples
     --------
@@ -77,7 +109,9 @@ def robust_margin(model: UncertainStateSpace, *, largest: float = 10.0) -> Robus
     (True, 2.0)
     """
     if not isinstance(model, UncertainStateSpace):
-        raise InputError(f"expected an UncertainStateSpace, got {type(model).__name__}")
+        return _of_blocks(model, blocks, largest)
+    if blocks:
+        raise InputError("an UncertainStateSpace has its block: give blocks with its .model")
     if not isinstance(model.model.basis, Polynomial):
         raise InputError("expected a model that is polynomial in one parameter, which is grown")
     if not (model.bound > 0 and largest > MIN_SCALE):
@@ -126,3 +160,47 @@ def _grown(lpv: LPVStateSpace, r: float) -> LPVStateSpace:
     A, B, C, D = (same(M) for M in (lpv.A, lpv.B, lpv.C, lpv.D))
     names = lpv.states, lpv.inputs, lpv.outputs
     return LPVStateSpace(wider, A, B, C, D, (wide,), *names, lpv.dt)
+
+
+def _of_blocks(
+    model: LFT | LPVStateSpace, blocks: Sequence[DynamicBlock], largest: float
+) -> RobustMargin:
+    loop = loop_of(model, blocks)
+    if not largest > MIN_SCALE:
+        raise InputError(f"largest: expected a factor above {MIN_SCALE:g}, got {largest!r:.40}")
+    if not loop.stable:
+        return RobustMargin(0.0, MIN_SCALE, loop.physical(np.zeros(loop.reals)), float("nan"))
+    _, d = best_reals(lambda d: _lost(loop, d, largest), loop.reals)
+    upper = _lost(loop, d, largest, refine=True)
+    borne = upper >= largest
+    level = proven_level(loop, 1 / upper, performance=False, growth=GROWTH).level
+    closed = loop.closed(min(upper, largest) * d)
+    found = worst_closing(closed, refine=True) if closed.stable and closed.parts else None
+    return RobustMargin(
+        min(1 / level, largest),
+        float("inf") if borne else upper,
+        loop.physical(upper * d),
+        float("nan") if found is None else loop.frequency(found.omega),
+        None if found is None else loop.unscaled(found.delta),
+    )
+
+
+def _lost(loop: Loop, d: np.ndarray, largest: float, refine: bool = False) -> float:
+    """Return the factor at which the loop is lost with its real parameters along d, roughly or
+    refined; no more than the largest.
+    """
+
+    def excess(r: float) -> float:
+        closed = loop.closed(r * d)
+        if not closed.stable:
+            return -1.0
+        if not closed.parts:
+            return 1.0
+        return max(1 - r * worst_closing(closed, refine).level, -1.0)
+
+    low = MIN_SCALE
+    for high in np.geomspace(largest / 2**STEPS, largest, STEPS + 1):
+        if excess(float(high)) <= 0:
+            return float(brentq(excess, low, float(high), rtol=ACCURACY if refine else ROUGH))  # type: ignore[arg-type]
+        low = float(high)
+    return largest

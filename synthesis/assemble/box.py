@@ -29,7 +29,7 @@ from synthesis.polynomial.pieces import Pieces
 from synthesis.polynomial.regions import Region, regions
 from synthesis.polynomial.symmetric import basis, extended, length, svec
 from synthesis.program.cone_program import ConeProgram
-from synthesis.proof.inequalities import Demand, Pair, decrease, peak, positivity
+from synthesis.proof.inequalities import Demand, Pair, decrease, output_form, positivity
 
 Array = np.ndarray
 
@@ -87,7 +87,7 @@ def affine_inequalities(
     changed by `weight`.
     """
     nx, nu, ny = model.sizes
-    eye, gains = np.eye(nx), demand.kind in ("l2 gain", "energy-to-peak gain")
+    eye, gains = np.eye(nx), demand.kind.endswith("gain")
     nothing = svec(np.zeros((nx, nx)))
     out = []
     # every P on its own segments
@@ -121,13 +121,13 @@ def affine_inequalities(
                     fixed,
                 )
             )
-        if demand.kind == "energy-to-peak gain" and region.next_segment == region.segment:
+        if demand.of_gramian and region.next_segment == region.segment:
             columns, P = _unknown(
                 shape, region.segment, np.unique(coefficients_of(shape, region.segment)), nx
             )
-            F = peak(model, region, P, float)
-            size = F.shape[0]
-            level_y = -svec(np.diag(np.r_[np.zeros(size - ny), np.ones(ny)]))
+            F = output_form(model, region, P, demand, float)
+            size, seen = F.shape[0], demand.seen(ny)
+            level_y = -svec(np.diag(np.r_[np.zeros(size - seen), np.ones(seen)]))
             out.append(_affine(F, columns, level_y, 0 * level_y, np.zeros((size, size))))
     return out
 

@@ -26,6 +26,8 @@ from synthesis.lpv.objectives import H2, L2, EnergyToPeak, Objective, PoleRegion
 from synthesis.lpv.recovery import Transformed, controller
 from synthesis.lpv.scaled_plant import degrees_of, scaled_plant_of
 from synthesis.lpv.search import ACCURACY
+from synthesis.lpv.search import BACK_OFF as BACK_OFFS
+from synthesis.lpv.variance import least_variance, separable
 from synthesis.plant.generalized import Generalized, blocks
 from synthesis.plant.plant import Plant, require_plant
 from synthesis.plant.refusals import failed, levels_above, require_channels
@@ -56,8 +58,8 @@ def multiobjective(
     rate: Rate = None,
     *,
     region: PoleRegion | None = None,
-    X: Dependence = 0,
-    Y: Dependence = 0,
+    X: Dependence | None = None,
+    Y: Dependence | None = None,
     gains: Dependence | None = None,
     direct: bool = True,
     back_off: float = BACK_OFF,
@@ -65,6 +67,11 @@ def multiobjective(
 ) -> Controller:
     """Design a dynamic controller that minimises a weighted sum of squared gains within hard
     bounds.
+
+    `H2()` alone, of a continuous plant in which every control costs, every measurement is disturbed
+    and no disturbance is felt directly, separates into a state feedback and a filter: X and Y may
+    both depend on p, and what is promised is the mean power in white noise, see
+    `synthesis.h2_gain`.
 
     Parameters
     ----------
@@ -76,8 +83,9 @@ def multiobjective(
         Largest |dp/dt|; by default the plant's own.
     region : PoleRegion, optional
         For the poles of every frozen loop.
-    X, Y : int, tuple or FunctionSpace
-        Degrees in the parameters; only one of them may depend on a parameter that moves.
+    X, Y : int, tuple or FunctionSpace, optional
+        Degrees in the parameters, 0 by default; only one of them may depend on a parameter that
+        moves. Of `H2()` alone both may; by default their degree rises while that lowers gamma.
     gains : int, tuple or FunctionSpace, optional
         Of the controller's own variables; by default the degree of the plant plus that of X and Y.
     direct : bool
@@ -101,7 +109,7 @@ def multiobjective(
     References
     ----------
     Scherer, Gahinet and Chilali, IEEE Trans. Automatic Control 42 (1997); with X(p) or Y(p):
-    Apkarian and Adams (1998).
+    Apkarian and Adams (1998). `H2()` alone: Wu, Ph.D. thesis, Berkeley (1995).
 
     Examples
     --------
@@ -119,6 +127,11 @@ def multiobjective(
     every = (objectives,) if isinstance(objectives, L2 | H2 | EnergyToPeak) else tuple(objectives)
     if not every:
         raise InputError("objectives: expected one or more of L2, H2 and EnergyToPeak, got none")
+    (factor,) = levels_above(float(back_off))
+    alone = every == (H2(weight=every[0].weight),) and region is None and gains is None
+    if alone and every[0].soft > 0 and separable(plant):
+        return least_variance(plant, X, Y, (factor, *BACK_OFFS))
+    X, Y = X or 0, Y or 0
     if region is not None and plant.dt is not None:
         raise InputError("a pole region is for continuous time: design there, then discretize")
     bases = [limited(functions(d, parameters, n), parameters, n) for d, n in ((X, "X"), (Y, "Y"))]
@@ -130,7 +143,6 @@ def multiobjective(
                 " them be of degree 0 (in discrete time both)"
             )
     solver = general_solver(solver)
-    (factor,) = levels_above(float(back_off))
     problem = _Problem(plant, bases[0], bases[1], gains, every, region, direct)
     attempts: list[Attempt] = []
     values = problem.best(solver, attempts)

@@ -53,6 +53,10 @@ LEVELS = (1.01, 2.0, 10.0, 100.0, 1e4)
 MAX_SWEEPS = 100
 """Largest number of sweeps of balancing."""
 
+GRAMIAN_SHARE = 0.01
+"""Share of the variance of the outputs by which noise at each state raises it, in
+`gramian_units`.
+"""
 
 T = TypeVar("T")
 
@@ -252,6 +256,33 @@ def dissipative(units: Scaling, model: LinearModel, gain: float) -> Scaling | No
             weight=powered(storage.W, -0.5),
         )
     return found
+
+
+def gramian_units(units: Scaling, model: LinearModel) -> Scaling:
+    """Return units in which P = I is the inverse Gramian of the inputs of a stable frozen model and
+    of a little noise at each state, which raises the variance of the outputs by `GRAMIAN_SHARE`;
+    weight^-2 is what that noise adds. Other models keep their units.
+    """
+    A, B, C, _ = units.of_model(model)
+    continuous, n = model.dt is None, len(A)
+    if not (model.is_stable() and B.size and C.size):
+        return units
+    noise = np.diag(np.sqrt(_pace(A if continuous else A - np.eye(n))))
+    by_inputs, by_noise = (_gramian(A, M, continuous, 0.0) for M in (B, noise))
+    seen, added = (float(np.sum((C @ X) * C)) for X in (by_inputs, by_noise))
+    if not (seen > 0 and added > 0):
+        return units
+    share = GRAMIAN_SHARE * seen / added
+    try:
+        root = np.linalg.cholesky(by_inputs + share * by_noise)
+    except np.linalg.LinAlgError:
+        return units
+    inner = math.sqrt(share) * linalg.solve(root, noise)
+    return units._replace(
+        left=linalg.solve(root, units.left),
+        right=units.right @ root,
+        weight=powered(inner @ inner.T, -0.5),
+    )
 
 
 def in_its_own_scale(found: Callable[[float], tuple[T, float, float]], expected: float) -> list[T]:

@@ -29,7 +29,7 @@ from synthesis.polynomial.regions import convert, regions
 from synthesis.polynomial.symmetric import schur_complement
 from synthesis.program.scaling import Scaling
 from synthesis.proof import pointwise
-from synthesis.proof.inequalities import Demand, Pair, decrease, peak, positivity
+from synthesis.proof.inequalities import Demand, Pair, decrease, output_form, positivity
 
 Array = np.ndarray
 
@@ -84,8 +84,8 @@ class Evidence(NamedTuple):
             return "the parameters of the model do not move as those of the proof"
         if not self.model.original:
             return "the pieces are not those of the model"
-        if kind == "energy-to-peak gain" and self.model.passes_peaks:
-            return "the energy-to-peak gain of a continuous model needs D = 0"
+        if self.demand.of_gramian and self.model.passes_peaks:
+            return f"the {kind} of a continuous model needs D = 0"
         return structure.first(
             P.fault_for([(s.low, s.high) for s in self.model.parameters], self.model.sizes[0]),
             self.units.fault(self.model.sizes[0]),
@@ -97,13 +97,9 @@ class Evidence(NamedTuple):
         energy counts, unchanged where their peaks do.
         """
         u, root = self.units, math.sqrt(self.units.time)
-        outputs = u.channel if self._peaks else u.channel / root
+        outputs = u.channel if self.demand.of_gramian else u.channel / root
         model = self.model.scaled(u.left, u.right, 1 / root, outputs, u.time)
         return model, self.demand._replace(time=u.time if model.dt is None else 1.0)
-
-    @property
-    def _peaks(self) -> bool:
-        return self.demand.kind == "energy-to-peak gain"
 
     def in_units(self, value: float) -> float:
         """Return a physical gain (decay rate, 1/s) in the scaled units."""
@@ -126,14 +122,14 @@ class Evidence(NamedTuple):
 
     @property
     def _input_energy(self) -> float:
-        return self.units.channel**2 if self._peaks else 1.0
+        return self.units.channel**2 if self.demand.of_gramian else 1.0
 
     def sampled(self, P: BoxLyapunov, points: int) -> tuple[BoxLyapunov, float]:
         """Return (P, the bound it admits at `points` values of each parameter in every region); inf
         (decay: -inf) where none.
 
-        For the energy-to-peak gain P is scaled so that its first inequality just holds; NaN for
-        stability.
+        For the energy-to-peak and H2 gain P is scaled so that its first inequality just holds; NaN
+        for stability.
         """
         kind = self.demand.kind
         model, demand = self.scaled
@@ -152,7 +148,7 @@ class Evidence(NamedTuple):
         factor = 1.0 / (g * (1 + LOOSENINGS[0]))
         P = replace(P, coefficients=P.coefficients * factor)
         back = self._back(P)
-        return P, math.sqrt(_samples(model, back, demand, points).peak()) / self.in_units(1.0)
+        return P, math.sqrt(_samples(model, back, demand, points).output()) / self.in_units(1.0)
 
     def least(self, P: BoxLyapunov, points: int) -> tuple[BoxLyapunov, float] | None:
         """Return (P, the best bound verified on the whole box), None where P proves nothing.
@@ -176,7 +172,7 @@ class Evidence(NamedTuple):
                     else value * math.sqrt(1 + fraction)
                 )
             )
-            if kind == "energy-to-peak gain":
+            if self.demand.of_gramian:
                 trial = replace(P, coefficients=P.coefficients / (1 + fraction))
                 bound *= math.sqrt(1 + fraction)
             else:
@@ -244,7 +240,7 @@ class Evidence(NamedTuple):
         """Check the same in floating point at more p, in scaled units."""
         u, points, (_, demand) = self.units, self._points(P, GRID, GRID), self.scaled
         model = u.of_matrices(self.model.at(points))
-        if self._peaks:
+        if self.demand.of_gramian:
             C, D = (M / math.sqrt(u.time) for M in (model.C, model.D))
             model = model._replace(C=C, D=D)
         back, bound = self._back(P), self.in_units(bound)
@@ -293,7 +289,7 @@ def polynomials(
     for index in np.ndindex(*P.segments):
         yield positivity(convert(P.segment(index), number))
     nx, nu, ny = model.sizes
-    g = number(bound) * number(bound) if demand.kind in ("l2 gain", "energy-to-peak gain") else None
+    g = number(bound) * number(bound) if demand.kind.endswith("gain") else None
     if demand.kind == "decay rate":
         demand = demand._replace(shift=bound)
     for region in regions(model, P.knots, demand.motion, demand.moving(P.degrees)):
@@ -303,12 +299,12 @@ def polynomials(
         for F in decrease(model, region, pair, demand, number):
             if demand.kind == "l2 gain":
                 F = _less(F, np.r_[np.zeros(nx), np.ones(nu)], g, number)
-            elif demand.kind == "energy-to-peak gain":
+            elif demand.of_gramian:
                 F = _less(F, np.r_[np.zeros(nx), np.ones(nu)], number(1.0), number)
             yield F
-        if demand.kind == "energy-to-peak gain" and region.next_segment == region.segment:
-            F = peak(model, region, pair.here, number)
-            yield _less(F, np.r_[np.zeros(F.shape[0] - ny), np.ones(ny)], g, number)
+        if demand.of_gramian and region.next_segment == region.segment:
+            F, seen = output_form(model, region, pair.here, demand, number), demand.seen(ny)
+            yield _less(F, np.r_[np.zeros(F.shape[0] - seen), np.ones(seen)], g, number)
 
 
 def _less(F: PolynomialMatrix, where: Array, g: object, number: Number) -> PolynomialMatrix:
@@ -317,14 +313,14 @@ def _less(F: PolynomialMatrix, where: Array, g: object, number: Number) -> Polyn
 
 class _Samples(NamedTuple):
     """Values of the inequalities and of P at points: `moves` for V along trajectories, `here` P
-    itself; `outputs` of the second inequality.
+    itself; `outputs` of the second inequality, with g in its last rows `seen`.
     """
 
     moves: list[Array]
     here: list[Array]
     outputs: list[Array]
     nx: int
-    ny: int
+    seen: int
 
     def gain(self) -> float:
         """Return the least g of the corner block."""
@@ -332,9 +328,9 @@ class _Samples(NamedTuple):
             return math.inf
         return max([MIN_LEVEL, *(_least_level(F, self.nx) for F in self.moves)])
 
-    def peak(self) -> float:
+    def output(self) -> float:
         """Return the least g of the second inequality."""
-        return max([MIN_LEVEL, *(_least_level(F, F.shape[1] - self.ny) for F in self.outputs)])
+        return max([MIN_LEVEL, *(_least_level(F, F.shape[1] - self.seen) for F in self.outputs)])
 
     def decay(self, dt: float | None) -> float:
         """Return the largest alpha."""
@@ -370,10 +366,10 @@ def _samples(model: Pieces, P: BoxLyapunov, demand: Demand, points: int) -> _Sam
             local = _grid(F, points)
             moves.append(F(local))
             here.append(pair.here(local[:, : len(region.box)]))
-        if demand.kind == "energy-to-peak gain":
-            F = peak(model, region, pair.here, float)
+        if demand.of_gramian:
+            F = output_form(model, region, pair.here, demand, float)
             outputs.append(F(_grid(F, points)))
-    return _Samples(moves, here, outputs, nx, ny)
+    return _Samples(moves, here, outputs, nx, demand.seen(ny))
 
 
 def _grid(F: PolynomialMatrix, points: int) -> Array:

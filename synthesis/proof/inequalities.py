@@ -5,18 +5,21 @@ nu_i = p_j where the rate of p_i is p_j:
 
     L2 gain          [A'P + PA + Pdot + C'C   PB + C'D; .   D'D - g I] < 0
     energy to peak   [A'P + PA + Pdot   PB; .   -I] < 0  and  [P   C'; .   g I] > 0, D = 0
+    H2               the first of these  and  [diag(P, .., P)   (c_1, .., c_ny)'; .   g] > 0, D = 0
     decay rate       A'P + PA + Pdot + 2 alpha P < 0
 
 discrete time, P+ = P(p(k+1)):
 
     L2 gain          [A'P+A - P + C'C   A'P+B + C'D; .   B'P+B + D'D - g I] < 0
     energy to peak   [A'P+A - P   A'P+B; .   B'P+B - I] < 0  and  [P 0 C'; 0 I D'; C D g I] > 0
+    H2               the first of these  and  the second of H2 for diag(P, I) and rows (c_i, d_i)
     decay rate       A'P+A exp(2 alpha dt) - P < 0
 
-and P > 0; gain^2 = g. Sources: Wu, Yang, Packard and Becker, Int. J. Robust and Nonlinear Control 6
-(1996), theorem 3.1; Rotea, "The generalized H2 control problem", Automatica 29 (1993); Boyd, El
-Ghaoui, Feron and Balakrishnan, "Linear Matrix Inequalities in System and Control Theory" (1994),
-sections 5.1 and 6.
+and P > 0; gain^2 = g; c_i is row i of C. P^-1 bounds the variance of the state in white noise, and
+g is then at least the trace of C P^-1 C'. Sources: Wu, Yang, Packard and Becker, Int. J. Robust
+and Nonlinear Control 6 (1996), theorem 3.1; Rotea, "The generalized H2 control problem", Automatica
+29 (1993); Boyd, El Ghaoui, Feron and Balakrishnan, "Linear Matrix Inequalities in System and
+Control Theory" (1994), sections 5.1 and 6.
 """
 
 from __future__ import annotations
@@ -51,6 +54,17 @@ class Demand(NamedTuple):
     motion: Motion
     shift: float = 0.0
     time: float = 1.0
+
+    @property
+    def of_gramian(self) -> bool:
+        """Whether P bounds the inverse Gramian of the inputs, and a second inequality the
+        outputs.
+        """
+        return self.kind in ("energy-to-peak gain", "h2 gain")
+
+    def seen(self, outputs: int) -> int:
+        """Return the number of rows of that second inequality in which g stands."""
+        return 1 if self.kind == "h2 gain" else outputs
 
     @property
     def rates(self) -> tuple[float, ...]:
@@ -135,18 +149,25 @@ def dissipation(
         yield block([[whole, side], [side.T, corner]]) if kind.endswith("gain") else whole
 
 
-def peak(model: Pieces, region: Region, P: PolynomialMatrix, number: Number) -> PolynomialMatrix:
-    """Return the second inequality of the energy-to-peak gain, negated and without the term
+def output_form(
+    model: Pieces, region: Region, P: PolynomialMatrix, demand: Demand, number: Number
+) -> PolynomialMatrix:
+    """Return the second inequality of the energy-to-peak or H2 gain, negated and without the term
     in g.
     """
     _, _, C, D = model_on(model, region, number)
     here = now(P, region, number)
-    if model.dt is None:
+    nx, nu, ny = model.sizes
+    if model.dt is not None:
+        eye = PolynomialMatrix.constant(exact(np.eye(nu), number), here.box)
+        zero = PolynomialMatrix.constant(exact(np.zeros((nx, nu)), number), here.box)
+        here, C = block([[here, zero], [zero.T, eye]]), block([[C, D]])
+    if demand.kind != "h2 gain":
         return -block([[here, C.T], [C, C @ C.T * 0]])
-    nx, nu, _ = model.sizes
-    eye = PolynomialMatrix.constant(exact(np.eye(nu), number), here.box)
-    zero = PolynomialMatrix.constant(exact(np.zeros((nx, nu)), number), here.box)
-    return -block([[here, zero, C.T], [zero.T, eye, D.T], [C, D, C @ C.T * 0]])
+    rows = [PolynomialMatrix(C.box, C.coefficients[..., i : i + 1, :]) for i in range(ny)]
+    none = here * 0
+    copies = [[here if i == j else none for j in range(ny)] + [row.T] for i, row in enumerate(rows)]
+    return -block([*copies, [*rows, rows[0] @ rows[0].T * 0]])
 
 
 class Form(NamedTuple):

@@ -267,9 +267,9 @@ def inequalities(
     here, slopes = tensor_spline(knots, degrees, P.coefficients, p, number)
     yield -here
     g = number(bound) * number(bound) if demand.kind.endswith("gain") else None
-    if demand.kind == "energy-to-peak gain":
+    if demand.of_gramian:
         # V grows by at most the energy of the input, and the outputs are seen by it
-        yield -_peak_form(here, model, dt, g)
+        yield -_output_form(here, model, demand.kind, dt, g)
         model, g = model._replace(C=model.C * 0, D=model.D * 0), number(1.0)
     supplied = None
     if channel is not None and isinstance(P, SplineLyapunov) and P.multiplier is not None:
@@ -292,16 +292,18 @@ def inequalities(
         yield dissipation(model, here, None, after, g, supplied)
 
 
-def _peak_form(P: Array, model: Matrices, dt: float | None, g: Any) -> Array:
+def _output_form(P: Array, model: Matrices, kind: str, dt: float | None, g: Any) -> Array:
     """Return the matrix that must be positive definite for |y|^2 < g V, or < g (V + |u|^2) in
-    discrete time.
+    discrete time; for a variance below g, that of the rows of C one after the other beside as many
+    copies of V.
     """
     _, B, C, D = model
-    corner = np.eye(len(C), dtype=int) * g
-    if dt is None:
-        return np.block([[P, C.T], [C, corner]])
-    one = np.eye(B.shape[1], dtype=int) + D[:0].T @ D[:0]
-    return np.block([[P, B * 0, C.T], [B.T * 0, one, D.T], [C, D, corner]])
+    if dt is not None:
+        one = np.eye(B.shape[1], dtype=int) + D[:0].T @ D[:0]
+        P, C = np.block([[P, B * 0], [B.T * 0, one]]), np.hstack([C, D])
+    if kind == "h2 gain":
+        P, C = np.kron(np.eye(len(C), dtype=int), P), C.reshape(1, -1)
+    return np.block([[P, C.T], [C, np.eye(len(C), dtype=int) * g]])
 
 
 def memory_inequalities(

@@ -13,6 +13,7 @@ from scipy import linalg
 
 from symheli.lpv import LPVStateSpace
 from symheli.progress import tracked
+from synthesis.certificate import Kind
 from synthesis.polynomial.motion import Motion
 from synthesis.polynomial.pieces import Pieces
 from synthesis.program.scaling import balance
@@ -52,8 +53,8 @@ def measure(demand: Demand, dt: float | None) -> Measure:
     """
     if demand.kind == "l2 gain":
         return lambda A, B, C, D: norm(A, B, C, D, dt)[0]
-    if demand.kind == "energy-to-peak gain":
-        return lambda A, B, C, D: energy_to_peak(A, B, C, D, dt)
+    if demand.of_gramian:
+        return lambda A, B, C, D: of_gramian(A, B, C, D, dt, demand.kind)
     return lambda A, B, C, D: -frozen_decay(A, dt)
 
 
@@ -67,9 +68,9 @@ def frozen_decay(A: Array, dt: float | None) -> float:
     )
 
 
-def energy_to_peak(A: Array, B: Array, C: Array, D: Array, dt: float | None) -> float:
+def of_gramian(A: Array, B: Array, C: Array, D: Array, dt: float | None, kind: Kind) -> float:
     """Return max |y(t)| over inputs of unit energy: sqrt of the largest eigenvalue of C X C' (+ D
-    D'), X the controllability Gramian.
+    D'), X the controllability Gramian; of the "h2 gain" the root of its trace.
 
     inf where the model is not stable. Source: Rotea (1993); discrete time by the same argument.
     """
@@ -81,7 +82,14 @@ def energy_to_peak(A: Array, B: Array, C: Array, D: Array, dt: float | None) -> 
     F, G = (A, B) if dt is None else to_continuous(A, B, C, D)[:2]
     X = linalg.solve_continuous_lyapunov(F, -G @ G.T)
     size = C @ X @ C.T + (D @ D.T if dt is not None else 0.0)
-    return math.sqrt(max(float(np.linalg.eigvalsh(0.5 * (size + size.T)).max(initial=0.0)), 0.0))
+    return math.sqrt(_size(size, kind))
+
+
+def _size(covariance: Array, kind: Kind) -> float:
+    """Return the largest variance in any direction, or of the "h2 gain" that of all outputs."""
+    if kind == "h2 gain":
+        return max(float(np.trace(covariance)), 0.0)
+    return max(float(np.linalg.eigvalsh(0.5 * (covariance + covariance.T)).max(initial=0.0)), 0.0)
 
 
 def worst_frozen(model: Pieces, size: Measure) -> Worst:
@@ -148,8 +156,8 @@ def worst_moving(
             known = FrozenGain(frozen.value, near, math.nan)
             found = lower_bound(line.model, line.rate, frozen=known, search=share)
             value, trajectory = found.gain, found.trajectory
-        elif demand.kind == "energy-to-peak gain":
-            value, trajectory = _peaks(line.model, line.rate, share)
+        elif demand.of_gramian:
+            value, trajectory = _peaks(line.model, line.rate, share, demand.kind)
         else:
             value, trajectory = _slowest(line.model, line.rate, share)
         if trajectory is not None and value > best.value:
@@ -183,10 +191,10 @@ def worst_tied(model: LPVStateSpace, demand: Demand, frozen: Worst, search: Sear
 
 
 def _peaks(
-    line: LPVStateSpace, rate: float, search: Search
+    line: LPVStateSpace, rate: float, search: Search, kind: Kind
 ) -> tuple[float, SchedulingTrajectory | None]:
-    """Return the energy-to-peak gain along waves: the Gramian of inputs held over each step, from
-    rest over some cycles.
+    """Return the energy-to-peak or H2 gain along waves: the Gramian of inputs held over each step,
+    from rest over some cycles.
     """
     family = WaveFamily(line, rate, search)
     best: tuple[float, SchedulingTrajectory | None] = (0.0, None)
@@ -207,7 +215,7 @@ def _peaks(
             Phi, Gamma = system.step[j, :n, :n], system.step[j, :n, n:]
             X = Phi @ X @ Phi.T + Gamma @ Gamma.T
             size = C[j] @ X @ C[j].T + (D[j] @ D[j].T if line.dt is not None else 0.0)
-            peak = max(peak, float(np.linalg.eigvalsh(size).max()))
+            peak = max(peak, _size(size, kind))
         # the time steps are good to about 1e-4
         value = math.sqrt(peak) * (1 - 1e-4 * (line.dt is None))
         if value > best[0]:

@@ -74,6 +74,8 @@ EXEMPT: dict[str, str] = {
                 "MarginTable",
                 "Margins",
                 "RobustMargin",
+                "WorstCaseGain",
+                "LoopShaping",
                 "SpecificationTable",
                 "StructuredController",
                 "Tube",
@@ -98,12 +100,22 @@ SLOW = {
     *("synthesis.Controller.discretize", "synthesis.estimator", "synthesis.Estimator.certify"),
     *("synthesis.certify_sampled", "synthesis.lft_feedback", "synthesis.multiobjective"),
     *("synthesis.proven_around", "synthesis.state_feedback", "synthesis.with_wrong_parameter"),
-    *("synthesis.frozen_box_gain", "synthesis.generalized_h2", "synthesis.decay_rate"),
+    *(
+        "synthesis.frozen_box_gain",
+        "synthesis.generalized_h2",
+        "synthesis.h2_gain",
+        "synthesis.decay_rate",
+    ),
     *("synthesis.stability", "synthesis.lower_bound", "synthesis.lft_gain"),
     *("synthesis.lqr", "synthesis.lqg", "synthesis.switched", "synthesis.dwell_time"),
     *("synthesis.SwitchedController.certify", "synthesis.Controller.of"),
     *("synthesis.Certificate.verify", "synthesis.lft_stability", "synthesis.structured"),
-    *("synthesis.bounded_truncation", "synthesis.robust_margin"),
+    *(
+        "synthesis.bounded_truncation",
+        "synthesis.robust_margin",
+        "synthesis.worst_case_gain",
+        "synthesis.loop_shaping",
+    ),
 }
 """Entries that fly, sweep or solve: `FEW` inputs each."""
 LARGER = {"synthesis.multiobjective", "synthesis.output_feedback", "synthesis.lft_feedback"}

@@ -86,7 +86,7 @@ def test_what_is_never_lost_and_what_always_is():
 
 
 def test_what_cannot_be_grown_is_refused():
-    with pytest.raises(InputError, match="expected an UncertainStateSpace"):
-        robust_margin(page().model)
+    with pytest.raises(InputError, match="expected an LFT"):
+        robust_margin(page().model.at(10.0))
     with pytest.raises(InputError, match="bound > 0"):
         robust_margin(UncertainStateSpace(page().model, ["d"], ["v"], 0.0, 1.0, "nothing"))

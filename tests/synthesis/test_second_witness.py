@@ -18,6 +18,7 @@ from synthesis import (
     SumOfSquares,
     decay_rate,
     generalized_h2,
+    h2_gain,
     l2_gain,
     stability,
 )
@@ -129,6 +130,7 @@ ANALYSES = {
     "splines": lambda lpv: l2_gain(lpv, form=COARSE, search=None),
     "box": lambda lpv: l2_gain(lpv, **BOX, search=None),
     "energy to peak": lambda lpv: generalized_h2(no_feedthrough(lpv), **BOX, search=None),
+    "variance": lambda lpv: h2_gain(no_feedthrough(lpv), **BOX, search=None),
 }
 
 

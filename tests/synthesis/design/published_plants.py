@@ -26,6 +26,11 @@ def spinning_disks(rate):
     The parameters are the speeds of the disks squared, rad^2/s^2, each with this `rate` per second.
     Source: Wu, Control of Linear Parameter Varying Systems, Ph.D. thesis, Berkeley (1995).
     """
+    return disks(rate, weight(0.3, 1.2, 1.0, 0.04), weight(1.0, 0.1, 0.01, 125.0))
+
+
+def disks(rate, error, command):
+    """The disks with these weights of the tracking error and the command."""
     m1, m2, spring, damping, disturbed = 1.0, 0.5, 200.0, 1.0, 0.1
     A = {(0, 0): np.zeros((4, 4)), (1, 0): np.zeros((4, 4)), (0, 1): np.zeros((4, 4))}
     A[0, 0][:2, 2:] = np.eye(2)
@@ -57,9 +62,9 @@ def spinning_disks(rate):
     )
     return plant.with_servo({"u": weight(0.0, 1.0, 0.01, 1.0)}).weighted(
         {
-            "error": weight(0.3, 1.2, 1.0, 0.04),
+            "error": error,
             "force": 1e-5,
-            "u": weight(1.0, 0.1, 0.01, 125.0),
+            "u": command,
             "noise": weight(1.0, 0.4, 0.01, 400.0),
         }
     )
@@ -176,3 +181,13 @@ def grid_to_lft(rate):
         Scheduling("rho2", "1/s", 1.0, 3.0, rate=rate),
     ]
     return first_order_lag({(1, 0): 1.0}, {(0, 1): 1.0}, {(1, 1): 1.0}, rho)
+
+
+def noisy_spinning_disks(rate):
+    """The spinning disks with a strictly proper weight of the error, for the least variance in
+    white noise.
+
+    The parameters are those of `spinning_disks`. Source: the page on stochastic LPV systems of
+    LPVTools' documentation, after Wu, Ph.D. thesis, Berkeley (1995).
+    """
+    return disks(rate, weight(0.0, 2.0, 1.0, 0.04), 1 / 50)

@@ -1,0 +1,1 @@
+"""Several uncertain things at once: real parameters, and dynamics of bounded gain."""

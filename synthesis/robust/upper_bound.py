@@ -1,0 +1,258 @@
+"""Upper bounds for every frequency, by scalings that commute with the blocks.
+
+At a frequency, M the response from w to z, blocks of norm at most 1/level cannot close the loop if
+
+    W - M* Z M - i (G M - M* G*) > 0,   Z = diag(d_k I or D_k), W = level^2 Z (of the sizes of w)
+
+with D_k > 0 and G_k Hermitian for a real number at several places, d_k > 0 for full dynamics. The
+scalings found at one frequency hold as far as the left side stays positive definite: up to the next
+imaginary eigenvalue of a Hamiltonian matrix. Frequencies are taken until nothing is left between.
+
+References
+----------
+Fan, Tits and Doyle, IEEE Trans. Automatic Control 36 (1991); Roos and Biannic, "Efficient
+computation of a guaranteed stability domain for a high-order parameter dependent plant", American
+Control Conference (2010), for the intervals.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy import sparse
+
+from synthesis.polynomial.symmetric import svec
+from synthesis.program.cone_program import Answer, ConeProgram, Solver, solve
+from synthesis.robust.structure import Loop
+
+Array = np.ndarray
+
+LEAST_MARGIN = 1e-7
+"""The left side counts as positive where its least eigenvalue is above this, for scalings <= 1."""
+CROSSING = 1e-7
+"""A real part of an eigenvalue below this share of its modulus counts as zero: more frequencies are
+then taken.
+"""
+MAX_FREQUENCIES = 400
+"""Largest number of frequencies; beyond it nothing is proven."""
+NARROW = 1e-9
+"""Relative width of an interval of frequencies below which its level is raised."""
+BISECTIONS = 14
+"""Of the level at one frequency."""
+MAX_LEVEL = 1e4
+"""Largest level, in units of the start, that is looked for."""
+
+
+class Scalings(NamedTuple):
+    """Z (nz, nz), W (nw, nw) without the level, and G (nw, nz)."""
+
+    Z: Array
+    W: Array
+    G: Array
+
+
+class Upper(NamedTuple):
+    """The level, proven for all frequencies where `covered`, and the frequency that decides."""
+
+    level: float
+    omega: float
+    covered: bool
+
+
+def proven_level(loop: Loop, start: float, *, performance: bool, growth: float) -> Upper:
+    """Return the least level, from `start` on in steps of `growth`, that no block exceeds at any
+    frequency: of all blocks, or of the performance alone beside blocks of norm 1.
+    """
+    loop = loop.in_units(start, performance)
+    level, decides = 1.0, math.nan
+    known: list[tuple[float, Scalings]] = []
+    while math.isfinite(level):
+        failed = _uncovered(loop, level, performance, known)
+        if failed is None:
+            return Upper(start * level, decides, True)
+        decides = failed
+        level = max(level_at(loop, failed, level, performance), level) * growth
+    return Upper(math.inf, decides, False)
+
+
+def level_at(loop: Loop, omega: float, low: float, performance: bool) -> float:
+    """Return the least level above `low` at a frequency, from above; inf beyond `MAX_LEVEL`."""
+    M = loop.response(omega)
+    high = 1.01 * low
+    while scalings_at(M, loop, high, performance) is None:
+        low, high = high, 2 * high
+        if high > MAX_LEVEL:
+            return math.inf
+    for _ in range(BISECTIONS):
+        middle = math.sqrt(low * high)
+        if high / low < 1 + 1e-5:
+            break
+        if scalings_at(M, loop, middle, performance) is None:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+def _uncovered(
+    loop: Loop, level: float, performance: bool, known: list[tuple[float, Scalings]]
+) -> float | None:
+    """Return a frequency at which the level has no scalings; None where every one is covered."""
+    paces = loop.paces
+    slow, fast = (float(paces[0]), float(paces[-1])) if len(paces) else (1.0, 1.0)
+    waiting = [(0.0, math.inf)]
+    for omega, found in known:
+        waiting = _without(waiting, _held(loop, found, omega, level, performance))
+    for _ in range(MAX_FREQUENCIES):
+        if not waiting:
+            return None
+        low, high = waiting.pop()
+        omega = _inside(low, high, slow, fast)
+        found = scalings_at(loop.response(omega), loop, level, performance)
+        if found is None:
+            return omega
+        held = _held(loop, found, omega, level, performance)
+        if held is None or held[1] - held[0] < NARROW * omega:
+            return omega
+        known.append((omega, found))
+        waiting = _without([*waiting, (low, high)], held)
+    return omega
+
+
+def _inside(low: float, high: float, slow: float, fast: float) -> float:
+    if low == 0.0 and math.isinf(high):
+        return math.sqrt(slow * fast)
+    if low == 0.0:
+        return min(0.5 * high, 0.1 * slow) if high > 0.2 * slow else 0.0
+    if math.isinf(high):
+        return max(2 * low, 10 * fast) if low < 5 * fast else math.inf
+    return math.sqrt(low * high)
+
+
+def _without(
+    intervals: Sequence[tuple[float, float]], held: tuple[float, float] | None
+) -> list[tuple[float, float]]:
+    if held is None:
+        return list(intervals)
+    out = []
+    for low, high in intervals:
+        for a, b in ((low, min(high, held[0])), (max(low, held[1]), high)):
+            if a < b:
+                out.append((a, b))
+    return out
+
+
+def _held(
+    loop: Loop, found: Scalings, omega: float, level: float, performance: bool
+) -> tuple[float, float] | None:
+    """Return the interval about omega in which the scalings hold; its upper end inf where they hold
+    for all above. None where they do not hold at omega.
+    """
+    by = found._replace(W=_levelled(found.W, loop, level, performance))
+    if np.linalg.eigvalsh(_left(loop.response(omega), by))[0] <= 0.1 * LEAST_MARGIN:
+        return None
+    A, B, C, D = loop.A, loop.B, loop.C, loop.D
+    middle, R = -D.T @ found.Z - 1j * found.G, _left(D, by)
+    least = np.linalg.eigvalsh(R)[0]
+    if abs(least) < 1e-12:
+        return None
+    S, Q = (middle @ C).conj().T, -C.T @ found.Z @ C
+    inner = np.linalg.solve(R, np.hstack([S.conj().T, B.T]))
+    side, back = inner[:, : len(A)], inner[:, len(A) :]
+    flow = A - B @ side
+    values = np.linalg.eigvals(np.block([[flow, -B @ back], [S @ side - Q, -flow.conj().T]]))
+    near = np.abs(values.real) <= CROSSING * np.maximum(
+        np.abs(values), loop.paces.max(initial=1.0) * 1e-6
+    )
+    cross = values.imag[near]
+    below, above = cross[cross < omega], cross[cross > omega]
+    if least <= 0 and not len(above):
+        return None
+    low = max(float(below.max()), 0.0) if len(below) else 0.0
+    return low, float(above.min()) if len(above) else math.inf
+
+
+def _levelled(W: Array, loop: Loop, level: float, performance: bool) -> Array:
+    out = W.copy()
+    for k, part in enumerate(loop.parts):
+        if not performance or k == len(loop.parts) - 1:
+            out[part.columns] = out[part.columns] * level**2
+    return out
+
+
+def scalings_at(M: Array, loop: Loop, level: float, performance: bool) -> Scalings | None:
+    """Return scalings <= 1 that show the level at one frequency; None where there are none."""
+    nz, nw = M.shape
+    basis = _basis(loop, nz, nw)
+    F = [_left(M, Scalings(Z, _levelled(W, loop, level, performance), G)) for Z, W, G in basis]
+    positive = [W for _, W, _ in basis]
+    rows, sizes, right = [], [], []
+    for each, limit in ((F, None), (positive, None), (positive, 1.0)):
+        sign = -1.0 if limit is None else 1.0
+        block = np.stack([sign * svec(_real(H)) for H in each], axis=1)
+        margin = svec(np.eye(2 * nw)) if limit is None else 0 * svec(np.eye(2 * nw))
+        rows.append(np.column_stack([block, margin]))
+        right.append(0 * margin if limit is None else svec(np.eye(2 * nw)))
+        sizes.append(2 * nw)
+    cost = np.zeros(len(basis) + 1)
+    cost[-1] = -1.0
+    program = ConeProgram(
+        cost, sparse.csc_matrix(np.vstack(rows)), np.concatenate(right), tuple(sizes), 0
+    )
+    found = solve(program, Solver("CLARABEL"))
+    if found.x is None or found.answer is not Answer.SOLVED or found.x[-1] <= LEAST_MARGIN:
+        return None
+    return Scalings(
+        *(np.tensordot(found.x[:-1], np.stack([each[i] for each in basis]), 1) for i in range(3))
+    )
+
+
+def _left(M: Array, by: Scalings) -> Array:
+    """Return the left side of the inequality for a response M; of `by` W has the level."""
+    turned = by.G @ M
+    return by.W - M.conj().T @ by.Z @ M - 1j * (turned - turned.conj().T)
+
+
+def _basis(loop: Loop, nz: int, nw: int) -> list[tuple[Array, Array, Array]]:
+    out = []
+    for part in loop.parts:
+        n = part.rows.stop - part.rows.start
+        if not part.real:
+            Z, W, G = np.zeros((nz, nz)), np.zeros((nw, nw)), np.zeros((nw, nz))
+            Z[part.rows, part.rows] = np.eye(n)
+            W[part.columns, part.columns] = np.eye(part.columns.stop - part.columns.start)
+            out.append((Z + 0j, W + 0j, G + 0j))
+            continue
+        for H in _hermitian(n):
+            Z, W, G = (np.zeros(s, complex) for s in ((nz, nz), (nw, nw), (nw, nz)))
+            Z[part.rows, part.rows], W[part.columns, part.columns] = H, H
+            out.append((Z, W, G))
+        for H in _hermitian(n):
+            Z, W, G = (np.zeros(s, complex) for s in ((nz, nz), (nw, nw), (nw, nz)))
+            G[part.columns, part.rows] = H
+            out.append((Z, W, G))
+    return out
+
+
+def _hermitian(n: int) -> list[Array]:
+    """Return a basis of the Hermitian matrices."""
+    out = []
+    for i in range(n):
+        for j in range(i + 1):
+            H = np.zeros((n, n), complex)
+            H[i, j] = H[j, i] = 1.0
+            out.append(H)
+            if i != j:
+                H = np.zeros((n, n), complex)
+                H[i, j], H[j, i] = 1j, -1j
+                out.append(H)
+    return out
+
+
+def _real(H: Array) -> Array:
+    """Return the real symmetric matrix that is definite where H is."""
+    real, imaginary = np.real(H), np.imag(H)
+    return np.block([[real, -imaginary], [imaginary, real]])
