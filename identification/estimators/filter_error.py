@@ -4,7 +4,7 @@ smoothing.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
@@ -47,6 +47,9 @@ correlated.
 
 LAGS = 25
 """Number of samples over which scores are taken to be correlated."""
+
+SLOWER = 4
+"""Factor of the number of steps where delay or bandwidth are sought too: they start far off."""
 
 CHUNK = 256
 """Number of samples whitened at a time."""
@@ -154,30 +157,37 @@ class FilterError(Method):
         theta, _ = instrumental_variables(arx, records, data, self.simulator)
         left = self.misfit * self._unexplained(arx, records)
         air = self.gust**2, float(np.exp(-records[0].dt / self.gust_time))
-        flights = []
+        unknown = arx.actuators.unknown if arx.actuators else ()
+        flights, late = [], np.zeros(len(unknown))
         for record, R in zip(records, self._variances(records), strict=True):
             noise = Noise.of(R, left, *air)
             flights += [(Stretch.of(arx, record, part), noise) for part in unbroken(arx, record)]
         weights = [len(s.y) for s, _ in flights]
         R = np.average([noise.R for _, noise in flights], axis=0, weights=weights)
-        count, settled = 0, False
-        for _ in tracked("filter error", range(self.steps)):
+        count, settled, n = 0, False, arx.n_regressors
+        prior = np.append(np.zeros(6 * n), np.ones(len(unknown)))
+        steps = self.steps * (SLOWER if unknown else 1)
+        for _ in tracked("filter error", range(steps)):
             count += 1
+            for s, _ in flights:
+                s.follow(late)
             parts = [s.normal(theta, noise) for s, noise in flights]
             normal, right = map(sum, zip(*parts, strict=True))
-            step, inverse = _solved(normal, right)  # type: ignore[arg-type]
-            change = step.reshape(6, -1).T
+            right[6 * n :] -= late  # type: ignore[index]
+            step, inverse = _solved(normal + np.diag(prior), right)  # type: ignore[arg-type]
+            change, later = step[: 6 * n].reshape(6, -1).T, step[6 * n :]
             for s, noise in flights:
-                s.smooth(theta, change, noise)
-            theta = theta + change
+                s.smooth(theta, change, later, noise)
+            theta, late = theta + change, late + later
             spread = np.sqrt(np.diag(inverse))
             settled = bool(np.all(np.abs(step) < 0.1 * spread))
             if settled:
                 break
-        scores = sum(s.scores(theta, noise) for s, noise in flights)
+        scores = sum(s.scores(theta, noise) for s, noise in flights) + np.diag(prior)
         covariance = inverse @ scores @ inverse  # type: ignore[operator]
         covariance = 0.5 * (covariance + covariance.T)
-        n = arx.n_regressors
+        deviations = np.sqrt(np.diag(covariance)[6 * n :])
+        covariance = covariance[: 6 * n, : 6 * n]
         residual = np.average([s.residual(theta) for s, _ in flights], axis=0, weights=weights)
         return Estimate(
             theta=theta,
@@ -191,9 +201,10 @@ class FilterError(Method):
                 "equation_variances": Noise.of(R, left, *air).Q.tolist(),
                 "gust": self.gust,
                 "gust_remains": air[1],
-            },
+            }
+            | ({"actuators": arx.actuators.found(late.tolist(), deviations)} if unknown else {}),  # type: ignore[union-attr]
             remarks=()
-            if settled or self.steps == 1
+            if settled or steps == 1
             else (not_settled(self, "excite more, or lower the degree of the basis"),),
             residual_covariance=residual,
             covariance=covariance.reshape(6, n, 6, n),
@@ -306,12 +317,13 @@ class Noise(NamedTuple):
 
 
 class Linearized(NamedTuple):
-    """The equations at the smoothed states: regressors F (m, n), what is left (m, 8), how it
-    answers errors of y(k-i), L_i (m, 8, 8), and of the gust, H (m, 8, 3), and the whitening of it
-    all.
+    """The equations at the smoothed states: regressors F (m, n) of the coefficients and D (m, 6, a)
+    of what is unknown of the actuators, what is left (m, 8), how it answers errors of y(k-i),
+    L_i (m, 8, 8), and of the gust, H (m, 8, 3), and the whitening of it all.
     """
 
     F: Array
+    D: Array
     left: Array
     L: list[Array]
     H: Array
@@ -321,10 +333,13 @@ class Linearized(NamedTuple):
 @dataclass(eq=False)
 class Stretch:
     """Measured samples y (n, 8) without a gap, and the states `x` (n, 8) and the gust (n, 3)
-    smoothed so far.
+    smoothed so far. `moved` (n, nu, a): derivative of the inputs by what is unknown of the
+    actuators.
     """
 
     arx: Aerodynamics
+    record: FlightRecord
+    part: slice
     y: Array
     u: Array
     p: Array
@@ -332,6 +347,7 @@ class Stretch:
     dt: float
     x: Array
     gust: Array
+    moved: Array
 
     @classmethod
     def of(cls, arx: Aerodynamics, record: FlightRecord, part: slice) -> Stretch:
@@ -339,7 +355,22 @@ class Stretch:
         s = Samples.of(arx, record)
         y = record.columns(STATES)[part]
         still = np.zeros((len(y), 3))
-        return cls(arx, y, s.u[part], s.p[part], s.f[part], record.dt, y.copy(), still)
+        u, p, f = s.u[part], s.p[part], s.f[part]
+        unknown = len(arx.actuators.unknown) if arx.actuators else 0
+        moved = np.zeros((*u.shape, unknown))
+        return cls(arx, record, part, y, u, p, f, record.dt, y.copy(), still, moved)
+
+    def follow(self, late: Array) -> None:
+        """Let the deflections follow the commands as late as `late`, in prior deviations."""
+        actuators = self.arx.actuators
+        if actuators is None or not len(late):
+            return
+        first = len(VELOCITIES)
+        at = slice(first, first + len(self.arx.commands))
+        given = self.record, self.arx.commands, self.arx.controls
+        point = actuators.point(late.tolist())
+        self.u[:, at] = actuators.along(*given, **point)[self.part]
+        self.moved[:, at] = actuators.changes(*given, late)[self.part]
 
     def _equations(self, theta: Array) -> tuple[Array, Array]:
         """Regressors (m, n) at the smoothed states, and what they leave (m, 8)."""
@@ -349,6 +380,14 @@ class Stretch:
         left = increments(self.x, self.dt)[self.arx.memory :]
         left[:, :6] -= F @ theta
         return F, left
+
+    def _by_actuators(self, theta: Array) -> Array:
+        """D (m, 6, a): what the equations gain by what is unknown of the actuators."""
+        out = np.zeros((len(self.y) - self.arx.memory, 6, self.moved.shape[2]))
+        for i, moved in enumerate(np.moveaxis(self.moved, 2, 0)):
+            rows = regressor_rows(self.arx, self.y[:, :6], moved, self.p, self.f, ("input",))
+            out[:, :, i] = rows @ theta[: rows.shape[1]]
+        return out
 
     def _sensitivity(self, theta: Array) -> list[Array]:
         """L_i (m, 8, 8): how the error of the equations at k answers an error of y(k-i)."""
@@ -371,6 +410,7 @@ class Stretch:
         in that is white.
         """
         F, left = self._equations(theta)
+        D = self._by_actuators(theta)
         L, first, n = self._sensitivity(theta), self.arx.memory, len(self.y)
         apart = self.y - self.x
         for i, block in enumerate(L):
@@ -387,50 +427,39 @@ class Stretch:
                 now[1:] - a * before[:-1]
                 for now, before in zip([*L, none], [none, *L], strict=True)
             ]
-            F, left, H = F[1:] - a * F[:-1], left[1:] - a * left[:-1], H[1:]
+            F, D = F[1:] - a * F[:-1], D[1:] - a * D[:-1]
+            left, H = left[1:] - a * left[:-1], H[1:]
             own = [own[0][1:], -a * own[0][1:]]
         terms: list[tuple[list[Array], Array]] = [(L, noise.R), (own, noise.Q)]
         if noise.gust:
             terms.append(([H], np.full(3, noise.gust * (1 - noise.remains**2))))
-        return Linearized(F, left, L, H, Whitening.of(terms))
+        return Linearized(F, D, left, L, H, Whitening.of(terms))
 
     def whitened(self, theta: Array, noise: Noise) -> Array:
         """Return the residuals (m, 8) of the equations, white and of variance 1 if `noise` is their
         only cause.
         """
-        _, left, _, _, white = self._linearized(theta, noise)
+        _, _, left, _, _, white = self._linearized(theta, noise)
         return white.whitened(left)
 
     def normal(self, theta: Array, noise: Noise) -> tuple[Array, Array]:
-        """X' X and X' e of the whitened regressors X (.., 6 n), equation by equation."""
-        F, left, _, _, white = self._linearized(theta, noise)
-        size = 6 * F.shape[1] + 1
+        """X' X and X' e of the whitened regressors X (.., 6 n + a), equation by equation, those of
+        the actuators last.
+        """
+        found = self._linearized(theta, noise)
+        size = 6 * found.F.shape[1] + found.D.shape[2] + 1
         whole = np.zeros((size, size))
-        for rows in self._whitened(F, left, white):
+        for rows in _whitened(found):
             flat = rows.reshape(-1, size)
             whole += flat.T @ flat
         return whole[:-1, :-1], whole[:-1, -1]
 
-    def _whitened(self, F: Array, left: Array, white: Whitening) -> Any:
-        """Chunks (k, 8, 6 n + 1) of G^-1 [I6 (x) F, left]."""
-        (m, n), before = F.shape, []
-        for start in range(0, m, CHUNK):
-            stop = min(start + CHUNK, m)
-            out = np.empty((stop - start, 8, 6 * n + 1))
-            for k in range(start, stop):
-                new = out[k - start]
-                diagonal = white.steps[0][k]
-                np.multiply(diagonal[:, :6, None], F[k], out=new[:, :-1].reshape(8, 6, n))
-                new[:, -1] = diagonal @ left[k]
-                for step, past in zip(white.steps[1:], before, strict=False):
-                    new -= step[k] @ past
-                before = [new, *before[: len(white.steps) - 2]]
-            yield out
-
-    def smooth(self, theta: Array, change: Array, noise: Noise) -> None:
-        """Adjust the states, and the gust, to fit the equations best with theta + `change`."""
-        F, left, L, H, white = self._linearized(theta, noise)
-        left[:, :6] -= F @ change
+    def smooth(self, theta: Array, change: Array, later: Array, noise: Noise) -> None:
+        """Adjust the states, and the gust, to fit the equations best with theta + `change`, and
+        actuators moved by `later`.
+        """
+        F, D, left, L, H, white = self._linearized(theta, noise)
+        left[:, :6] -= F @ change + D @ later
         pull = white.adjoint(white.whitened(left))
         moved, n = np.zeros_like(self.y), len(self.y)
         first = n - len(F)
@@ -442,11 +471,12 @@ class Stretch:
             self.gust[first - 1 : -1] = lfilter([1.0], [1.0, -noise.remains], drive, axis=0)
 
     def scores(self, theta: Array, noise: Noise) -> Array:
-        """Covariance (6 n, 6 n) of X' e, e correlated over `LAGS` samples (Newey and West)."""
-        F, left, _, _, white = self._linearized(theta, noise)
+        """Covariance (6 n + a, 6 n + a) of X' e, e correlated over `LAGS` samples (Newey and
+        West).
+        """
         parts = (
             np.einsum("kij,ki->kj", rows[:, :, :-1], rows[:, :, -1])
-            for rows in self._whitened(F, left, white)
+            for rows in _whitened(self._linearized(theta, noise))
         )
         return long_run_covariance(parts, LAGS)
 
@@ -455,6 +485,26 @@ class Stretch:
         F = regressor_rows(self.arx, self.y[:, :6], self.u, self.p, self.f)
         e = increments(self.y, self.dt)[self.arx.memory :, :6] - F @ theta
         return e.T @ e / max(len(e) - F.shape[1], 1)
+
+
+def _whitened(found: Linearized) -> Iterator[Array]:
+    """Yield chunks (k, 8, 6 n + a + 1) of G^-1 [I6 (x) F, D, left]."""
+    F, D, left, _, _, white = found
+    (m, n), before = F.shape, []
+    for start in range(0, m, CHUNK):
+        stop = min(start + CHUNK, m)
+        out = np.empty((stop - start, 8, 6 * n + D.shape[2] + 1))
+        for k in range(start, stop):
+            new = out[k - start]
+            diagonal = white.steps[0][k]
+            coefficients = diagonal[:, :6, None] * F[k]
+            new[:, : 6 * n] = coefficients.reshape(8, -1)
+            new[:, 6 * n : -1] = diagonal[:, :6] @ D[k]
+            new[:, -1] = diagonal @ left[k]
+            for step, past in zip(white.steps[1:], before, strict=False):
+                new -= step[k] @ past
+            before = [new, *before[: len(white.steps) - 2]]
+        yield out
 
 
 def _solved(normal: Array, right: Array) -> tuple[Array, Array]:

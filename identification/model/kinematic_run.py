@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from identification.model.prediction import DIVERGED
-from identification.structure.kinematic_arx import STATES, KinematicARX
+from identification.structure.kinematic_arx import MOVING, STATES, KinematicARX
 from identification.structure.regressors import basis_values, scheduling_values
 from symheli.errors import InputError
 from symheli.records import FlightRecord
@@ -70,7 +70,7 @@ class Run:
             )
         return cls(
             record.columns(STATES),
-            record.columns(kin.inputs),
+            record.columns(aero.inputs[len(MOVING) :]),
             np.einsum("kf,sfo->kso", f, blocks[signals], optimize=True),
             known,
             np.array([e.lag for e in entries]),

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import os
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from identification.model import model_file, saved_model
 from identification.model.kinematic_model import KinematicModel
+from identification.structure.actuators import Actuators
 from identification.structure.kinematic_arx import MOVING, KinematicARX
+from symheli.flight import Servo
 from symheli.lpv import FunctionSpace
 from symheli.values import plain_file
 from symheli.values.kinematics import GRAVITY
@@ -28,11 +32,27 @@ def save(model: KinematicModel, path: str | os.PathLike[str]) -> Path:
         path,
         SCHEMA,
         {
-            "structure": saved_model.described_structure(model.structure),
+            "structure": _described(model.structure),
             **saved_model.described(model.aerodynamics),
             "trim": model.trim.tolist(),
+            "drive": None if model.drive is None else saved_model.described(model.drive),
         },
     )
+
+
+def _described(kin: KinematicARX) -> dict[str, Any]:
+    """The fields of a structure in plain values."""
+    plain = saved_model.described_structure(kin)
+    return plain | {"actuators": None if kin.actuators is None else asdict(kin.actuators)}
+
+
+def _actuators(given: dict[str, Any] | None) -> Actuators | None:
+    """Actuators from their plain values."""
+    if given is None:
+        return None
+    servos = given["servos"]
+    made = None if servos is None else {u: Servo(**servo) for u, servo in servos.items()}
+    return Actuators(**(given | {"servos": made}))
 
 
 def load(path: str | os.PathLike[str], basis: FunctionSpace | None = None) -> KinematicModel:
@@ -43,11 +63,13 @@ def load(path: str | os.PathLike[str], basis: FunctionSpace | None = None) -> Ki
     try:
         given = saved_model.fields_of_structure(content, basis, path)
         given["na"] = dict(zip(MOVING, given["na"], strict=True))
-        kin = KinematicARX(**given)
+        kin = KinematicARX(**(given | {"actuators": _actuators(given.get("actuators"))}))
+        drive = content.get("drive")
         return KinematicModel(
             structure=kin,
             aerodynamics=saved_model.model_of(kin.aerodynamics, content),
             trim=content["trim"],
+            drive=drive and saved_model.model_of(kin.drive, drive),  # type: ignore[arg-type]
         )
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise plain_file.incomplete(path, error) from error
