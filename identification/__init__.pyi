@@ -102,6 +102,7 @@ from identification.recursive.rigid_body_online import RigidBodyOnline as RigidB
 from identification.structure.actuators import Actuators as Actuators
 from identification.structure.kinematic_arx import KinematicARX as KinematicARX
 from identification.structure.lpvarx import LPVARX as LPVARX
+from identification.structure.steady_wind import SteadyWind as SteadyWind
 from symheli.lpv import (
     BSpline as BSpline,
 )

@@ -133,19 +133,21 @@ def fit(
 def _rigid(
     structure: KinematicARX, records: tuple[FlightRecord, ...], method: Method
 ) -> KinematicModel:
-    """The model of a rigid vehicle; with actuators that are to be estimated, with those found. The
+    """The model of a rigid vehicle; with those actuators, and in that wind,
+    that were found. The
     equation of a rotor's speed is fitted by least squares: a governed speed is measured well.
     """
-    actuators = structure.actuators
-    if actuators is not None and actuators.unknown and not isinstance(method, FilterError):
+    parts = {"actuators": structure.actuators, "wind": structure.wind}
+    unknown = [f"{n} of the {name}" for name, part in parts.items() if part for n in part.unknown]
+    if unknown and not isinstance(method, FilterError):
         raise InputError(
-            f"{' and '.join(actuators.unknown)} of the actuators: estimated by FilterError(...)"
-            f" only; give deviations of 0 for method {method.shorthand!r}"
+            f"{', '.join(unknown)}: estimated by FilterError(...) only; give deviations of 0 for"
+            f" method {method.shorthand!r}"
         )
     aerodynamics = _fitted(structure.aerodynamics, records, method)
-    if actuators is not None:
-        found = actuators.settled(aerodynamics.details.get("actuators", {}))
-        structure = replace(structure, actuators=found)
+    if unknown:
+        known = {n: p and p.settled(aerodynamics.details.get(n, {})) for n, p in parts.items()}
+        structure = replace(structure, **known)
         aerodynamics = replace(aerodynamics, structure=structure.aerodynamics)
     drive = structure.drive
     return KinematicModel(

@@ -20,7 +20,7 @@ from identification.estimators.method import Estimate, Method, not_settled
 from identification.estimators.newey_west import long_run_covariance
 from identification.structure.kinematic_arx import STATES, Aerodynamics, increments
 from identification.structure.lpvarx import LPVARX
-from identification.structure.regressors import Regression, Samples, regressor_rows
+from identification.structure.regressors import Regression, Samples, regressor_rows, stacked
 from symheli.errors import InputError, UnknownNameError
 from symheli.progress import tracked
 from symheli.records import FlightRecord
@@ -49,7 +49,10 @@ LAGS = 25
 """Number of samples over which scores are taken to be correlated."""
 
 SLOWER = 4
-"""Factor of the number of steps where delay or bandwidth are sought too: they start far off."""
+"""Factor of the number of steps where a delay or a wind is sought too: they start far off."""
+
+DIFFERENCE = 1e-3
+"""Step of central differences by an unknown of actuators or wind, in its prior deviation."""
 
 CHUNK = 256
 """Number of samples whitened at a time."""
@@ -154,31 +157,46 @@ class FilterError(Method):
                 "the filter error method needs known kinematics: fit a KinematicARX, or choose"
                 " another method for an LPVARX"
             )
-        theta, _ = instrumental_variables(arx, records, data, self.simulator)
-        left = self.misfit * self._unexplained(arx, records)
+        found, z = self._from(arx, records, data, np.zeros(arx.unknown))
+        if arx.wind is not None and arx.wind.unknown:  # what moved the schedule moves the start
+            found, _ = self._from(arx, records, data, z)
+        return found
+
+    def _from(
+        self, arx: Aerodynamics, records: Sequence[FlightRecord], data: Regression, z: Array
+    ) -> tuple[Estimate, Array]:
+        """Estimate from a start by instruments with the unknowns of actuators and wind at `z`;
+        these too.
+        """
+        unknown, there = arx.unknown, arx
+        if z.any():
+            there = arx.moved(z.tolist())
+            records = [there.derived(record) for record in records]
+            data = stacked(there, records)
+        theta, _ = instrumental_variables(there, records, data, self.simulator)
+        left = self.misfit * self._unexplained(there, records)
         air = self.gust**2, float(np.exp(-records[0].dt / self.gust_time))
-        unknown = arx.actuators.unknown if arx.actuators else ()
-        flights, late = [], np.zeros(len(unknown))
+        flights = []
         for record, R in zip(records, self._variances(records), strict=True):
             noise = Noise.of(R, left, *air)
             flights += [(Stretch.of(arx, record, part), noise) for part in unbroken(arx, record)]
         weights = [len(s.y) for s, _ in flights]
         R = np.average([noise.R for _, noise in flights], axis=0, weights=weights)
         count, settled, n = 0, False, arx.n_regressors
-        prior = np.append(np.zeros(6 * n), np.ones(len(unknown)))
+        prior = np.append(np.zeros(6 * n), np.ones(unknown))
         steps = self.steps * (SLOWER if unknown else 1)
         for _ in tracked("filter error", range(steps)):
             count += 1
             for s, _ in flights:
-                s.follow(late)
+                s.follow(z)
             parts = [s.normal(theta, noise) for s, noise in flights]
             normal, right = map(sum, zip(*parts, strict=True))
-            right[6 * n :] -= late  # type: ignore[index]
+            right[6 * n :] -= z  # type: ignore[index]
             step, inverse = _solved(normal + np.diag(prior), right)  # type: ignore[arg-type]
             change, later = step[: 6 * n].reshape(6, -1).T, step[6 * n :]
             for s, noise in flights:
                 s.smooth(theta, change, later, noise)
-            theta, late = theta + change, late + later
+            theta, z = theta + change, z + later
             spread = np.sqrt(np.diag(inverse))
             settled = bool(np.all(np.abs(step) < 0.1 * spread))
             if settled:
@@ -187,9 +205,8 @@ class FilterError(Method):
         covariance = inverse @ scores @ inverse  # type: ignore[operator]
         covariance = 0.5 * (covariance + covariance.T)
         deviations = np.sqrt(np.diag(covariance)[6 * n :])
-        covariance = covariance[: 6 * n, : 6 * n]
         residual = np.average([s.residual(theta) for s, _ in flights], axis=0, weights=weights)
-        return Estimate(
+        estimate = Estimate(
             theta=theta,
             details={
                 "steps": count,
@@ -202,13 +219,14 @@ class FilterError(Method):
                 "gust": self.gust,
                 "gust_remains": air[1],
             }
-            | ({"actuators": arx.actuators.found(late.tolist(), deviations)} if unknown else {}),  # type: ignore[union-attr]
+            | arx.found(z.tolist(), deviations.tolist()),
             remarks=()
             if settled or steps == 1
             else (not_settled(self, "excite more, or lower the degree of the basis"),),
             residual_covariance=residual,
-            covariance=covariance.reshape(6, n, 6, n),
+            covariance=covariance[: 6 * n, : 6 * n].reshape(6, n, 6, n),
         )
+        return estimate, z
 
     def _variances(self, records: Sequence[FlightRecord]) -> list[Array]:
         """Return the variances of the sensors (8,) in each record; where one is too short, those of
@@ -318,7 +336,7 @@ class Noise(NamedTuple):
 
 class Linearized(NamedTuple):
     """The equations at the smoothed states: regressors F (m, n) of the coefficients and D (m, 6, a)
-    of what is unknown of the actuators, what is left (m, 8), how it answers errors of y(k-i),
+    of the unknowns of actuators and wind, what is left (m, 8), how it answers errors of y(k-i),
     L_i (m, 8, 8), and of the gust, H (m, 8, 3), and the whitening of it all.
     """
 
@@ -330,63 +348,82 @@ class Linearized(NamedTuple):
     white: Whitening
 
 
+class Signals(NamedTuple):
+    """What acts on a stretch besides its states: inputs behind the velocities u (n, nu - 6), wind
+    in the axes of the body (n, 3), p and the basis f (n, size).
+    """
+
+    u: Array
+    air: Array
+    p: Array
+    f: Array
+
+    @classmethod
+    def of(cls, arx: Aerodynamics, record: FlightRecord, part: slice) -> Signals:
+        """Of the samples of `part` of a record."""
+        s, first = Samples.of(arx, record), len(VELOCITIES)
+        air = record.columns(STATES)[part, :3] - s.u[part, :3]
+        return cls(s.u[part, first:], air, s.p[part], s.f[part])
+
+
 @dataclass(eq=False)
 class Stretch:
     """Measured samples y (n, 8) without a gap, and the states `x` (n, 8) and the gust (n, 3)
-    smoothed so far. `moved` (n, nu, a): derivative of the inputs by what is unknown of the
-    actuators.
+    smoothed so far; the other signals `now`, and to both `sides` of each unknown of actuators and
+    wind.
     """
 
     arx: Aerodynamics
     record: FlightRecord
     part: slice
     y: Array
-    u: Array
-    p: Array
-    f: Array
     dt: float
     x: Array
     gust: Array
-    moved: Array
+    now: Signals
+    sides: list[tuple[Signals, Signals]]
 
     @classmethod
     def of(cls, arx: Aerodynamics, record: FlightRecord, part: slice) -> Stretch:
         """The samples of `part` of a record."""
-        s = Samples.of(arx, record)
         y = record.columns(STATES)[part]
-        still = np.zeros((len(y), 3))
-        u, p, f = s.u[part], s.p[part], s.f[part]
-        unknown = len(arx.actuators.unknown) if arx.actuators else 0
-        moved = np.zeros((*u.shape, unknown))
-        return cls(arx, record, part, y, u, p, f, record.dt, y.copy(), still, moved)
+        now = Signals.of(arx, record, part)
+        return cls(arx, record, part, y, record.dt, y.copy(), np.zeros((len(y), 3)), now, [])
 
-    def follow(self, late: Array) -> None:
-        """Let the deflections follow the commands as late as `late`, in prior deviations."""
-        actuators = self.arx.actuators
-        if actuators is None or not len(late):
+    def follow(self, z: Array) -> None:
+        """Let inputs and velocities through the air be those of the unknowns at `z`, in their prior
+        deviations.
+        """
+        if not len(z):
             return
-        first = len(VELOCITIES)
-        at = slice(first, first + len(self.arx.commands))
-        given = self.record, self.arx.commands, self.arx.controls
-        point = actuators.point(late.tolist())
-        self.u[:, at] = actuators.along(*given, **point)[self.part]
-        self.moved[:, at] = actuators.changes(*given, late)[self.part]
+
+        def at(place: Array) -> Signals:
+            there = self.arx.moved(place.tolist())
+            return Signals.of(there, there.derived(self.record), self.part)
+
+        steps = DIFFERENCE * np.eye(len(z))
+        self.now = at(z)
+        self.sides = [(at(z + step), at(z - step)) for step in steps]
+
+    def _rows(self, signals: Signals) -> Array:
+        """Regressors (m, n) at the smoothed states."""
+        z = self.x[:, :6].copy()
+        z[:, :3] -= signals.air
+        u = np.hstack([z, signals.u])
+        return regressor_rows(self.arx, z, u, signals.p, signals.f)
 
     def _equations(self, theta: Array) -> tuple[Array, Array]:
         """Regressors (m, n) at the smoothed states, and what they leave (m, 8)."""
-        u = self.u.copy()
-        u[:, :6] = self.x[:, :6]
-        F = regressor_rows(self.arx, self.x[:, :6], u, self.p, self.f)
+        F = self._rows(self.now)
         left = increments(self.x, self.dt)[self.arx.memory :]
         left[:, :6] -= F @ theta
         return F, left
 
-    def _by_actuators(self, theta: Array) -> Array:
-        """D (m, 6, a): what the equations gain by what is unknown of the actuators."""
-        out = np.zeros((len(self.y) - self.arx.memory, 6, self.moved.shape[2]))
-        for i, moved in enumerate(np.moveaxis(self.moved, 2, 0)):
-            rows = regressor_rows(self.arx, self.y[:, :6], moved, self.p, self.f, ("input",))
-            out[:, :, i] = rows @ theta[: rows.shape[1]]
+    def _by_unknowns(self, theta: Array) -> Array:
+        """D (m, 6, a): what the equations gain by each unknown of actuators and wind."""
+        out = np.zeros((len(self.y) - self.arx.memory, 6, len(self.sides)))
+        for i, (above, below) in enumerate(self.sides):
+            out[:, :, i] = (self._rows(above) - self._rows(below)) @ theta / (2 * DIFFERENCE)
         return out
 
     def _sensitivity(self, theta: Array) -> list[Array]:
@@ -399,7 +436,7 @@ class Stretch:
         half = 0.5 * self.dt
         L[0] += np.eye(8) - half * J[first:]
         L[1] -= np.eye(8) + half * J[first - 1 : -1]
-        f = self.f[first:]
+        f = self.now.f[first:]
         for row, e in entries:
             if e.channel < 6:
                 L[e.lag][:, :6, e.channel] -= f @ theta[row * size : (row + 1) * size]
@@ -410,7 +447,7 @@ class Stretch:
         in that is white.
         """
         F, left = self._equations(theta)
-        D = self._by_actuators(theta)
+        D = self._by_unknowns(theta)
         L, first, n = self._sensitivity(theta), self.arx.memory, len(self.y)
         apart = self.y - self.x
         for i, block in enumerate(L):
@@ -418,7 +455,7 @@ class Stretch:
         own = [np.broadcast_to(np.eye(8), L[0].shape)]
         H = np.zeros((len(F), 8, 3))
         if noise.gust:
-            a, size, f = noise.remains, self.arx.basis.size, self.f[first:]
+            a, size, f = noise.remains, self.arx.basis.size, self.now.f[first:]
             for row, e in enumerate(self.arx.entries):
                 if e.kind == "input" and e.channel < 3 and e.lag == 1:
                     H[:, :6, e.channel] -= f @ theta[row * size : (row + 1) * size]
@@ -444,7 +481,7 @@ class Stretch:
 
     def normal(self, theta: Array, noise: Noise) -> tuple[Array, Array]:
         """X' X and X' e of the whitened regressors X (.., 6 n + a), equation by equation, those of
-        the actuators last.
+        actuators and wind last.
         """
         found = self._linearized(theta, noise)
         size = 6 * found.F.shape[1] + found.D.shape[2] + 1
@@ -456,7 +493,7 @@ class Stretch:
 
     def smooth(self, theta: Array, change: Array, later: Array, noise: Noise) -> None:
         """Adjust the states, and the gust, to fit the equations best with theta + `change`, and
-        actuators moved by `later`.
+        actuators and wind moved by `later`.
         """
         F, D, left, L, H, white = self._linearized(theta, noise)
         left[:, :6] -= F @ change + D @ later
@@ -482,7 +519,9 @@ class Stretch:
 
     def residual(self, theta: Array) -> Array:
         """Covariance (6, 6) of what one step leaves, measured to measured."""
-        F = regressor_rows(self.arx, self.y[:, :6], self.u, self.p, self.f)
+        u = np.hstack([self.y[:, :6], self.now.u])
+        u[:, :3] -= self.now.air
+        F = regressor_rows(self.arx, u, u, self.now.p, self.now.f)
         e = increments(self.y, self.dt)[self.arx.memory :, :6] - F @ theta
         return e.T @ e / max(len(e) - F.shape[1], 1)
 

@@ -259,7 +259,7 @@ class KinematicModel:
         With `outputs` and `inputs` only these, as `to_state_space` keeps them.
         """
         model = self.realization.at(held_value(p), outputs, inputs)
-        return model.driven_by(self._actuators(inputs))
+        return model.driven_by(parts) if (parts := self._actuators(inputs)) else model
 
     def to_state_space(
         self,
@@ -298,7 +298,7 @@ class KinematicModel:
             A basis that is not polynomial, or nothing that moves.
         """
         model = self.realization.lpv(self.parameters, outputs, inputs, held or {}, degree)
-        return model.driven_by(self._actuators(inputs))
+        return model.driven_by(parts) if (parts := self._actuators(inputs)) else model
 
     def uncertain(
         self,

@@ -23,9 +23,6 @@ CONTROLS = ("d_lon", "d_lat", "d_col", "d_ped")
 SETTLING = 0.5
 """Time that servos need to forget where a record began, s."""
 
-DIFFERENCE = 1e-3
-"""Step of central differences of deflections, in prior deviations: they are smooth in both."""
-
 
 @dataclass(frozen=True)
 class Actuators:
@@ -92,6 +89,12 @@ class Actuators:
             "delay": max(self.delay + self.delay_deviation * moved.get("delay", 0.0), 0.0),
         }
 
+    def moved(self, z: Sequence[float]) -> Actuators:
+        """Return these at `z` in their prior deviations from what is told."""
+        point = self.point(z)
+        servos = self.servos and {u: faster(s, point["bandwidth"]) for u, s in self.servos.items()}
+        return replace(self, servos=servos, delay=point["delay"])
+
     def found(self, z: Sequence[float], deviations: Sequence[float]) -> Estimates:
         """Value and standard deviation of what is estimated, at `z` with `deviations`, both in
         prior deviations.
@@ -111,9 +114,8 @@ class Actuators:
         factor, _ = estimates.get("bandwidth", (1.0, 0.0))
         delay, _ = estimates.get("delay", (self.delay, 0.0))
         servos = self.servos and {u: faster(s, factor) for u, s in self.servos.items()}
-        return replace(
-            self, servos=servos, delay=delay, bandwidth_deviation=0.0, delay_deviation=0.0
-        )
+        known = {"bandwidth_deviation": 0.0, "delay_deviation": 0.0}
+        return replace(self, servos=servos, delay=delay, **known)
 
     def require(self, controls: Sequence[str]) -> None:
         """Raises `InputError` where a control has no servo."""
@@ -154,7 +156,7 @@ class Actuators:
         return out.reshape(len(commands), ratio, -1).mean(axis=1)
 
     def along(
-        self, record: FlightRecord, commands: Sequence[str], controls: Sequence[str], **point: float
+        self, record: FlightRecord, commands: Sequence[str], controls: Sequence[str]
     ) -> Array:
         """Mean deflections (n, nu) of a record's `commands`; NaN where one is missing and until
         servos have forgotten how a piece began.
@@ -164,29 +166,8 @@ class Actuators:
         settled = round(SETTLING / record.dt)
         for piece in pieces(record, u):
             part = slice(piece.start, piece.stop)
-            out[part] = self.deflections(u[part], record.dt, controls=controls, **point)
+            out[part] = self.deflections(u[part], record.dt, controls=controls)
             out[piece.start : piece.start + settled] = np.nan
-        return out
-
-    def changes(
-        self,
-        record: FlightRecord,
-        commands: Sequence[str],
-        controls: Sequence[str],
-        z: Sequence[float],
-    ) -> Array:
-        """Derivative (n, nu, unknown) of `along` by what is unknown, at `z`, in prior
-        deviations.
-        """
-        out = np.zeros((len(record), len(commands), len(self.unknown)))
-        for i in range(len(self.unknown)):
-            step = np.zeros(len(self.unknown))
-            step[i] = DIFFERENCE
-            both = (
-                self.along(record, commands, controls, **self.point((z + sign * step).tolist()))
-                for sign in (1, -1)
-            )
-            out[:, :, i] = np.subtract(*both) / (2 * DIFFERENCE)
         return out
 
     # --- for design ------------------------------------------------------------------------------

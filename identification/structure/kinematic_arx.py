@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
 from typing import ClassVar
 
@@ -13,7 +13,8 @@ from scipy.integrate import cumulative_trapezoid
 from identification.structure.actuators import Actuators, bare, behind, pieces
 from identification.structure.lpvarx import LPVARX
 from identification.structure.orders import Orders
-from symheli.errors import InputError
+from identification.structure.steady_wind import VELOCITY, SteadyWind, of_air
+from symheli.errors import InputError, UnknownNameError
 from symheli.lpv import FunctionSpace
 from symheli.records import FlightRecord
 from symheli.values import Signal
@@ -45,6 +46,8 @@ def increments(y: Array, dt: float) -> Array:
     return out
 
 
+Found = dict[str, dict[str, tuple[float, float]]]
+
 INTEGRAL = "{}_integral"
 """Name of the integral of what a governed speed lacks."""
 
@@ -67,6 +70,8 @@ class Aerodynamics(LPVARX):
         A measured speed that a governor holds.
     governed_at : float, optional
         What it holds it at.
+    wind : SteadyWind, optional
+        In which the records were flown.
 
     Examples
     --------
@@ -80,6 +85,33 @@ class Aerodynamics(LPVARX):
     actuators: Actuators | None = None
     rotor_speed: str | None = None
     governed_at: float | None = None
+    wind: SteadyWind | None = None
+
+    @property
+    def unknown(self) -> int:
+        """Number of unknowns of the actuators and the wind."""
+        return sum(len(part.unknown) for part in (self.actuators, self.wind) if part)
+
+    def moved(self, z: Sequence[float]) -> Aerodynamics:
+        """Return the same with actuators and wind at `z` in their prior deviations, actuators
+        first.
+        """
+        first = len(self.actuators.unknown) if self.actuators else 0
+        return replace(
+            self,
+            actuators=self.actuators and self.actuators.moved(z[:first]),
+            wind=self.wind and self.wind.moved(z[first:]),
+        )
+
+    def found(self, z: Sequence[float], deviations: Sequence[float]) -> Found:
+        """Values and standard deviations of what was estimated: "actuators" and "wind"."""
+        first = len(self.actuators.unknown) if self.actuators else 0
+        out: Found = {}
+        if self.actuators and self.actuators.unknown:
+            out["actuators"] = self.actuators.found(z[:first], deviations[:first])
+        if self.wind and self.wind.unknown:
+            out["wind"] = self.wind.found(z[first:], deviations[first:])
+        return out
 
     @property
     def controls(self) -> tuple[str, ...]:
@@ -93,12 +125,7 @@ class Aerodynamics(LPVARX):
         names = [str(s) for s in INCREMENTS]
         if set(names) <= set(record.signals):
             return record
-        if self.rotor_speed is not None:
-            record = _governed(record, self.rotor_speed, self.governed_at)
-        if self.actuators is not None:
-            found = self.actuators.along(record, self.commands, self.controls)
-            units = {behind(u): record.signals[record.signals.index(u)].unit for u in self.commands}  # type: ignore[arg-type]
-            record = record.with_signals(units, **dict(zip(units, found.T, strict=True)))
+        record = self.derived(record)
         y = record.columns(STATES)
         for signal in RIGID_BODY:
             found = record.signals[record.signals.index(str(signal))]  # type: ignore[arg-type]
@@ -109,6 +136,18 @@ class Aerodynamics(LPVARX):
             out[part] = increments(y[part], record.dt)
         units = {str(s): s.unit for s in INCREMENTS}
         return record.with_signals(units, **dict(zip(names, out.T, strict=False)))
+
+    def derived(self, record: FlightRecord) -> FlightRecord:
+        """The record with deflections, the rotor's signals and velocities through the air, where
+        the structure has them.
+        """
+        if self.rotor_speed is not None:
+            record = _governed(record, self.rotor_speed, self.governed_at)
+        if self.actuators is not None:
+            found = self.actuators.along(record, self.commands, self.controls)
+            units = {behind(u): record.signals[record.signals.index(u)].unit for u in self.commands}  # type: ignore[arg-type]
+            record = record.with_signals(units, **dict(zip(units, found.T, strict=True)))
+        return record if self.wind is None else self.wind.along(record)
 
 
 def _governed(record: FlightRecord, speed: str, wanted: float | None) -> FlightRecord:
@@ -177,6 +216,9 @@ class KinematicARX:
     governed_at : float, optional
         Speed that the governor holds it at, in its unit, where the record has no Om_reference;
         default its mean over a record, which serves where the flight ends as it began.
+    wind : SteadyWind, optional
+        In which the records were flown: aerodynamics, and a schedule over ground, see the velocity
+        through the air. What of it is not known `FilterError` estimates.
 
     Raises
     ------
@@ -211,6 +253,7 @@ class KinematicARX:
     actuators: Actuators | None = None
     rotor_speed: str | None = None
     governed_at: float | None = None
+    wind: SteadyWind | None = None
 
     outputs: ClassVar[tuple[str, ...]] = STATES
 
@@ -224,10 +267,13 @@ class KinematicARX:
             if not isinstance(self.actuators, Actuators):
                 raise InputError(f"actuators: expected Actuators(...), got {self.actuators!r:.80}")
             self.actuators.require(tuple(map(bare, given)))
+        if self.wind is not None and not isinstance(self.wind, SteadyWind):
+            raise InputError(f"wind: expected SteadyWind(...), got {self.wind!r:.80}")
         if self.rotor_speed in (*STATES, *given):
             raise InputError(f"rotor_speed: {self.rotor_speed} is a state or an input already")
         aero = self.aerodynamics  # raises for anything else that does not fit
-        object.__setattr__(self, "scheduling", aero.scheduling)
+        if self.wind is None:
+            object.__setattr__(self, "scheduling", aero.scheduling)
         lags = aero.input_lag_ranges[0]
         object.__setattr__(self, "na", tuple(len(r) for r in lags[: len(MOVING)]))
         if 0 in self.na:  # type: ignore[operator]
@@ -247,13 +293,22 @@ class KinematicARX:
         more = {u: nb if isinstance(nb, int) else nb[u] for u in self.inputs}  # type: ignore[index,call-overload]
         if self.actuators is not None:
             more = {behind(u): n for u, n in more.items()}
-        names = (*MOVING, *more)
+        scheduling: str | tuple[str, ...] = self.scheduling
+        if self.wind is not None:
+            orders = {of_air(z) if z in VELOCITY else z: n for z, n in orders.items()}
+            given = (scheduling,) if isinstance(scheduling, str) else tuple(scheduling)
+            if self.wind.over_ground not in (None, *given):
+                raise UnknownNameError(
+                    "scheduling parameter over ground", str(self.wind.over_ground), given
+                )
+            scheduling = tuple(of_air(n) if n == self.wind.over_ground else n for n in given)
+        names = (*orders, *more)
         if self.rotor_speed is not None:
             more |= dict.fromkeys(self.rotor, 1)
         return Aerodynamics(
             outputs,
             (*names, *self.rotor),
-            self.scheduling,
+            scheduling,
             na=0,
             nb=orders | more,
             delay=1,
@@ -265,6 +320,7 @@ class KinematicARX:
             actuators=self.actuators,
             rotor_speed=self.rotor_speed,
             governed_at=self.governed_at,
+            wind=self.wind,
         )
 
     @property
