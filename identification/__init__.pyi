@@ -101,6 +101,7 @@ from identification.recursive.recursive_least_squares import (
 from identification.recursive.rigid_body_online import RigidBodyOnline as RigidBodyOnline
 from identification.structure.actuators import Actuators as Actuators
 from identification.structure.kinematic_arx import KinematicARX as KinematicARX
+from identification.structure.late_sensors import LateSensors as LateSensors
 from identification.structure.lpvarx import LPVARX as LPVARX
 from identification.structure.steady_wind import SteadyWind as SteadyWind
 from symheli.lpv import (

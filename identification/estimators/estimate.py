@@ -133,12 +133,12 @@ def fit(
 def _rigid(
     structure: KinematicARX, records: tuple[FlightRecord, ...], method: Method
 ) -> KinematicModel:
-    """The model of a rigid vehicle; with those actuators, and in that wind,
-    that were found. The
+    """The model of a rigid vehicle; with its parts (actuators, wind, sensors) as they
+    were found. The
     equation of a rotor's speed is fitted by least squares: a governed speed is measured well.
     """
-    parts = {"actuators": structure.actuators, "wind": structure.wind}
-    unknown = [f"{n} of the {name}" for name, part in parts.items() if part for n in part.unknown]
+    parts = structure.aerodynamics.parts
+    unknown = [f"{n} of the {name}" for name, part in parts.items() for n in part.unknown]
     if unknown and not isinstance(method, FilterError):
         raise InputError(
             f"{', '.join(unknown)}: estimated by FilterError(...) only; give deviations of 0 for"
@@ -146,7 +146,7 @@ def _rigid(
         )
     aerodynamics = _fitted(structure.aerodynamics, records, method)
     if unknown:
-        known = {n: p and p.settled(aerodynamics.details.get(n, {})) for n, p in parts.items()}
+        known = {n: p.settled(aerodynamics.details.get(n, {})) for n, p in parts.items()}
         structure = replace(structure, **known)
         aerodynamics = replace(aerodynamics, structure=structure.aerodynamics)
     drive = structure.drive

@@ -6,9 +6,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.linalg import cho_factor, cho_solve
 from scipy.signal import lfilter
 
@@ -21,7 +22,7 @@ from identification.estimators.newey_west import long_run_covariance
 from identification.structure.kinematic_arx import STATES, Aerodynamics, increments
 from identification.structure.lpvarx import LPVARX
 from identification.structure.regressors import Regression, Samples, regressor_rows, stacked
-from symheli.errors import InputError, UnknownNameError
+from symheli.errors import DataWarning, InputError, UnknownNameError
 from symheli.progress import tracked
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
@@ -53,6 +54,12 @@ SLOWER = 4
 
 DIFFERENCE = 1e-3
 """Step of central differences by an unknown of actuators or wind, in its prior deviation."""
+
+WIND_TOLD = 0.5
+"""Largest standard deviation of a wind that counts as told by the flights, m/s."""
+
+FARTHEST = 4.0
+"""Largest move of late sensors, in their prior deviation."""
 
 CHUNK = 256
 """Number of samples whitened at a time."""
@@ -158,7 +165,7 @@ class FilterError(Method):
                 " another method for an LPVARX"
             )
         found, z = self._from(arx, records, data, np.zeros(arx.unknown))
-        if arx.wind is not None and arx.wind.unknown:  # what moved the schedule moves the start
+        if any(part.unknown for part in (arx.wind, arx.sensors) if part):  # they moved the start
             found, _ = self._from(arx, records, data, z)
         return found
 
@@ -168,13 +175,13 @@ class FilterError(Method):
         """Estimate from a start by instruments with the unknowns of actuators and wind at `z`;
         these too.
         """
-        unknown, there = arx.unknown, arx
+        unknown, there, moved = arx.unknown, arx, records
         if z.any():
             there = arx.moved(z.tolist())
-            records = [there.derived(record) for record in records]
-            data = stacked(there, records)
-        theta, _ = instrumental_variables(there, records, data, self.simulator)
-        left = self.misfit * self._unexplained(there, records)
+            moved = [there.again(record, arx) for record in records]
+            data = stacked(there, moved)
+        theta, _ = instrumental_variables(there, moved, data, self.simulator)
+        left = self.misfit * self._unexplained(there, moved)
         air = self.gust**2, float(np.exp(-records[0].dt / self.gust_time))
         flights = []
         for record, R in zip(records, self._variances(records), strict=True):
@@ -220,9 +227,14 @@ class FilterError(Method):
                 "gust_remains": air[1],
             }
             | arx.found(z.tolist(), deviations.tolist()),
-            remarks=()
-            if settled or steps == 1
-            else (not_settled(self, "excite more, or lower the degree of the basis"),),
+            remarks=(
+                *_unknown_wind(arx.found(z.tolist(), deviations.tolist()).get("wind", {})),
+                *(
+                    ()
+                    if settled or steps == 1
+                    else (not_settled(self, "excite more, or lower the degree of the basis"),)
+                ),
+            ),
             residual_covariance=residual,
             covariance=covariance[: 6 * n, : 6 * n].reshape(6, n, 6, n),
         )
@@ -247,7 +259,7 @@ class FilterError(Method):
         phi, y = [], []
         for record in records:
             rows = flown_rows(arx, record, self.simulator)
-            left = arx.prepared(self.simulator.flown(record)).columns(arx.outputs)
+            left = arx.simulated.prepared(self.simulator.flown(record)).columns(arx.outputs)
             known = np.isfinite(rows).all(axis=1) & np.isfinite(left).all(axis=1)
             phi.append(rows[known])
             y.append(left[known])
@@ -315,7 +327,15 @@ def unbroken(arx: Aerodynamics, record: FlightRecord) -> list[slice]:
         edges = np.flatnonzero(np.diff(np.concatenate([[0], inside, [0]])))
         pairs = zip(edges[::2], edges[1::2], strict=True)
         out += [slice(part.start + int(a), part.start + int(b)) for a, b in pairs]
+    edge = _edge(arx, record.dt)
+    out = [slice(s.start + edge, s.stop - edge) for s in out]
     return [s for s in out if s.stop - s.start > 2 * arx.memory + 1]
+
+
+def _edge(arx: Aerodynamics, dt: float) -> int:
+    """Number of samples at both ends of a stretch that late sensors may move beyond it."""
+    late = arx.sensors
+    return 0 if late is None else int(np.ceil((abs(late.delay) + FARTHEST * late.deviation) / dt))
 
 
 class Noise(NamedTuple):
@@ -335,9 +355,9 @@ class Noise(NamedTuple):
 
 
 class Linearized(NamedTuple):
-    """The equations at the smoothed states: regressors F (m, n) of the coefficients and D (m, 6, a)
-    of the unknowns of actuators and wind, what is left (m, 8), how it answers errors of y(k-i),
-    L_i (m, 8, 8), and of the gust, H (m, 8, 3), and the whitening of it all.
+    """The equations at the smoothed states: regressors F (m, n) of the coefficients and D (m, 8, a)
+    of the unknowns of actuators, wind and sensors, what is left (m, 8), how it answers errors of
+    y(k-i), L_i (m, 8, 8), and of the gust, H (m, 8, 3), and the whitening of it all.
     """
 
     F: Array
@@ -350,20 +370,24 @@ class Linearized(NamedTuple):
 
 class Signals(NamedTuple):
     """What acts on a stretch besides its states: inputs behind the velocities u (n, nu - 6), wind
-    in the axes of the body (n, 3), p and the basis f (n, size).
+    in the axes of the body (n, 3), p, the basis f (n, size), and how far ahead each state is read
+    (8,), s.
     """
 
     u: Array
     air: Array
     p: Array
     f: Array
+    ahead: Array
 
     @classmethod
     def of(cls, arx: Aerodynamics, record: FlightRecord, part: slice) -> Signals:
         """Of the samples of `part` of a record."""
+        late = arx.sensors
+        ahead = np.array([late.delay if late and name in late.signals else 0.0 for name in STATES])
         s, first = Samples.of(arx, record), len(VELOCITIES)
         air = record.columns(STATES)[part, :3] - s.u[part, :3]
-        return cls(s.u[part, first:], air, s.p[part], s.f[part])
+        return cls(s.u[part, first:], air, s.p[part], s.f[part], ahead)
 
 
 @dataclass(eq=False)
@@ -391,39 +415,51 @@ class Stretch:
         return cls(arx, record, part, y, record.dt, y.copy(), np.zeros((len(y), 3)), now, [])
 
     def follow(self, z: Array) -> None:
-        """Let inputs and velocities through the air be those of the unknowns at `z`, in their prior
+        """Let what is measured, and what acts, be that of the unknowns at `z`, in their prior
         deviations.
         """
         if not len(z):
             return
-
-        def at(place: Array) -> Signals:
-            there = self.arx.moved(place.tolist())
-            return Signals.of(there, there.derived(self.record), self.part)
-
+        before = self.now.ahead
+        self.now, self.y = self._at(z)
+        self.x = _ahead(self.x, self.now.ahead - before, self.dt)
         steps = DIFFERENCE * np.eye(len(z))
-        self.now = at(z)
-        self.sides = [(at(z + step), at(z - step)) for step in steps]
+        self.sides = [(self._at(z + step)[0], self._at(z - step)[0]) for step in steps]
 
-    def _rows(self, signals: Signals) -> Array:
-        """Regressors (m, n) at the smoothed states."""
-        z = self.x[:, :6].copy()
+    def _at(self, z: Array) -> tuple[Signals, Array]:
+        """What acts, and the measured states (n, 8), with the unknowns at `z`."""
+        there = self.arx.moved(z.tolist())
+        record = there.again(self.record, self.arx)
+        return Signals.of(there, record, self.part), record.columns(STATES)[self.part]
+
+    def _rows(self, signals: Signals, x: Array) -> Array:
+        """Regressors (m, n) at states x (n, 8)."""
+        z = x[:, :6].copy()
         z[:, :3] -= signals.air
         u = np.hstack([z, signals.u])
         return regressor_rows(self.arx, z, u, signals.p, signals.f)
 
     def _equations(self, theta: Array) -> tuple[Array, Array]:
         """Regressors (m, n) at the smoothed states, and what they leave (m, 8)."""
-        F = self._rows(self.now)
-        left = increments(self.x, self.dt)[self.arx.memory :]
+        F = self._rows(self.now, self.x)
+        return F, self._left(F, self.x, theta)
+
+    def _left(self, F: Array, x: Array, theta: Array) -> Array:
+        """What regressors leave (m, 8) of the increments of states x."""
+        left = increments(x, self.dt)[self.arx.memory :]
         left[:, :6] -= F @ theta
-        return F, left
+        return left
 
     def _by_unknowns(self, theta: Array) -> Array:
-        """D (m, 6, a): what the equations gain by each unknown of actuators and wind."""
-        out = np.zeros((len(self.y) - self.arx.memory, 6, len(self.sides)))
+        """D (m, 8, a): what the equations lose by each unknown of actuators, wind and sensors."""
+        out = np.zeros((len(self.y) - self.arx.memory, 8, len(self.sides)))
+        rate = np.gradient(self.x, self.dt, axis=0)
         for i, (above, below) in enumerate(self.sides):
-            out[:, :, i] = (self._rows(above) - self._rows(below)) @ theta / (2 * DIFFERENCE)
+            sides = []
+            for side in (above, below):
+                x = self.x + (side.ahead - self.now.ahead) * rate
+                sides.append(self._left(self._rows(side, x), x, theta))
+            out[:, :, i] = (sides[1] - sides[0]) / (2 * DIFFERENCE)
         return out
 
     def _sensitivity(self, theta: Array) -> list[Array]:
@@ -481,7 +517,7 @@ class Stretch:
 
     def normal(self, theta: Array, noise: Noise) -> tuple[Array, Array]:
         """X' X and X' e of the whitened regressors X (.., 6 n + a), equation by equation, those of
-        actuators and wind last.
+        the unknowns last.
         """
         found = self._linearized(theta, noise)
         size = 6 * found.F.shape[1] + found.D.shape[2] + 1
@@ -493,10 +529,11 @@ class Stretch:
 
     def smooth(self, theta: Array, change: Array, later: Array, noise: Noise) -> None:
         """Adjust the states, and the gust, to fit the equations best with theta + `change`, and
-        actuators and wind moved by `later`.
+        the unknowns moved by `later`.
         """
         F, D, left, L, H, white = self._linearized(theta, noise)
-        left[:, :6] -= F @ change + D @ later
+        left[:, :6] -= F @ change
+        left -= D @ later
         pull = white.adjoint(white.whitened(left))
         moved, n = np.zeros_like(self.y), len(self.y)
         first = n - len(F)
@@ -526,6 +563,28 @@ class Stretch:
         return e.T @ e / max(len(e) - F.shape[1], 1)
 
 
+def _unknown_wind(wind: Mapping[str, tuple[float, float]]) -> tuple[Warning, ...]:
+    """The remark on a wind that the flights do not tell."""
+    wide = [f"{name} {value:.1f} +- {size:.1f}" for name, (value, size) in wind.items()]
+    if all(size <= WIND_TOLD for _, size in wind.values()):
+        return ()
+    return (
+        DataWarning(
+            f"the flights do not tell the wind (m/s: {', '.join(wide)}), and with it not at which"
+            " airspeed a coefficient holds: fly a second heading, or measure the airspeed"
+        ),
+    )
+
+
+def _ahead(x: Array, by: Array, dt: float) -> Array:
+    """Return states (n, 8) as they are later, each `by` (8,) seconds, held at the ends."""
+    if not by.any():
+        return x
+    time = dt * np.arange(len(x))
+    later = [np.clip(time + late, time[0], time[-1]) for late in by]
+    return np.column_stack([CubicSpline(time, c)(at) for c, at in zip(x.T, later, strict=True)])
+
+
 def _whitened(found: Linearized) -> Iterator[Array]:
     """Yield chunks (k, 8, 6 n + a + 1) of G^-1 [I6 (x) F, D, left]."""
     F, D, left, _, _, white = found
@@ -538,7 +597,7 @@ def _whitened(found: Linearized) -> Iterator[Array]:
             diagonal = white.steps[0][k]
             coefficients = diagonal[:, :6, None] * F[k]
             new[:, : 6 * n] = coefficients.reshape(8, -1)
-            new[:, 6 * n : -1] = diagonal[:, :6] @ D[k]
+            new[:, 6 * n : -1] = diagonal @ D[k]
             new[:, -1] = diagonal @ left[k]
             for step, past in zip(white.steps[1:], before, strict=False):
                 new -= step[k] @ past

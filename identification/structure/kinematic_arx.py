@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
 from typing import ClassVar
@@ -11,6 +11,7 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from identification.structure.actuators import Actuators, bare, behind, pieces
+from identification.structure.late_sensors import LateSensors
 from identification.structure.lpvarx import LPVARX
 from identification.structure.orders import Orders
 from identification.structure.steady_wind import VELOCITY, SteadyWind, of_air
@@ -46,6 +47,7 @@ def increments(y: Array, dt: float) -> Array:
     return out
 
 
+Part = Actuators | SteadyWind | LateSensors
 Found = dict[str, dict[str, tuple[float, float]]]
 
 INTEGRAL = "{}_integral"
@@ -72,6 +74,8 @@ class Aerodynamics(LPVARX):
         What it holds it at.
     wind : SteadyWind, optional
         In which the records were flown.
+    sensors : LateSensors, optional
+        Those that read what was true some time ago.
 
     Examples
     --------
@@ -86,32 +90,43 @@ class Aerodynamics(LPVARX):
     rotor_speed: str | None = None
     governed_at: float | None = None
     wind: SteadyWind | None = None
+    sensors: LateSensors | None = None
+
+    @property
+    def parts(self) -> dict[str, Part]:
+        """What stands between the record and the regression, by name of its field."""
+        every = {"actuators": self.actuators, "wind": self.wind, "sensors": self.sensors}
+        return {name: part for name, part in every.items() if part is not None}
 
     @property
     def unknown(self) -> int:
-        """Number of unknowns of the actuators and the wind."""
-        return sum(len(part.unknown) for part in (self.actuators, self.wind) if part)
+        """Number of what is unknown of its parts."""
+        return sum(len(part.unknown) for part in self.parts.values())
+
+    def _each(self, z: Sequence[float]) -> Iterator[tuple[str, Part, Sequence[float]]]:
+        """Its parts, with those of `z` that belong to each."""
+        first = 0
+        for name, part in self.parts.items():
+            yield name, part, z[first : first + len(part.unknown)]
+            first += len(part.unknown)
 
     def moved(self, z: Sequence[float]) -> Aerodynamics:
-        """Return the same with actuators and wind at `z` in their prior deviations, actuators
-        first.
-        """
-        first = len(self.actuators.unknown) if self.actuators else 0
-        return replace(
-            self,
-            actuators=self.actuators and self.actuators.moved(z[:first]),
-            wind=self.wind and self.wind.moved(z[first:]),
-        )
+        """Return the same with its parts at `z`, in their prior deviations."""
+        return replace(self, **{name: part.moved(own) for name, part, own in self._each(z)})
 
     def found(self, z: Sequence[float], deviations: Sequence[float]) -> Found:
-        """Values and standard deviations of what was estimated: "actuators" and "wind"."""
-        first = len(self.actuators.unknown) if self.actuators else 0
-        out: Found = {}
-        if self.actuators and self.actuators.unknown:
-            out["actuators"] = self.actuators.found(z[:first], deviations[:first])
-        if self.wind and self.wind.unknown:
-            out["wind"] = self.wind.found(z[first:], deviations[first:])
-        return out
+        """Values and standard deviations of what was estimated, by part."""
+        sizes = [own for _, _, own in self._each(deviations)]
+        return {
+            name: part.found(own, size)
+            for (name, part, own), size in zip(self._each(z), sizes, strict=True)
+            if part.unknown
+        }
+
+    @property
+    def simulated(self) -> Aerodynamics:
+        """The regression for a simulated flight, whose signals are not late."""
+        return replace(self, sensors=None)
 
     @property
     def controls(self) -> tuple[str, ...]:
@@ -125,7 +140,18 @@ class Aerodynamics(LPVARX):
         names = [str(s) for s in INCREMENTS]
         if set(names) <= set(record.signals):
             return record
-        record = self.derived(record)
+        return self._completed(record if self.sensors is None else self.sensors.along(record))
+
+    def again(self, record: FlightRecord, before: Aerodynamics) -> FlightRecord:
+        """A record that was prepared `before` with its parts elsewhere, as this one prepares it."""
+        if self.sensors is not None and before.sensors is not None:
+            later = self.sensors.delay - before.sensors.delay
+            record = replace(self.sensors, delay=later).along(record)
+        return self._completed(record)
+
+    def _completed(self, record: FlightRecord) -> FlightRecord:
+        """The record, its signals in time, with all that is computed from them."""
+        record = self._derived(record)
         y = record.columns(STATES)
         for signal in RIGID_BODY:
             found = record.signals[record.signals.index(str(signal))]  # type: ignore[arg-type]
@@ -135,9 +161,9 @@ class Aerodynamics(LPVARX):
         for part in record.segments():
             out[part] = increments(y[part], record.dt)
         units = {str(s): s.unit for s in INCREMENTS}
-        return record.with_signals(units, **dict(zip(names, out.T, strict=False)))
+        return record.with_signals(units, **dict(zip(units, out.T, strict=False)))
 
-    def derived(self, record: FlightRecord) -> FlightRecord:
+    def _derived(self, record: FlightRecord) -> FlightRecord:
         """The record with deflections, the rotor's signals and velocities through the air, where
         the structure has them.
         """
@@ -219,6 +245,8 @@ class KinematicARX:
     wind : SteadyWind, optional
         In which the records were flown: aerodynamics, and a schedule over ground, see the velocity
         through the air. What of it is not known `FilterError` estimates.
+    sensors : LateSensors, optional
+        Sensors that come later than the others; `FilterError` estimates how late.
 
     Raises
     ------
@@ -254,6 +282,7 @@ class KinematicARX:
     rotor_speed: str | None = None
     governed_at: float | None = None
     wind: SteadyWind | None = None
+    sensors: LateSensors | None = None
 
     outputs: ClassVar[tuple[str, ...]] = STATES
 
@@ -267,8 +296,10 @@ class KinematicARX:
             if not isinstance(self.actuators, Actuators):
                 raise InputError(f"actuators: expected Actuators(...), got {self.actuators!r:.80}")
             self.actuators.require(tuple(map(bare, given)))
-        if self.wind is not None and not isinstance(self.wind, SteadyWind):
-            raise InputError(f"wind: expected SteadyWind(...), got {self.wind!r:.80}")
+        for name, kind in (("wind", SteadyWind), ("sensors", LateSensors)):
+            part = getattr(self, name)
+            if part is not None and not isinstance(part, kind):
+                raise InputError(f"{name}: expected {kind.__name__}(...), got {part!r:.80}")
         if self.rotor_speed in (*STATES, *given):
             raise InputError(f"rotor_speed: {self.rotor_speed} is a state or an input already")
         aero = self.aerodynamics  # raises for anything else that does not fit
@@ -321,6 +352,7 @@ class KinematicARX:
             rotor_speed=self.rotor_speed,
             governed_at=self.governed_at,
             wind=self.wind,
+            sensors=self.sensors,
         )
 
     @property
