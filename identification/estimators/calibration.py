@@ -494,7 +494,10 @@ class _Search:
         if self.actuators is None:
             return self.commands
         point = self.actuators.point(theta[self.k :].tolist())
-        return [self.actuators.deflections(c, self.dt, **point) for c in self.commands]
+        return [
+            self.actuators.deflections(c, self.dt, controls=CONTROLS, **point)
+            for c in self.commands
+        ]
 
     def input_changes(self, theta: Array) -> list[Array]:
         """Derivative (n, 4, unknown) of the deflections of every piece: they are smooth in both."""

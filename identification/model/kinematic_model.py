@@ -168,7 +168,7 @@ class KinematicModel:
         the record's plan. From the first samples of each segment on nothing measured is used.
         Raises `InputError` for a record without references, or without a controller.
         """
-        self._require_plain("a run in the recorded loop")
+        self.structure.require_plain("a run in the recorded loop")
         return kinematic_run.closed_loop(
             self._along(record), self.structure.inputs, record, controller
         )
@@ -218,7 +218,7 @@ class KinematicModel:
         """
         from identification.recursive.kinematic_observer import KinematicObserver, deviations
 
-        self._require_plain("an observer")
+        self.structure.require_plain("an observer")
         found = self.details.get("process_noise") if process is None else process
         if found is None:
             raise InputError(
@@ -348,7 +348,7 @@ class KinematicModel:
                 f"method {self.method!r} gives no covariance that holds for noise in the"
                 " regressors: fit by FilterError(SimulatedFlight(...))"
             )
-        self._require_plain("a set of models")
+        self.structure.require_plain("a set of models")
         block, ellipsoid = self.realization.uncertain_part(
             self.parameters,
             outputs,
@@ -415,14 +415,6 @@ class KinematicModel:
         from identification.model import saved_kinematic_model
 
         return saved_kinematic_model.save_mat(self, path)
-
-    def _require_plain(self, what: str) -> None:
-        """Raises `InputError` for a model with actuators or a rotor's speed."""
-        if self.structure.actuators is not None or self.drive is not None:
-            raise InputError(
-                f"{what} takes a model from deflections, without actuators or rotor_speed: fit one"
-                " from the deflections, or take .at(p) or .to_state_space()"
-            )
 
     def _along(self, record: FlightRecord) -> Run:
         prepared = self.structure.aerodynamics.prepared(record)

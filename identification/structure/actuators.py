@@ -286,7 +286,7 @@ def _response(system: System, i: int, u: Array) -> Array:
     if not len(system[0]):
         return system[3][0, i] * u
     numerator, denominator = ss2tf(*system, input=i)
-    return lfilter(numerator[0], denominator, u)
+    return np.asarray(lfilter(numerator[0], denominator, u))
 
 
 def _held(A: Array, B: Array, C: Array, D: Array, time: float) -> System:

@@ -368,6 +368,16 @@ class KinematicARX:
             return None
         return self._regression((_change(self.rotor_speed),))
 
+    def require_plain(self, what: str) -> None:
+        """Raises `InputError` with `what` needs it, unless the regression takes the signals of a
+        record as they are: no actuators, rotor speed, wind or late sensors.
+        """
+        if self.aerodynamics.parts or self.rotor_speed is not None:
+            raise InputError(
+                f"{what} takes a KinematicARX without actuators, rotor_speed, wind or sensors: fit"
+                " one to a record of deflections in still air, or take .at(p) or .to_state_space()"
+            )
+
     @property
     def parameters(self) -> tuple[str, ...]:
         """Names of the scheduling parameters, also where there is one."""
