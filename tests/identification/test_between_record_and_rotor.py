@@ -157,7 +157,7 @@ def test_in_a_known_wind_the_coefficients_are_exact(vehicle):
     np.testing.assert_allclose(ahead[5:], records[0].columns(STATES)[5:], atol=1e-5)
 
 
-@pytest.mark.slow(but="delay")
+@pytest.mark.slow
 @pytest.mark.parametrize("part", ["delay", "wind", "sensors"])
 def test_what_is_not_known_is_found_beside_the_coefficients(vehicle, part):
     """Five of the standard deviations that are handed out, which leave out what of the
