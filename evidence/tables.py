@@ -7,6 +7,7 @@ from __future__ import annotations
 import argparse
 import os
 import re
+import shlex
 import sys
 import time
 from collections.abc import Iterable, Sequence
@@ -62,7 +63,7 @@ def own_command() -> str:
         if specification
         else f"{Path(sys.argv[0]).parent.name}/{Path(sys.argv[0]).name}"
     )
-    typed = " ".join(["python", script, *sys.argv[1:]])
+    typed = f"python {script} {shlex.join(sys.argv[1:])}".strip()
     return re.sub(r" --(out|processes)[ =]\S+", "", typed)
 
 

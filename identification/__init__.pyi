@@ -11,7 +11,6 @@ from identification.design.experiment_design import (
 from identification.design.experiment_design import (
     compare_experiments as compare_experiments,
 )
-from identification.estimators.actuators import Actuators as Actuators
 from identification.estimators.calibration import calibrate as calibrate
 from identification.estimators.estimate import fit as fit
 from identification.estimators.filter_error import FilterError as FilterError
@@ -100,8 +99,11 @@ from identification.recursive.recursive_least_squares import (
     RecursiveLeastSquares as RecursiveLeastSquares,
 )
 from identification.recursive.rigid_body_online import RigidBodyOnline as RigidBodyOnline
+from identification.structure.actuators import Actuators as Actuators
 from identification.structure.kinematic_arx import KinematicARX as KinematicARX
+from identification.structure.late_sensors import LateSensors as LateSensors
 from identification.structure.lpvarx import LPVARX as LPVARX
+from identification.structure.steady_wind import SteadyWind as SteadyWind
 from symheli.lpv import (
     BSpline as BSpline,
 )

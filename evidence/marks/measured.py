@@ -28,7 +28,6 @@ from studies.transition.flights import (
     autopilot_for,
 )
 from symheli import Dryden, FlightRecord, Helicopter, Wind
-from symheli.flight import XCELL_SERVOS, gain_scheduled_lqr
 from symheli.values.arrays import Array
 
 STATIC_SPEEDS = (0.0, 1.0, 2.0, 4.0, 7.0, 10.0, 13.0)
@@ -59,7 +58,6 @@ class Setting:
 
     truth: str = "xcell60"
     simulator: str = PAIRS["xcell60"]
-    servos: bool = False
     turbulent: bool = False
 
     def air(self, seed: int) -> Wind | None:
@@ -68,32 +66,23 @@ class Setting:
             return None
         return Wind(BREEZE, turbulence=Dryden(BREEZE_AT_20FT, ABOVE_GROUND), seed=seed)
 
-    @property
-    def governor(self) -> str:
-        """With servos the rotor speed is not held for free either."""
-        return "pi" if self.servos else "ideal"
-
     def helicopters(self) -> tuple[Helicopter, Helicopter]:
         """Truth and simulator."""
         return (
-            Helicopter.load(self.truth, governor=self.governor),  # type: ignore[arg-type]
-            Helicopter.load(self.simulator, governor=self.governor),  # type: ignore[arg-type]
+            Helicopter.load(self.truth, governor="ideal"),
+            Helicopter.load(self.simulator, governor="ideal"),
         )
 
 
 def of_seed(setting: Setting, seed: int) -> Marks:
     """Fly, identify, judge."""
     heli, simulator = setting.helicopters()
-    autopilot = (
-        gain_scheduled_lqr(heli, 0.0, TOP, 0.02, servos=XCELL_SERVOS)
-        if setting.servos
-        else autopilot_for(heli)
-    )
-    plan = aggressive(seed, autopilot, servos=setting.servos, wind=setting.air(seed))
+    autopilot = autopilot_for(heli)
+    plan = aggressive(seed, autopilot, wind=setting.air(seed))
     training = symheli.fly(heli, plan)
-    model = identified(training, simulator, setting.servos, setting.turbulent)
-    test = symheli.fly(heli, transition(seed, autopilot, servos=setting.servos))
-    truth = Truth.of(heli, setting.servos)
+    model = identified(training, simulator, setting.turbulent)
+    test = symheli.fly(heli, transition(seed, autopilot))
+    truth = Truth.of(heli)
     models = frozen_axes(model, truth)
     beside = truth.compare(models)
     gaps = {name: one["model"].gap for name, one in beside.items()}
@@ -102,9 +91,7 @@ def of_seed(setting: Setting, seed: int) -> Marks:
         seed=seed,
         gaps={name: (float(g.max()), float(SPEEDS[g.argmax()])) for name, g in gaps.items()},
         stability=beside["all axes"].otherwise_stable("model"),
-        static=(
-            {} if setting.servos else {v: truth.static_ratio(models, v) for v in STATIC_SPEEDS}
-        ),
+        static={v: truth.static_ratio(models, v) for v in STATIC_SPEEDS},
         ahead=fits_of(clean, model.predict(test, HORIZON)),
         baseline=fits_of(clean, baseline_of(heli, test)),
         measured=fits_of(test.columns(OUTPUTS), model.predict(test, HORIZON)),
@@ -133,7 +120,7 @@ def table(setting: Setting, marks: Sequence[Marks], simulator_gaps: dict[str, fl
     ]
     limits = (
         dict.fromkeys(marks[0].gaps, 0.15)
-        if setting.servos or setting.turbulent
+        if setting.turbulent
         else {"lateral": 0.05, "longitudinal": 0.05, "all axes": 0.10}
     )
     for axis in marks[0].gaps:
@@ -178,7 +165,7 @@ def _row(name: str, mark: float, values: Array, marks: Sequence[Marks], worst: f
 def simulators_gaps(setting: Setting) -> dict[str, float]:
     """The worst nu-gap over airspeed of the simulator itself, by set of axes."""
     heli, simulator = setting.helicopters()
-    own = Truth.of(heli, setting.servos).compare(Truth.of(simulator, setting.servos).models)
+    own = Truth.of(heli).compare(Truth.of(simulator).models)
     return {name: float(one["model"].gap.max()) for name, one in own.items()}
 
 
@@ -187,13 +174,11 @@ def main() -> None:
     parser = parser_of(__doc__, "0-20")
     parser.add_argument("--truth", default="xcell60", choices=sorted(PAIRS))
     parser.add_argument("--simulator", help="default: the other vehicle")
-    parser.add_argument("--servos", action="store_true", help="servos, 20 ms delay, governor pi")
     parser.add_argument("--turbulent", action="store_true", help="breeze and light turbulence")
     options = parsed(parser, "identified.md", timed=False)
     setting = Setting(
         options.truth,
         options.simulator or PAIRS[options.truth],
-        options.servos,
         options.turbulent,
     )
     calls = [partial(of_seed, setting, s) for s in seeds_of(options)]
@@ -201,9 +186,7 @@ def main() -> None:
     text = table(setting, marks, simulators_gaps(setting))
     print(as_json(_plain(marks)) if options.json else text)
     if options.write:
-        section = setting.truth + (
-            " with servos" if setting.servos else " in turbulence" if setting.turbulent else ""
-        )
+        section = setting.truth + (" in turbulence" if setting.turbulent else "")
         keep(DOCS / "identified.md", section, text)
 
 

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby
 from pathlib import Path
 
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from identification.estimators.actuators import CONTROLS, Actuators
+from identification.structure.actuators import CONTROLS, SETTLING, Actuators, pieces
 from symheli import Helicopter, trim
 from symheli.airframe.written import as_toml
 from symheli.errors import (
@@ -70,9 +69,6 @@ TINY = 1e-24
 
 DRAWS_TRIED = 50
 """Number of draws tried for each that is asked."""
-
-SETTLING = 0.5
-"""Time that servos need to forget where a record began, s."""
 
 WHITE = 0.3
 """Correlation of residuals from sample to sample above which the model leaves something out."""
@@ -408,6 +404,8 @@ def _outputs(
 ) -> tuple[str, ...]:
     if not flights:
         raise InputError("no flights: give at least one FlightRecord")
+    if actuators is not None:
+        actuators.require(CONTROLS)
     able = [str(s) for s in heli.states if s in ("u", "v", "w", "p", "q", "r", "phi", "theta")]
     if heli.governor == "pi":
         able.append("Om")
@@ -496,7 +494,10 @@ class _Search:
         if self.actuators is None:
             return self.commands
         point = self.actuators.point(theta[self.k :].tolist())
-        return [self.actuators.deflections(c, self.dt, **point) for c in self.commands]
+        return [
+            self.actuators.deflections(c, self.dt, controls=CONTROLS, **point)
+            for c in self.commands
+        ]
 
     def input_changes(self, theta: Array) -> list[Array]:
         """Derivative (n, 4, unknown) of the deflections of every piece: they are smooth in both."""
@@ -532,7 +533,7 @@ class _Search:
         for record in flights:
             y = record.columns(self.outputs)
             u = record.columns(_inputs(record, self.actuators))
-            for piece in _pieces(record, u):
+            for piece in pieces(record, u):
                 self.commands.append(self._followed(u[piece.start : piece.stop]))
                 for first in range(piece.start + settled, piece.stop - samples, samples):
                     part = y[first : first + samples + 1]
@@ -551,7 +552,7 @@ class _Search:
 
     def _followed(self, commands: Array) -> Array:
         """Commands as servos follow them: limited, quantised, no faster than they are."""
-        if self.actuators is None:
+        if self.actuators is None or self.actuators.servos is None:
             return commands
         bank = ServoBank(self.actuators.servos, CONTROLS, self.heli.travel, self.dt)
         return bank.follow(commands)
@@ -695,15 +696,7 @@ class _Search:
         """Value and standard deviation of what is estimated of the actuators."""
         if self.actuators is None:
             return {}
-        point = self.actuators.point(theta[self.k :].tolist())
-        own = {
-            "bandwidth": self.actuators.bandwidth_deviation * point["bandwidth"],
-            "delay": self.actuators.delay_deviation,
-        }
-        return {
-            name: (point[name], own[name] * float(deviations[self.k + i]))
-            for i, name in enumerate(self.actuators.unknown)
-        }
+        return self.actuators.found(theta[self.k :].tolist(), deviations[self.k :].tolist())
 
     def result(self, theta: Array, window: float, steps: int, converged: bool) -> Calibration:
         """The calibrated helicopter and its uncertainty."""
@@ -739,16 +732,6 @@ class _Search:
             steps=steps,
             converged=converged,
         )
-
-
-def _pieces(record: FlightRecord, u: Array) -> Iterator[range]:
-    """Pieces of a record without a gap in time or in the inputs."""
-    whole_rows: list[bool] = np.isfinite(u).all(axis=1).tolist()  # type: ignore[assignment]
-    for part in record.segments():
-        for known, group in groupby(range(part.start, part.stop), key=lambda k: whole_rows[k]):
-            rows = list(group)
-            if known:
-                yield range(rows[0], rows[-1] + 1)
 
 
 def _from_euler(x: Array) -> Array:

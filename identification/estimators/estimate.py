@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import overload
 
 from identification.design.excitation import excitation_of
 from identification.design.leakage import warn_of_leakage
 from identification.estimators import (  # noqa: F401  known by their shorthand once loaded
-    filter_error,
     instrumental_variables,
     lasso,
     output_error,
@@ -17,6 +17,7 @@ from identification.estimators import (  # noqa: F401  known by their shorthand 
     refined_instruments,
     ridge,
 )
+from identification.estimators.filter_error import FilterError
 from identification.estimators.least_squares import residual_covariance
 from identification.estimators.method import Method, method_of
 from identification.model.kinematic_fit import mean_trim
@@ -25,6 +26,7 @@ from identification.model.lpvarx_model import LPVARXModel
 from identification.structure.kinematic_arx import KinematicARX
 from identification.structure.lpvarx import LPVARX, require_structure
 from identification.structure.regressors import as_records, stacked, units_of
+from symheli.errors import InputError
 from symheli.records import FlightRecord
 
 
@@ -97,8 +99,8 @@ def fit(
     UnknownNameError
         A signal the records lack, or an unknown shorthand.
     InputError
-        The scheduling parameter leaves the range of the basis, or records differ in sample period
-        or units.
+        The scheduling parameter leaves the range of the basis, records differ in sample period or
+        units, or a delay or a bandwidth is to be estimated by another method than `FilterError`.
     AccuracyError
         A residual of "ls" or "rls" is not orthogonal to every regressor.
 
@@ -124,13 +126,36 @@ def fit(
     [[[-0.5]]]
     """
     if isinstance(structure, KinematicARX):
-        records = as_records(records)
-        return KinematicModel(
-            structure=structure,
-            aerodynamics=_fitted(structure.aerodynamics, records, method),
-            trim=mean_trim(structure, records),
-        )
+        return _rigid(structure, as_records(records), method_of(method))
     return _fitted(structure, records, method)
+
+
+def _rigid(
+    structure: KinematicARX, records: tuple[FlightRecord, ...], method: Method
+) -> KinematicModel:
+    """The model of a rigid vehicle; with its parts (actuators, wind, sensors) as they
+    were found. The
+    equation of a rotor's speed is fitted by least squares: a governed speed is measured well.
+    """
+    parts = structure.aerodynamics.parts
+    unknown = [f"{n} of the {name}" for name, part in parts.items() for n in part.unknown]
+    if unknown and not isinstance(method, FilterError):
+        raise InputError(
+            f"{', '.join(unknown)}: estimated by FilterError(...) only; give deviations of 0 for"
+            f" method {method.shorthand!r}"
+        )
+    aerodynamics = _fitted(structure.aerodynamics, records, method)
+    if unknown:
+        known = {n: p.settled(aerodynamics.details.get(n, {})) for n, p in parts.items()}
+        structure = replace(structure, **known)
+        aerodynamics = replace(aerodynamics, structure=structure.aerodynamics)
+    drive = structure.drive
+    return KinematicModel(
+        structure=structure,
+        aerodynamics=aerodynamics,
+        trim=mean_trim(structure, records),
+        drive=None if drive is None else _fitted(drive, records, "ls"),
+    )
 
 
 def _fitted(

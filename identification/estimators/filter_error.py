@@ -4,11 +4,12 @@ smoothing.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.linalg import cho_factor, cho_solve
 from scipy.signal import lfilter
 
@@ -20,8 +21,8 @@ from identification.estimators.method import Estimate, Method, not_settled
 from identification.estimators.newey_west import long_run_covariance
 from identification.structure.kinematic_arx import STATES, Aerodynamics, increments
 from identification.structure.lpvarx import LPVARX
-from identification.structure.regressors import Regression, Samples, regressor_rows
-from symheli.errors import InputError, UnknownNameError
+from identification.structure.regressors import Regression, Samples, regressor_rows, stacked
+from symheli.errors import DataWarning, InputError, UnknownNameError
 from symheli.progress import tracked
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
@@ -47,6 +48,18 @@ correlated.
 
 LAGS = 25
 """Number of samples over which scores are taken to be correlated."""
+
+SLOWER = 4
+"""Factor of the number of steps where a delay or a wind is sought too: they start far off."""
+
+DIFFERENCE = 1e-3
+"""Step of central differences by an unknown of actuators or wind, in its prior deviation."""
+
+WIND_TOLD = 0.5
+"""Largest standard deviation of a wind that counts as told by the flights, m/s."""
+
+FARTHEST = 4.0
+"""Largest move of late sensors, in their prior deviation."""
 
 CHUNK = 256
 """Number of samples whitened at a time."""
@@ -151,8 +164,24 @@ class FilterError(Method):
                 "the filter error method needs known kinematics: fit a KinematicARX, or choose"
                 " another method for an LPVARX"
             )
-        theta, _ = instrumental_variables(arx, records, data, self.simulator)
-        left = self.misfit * self._unexplained(arx, records)
+        found, z = self._from(arx, records, data, np.zeros(arx.unknown))
+        if any(part.unknown for part in (arx.wind, arx.sensors) if part):  # they moved the start
+            found, _ = self._from(arx, records, data, z)
+        return found
+
+    def _from(
+        self, arx: Aerodynamics, records: Sequence[FlightRecord], data: Regression, z: Array
+    ) -> tuple[Estimate, Array]:
+        """Estimate from a start by instruments with the unknowns of actuators and wind at `z`;
+        these too.
+        """
+        unknown, there, moved = arx.unknown, arx, records
+        if z.any():
+            there = arx.moved(z.tolist())
+            moved = [there.again(record, arx) for record in records]
+            data = stacked(there, moved)
+        theta, _ = instrumental_variables(there, moved, data, self.simulator)
+        left = self.misfit * self._unexplained(there, moved)
         air = self.gust**2, float(np.exp(-records[0].dt / self.gust_time))
         flights = []
         for record, R in zip(records, self._variances(records), strict=True):
@@ -160,26 +189,31 @@ class FilterError(Method):
             flights += [(Stretch.of(arx, record, part), noise) for part in unbroken(arx, record)]
         weights = [len(s.y) for s, _ in flights]
         R = np.average([noise.R for _, noise in flights], axis=0, weights=weights)
-        count, settled = 0, False
-        for _ in tracked("filter error", range(self.steps)):
+        count, settled, n = 0, False, arx.n_regressors
+        prior = np.append(np.zeros(6 * n), np.ones(unknown))
+        steps = self.steps * (SLOWER if unknown else 1)
+        for _ in tracked("filter error", range(steps)):
             count += 1
+            for s, _ in flights:
+                s.follow(z)
             parts = [s.normal(theta, noise) for s, noise in flights]
             normal, right = map(sum, zip(*parts, strict=True))
-            step, inverse = _solved(normal, right)  # type: ignore[arg-type]
-            change = step.reshape(6, -1).T
+            right[6 * n :] -= z  # type: ignore[index]
+            step, inverse = _solved(normal + np.diag(prior), right)  # type: ignore[arg-type]
+            change, later = step[: 6 * n].reshape(6, -1).T, step[6 * n :]
             for s, noise in flights:
-                s.smooth(theta, change, noise)
-            theta = theta + change
+                s.smooth(theta, change, later, noise)
+            theta, z = theta + change, z + later
             spread = np.sqrt(np.diag(inverse))
             settled = bool(np.all(np.abs(step) < 0.1 * spread))
             if settled:
                 break
-        scores = sum(s.scores(theta, noise) for s, noise in flights)
+        scores = sum(s.scores(theta, noise) for s, noise in flights) + np.diag(prior)
         covariance = inverse @ scores @ inverse  # type: ignore[operator]
         covariance = 0.5 * (covariance + covariance.T)
-        n = arx.n_regressors
+        deviations = np.sqrt(np.diag(covariance)[6 * n :])
         residual = np.average([s.residual(theta) for s, _ in flights], axis=0, weights=weights)
-        return Estimate(
+        estimate = Estimate(
             theta=theta,
             details={
                 "steps": count,
@@ -191,13 +225,20 @@ class FilterError(Method):
                 "equation_variances": Noise.of(R, left, *air).Q.tolist(),
                 "gust": self.gust,
                 "gust_remains": air[1],
-            },
-            remarks=()
-            if settled or self.steps == 1
-            else (not_settled(self, "excite more, or lower the degree of the basis"),),
+            }
+            | arx.found(z.tolist(), deviations.tolist()),
+            remarks=(
+                *_unknown_wind(arx.found(z.tolist(), deviations.tolist()).get("wind", {})),
+                *(
+                    ()
+                    if settled or steps == 1
+                    else (not_settled(self, "excite more, or lower the degree of the basis"),)
+                ),
+            ),
             residual_covariance=residual,
-            covariance=covariance.reshape(6, n, 6, n),
+            covariance=covariance[: 6 * n, : 6 * n].reshape(6, n, 6, n),
         )
+        return estimate, z
 
     def _variances(self, records: Sequence[FlightRecord]) -> list[Array]:
         """Return the variances of the sensors (8,) in each record; where one is too short, those of
@@ -218,7 +259,7 @@ class FilterError(Method):
         phi, y = [], []
         for record in records:
             rows = flown_rows(arx, record, self.simulator)
-            left = arx.prepared(self.simulator.flown(record)).columns(arx.outputs)
+            left = arx.simulated.prepared(self.simulator.flown(record)).columns(arx.outputs)
             known = np.isfinite(rows).all(axis=1) & np.isfinite(left).all(axis=1)
             phi.append(rows[known])
             y.append(left[known])
@@ -286,7 +327,15 @@ def unbroken(arx: Aerodynamics, record: FlightRecord) -> list[slice]:
         edges = np.flatnonzero(np.diff(np.concatenate([[0], inside, [0]])))
         pairs = zip(edges[::2], edges[1::2], strict=True)
         out += [slice(part.start + int(a), part.start + int(b)) for a, b in pairs]
+    edge = _edge(arx, record.dt)
+    out = [slice(s.start + edge, s.stop - edge) for s in out]
     return [s for s in out if s.stop - s.start > 2 * arx.memory + 1]
+
+
+def _edge(arx: Aerodynamics, dt: float) -> int:
+    """Number of samples at both ends of a stretch that late sensors may move beyond it."""
+    late = arx.sensors
+    return 0 if late is None else int(np.ceil((abs(late.delay) + FARTHEST * late.deviation) / dt))
 
 
 class Noise(NamedTuple):
@@ -306,49 +355,112 @@ class Noise(NamedTuple):
 
 
 class Linearized(NamedTuple):
-    """The equations at the smoothed states: regressors F (m, n), what is left (m, 8), how it
-    answers errors of y(k-i), L_i (m, 8, 8), and of the gust, H (m, 8, 3), and the whitening of it
-    all.
+    """The equations at the smoothed states: regressors F (m, n) of the coefficients and D (m, 8, a)
+    of the unknowns of actuators, wind and sensors, what is left (m, 8), how it answers errors of
+    y(k-i), L_i (m, 8, 8), and of the gust, H (m, 8, 3), and the whitening of it all.
     """
 
     F: Array
+    D: Array
     left: Array
     L: list[Array]
     H: Array
     white: Whitening
 
 
+class Signals(NamedTuple):
+    """What acts on a stretch besides its states: inputs behind the velocities u (n, nu - 6), wind
+    in the axes of the body (n, 3), p, the basis f (n, size), and how far ahead each state is read
+    (8,), s.
+    """
+
+    u: Array
+    air: Array
+    p: Array
+    f: Array
+    ahead: Array
+
+    @classmethod
+    def of(cls, arx: Aerodynamics, record: FlightRecord, part: slice) -> Signals:
+        """Of the samples of `part` of a record."""
+        late = arx.sensors
+        ahead = np.array([late.delay if late and name in late.signals else 0.0 for name in STATES])
+        s, first = Samples.of(arx, record), len(VELOCITIES)
+        air = record.columns(STATES)[part, :3] - s.u[part, :3]
+        return cls(s.u[part, first:], air, s.p[part], s.f[part], ahead)
+
+
 @dataclass(eq=False)
 class Stretch:
     """Measured samples y (n, 8) without a gap, and the states `x` (n, 8) and the gust (n, 3)
-    smoothed so far.
+    smoothed so far; the other signals `now`, and to both `sides` of each unknown of actuators and
+    wind.
     """
 
     arx: Aerodynamics
+    record: FlightRecord
+    part: slice
     y: Array
-    u: Array
-    p: Array
-    f: Array
     dt: float
     x: Array
     gust: Array
+    now: Signals
+    sides: list[tuple[Signals, Signals]]
 
     @classmethod
     def of(cls, arx: Aerodynamics, record: FlightRecord, part: slice) -> Stretch:
         """The samples of `part` of a record."""
-        s = Samples.of(arx, record)
         y = record.columns(STATES)[part]
-        still = np.zeros((len(y), 3))
-        return cls(arx, y, s.u[part], s.p[part], s.f[part], record.dt, y.copy(), still)
+        now = Signals.of(arx, record, part)
+        return cls(arx, record, part, y, record.dt, y.copy(), np.zeros((len(y), 3)), now, [])
+
+    def follow(self, z: Array) -> None:
+        """Let what is measured, and what acts, be that of the unknowns at `z`, in their prior
+        deviations.
+        """
+        if not len(z):
+            return
+        before = self.now.ahead
+        self.now, self.y = self._at(z)
+        self.x = _ahead(self.x, self.now.ahead - before, self.dt)
+        steps = DIFFERENCE * np.eye(len(z))
+        self.sides = [(self._at(z + step)[0], self._at(z - step)[0]) for step in steps]
+
+    def _at(self, z: Array) -> tuple[Signals, Array]:
+        """What acts, and the measured states (n, 8), with the unknowns at `z`."""
+        there = self.arx.moved(z.tolist())
+        record = there.again(self.record, self.arx)
+        return Signals.of(there, record, self.part), record.columns(STATES)[self.part]
+
+    def _rows(self, signals: Signals, x: Array) -> Array:
+        """Regressors (m, n) at states x (n, 8)."""
+        z = x[:, :6].copy()
+        z[:, :3] -= signals.air
+        u = np.hstack([z, signals.u])
+        return regressor_rows(self.arx, z, u, signals.p, signals.f)
 
     def _equations(self, theta: Array) -> tuple[Array, Array]:
         """Regressors (m, n) at the smoothed states, and what they leave (m, 8)."""
-        u = self.u.copy()
-        u[:, :6] = self.x[:, :6]
-        F = regressor_rows(self.arx, self.x[:, :6], u, self.p, self.f)
-        left = increments(self.x, self.dt)[self.arx.memory :]
+        F = self._rows(self.now, self.x)
+        return F, self._left(F, self.x, theta)
+
+    def _left(self, F: Array, x: Array, theta: Array) -> Array:
+        """What regressors leave (m, 8) of the increments of states x."""
+        left = increments(x, self.dt)[self.arx.memory :]
         left[:, :6] -= F @ theta
-        return F, left
+        return left
+
+    def _by_unknowns(self, theta: Array) -> Array:
+        """D (m, 8, a): what the equations lose by each unknown of actuators, wind and sensors."""
+        out = np.zeros((len(self.y) - self.arx.memory, 8, len(self.sides)))
+        rate = np.gradient(self.x, self.dt, axis=0)
+        for i, (above, below) in enumerate(self.sides):
+            sides = []
+            for side in (above, below):
+                x = self.x + (side.ahead - self.now.ahead) * rate
+                sides.append(self._left(self._rows(side, x), x, theta))
+            out[:, :, i] = (sides[1] - sides[0]) / (2 * DIFFERENCE)
+        return out
 
     def _sensitivity(self, theta: Array) -> list[Array]:
         """L_i (m, 8, 8): how the error of the equations at k answers an error of y(k-i)."""
@@ -360,7 +472,7 @@ class Stretch:
         half = 0.5 * self.dt
         L[0] += np.eye(8) - half * J[first:]
         L[1] -= np.eye(8) + half * J[first - 1 : -1]
-        f = self.f[first:]
+        f = self.now.f[first:]
         for row, e in entries:
             if e.channel < 6:
                 L[e.lag][:, :6, e.channel] -= f @ theta[row * size : (row + 1) * size]
@@ -371,6 +483,7 @@ class Stretch:
         in that is white.
         """
         F, left = self._equations(theta)
+        D = self._by_unknowns(theta)
         L, first, n = self._sensitivity(theta), self.arx.memory, len(self.y)
         apart = self.y - self.x
         for i, block in enumerate(L):
@@ -378,7 +491,7 @@ class Stretch:
         own = [np.broadcast_to(np.eye(8), L[0].shape)]
         H = np.zeros((len(F), 8, 3))
         if noise.gust:
-            a, size, f = noise.remains, self.arx.basis.size, self.f[first:]
+            a, size, f = noise.remains, self.arx.basis.size, self.now.f[first:]
             for row, e in enumerate(self.arx.entries):
                 if e.kind == "input" and e.channel < 3 and e.lag == 1:
                     H[:, :6, e.channel] -= f @ theta[row * size : (row + 1) * size]
@@ -387,50 +500,40 @@ class Stretch:
                 now[1:] - a * before[:-1]
                 for now, before in zip([*L, none], [none, *L], strict=True)
             ]
-            F, left, H = F[1:] - a * F[:-1], left[1:] - a * left[:-1], H[1:]
+            F, D = F[1:] - a * F[:-1], D[1:] - a * D[:-1]
+            left, H = left[1:] - a * left[:-1], H[1:]
             own = [own[0][1:], -a * own[0][1:]]
         terms: list[tuple[list[Array], Array]] = [(L, noise.R), (own, noise.Q)]
         if noise.gust:
             terms.append(([H], np.full(3, noise.gust * (1 - noise.remains**2))))
-        return Linearized(F, left, L, H, Whitening.of(terms))
+        return Linearized(F, D, left, L, H, Whitening.of(terms))
 
     def whitened(self, theta: Array, noise: Noise) -> Array:
         """Return the residuals (m, 8) of the equations, white and of variance 1 if `noise` is their
         only cause.
         """
-        _, left, _, _, white = self._linearized(theta, noise)
+        _, _, left, _, _, white = self._linearized(theta, noise)
         return white.whitened(left)
 
     def normal(self, theta: Array, noise: Noise) -> tuple[Array, Array]:
-        """X' X and X' e of the whitened regressors X (.., 6 n), equation by equation."""
-        F, left, _, _, white = self._linearized(theta, noise)
-        size = 6 * F.shape[1] + 1
+        """X' X and X' e of the whitened regressors X (.., 6 n + a), equation by equation, those of
+        the unknowns last.
+        """
+        found = self._linearized(theta, noise)
+        size = 6 * found.F.shape[1] + found.D.shape[2] + 1
         whole = np.zeros((size, size))
-        for rows in self._whitened(F, left, white):
+        for rows in _whitened(found):
             flat = rows.reshape(-1, size)
             whole += flat.T @ flat
         return whole[:-1, :-1], whole[:-1, -1]
 
-    def _whitened(self, F: Array, left: Array, white: Whitening) -> Any:
-        """Chunks (k, 8, 6 n + 1) of G^-1 [I6 (x) F, left]."""
-        (m, n), before = F.shape, []
-        for start in range(0, m, CHUNK):
-            stop = min(start + CHUNK, m)
-            out = np.empty((stop - start, 8, 6 * n + 1))
-            for k in range(start, stop):
-                new = out[k - start]
-                diagonal = white.steps[0][k]
-                np.multiply(diagonal[:, :6, None], F[k], out=new[:, :-1].reshape(8, 6, n))
-                new[:, -1] = diagonal @ left[k]
-                for step, past in zip(white.steps[1:], before, strict=False):
-                    new -= step[k] @ past
-                before = [new, *before[: len(white.steps) - 2]]
-            yield out
-
-    def smooth(self, theta: Array, change: Array, noise: Noise) -> None:
-        """Adjust the states, and the gust, to fit the equations best with theta + `change`."""
-        F, left, L, H, white = self._linearized(theta, noise)
+    def smooth(self, theta: Array, change: Array, later: Array, noise: Noise) -> None:
+        """Adjust the states, and the gust, to fit the equations best with theta + `change`, and
+        the unknowns moved by `later`.
+        """
+        F, D, left, L, H, white = self._linearized(theta, noise)
         left[:, :6] -= F @ change
+        left -= D @ later
         pull = white.adjoint(white.whitened(left))
         moved, n = np.zeros_like(self.y), len(self.y)
         first = n - len(F)
@@ -442,19 +545,64 @@ class Stretch:
             self.gust[first - 1 : -1] = lfilter([1.0], [1.0, -noise.remains], drive, axis=0)
 
     def scores(self, theta: Array, noise: Noise) -> Array:
-        """Covariance (6 n, 6 n) of X' e, e correlated over `LAGS` samples (Newey and West)."""
-        F, left, _, _, white = self._linearized(theta, noise)
+        """Covariance (6 n + a, 6 n + a) of X' e, e correlated over `LAGS` samples (Newey and
+        West).
+        """
         parts = (
             np.einsum("kij,ki->kj", rows[:, :, :-1], rows[:, :, -1])
-            for rows in self._whitened(F, left, white)
+            for rows in _whitened(self._linearized(theta, noise))
         )
         return long_run_covariance(parts, LAGS)
 
     def residual(self, theta: Array) -> Array:
         """Covariance (6, 6) of what one step leaves, measured to measured."""
-        F = regressor_rows(self.arx, self.y[:, :6], self.u, self.p, self.f)
+        u = np.hstack([self.y[:, :6], self.now.u])
+        u[:, :3] -= self.now.air
+        F = regressor_rows(self.arx, u, u, self.now.p, self.now.f)
         e = increments(self.y, self.dt)[self.arx.memory :, :6] - F @ theta
         return e.T @ e / max(len(e) - F.shape[1], 1)
+
+
+def _unknown_wind(wind: Mapping[str, tuple[float, float]]) -> tuple[Warning, ...]:
+    """The remark on a wind that the flights do not tell."""
+    wide = [f"{name} {value:.1f} +- {size:.1f}" for name, (value, size) in wind.items()]
+    if all(size <= WIND_TOLD for _, size in wind.values()):
+        return ()
+    return (
+        DataWarning(
+            f"the flights do not tell the wind (m/s: {', '.join(wide)}), and with it not at which"
+            " airspeed a coefficient holds: fly a second heading, or measure the airspeed"
+        ),
+    )
+
+
+def _ahead(x: Array, by: Array, dt: float) -> Array:
+    """Return states (n, 8) as they are later, each `by` (8,) seconds, held at the ends."""
+    if not by.any():
+        return x
+    time = dt * np.arange(len(x))
+    later = [np.clip(time + late, time[0], time[-1]) for late in by]
+    return np.column_stack([CubicSpline(time, c)(at) for c, at in zip(x.T, later, strict=True)])
+
+
+def _whitened(found: Linearized) -> Iterator[Array]:
+    """Yield chunks (k, 8, 6 n + a + 1) of G^-1 [I6 (x) F, D, left]."""
+    F, D, left, _, _, white = found
+    (m, n), before = F.shape, []
+    for start in range(0, m, CHUNK):
+        stop = min(start + CHUNK, m)
+        out = np.empty((stop - start, 8, 6 * n + D.shape[2] + 1))
+        for k in range(start, stop):
+            new = out[k - start]
+            diagonal = white.steps[0][k]
+            coefficients = diagonal[:, :6, None] * F[k]
+            new[:, : 6 * n] = coefficients.reshape(8, -1)
+            new[:, 6 * n : -1] = diagonal @ D[k]
+            new[:, -1] = diagonal @ left[k]
+            for step, past in zip(white.steps[1:], before, strict=False):
+                new -= step[k] @ past
+            before = [new, *before[: len(white.steps) - 2]]
+        yield out
 
 
 def _solved(normal: Array, right: Array) -> tuple[Array, Array]:

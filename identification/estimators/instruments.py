@@ -213,7 +213,7 @@ def flown_rows(arx: LPVARX, record: FlightRecord, source: FlightSource) -> Array
             f"{source} flew other samples than those of the record: {len(flown)} from"
             f" {flown.time[0]:.6g} s, not {len(record)} from {record.time[0]:.6g} s"
         )
-    s, out = Samples.of(arx, flown), np.full((len(record), arx.n_regressors), np.nan)
+    s, out = Samples.of(arx.simulated, flown), np.full((len(record), arx.n_regressors), np.nan)
     for part in record.segments():
         if part.stop - part.start > arx.memory:
             out[part.start + arx.memory : part.stop] = regressor_rows(

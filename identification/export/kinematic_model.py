@@ -71,6 +71,7 @@ def write_kinematic_model(
     ['heli.h', 'heli.c', 'heli_check.c']
     >>> folder.cleanup()
     """
+    model.structure.require_plain("C code")
     program = CProgram(
         template=HERE / "kinematic_model",
         name=name,

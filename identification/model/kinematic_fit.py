@@ -27,6 +27,7 @@ def mean_trim(kin: KinematicARX, records: Sequence[FlightRecord]) -> Array:
     """
     aero, size = kin.aerodynamics, kin.basis.size
     rows, states, parameters = [], [], []
+    records = [aero.prepared(record) for record in records]
     for record in records:
         p = scheduling_values(aero, record).reshape(len(record), -1)
         f = basis_values(aero, p[:, 0] if p.shape[1] == 1 else p)

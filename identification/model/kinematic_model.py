@@ -9,12 +9,15 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from identification.model import kinematic_run
 from identification.model.kinematic_realization import Realization
 from identification.model.kinematic_run import Run
 from identification.model.lpvarx_model import LEAST_SQUARES, LPVARXModel
 from identification.model.prediction import named_fit, require_horizon
 from identification.model.realization import held_value
+from identification.structure.actuators import bare
 from identification.structure.kinematic_arx import MOVING, STATES, KinematicARX
 from symheli.errors import InputError
 from symheli.lpv import FunctionSpace, LinearModel, LPVStateSpace, UncertainStateSpace
@@ -45,6 +48,8 @@ class KinematicModel:
     trim : array (basis size, 8)
         u v w p q r phi theta at steady p, as functions of p: the mean of the records there. What
         the kinematics are linearized about in `at` and `to_state_space`, and nothing else.
+    drive : LPVARXModel, optional
+        The regression of the rotor's speed, where the structure has it.
 
     Raises
     ------
@@ -68,6 +73,7 @@ class KinematicModel:
     structure: KinematicARX
     aerodynamics: LPVARXModel
     trim: Array
+    drive: LPVARXModel | None = None
 
     __repr__ = summarized
     _repr_html_ = as_table
@@ -77,6 +83,8 @@ class KinematicModel:
         object.__setattr__(self, "trim", frozen(self.trim, "trim", (size, len(STATES))))
         if self.aerodynamics.structure != self.structure.aerodynamics:
             raise InputError("aerodynamics: another regression than that of the structure")
+        if (self.drive and self.drive.structure) != self.structure.drive:
+            raise InputError("drive: another regression than that of the structure")
 
     # --- what it is ------------------------------------------------------------------------------
 
@@ -87,12 +95,17 @@ class KinematicModel:
 
     @property
     def inputs(self) -> tuple[Signal, ...]:
-        """The controls."""
-        return self.aerodynamics.inputs[len(self.structure.aerodynamics.inputs) - self._nu :]
+        """The controls, or their commands where actuators follow them."""
+        return tuple(
+            Signal(name, behind.unit)
+            for name, behind in zip(self.structure.inputs, self._regressed, strict=True)
+        )
 
     @property
-    def _nu(self) -> int:
-        return len(self.structure.inputs)
+    def _regressed(self) -> tuple[Signal, ...]:
+        """The inputs of the regression: the controls, or the mean deflections behind actuators."""
+        first = len(MOVING)
+        return self.aerodynamics.inputs[first : first + len(self.structure.inputs)]
 
     @property
     def parameters(self) -> tuple[Signal, ...]:
@@ -155,6 +168,7 @@ class KinematicModel:
         the record's plan. From the first samples of each segment on nothing measured is used.
         Raises `InputError` for a record without references, or without a controller.
         """
+        self.structure.require_plain("a run in the recorded loop")
         return kinematic_run.closed_loop(
             self._along(record), self.structure.inputs, record, controller
         )
@@ -204,6 +218,7 @@ class KinematicModel:
         """
         from identification.recursive.kinematic_observer import KinematicObserver, deviations
 
+        self.structure.require_plain("an observer")
         found = self.details.get("process_noise") if process is None else process
         if found is None:
             raise InputError(
@@ -220,8 +235,17 @@ class KinematicModel:
 
     @cached_property
     def realization(self) -> Realization:
-        """The state-space form: states, matrices at any p."""
-        return Realization.of(self.structure, self.theta, self.trim, self.inputs, self.dt)
+        """The state-space form from deflections: states, matrices at any p."""
+        kin, rotor = self.structure, self.aerodynamics.inputs[len(MOVING) + len(self._regressed) :]
+        theta = np.hstack([self.theta, self.drive.theta]) if self.drive else self.theta
+        return Realization.of(kin, theta, self.trim, self.inputs, self.dt, rotor)
+
+    def _actuators(self, inputs: Sequence[str] | None) -> dict[str, LinearModel]:
+        """What stands before each of the inputs that stay."""
+        if self.structure.actuators is None:
+            return {}
+        kept = [u for u in self.inputs if inputs is None or u in inputs]
+        return self.structure.actuators.sampled({bare(u): u for u in kept}, self.dt)
 
     def at(
         self,
@@ -234,7 +258,8 @@ class KinematicModel:
 
         With `outputs` and `inputs` only these, as `to_state_space` keeps them.
         """
-        return self.realization.at(held_value(p), outputs, inputs)
+        model = self.realization.at(held_value(p), outputs, inputs)
+        return model.driven_by(parts) if (parts := self._actuators(inputs)) else model
 
     def to_state_space(
         self,
@@ -272,7 +297,8 @@ class KinematicModel:
         InputError
             A basis that is not polynomial, or nothing that moves.
         """
-        return self.realization.lpv(self.parameters, outputs, inputs, held or {}, degree)
+        model = self.realization.lpv(self.parameters, outputs, inputs, held or {}, degree)
+        return model.driven_by(parts) if (parts := self._actuators(inputs)) else model
 
     def uncertain(
         self,
@@ -322,6 +348,7 @@ class KinematicModel:
                 f"method {self.method!r} gives no covariance that holds for noise in the"
                 " regressors: fit by FilterError(SimulatedFlight(...))"
             )
+        self.structure.require_plain("a set of models")
         block, ellipsoid = self.realization.uncertain_part(
             self.parameters,
             outputs,

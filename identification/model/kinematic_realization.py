@@ -61,17 +61,28 @@ class Realization:
     memory: tuple[tuple[int, int], ...]
     """(column of z and u side by side, how many samples back) of each state after y(k)."""
     dt: float
+    rotor: tuple[Signal, ...] = ()
+    """The speed of a governed rotor and its integral: the last states."""
 
     @classmethod
     def of(
-        cls, kin: KinematicARX, theta: Array, trim: Array, inputs: tuple[Signal, ...], dt: float
+        cls,
+        kin: KinematicARX,
+        theta: Array,
+        trim: Array,
+        inputs: tuple[Signal, ...],
+        dt: float,
+        rotor: tuple[Signal, ...] = (),
     ) -> Realization:
-        """Return the realization of coefficients (n, 6) and the trim (basis size, 8)."""
+        """Return the realization of coefficients (n, 6), with a rotor (n, 7), and the trim (basis
+        size, 8).
+        """
         lags = [len(r) for r in kin.aerodynamics.input_lag_ranges[0]]
-        names = (*RIGID_BODY[: len(MOVING)], *inputs)
+        names = (*RIGID_BODY[: len(MOVING)], *inputs, *rotor)
         memory = tuple((c, back) for c, n in enumerate(lags) for back in range(1, n))
         remembered = tuple(Signal(f"{names[c]}_lag{b}", names[c].unit) for c, b in memory)
-        return cls(kin, theta, trim, (*RIGID_BODY, *remembered), inputs, memory, dt)
+        states = (*RIGID_BODY, *remembered, *rotor)
+        return cls(kin, theta, trim, states, inputs, memory, dt, rotor)
 
     def matrices(self, p: Array) -> Matrices:
         """Return the matrices at each p (K,) or (K, parameters)."""
@@ -105,23 +116,30 @@ class Realization:
                 X[row, ny + self.memory.index((e.channel, e.lag - 1))] = 1.0
             elif e.channel < nz:
                 X[row, e.channel] = 1.0
-            else:
+            elif e.channel < nz + len(self.inputs):
                 U[row, e.channel - nz] = 1.0
+            else:
+                X[row, e.channel - nz - len(self.inputs) - len(self.rotor)] = 1.0
         return X, U
 
     def _linear(self, p: Array) -> tuple[Array, Array]:
         X, U = self.regressor()
         ny, f = len(STATES), self.kin.basis(p)
-        blocks = self.theta.reshape(-1, f.shape[-1], len(MOVING))[: len(X)]
+        blocks = self.theta.reshape(-1, f.shape[-1], self.theta.shape[1])[: len(X)]
         C = np.einsum("kf,sfo->kos", f, blocks)
         solved = self.solved(p)
         half = 0.5 * self.dt * self._jacobian(p)
         nx, nu = X.shape[1], U.shape[1]
         A, B = np.zeros((len(f), nx, nx)), np.zeros((len(f), nx, nu))
         A[:, :ny, :ny] = np.linalg.solve(np.eye(ny) - half, np.eye(ny) + half)
-        A[:, :ny] += solved @ C @ X
-        B[:, :ny] = solved @ C @ U
         nz = len(MOVING)
+        A[:, :ny] += solved @ C[:, :nz] @ X
+        B[:, :ny] = solved @ C[:, :nz] @ U
+        if self.rotor:  # its integral by the trapezoidal rule
+            speed = np.eye(nx)[-2]
+            A[:, -2], B[:, -2] = speed + C[:, nz] @ X, C[:, nz] @ U
+            A[:, -1] = np.eye(nx)[-1] - 0.5 * self.dt * (speed + A[:, -2])
+            B[:, -1] = -0.5 * self.dt * B[:, -2]
         for row, (column, back) in enumerate(self.memory, start=ny):
             if back > 1:
                 A[:, row, ny + self.memory.index((column, back - 1))] = 1.0
@@ -158,6 +176,7 @@ class Realization:
         nz, ny = len(MOVING), len(STATES)
         stays = {c for c in y if c < nz} | {nz + i for i in u}
         x = y + [ny + i for i, (column, _) in enumerate(self.memory) if column in stays]
+        x += range(len(self.states) - len(self.rotor), len(self.states))
         return x, u, y
 
     def lpv(
@@ -277,6 +296,8 @@ class Realization:
                 out[part.start + back : part.stop, i] = signals[
                     part.start : max(part.stop - back, part.start), column
                 ]
+        if self.rotor:
+            out[:, -len(self.rotor) :] = u[:, -len(self.rotor) :]
         return out
 
 

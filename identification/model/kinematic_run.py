@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from identification.model.prediction import DIVERGED
-from identification.structure.kinematic_arx import STATES, KinematicARX
+from identification.structure.kinematic_arx import MOVING, STATES, KinematicARX
 from identification.structure.regressors import basis_values, scheduling_values
 from symheli.errors import InputError
 from symheli.records import FlightRecord
@@ -68,13 +68,22 @@ class Run:
             known = known + np.einsum(
                 "kd,kf,dfo->ko", moving, f, blocks[len(signals) + 1 :], optimize=True
             )
+        columns = np.array([e.channel for e in entries])
+        lags = np.array([e.lag for e in entries])
+        C = np.einsum("kf,sfo->kso", f, blocks[signals], optimize=True)
+        if kin.wind is not None:
+            first = aero.inputs[: len(MOVING)]
+            wind = record.columns(MOVING) - record.columns(first)
+            for s, (column, lag) in enumerate(zip(columns, lags, strict=True)):
+                if column < len(MOVING):
+                    known[lag:] -= C[lag:, s] * wind[:-lag, column, None]
         return cls(
             record.columns(STATES),
-            record.columns(kin.inputs),
-            np.einsum("kf,sfo->kso", f, blocks[signals], optimize=True),
+            record.columns(aero.inputs[len(MOVING) :]),
+            C,
             known,
-            np.array([e.lag for e in entries]),
-            np.array([e.channel for e in entries]),
+            lags,
+            columns,
             record.segments(),
             kin.memory,
             record.dt,

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import os
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from identification.model import model_file, saved_model
 from identification.model.kinematic_model import KinematicModel
+from identification.structure.actuators import Actuators
 from identification.structure.kinematic_arx import MOVING, KinematicARX
+from identification.structure.late_sensors import LateSensors
+from identification.structure.steady_wind import SteadyWind
+from symheli.flight import Servo
 from symheli.lpv import FunctionSpace
 from symheli.values import plain_file
 from symheli.values.kinematics import GRAVITY
@@ -28,11 +34,41 @@ def save(model: KinematicModel, path: str | os.PathLike[str]) -> Path:
         path,
         SCHEMA,
         {
-            "structure": saved_model.described_structure(model.structure),
+            "structure": _described(model.structure),
             **saved_model.described(model.aerodynamics),
             "trim": model.trim.tolist(),
+            "drive": None if model.drive is None else saved_model.described(model.drive),
         },
     )
+
+
+def _described(kin: KinematicARX) -> dict[str, Any]:
+    """The fields of a structure in plain values."""
+    plain = saved_model.described_structure(kin)
+    return plain | {name: part and _finite(asdict(part)) for name, part in _parts(plain)}
+
+
+def _finite(values: dict[str, Any]) -> dict[str, Any]:
+    """Values without those that are infinite: rates of servos without limit, their default."""
+    return {
+        name: _finite(value) if isinstance(value, dict) else value
+        for name, value in values.items()
+        if value != np.inf
+    }
+
+
+def _parts(given: dict[str, Any]) -> list[tuple[str, Any]]:
+    return [(name, given.get(name)) for name in MADE]
+
+
+def _actuators(**given: Any) -> Actuators:
+    """Actuators from their plain values."""
+    servos = given.pop("servos")
+    return Actuators(servos and {u: Servo(**servo) for u, servo in servos.items()}, **given)
+
+
+MADE = {"actuators": _actuators, "wind": SteadyWind, "sensors": LateSensors}
+"""What makes each part of a structure from its plain values."""
 
 
 def load(path: str | os.PathLike[str], basis: FunctionSpace | None = None) -> KinematicModel:
@@ -43,11 +79,14 @@ def load(path: str | os.PathLike[str], basis: FunctionSpace | None = None) -> Ki
     try:
         given = saved_model.fields_of_structure(content, basis, path)
         given["na"] = dict(zip(MOVING, given["na"], strict=True))
-        kin = KinematicARX(**given)
+        parts = {name: part and MADE[name](**part) for name, part in _parts(given)}
+        kin = KinematicARX(**(given | parts))
+        drive = content.get("drive")
         return KinematicModel(
             structure=kin,
             aerodynamics=saved_model.model_of(kin.aerodynamics, content),
             trim=content["trim"],
+            drive=drive and saved_model.model_of(kin.drive, drive),  # type: ignore[arg-type]
         )
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise plain_file.incomplete(path, error) from error

@@ -92,6 +92,8 @@ class RecursiveLeastSquares:
 
     def __post_init__(self) -> None:
         require_structure(self.regression)
+        if isinstance(self.structure, KinematicARX):
+            self.structure.require_plain("an estimator in flight")
         if self.precision not in PRECISIONS:
             raise InputError(f'precision: expected "double" or "single", got {self.precision!r}')
         forgetting_of(self.forgetting, self.floor)

@@ -360,6 +360,11 @@ class LPVARX:
         """
         return record
 
+    @property
+    def simulated(self) -> LPVARX:
+        """The structure for a simulated flight: the same, unless sensors come late."""
+        return self
+
     def lti(self) -> LPVARX:
         """Return the same signals, orders and delays with constant coefficients: the baseline for
         scheduling.

@@ -25,10 +25,9 @@ PAIRS = {"xcell60": "xcell_kahn_hudson", "xcell_kahn_hudson": "xcell60"}
 CONSTANT, ALONE, BOTH = "constant coefficients", "over airspeed", "over airspeed and acceleration"
 
 
-def structure(servos: bool = False, turbulent: bool = False) -> KinematicARX:
-    """Cubic in airspeed, quadratic in acceleration, of total degree 3; where servos fly, from the
-    commands, with as many lags as delay and servo need; in turbulence, which leaves less to be
-    told, quadratic in airspeed alone.
+def structure(turbulent: bool = False) -> KinematicARX:
+    """Cubic in airspeed, quadratic in acceleration, of total degree 3; in turbulence, which leaves
+    less to be told, quadratic in airspeed alone.
     """
     if turbulent:
         return KinematicARX(INPUTS, SCHEDULING[0], basis=Polynomial(2, 0.0, TOP))
@@ -36,8 +35,7 @@ def structure(servos: bool = False, turbulent: bool = False) -> KinematicARX:
         (Polynomial(3, 0.0, TOP), Polynomial(2, -FASTEST, FASTEST)),
         total_degree=3,
     )
-    inputs = tuple(f"{u}_command" for u in INPUTS) if servos else INPUTS
-    return KinematicARX(inputs, SCHEDULING, basis=basis, nb=4 if servos else 2, offset_rate=False)
+    return KinematicARX(INPUTS, SCHEDULING, basis=basis, nb=2, offset_rate=False)
 
 
 def structures() -> dict[str, KinematicARX]:
@@ -52,7 +50,6 @@ def structures() -> dict[str, KinematicARX]:
 def identified(
     records: FlightRecord | list[FlightRecord],
     simulator: Helicopter,
-    servos: bool = False,
     turbulent: bool = False,
     kin: KinematicARX | None = None,
 ) -> KinematicModel:
@@ -60,4 +57,4 @@ def identified(
     where the air is `turbulent`. `kin`: another structure than that of `structure`.
     """
     method = FilterError(SimulatedFlight(simulator), gust=GUST if turbulent else 0.0)
-    return fit(kin or structure(servos, turbulent), records, method=method)
+    return fit(kin or structure(turbulent), records, method=method)

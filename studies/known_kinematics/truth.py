@@ -15,7 +15,7 @@ from studies.transition.comparison import SCALES
 from studies.transition.flights import TOP
 from studies.transition.guarantees import PERIOD, SIZES
 from symheli import Helicopter, LinearModel
-from symheli.flight import XCELL_SERVOS
+from symheli.flight import Servo
 from symheli.values import Signal
 
 SPEEDS = np.linspace(0.0, TOP, 27)
@@ -46,21 +46,29 @@ FrozenAxes = Mapping[str, Sequence[LinearModel]]
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """Linear models at `SPEEDS`, 50 Hz, by axis; from the commands where servos fly."""
+    """Linear models at `SPEEDS` by axis; from the commands where servos fly."""
 
     models: Mapping[str, tuple[LinearModel, ...]]
-    servos: bool
 
     @classmethod
-    def of(cls, heli: Helicopter, servos: bool = False) -> Truth:
-        """By exact linearization; with the servos and one sample of delay before them."""
+    def of(
+        cls,
+        heli: Helicopter,
+        axes: Mapping[str, Axis] = AXES,
+        *,
+        period: float = PERIOD,
+        servos: Mapping[str, Servo] | None = None,
+        late: int = 0,
+    ) -> Truth:
+        """By exact linearization, sampled every `period` seconds; with `servos` and `late` samples
+        of delay before them.
+        """
         exact = [symheli.linearize(heli, symheli.trim(heli, float(v))) for v in SPEEDS]
-        models = {}
-        for name, axis in AXES.items():
-            if servos and axis.states is not None:
-                continue
-            models[name] = tuple(sampled(model, axis, servos) for model in exact)
-        return cls(models, servos)
+        models = {
+            name: tuple(sampled(model, axis, period, servos, late) for model in exact)
+            for name, axis in axes.items()
+        }
+        return cls(models)
 
     def compare(self, models: FrozenAxes, frequencies: int = 2000) -> dict[str, FrozenModels]:
         """The models ("model") beside the truth over airspeed, by axis, of the axes that `models`
@@ -85,23 +93,33 @@ class Truth:
         return static_gain(models["lateral"][k]) / static_gain(self.models["lateral"][k])
 
 
-def sampled(model: LinearModel, axis: Axis, servos: bool = False) -> LinearModel:
-    """The part of a continuous model that is an axis, at 50 Hz."""
+def sampled(
+    model: LinearModel,
+    axis: Axis,
+    period: float = PERIOD,
+    servos: Mapping[str, Servo] | None = None,
+    late: int = 0,
+) -> LinearModel:
+    """The part of a continuous model that is an axis, sampled, behind `servos` and `late` samples
+    of delay.
+    """
     kept = model if axis.states is None else model.select(states=axis.states)
     kept = kept.select(inputs=axis.inputs, outputs=axis.outputs)
-    if not servos:
-        return kept.discretize(PERIOD)
-    actuators = {u: XCELL_SERVOS[u].linear(u) for u in axis.inputs}
-    return delayed(kept.driven_by(actuators).discretize(PERIOD))
+    if servos is not None:
+        kept = kept.driven_by({u: servos[u].linear(u) for u in axis.inputs})
+    out = kept.discretize(period)
+    for sample in range(late):
+        out = delayed(out, f"late{sample + 1}")
+    return out
 
 
-def delayed(model: LinearModel) -> LinearModel:
+def delayed(model: LinearModel, name: str = "late") -> LinearModel:
     """Return the same with every input one sample later."""
     nx, nu = model.B.shape
     A = np.block([[model.A, model.B], [np.zeros((nu, nx + nu))]])
     B = np.vstack([np.zeros((nx, nu)), np.eye(nu)])
     C = np.hstack([model.C, model.D])
-    states = (*model.states, *(Signal(f"{u}_late", u.unit) for u in model.inputs))
+    states = (*model.states, *(Signal(f"{u}_{name}", u.unit) for u in model.inputs))
     return LinearModel(
         A, B, C, np.zeros_like(model.D), states, model.inputs, model.outputs, dt=model.dt
     )

@@ -18,7 +18,7 @@ from evidence.bracket.measured import GAINS, bracket
 from evidence.flown import campaign, designs
 from evidence.flown import tuning as sizes
 from evidence.jerk.measured import TransitionPlan, fastest
-from evidence.marks import calibrated, guarantee, measured
+from evidence.marks import calibrated, conditions, guarantee, measured
 from evidence.public_files import fetched
 from evidence.reach.measured import gains
 from evidence.tables import DOCS
@@ -100,6 +100,13 @@ def guarantee_of_the_worst_seed():
 def calibrated_vehicle_of_the_worst_seed():
     shown, seed = worst(KEPT["identified.md", "xcell60 calibrated"].cells("all axes")[2])
     assert same(shown, calibrated.of_seed(seed).gaps["all axes"], rel=1e-3)
+
+
+def flight_with_servos_of_the_worst_seed():
+    name = "servos"
+    about = conditions.CONDITIONS[name].about
+    shown, seed = worst(KEPT["identified.md", "xcell60 under real conditions"].cells(about)[2])
+    assert same(shown, conditions.of_seed(name, seed).gap)
 
 
 def bands_of_ten_seeds():
@@ -351,6 +358,7 @@ ROWS = {
         "xcell60 in turbulence", turbulent=True
     ),
     ("identified.md", "guarantee xcell60"): guarantee_of_the_worst_seed,
+    ("identified.md", "xcell60 under real conditions"): flight_with_servos_of_the_worst_seed,
     ("identified.md", "xcell60 calibrated"): calibrated_vehicle_of_the_worst_seed,
     ("identified.md", "frequency responses"): bands_of_ten_seeds,
     ("identified.md", "two bands"): two_bands_of_the_first_seed,

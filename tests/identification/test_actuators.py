@@ -71,7 +71,7 @@ def test_a_delay_is_estimated_beside_the_parameters(ideal, flight):
 
 def test_what_cannot_be_an_actuator_is_refused():
     with pytest.raises(InputError, match="none given for d_lat"):
-        idn.Actuators({"d_lon": XCELL_SERVOS["d_lon"]})
+        idn.Actuators({"d_lon": XCELL_SERVOS["d_lon"]}).deflections(np.zeros((3, 4)), 0.02)
     with pytest.raises(InputError, match="delay"):
         idn.Actuators(XCELL_SERVOS, delay=-0.1)
     with pytest.raises(InputError, match="bandwidth_deviation"):

@@ -52,8 +52,8 @@ def test_a_step_is_generalized_least_squares_with_the_dense_covariance(vehicle, 
     theta = vehicle.theta + 1e-3
 
     def left(y):
-        u, p = s.u[:, 6:], np.ravel(s.p)
-        added = np.array([vehicle_like.added(k, y, u, p, s.f[k]) for k in range(1, 9)])
+        u, p = s.now.u, np.ravel(s.now.p)
+        added = np.array([vehicle_like.added(k, y, u, p, s.now.f[k]) for k in range(1, 9)])
         out = increments(y, s.dt)[1:]
         out[:, :6] -= added
         return out.ravel()
@@ -75,7 +75,7 @@ def test_a_step_is_generalized_least_squares_with_the_dense_covariance(vehicle, 
     X, e, remains = X.reshape(64, -1), left(y0), 0.9
     if gust:
         A1 = (
-            s.f[1:]
+            s.now.f[1:]
             @ theta.reshape(-1, vehicle.kin.basis.size, 6)
             .swapaxes(0, 1)
             .reshape(vehicle.kin.basis.size, -1)
