@@ -1,11 +1,13 @@
-"""`python -m evidence.tubes`: the largest gusts for which a tube is proven, beside the worst gust
-found, of both packaged helicopters.
+"""`python -m evidence.tubes`: the largest gusts for which a tube is proven at held airspeeds, and
+tubes along ranges of airspeed, beside the worst gusts found, of both packaged helicopters.
 """
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import casadi
 import numpy as np
@@ -13,7 +15,10 @@ from scipy.linalg import expm
 
 from evidence.tables import DOCS, keep, markdown
 from symheli import Helicopter
+from symheli.errors import InputError
 from synthesis import Tube, tube
+from synthesis.tubes.deviations import Cell, Deviations
+from synthesis.tubes.reference import TUBE_SIZES, moving
 
 Array = np.ndarray
 
@@ -21,6 +26,18 @@ VEHICLES = ("xcell60", "xcell_kahn_hudson")
 AIRSPEEDS = (0.0, 3.0, 6.0, 8.0, 10.0, 13.0)
 GUSTS = (0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.75, 1.0, 1.25, 1.5)
 """Amplitudes that are tried, m/s."""
+TRANSITIONS = (
+    ("xcell60", 3.0, 5.0, 0.25, 1.0, 1.0, 1.0),
+    ("xcell_kahn_hudson", 3.0, 4.0, 0.25, 1.0, 1.0, 1.0),
+    ("xcell60", 9.0, 10.0, 0.25, 0.5, 0.5, 0.5),
+)
+"""Helicopter, range, m/s; gusts, m/s; largest acceleration, jerk and snap, m/s^2, m/s^3, m/s^4."""
+FLIGHTS, SECONDS = 10_000, 0.25
+"""From the border of a tube, and how long each lasts: what leaves it leaves at once."""
+INTERVALS = (3.0, 5.0, 7.0, 8.0, 9.0, 10.0, 12.0)
+"""Where remainders are shown, m/s."""
+SMALL_TUBE = 0.1
+"""Its half widths, in units of `TUBE_SIZES`."""
 STEP = 0.005
 """Of Runge and Kutta's method, s; the fastest pole of the loops is near -40 1/s."""
 HORIZON = 1000
@@ -39,47 +56,128 @@ def largest(heli: Helicopter, airspeed: float) -> tuple[float, Tube | None]:
     return (GUSTS[low] if found else 0.0), found
 
 
-def flown(found: Tube, e: Array, gust: Callable[[int], Array], steps: int) -> float:
-    """The largest e'P e of nonlinear flights from deviations e (N, n) in gusts gust(k) (N, 3), m/s.
+def flown(
+    found: Tube,
+    e: Array,
+    gust: Callable[[int], Array],
+    steps: int,
+    command: Command | None = None,
+    step: float = STEP,
+) -> Array:
+    """The largest e'P e of each nonlinear flight (N,) from deviations e (N, n) in gusts gust(k) (N,
+    3), m/s, along a command; by default the first airspeed is held.
 
     Runge and Kutta's method of order 4.
     """
     loop, count = found.deviations, len(e)
-    x, u, w = casadi.SX.sym("x", len(loop.x)), casadi.SX.sym("u", 4), casadi.SX.sym("w", 3)
-    rhs = casadi.Function("rhs", [x, u, w], [loop.heli.rhs(x, u, w)]).map(count)
+    reference = loop.reference
+    data, c = casadi.SX.sym("data", reference.data.shape[1]), casadi.SX.sym("c", 4)
+    x, w = casadi.SX.sym("e", e.shape[1]), casadi.SX.sym("w", 3)
+    x_r, moving, u_r, K = reference.between(data, c)
+    motion = loop.heli.rhs(x_r + x, u_r + K @ x, w) - moving
+    rhs = casadi.Function("rhs", [x, w, c, data], [motion]).map(count)
+    command = command or Command.held(found, count)
 
-    def rate(e: Array, w: Array) -> Array:
-        return np.asarray(rhs((loop.x + e).T, (loop.u + e @ loop.gain.T).T, w.T)).T
+    def rate(e: Array, w: Array, t: float) -> Array:
+        p, *rest = command.at(t)
+        i, s = reference.place(p)
+        return np.asarray(rhs(e.T, w.T, np.stack([s, *rest]), reference.data[i].T)).T
 
-    most = 0.0
+    most = np.zeros(count)
     for k in range(steps):
-        w = gust(k)
-        a = rate(e, w)
-        b = rate(e + STEP / 2 * a, w)
-        c = rate(e + STEP / 2 * b, w)
-        e = e + STEP / 6 * (a + 2 * b + 2 * c + rate(e + STEP * c, w))
-        most = max(most, np.einsum("ki,ij,kj->k", e, found.P, e).max())
-    return float(most)
+        w, t = gust(k), k * step
+        a = rate(e, w, t)
+        b = rate(e + step / 2 * a, w, t + step / 2)
+        c_ = rate(e + step / 2 * b, w, t + step / 2)
+        e = e + step / 6 * (a + 2 * b + 2 * c_ + rate(e + step * c_, w, t + step))
+        P = found.along(command.at(t + step)[0])
+        most = np.maximum(most, np.einsum("ki,kij,kj->k", e, P, e))
+    return most
 
 
-def worst(found: Tube) -> float:
-    """The largest sqrt(e'P e) of nonlinear flights from steady flight, each in the gust that drives
-    the linear loop furthest in one direction.
+@dataclass(frozen=True)
+class Command:
+    """Commanded airspeeds middle + size sin(rate t + phase), arrays (N,): m/s, rad/s, rad."""
+
+    middle: Array
+    size: Array
+    rate: Array
+    phase: Array
+
+    @classmethod
+    def held(cls, found: Tube, count: int, airspeed: float | None = None) -> Command:
+        """An airspeed for all, by default the first."""
+        p = found.airspeeds[0] if airspeed is None else airspeed
+        zero = np.zeros(count)
+        return cls(zero + p, zero, zero, zero)
+
+    @classmethod
+    def drawn(cls, found: Tube, count: int, rng: np.random.Generator) -> Command:
+        """As large as range and limits allow, of rates from slow to fast."""
+        low, high = found.airspeeds[0], found.airspeeds[-1]
+        rate = np.exp(rng.uniform(np.log(0.1), np.log(4.0), count))
+        a, j, b = found.deviations.reference.limits
+        size = np.minimum.reduce([a / rate, j / rate**2, b / rate**3, 0 * rate + (high - low) / 2])
+        size = size if high > low else 0 * rate
+        middle = rng.uniform(low + size, high - size)
+        return cls(middle, size, rate, rng.uniform(0, 2 * np.pi, count))
+
+    def at(self, t: float) -> tuple[Array, Array, Array, Array]:
+        """p, its first three derivatives, (N,); the last 0 where the jerk may jump."""
+        angle, rate = self.rate * t + self.phase, self.rate
+        sine, cosine = self.size * np.sin(angle), self.size * np.cos(angle)
+        return self.middle + sine, rate * cosine, -(rate**2) * sine, -(rate**3) * cosine
+
+
+def from_its_border(found: Tube, count: int, seconds: float) -> float:
+    """The largest sqrt(e'P e) of flights that start on the border of the tube, in gusts of full
+    size that change at random, slowly and fast, along commands as large as allowed.
     """
-    loop = found.deviations
-    A, B, E = (np.asarray(m) for m in loop.heli.jacobian(loop.x, loop.u, np.zeros(3)))
-    root = np.linalg.cholesky(found.P)
+    rng = np.random.default_rng(0)
+    command = Command.drawn(found, count, rng)
+    P = found.along(command.at(0.0)[0])
+    e = rng.standard_normal((count, P.shape[-1]))
+    e = np.linalg.solve(np.swapaxes(np.linalg.cholesky(P), 1, 2), e[..., None])[..., 0]
+    e /= np.sqrt(np.einsum("ki,kij,kj->k", e, P, e))[:, None]
+    held, w = rng.integers(1, 100, count), np.zeros((count, 3))
+
+    def gust(k: int) -> Array:
+        new = rng.standard_normal((count, 3))
+        new *= found.deviations.gust / np.linalg.norm(new, axis=1, keepdims=True)
+        change = k % held == 0
+        w[change] = new[change]
+        return w.copy()
+
+    step = 2 * STEP
+    return float(flown(found, e, gust, round(seconds / step), command, step).max() ** 0.5)
+
+
+def worst(found: Tube, airspeed: float | None = None) -> float:
+    """The largest sqrt(e'P e) of nonlinear flights from the reference at an airspeed (by default
+    the first), each in the gust that drives the linear loop furthest in one direction.
+    """
+    loop, p = found.deviations, found.airspeeds[0] if airspeed is None else airspeed
+    i, s = loop.reference.place([p])
+    c = casadi.SX.sym("c", 4)
+    at = casadi.Function(
+        "reference", [c], list(loop.reference.between(loop.reference.data[i[0]], c))
+    )
+    x, _, u, K = (np.asarray(m) for m in at([s[0], 0, 0, 0]))
+    A, B, E = (np.asarray(m) for m in loop.heli.jacobian(x, u, np.zeros(3)))
+    root = np.linalg.cholesky(found.at(p))
     rng = np.random.default_rng(0)
     drawn = rng.standard_normal((DIRECTIONS - 2 * len(A), len(A)))
     unit = np.vstack([np.eye(len(A)), -np.eye(len(A)), drawn])
     adjoint = (root @ unit.T).T  # direction of e'P e at the end
-    back, rows = expm((A + B @ loop.gain).T * STEP), []
+    back, rows = expm((A + B @ K).T * STEP), []
     for _ in range(HORIZON):
         rows.append(adjoint @ E)
         adjoint = adjoint @ back.T
     history = np.array(rows[::-1])
     history *= loop.gust / np.maximum(np.linalg.norm(history, axis=-1, keepdims=True), 1e-300)
-    return flown(found, np.zeros((len(unit), len(A))), lambda k: history[k], HORIZON) ** 0.5
+    command = Command.held(found, len(unit), p)
+    start = np.zeros((len(unit), len(A)))
+    return float(flown(found, start, lambda k: history[k], HORIZON, command).max() ** 0.5)
 
 
 def table(vehicles: Sequence[str], airspeeds: Sequence[float]) -> str:
@@ -111,19 +209,80 @@ def table(vehicles: Sequence[str], airspeeds: Sequence[float]) -> str:
     return markdown([*head, "worst gust found"], rows)
 
 
+def transitions(cases: Sequence[tuple[Any, ...]], count: int, seconds: float) -> str:
+    """The table of tubes along ranges of airspeed in Markdown, a row for each case."""
+    rows = []
+    for name, *limits in cases:
+        low, high, gust, acceleration, jerk, snap = limits
+        heli = Helicopter.load(name, governor="ideal")
+        found = tube(heli, (low, high), gust=gust, acceleration=acceleration, jerk=jerk, snap=snap)
+        row = [
+            *(name, f"{low:g} to {high:g}"),
+            *(f"{gust:g}", f"{acceleration:g}, {jerk:g}, {snap:g}"),
+        ]
+        if found.proven:
+            widths = [f"{w:.2g}" for w in found.half_widths[:8]]
+            share = max(worst(found, float(p)) for p in (low, high))
+            border = from_its_border(found, count, seconds)
+            row += [" ".join(widths[:3]) + "; " + " ".join(widths[3:6]), " ".join(widths[6:])]
+            row += [f"{share:.2f}", f"{border:.3f}"]
+        else:
+            row += [f"none: {found.why}", "", "", ""]
+        rows.append(row)
+        print(*row, flush=True)
+    head = ["helicopter", "airspeed, m/s", "gusts, m/s", "limits, m/s^2, m/s^3, m/s^4"]
+    head += ["u v w, m/s; p q r, rad/s", "phi theta, rad", "worst gust found", "furthest flight"]
+    return markdown(head, rows)
+
+
+def remainders(intervals: Sequence[float]) -> str:
+    """What keeps tubes from being proven, in Markdown: for cells of 1 m/s, and accelerations from 0
+    to 1 m/s^2, the rates (1/s) at which terms of the Jacobian that are bounded in size alone may
+    move the deviations, on a small tube.
+    """
+    heli, sizes = Helicopter.load(VEHICLES[0], governor="ideal"), np.array(TUBE_SIZES)
+    units = np.concatenate([SMALL_TUBE * sizes, np.ones(4)])
+    rows = []
+    for low in intervals:
+        loop = Deviations(heli, moving(heli, np.array([low, low + 1]), (1.0, 1.0, 1.0)), 0.0)
+        cell = Cell(0, (0.0, 1.0), (0.0, 1.0))
+        (over,) = loop.enclosed([cell], np.diag(units[:10])[None], loop.drifts([cell]))
+        if over is None:
+            raise InputError(f"no bounds from {low:g} to {low + 1:g} m/s")
+        across = np.sqrt(np.einsum("kii,i->k", over.weights[:, :-1, :-1], units[:-1] ** 2))
+        rates = across * np.abs(over.left / units[:10]).max(axis=1)
+        single = (over.left != 0).sum(axis=1) == 1
+        row = dict(zip(np.abs(over.left[single]).argmax(axis=1), rates[single], strict=True))
+        pqr = [f"{row.get(i, 0.0):.2g}" for i in (3, 4, 5)]
+        kinks = max(rates[~single], default=0.0)
+        rows.append([f"{low:g} to {low + 1:g}", f"{kinks:.2g}", " ".join(pqr)])
+    return markdown(["airspeed, m/s", "largest kink, 1/s", "remainder of p q r, 1/s"], rows)
+
+
 def main() -> None:
-    """Print the table, or keep it in docs/tubes.md."""
+    """Print the tables, or keep them in docs/tubes.md."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--write", action="store_true", help="keep the table in docs/tubes.md")
+    parser.add_argument("--write", action="store_true", help="keep the tables in docs/tubes.md")
     parser.add_argument("--quick", action="store_true", help="one helicopter at 0 and 8 m/s")
+    parser.add_argument(
+        "--only", choices=("amplitudes", "transitions", "remainders"), help="one of the tables"
+    )
     given = parser.parse_args()
     if given.write and given.quick:
-        parser.error("--write keeps the whole table: leave out --quick")
-    text = table(VEHICLES[:1], (0.0, 8.0)) if given.quick else table(VEHICLES, AIRSPEEDS)
-    if given.write:
-        keep(DOCS / "tubes.md", "amplitudes", text)
-    else:
-        print(text)
+        parser.error("--write keeps whole tables: leave out --quick")
+    makers = {
+        "amplitudes": lambda: table(VEHICLES, AIRSPEEDS),
+        "transitions": lambda: transitions(TRANSITIONS, FLIGHTS, SECONDS),
+        "remainders": lambda: remainders(INTERVALS),
+    }
+    if given.quick:
+        makers = {"amplitudes": lambda: table(VEHICLES[:1], (0.0, 8.0))}
+    for name in [given.only] if given.only else makers:
+        text = makers[name]()
+        if given.write:
+            keep(DOCS / "tubes.md", name, text)
+        else:
+            print(text)
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ import numpy as np
 from symheli.codegen.program import Operation, Program
 from symheli.codegen.translation import operations
 from symheli.enclosure.domain import Domain
-from symheli.enclosure.form import AffineForm, hull, pick
+from symheli.enclosure.form import EPS, MARGIN, AffineForm, hull, pick
 from symheli.enclosure.interval import Interval
 from symheli.errors import InputError
 
@@ -57,19 +57,6 @@ class Enclosure:
         leading = self.value.shape[:-1]
         checks = [np.isfinite(f.rest).reshape(*leading, -1).all(axis=-1) for f in forms]
         return np.logical_and.reduce(checks)
-
-    def segment_average(self) -> AffineForm:
-        """Averages of the Jacobian over segments from the centre of the set to its points.
-
-        For every z: f(x(z)) - f(x(0)) = J [x(z) - x(0)] with J in this form, by the mean value
-        theorem; the linear part halves, since it is averaged over [0, z]. All domains take part:
-        one that must not is enclosed as many small sets instead.
-        """
-        if self.jacobian is None:
-            raise InputError("enclose(..., by=[0, ...]) is needed for averages of the Jacobian")
-        j, kinks = self.jacobian, self.jacobian.slopes.shape[-1] - self.symbols
-        halves = np.repeat([0.5, 1.0], [self.symbols, kinks])
-        return AffineForm(j.centre, halves * j.slopes, j.rest, j.groups)
 
 
 def enclose(
@@ -155,6 +142,103 @@ def enclose(
         rows = [d.derivative(over.seeds)[:, :seeds] for d in flat]
         slopes = _stacked(rows, like, (seeds,))
     return Enclosure(*symbols.finished(value, slopes, roots), symbols.own)
+
+
+def segment_averages(
+    function: casadi.Function,
+    *domains: Domain,
+    along: Sequence[int],
+    start: casadi.Function | None = None,
+    continuous: bool = False,
+    pieces: int = 4,
+) -> tuple[AffineForm, int]:
+    """Averages of the Jacobian over segments from the centre of a set to each of its points.
+
+    f(x(z)) - f(x(0)) = J [x(z) - x(0)] with J (n_out, n_in) in the form returned, by the mean value
+    theorem. What is linear in z is averaged over [0, z], and halves. The equations are enclosed
+    over `pieces` sets of 1/pieces, 2/pieces, ... of the size, one for each part of a segment: a
+    remainder of second order falls to a third, one of first order to a half.
+
+    Parameters
+    ----------
+    function, domains, start, continuous
+        As for `enclose`.
+    along : sequence of int
+        Positions of the inputs that move along the segment; J has their derivatives. The others are
+        the same all along it, any ones of their domains.
+    pieces : int
+        Parts of a segment.
+
+    Returns
+    -------
+    average : AffineForm (N, n_out, n_in), or without the axis N
+        In the symbols of the domains, and of kinks.
+    symbols : int
+        Number of those of the domains.
+
+    Examples
+    --------
+    >>> import casadi
+    >>> x = casadi.SX.sym("x", 1)
+    >>> f = casadi.Function("f", [x], [x**2])
+    >>> average, _ = segment_averages(f, Domain.box([-1.0], [1.0]), along=[0])
+    >>> print(average.centre.round(6), average.slopes.round(6))
+    [[0.]] [[[1.]]]
+    """
+    counts = [
+        len(m) for d in domains for m, axes in ((d.centre, 1), (d.generators, 2)) if m.ndim > axes
+    ]
+    count, sizes = max(counts, default=1), np.arange(1, pieces + 1) / pieces
+    over = [
+        _pieces(d, count, sizes if i in along else np.ones(pieces)) for i, d in enumerate(domains)
+    ]
+    found = enclose(function, *over, start=start, by=along, continuous=continuous)
+    j = found.jacobian
+    if j is None:
+        raise InputError("averages along segments need along=[0, ...]: inputs that move")
+    moving = np.concatenate([np.full(sum(d.groups), i in along) for i, d in enumerate(domains)])
+    groups, own = j.groups, found.symbols
+
+    def parts(values: Array) -> Array:
+        return values.reshape(-1, pieces, *values.shape[1:])
+
+    # on part k of the segment, s z is at (k + 1/2) / (k + 1) of the set's size on average
+    share = (np.arange(pieces) + 0.5) / np.arange(1, pieces + 1)
+    slopes, rest = parts(j.slopes), parts(j.rest).mean(axis=1)
+    linear = slopes[..., :own] * np.where(moving, share[:, None], 1.0)[:, None, None]
+    kinks, more = _common(slopes[..., own:])
+    size = np.abs(parts(j.centre)).mean(axis=1) + np.abs(slopes).sum(axis=-1).mean(axis=1)
+    rest = (rest + more + 4 * pieces * EPS * size) * MARGIN
+    average = AffineForm(
+        parts(j.centre).mean(axis=1),
+        np.concatenate([linear.mean(axis=1), kinks], axis=-1),
+        rest,
+        groups,
+    )
+    return (average if counts else average[0]), own
+
+
+def _pieces(domain: Domain, count: int, sizes: Array) -> Domain:
+    """The domain in each of these sizes, side by side, for each of `count` sets."""
+    centre = np.broadcast_to(domain.centre, (count, domain.size))
+    each = np.broadcast_to(domain.generators, (count, *domain.generators.shape[-2:]))
+    generators = (sizes[:, None, None] * each[:, None]).reshape(count * len(sizes), *each.shape[1:])
+    return Domain(np.repeat(centre, len(sizes), axis=0), generators, domain.groups)
+
+
+def _common(slopes: Array) -> tuple[Array, Array]:
+    """Factors of numbers in [-1, 1], another one on each part of a segment, (N, K, ..., k): those
+    of their averages (N, ..., k), and what that leaves (N, ...).
+
+    sum of M_i s_i / K = M s + ..., M_i = c_i M + ..., with s between the averages of -|c_i|, |c_i|.
+    """
+    mean = slopes.mean(axis=1)
+    axes = tuple(range(2, slopes.ndim - 1))
+    product = (slopes * mean[:, None]).sum(axis=axes, keepdims=True)
+    square = (mean * mean).sum(axis=tuple(a - 1 for a in axes), keepdims=True)[:, None]
+    share = np.divide(product, square, out=np.zeros(product.shape), where=square > 0)
+    left = np.abs(slopes - share * mean[:, None]) + 4 * EPS * np.abs(slopes)
+    return np.abs(share).mean(axis=1) * mean * MARGIN, left.mean(axis=1).sum(axis=-1) * MARGIN
 
 
 # --- inputs and outputs --------------------------------------------------------------------------
@@ -313,6 +397,19 @@ class _Dual:
         sign = pick(x.lower >= 0, one, pick(x.upper <= 0, -one, kink))
         return self.chain(self.value.absolute(), sign)
 
+    def signed_square(self, kink: AffineForm | None) -> _Dual:
+        """x|x|, whose derivative is 2|x|. `kink`: the symbol in [-1, 1] that |x| has instead of
+        its remainder, the same one for all derivatives.
+        """
+        size = self.value.absolute()
+        value = self.value * size
+        if self.slope is None:
+            return _Dual(value)
+        if kink is not None:
+            free = replace(size, rest=np.zeros(size.shape))
+            size = replace(free + kink.scaled(size.rest), bound=size.bound)
+        return self.chain(value, size.scaled(2.0))
+
     def maximum(self, other: _Dual, kink: AffineForm | None) -> _Dual:
         a, b = self.value.interval, other.value.interval
         slope = _either(a.lower >= b.upper, b.lower >= a.upper, self.slope, other.slope, kink)
@@ -461,6 +558,8 @@ class _Over:
                 return _square_root(self.program, o, values, _dual(a[0], like))
         d = [_dual(v, like) for v in a]
         match o.name:
+            case "mul" if (found := self._squared(o.arguments, values, like)) is not None:
+                return found
             case "add":
                 return d[0] + d[1]
             case "sub":
@@ -483,6 +582,43 @@ class _Over:
                 outer = None if d[0].slope is None else d[0].value.slope_of(o.name)
                 return d[0].chain(d[0].value.elementary(o.name), outer)
         raise InputError(f"{self.program.name}: the operation {o.name} has no bounds")
+
+    def _squared(
+        self, factors: tuple[int, ...], values: list[Value], like: AffineForm
+    ) -> _Dual | None:
+        """The product x (a + b |x|) = a x + b x|x|, None where it is no such product."""
+        for x, other in (factors, factors[::-1]):
+            parts = self._with_absolute(other, x, values, like)
+            if parts is not None:
+                free, size, position = parts
+                kink = self._kink(position, like) if self.seeds else None
+                own = _dual(values[x], like)
+                square = own.signed_square(kink) * size
+                return square if free is None else square + free * own
+        return None
+
+    def _with_absolute(
+        self, k: int, x: int, values: list[Value], like: AffineForm
+    ) -> tuple[_Dual | None, _Dual, int] | None:
+        """(a, b, position of |x|) of an operation that is a + b |x|; a None: 0."""
+        o = self.program.operations[k]
+        if o.name == "fabs" and o.arguments == (x,):
+            return None, _dual(1.0, like), k
+        if o.name not in ("add", "mul", "neg"):
+            return None
+        for one, rest in zip(o.arguments, (o.arguments[1:], o.arguments[:1]), strict=False):
+            parts = self._with_absolute(one, x, values, like)
+            if parts is None:
+                continue
+            free, size, position = parts
+            other = [_dual(values[i], like) for i in rest]
+            match o.name:
+                case "add":
+                    return (other[0] if free is None else free + other[0]), size, position
+                case "mul":
+                    return (None if free is None else free * other[0]), size * other[0], position
+            return (None if free is None else -free), -size, position
+        return None
 
     def _select(self, condition: Array, yes: _Dual, no: _Dual, kink: AffineForm | None) -> _Dual:
         """One of two numbers; both where the condition is open."""

@@ -177,6 +177,21 @@ class AffineProgram:
                     out[:, each.columns] += np.moveaxis(part, -1, 0)
         return sparse.csr_matrix(out), weights @ v[0]
 
+    def placed(self, columns: Array, count: int) -> tuple[sparse.csr_matrix, Array]:
+        """Return the rows A, b of its inequalities, A x + b in the cones of `sizes`, in a program
+        of `count` variables, which has the variables of this one at `columns`.
+        """
+        to = sparse.csr_matrix(
+            (np.ones(self.count), (range(self.count), columns)), (self.count, count)
+        )
+        A = sparse.vstack([A for A, _ in self._positive])
+        return sparse.csr_matrix(A @ to), np.concatenate([b for _, b in self._positive])
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """Numbers of rows of the matrices that are positive semidefinite."""
+        return tuple(self._sizes)
+
     def minimise(self, cost: Array, solver: Solver) -> Candidate:
         """Return the solver's candidate for the least cost' x."""
         rows = [*self._zero, *self._positive]

@@ -323,6 +323,10 @@ def _clarabel(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
     try:
         with no_panic():
             solution = in_thread(work)
+            if str(solution.status) == "NumericalError":
+                # its own scaling of rows and columns can leave a system that is not definite
+                settings.equilibrate_enable = False
+                solution = in_thread(work)
     except SolverError as error:
         return Answer.FAILED, None, str(error)
     word = str(solution.status)

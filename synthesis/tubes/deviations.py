@@ -1,7 +1,8 @@
-"""Deviations of a helicopter from steady flight under state feedback, over an ellipsoid."""
+"""Deviations of a helicopter from its reference under state feedback, over ellipsoids."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -9,66 +10,184 @@ import casadi
 import numpy as np
 
 from symheli import Helicopter
-from symheli.enclosure import AffineForm, Domain, enclose
+from symheli.enclosure import AffineForm, Domain, enclose, segment_averages
+from symheli.enclosure.form import EPS
 from symheli.values.summary import summarized
 from synthesis.tubes.inequality import ROUNDED, ROUNDED_UP, MatrixSet, elementwise, rank_one
+from synthesis.tubes.reference import Reference
 
 Array = np.ndarray
+
+JACOBIAN_PARTS, DRIFT_PARTS = (4, 4), (16, 16)
+"""Parts of a cell along airspeed and acceleration over which the Jacobian, and the drift of the
+reference, are enclosed.
+"""
+SMALL = 1e-3
+"""Rate, 1/s, up to which a term is part of the remainder: the deviations' change over their size.
+"""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """Commands between two nodes of the airspeed: shares `s` of the way from one to the other and
+    accelerations `a`, m/s^2, each (lower, upper).
+    """
+
+    interval: int
+    s: tuple[float, float]
+    a: tuple[float, float]
+
+    @property
+    def domain(self) -> tuple[Array, Array]:
+        """Centre and half widths of (s, a), which cover the cell."""
+        lower, upper = np.array([self.s, self.a]).T
+        centre = 0.5 * (lower + upper)
+        half = np.maximum(upper - centre, centre - lower)
+        return centre, np.where(half > 0, np.nextafter(half, np.inf), 0.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Deviations:
-    """de/dt of e = x - x0 with u = u0 + K e in gusts of amplitude `gust`.
+    """de/dt of e = x - x_r with u = u_r + K e in gusts of amplitude `gust`.
 
-    x (n,) and u (4,): steady flight, SI and rad. gain (4, n): K, rad per SI unit. gust: m/s, body
-    axes, any direction.
+    gust: m/s, body axes, any direction.
     """
 
     heli: Helicopter
-    x: Array
-    u: Array
-    gain: Array
+    reference: Reference
     gust: float
 
     __repr__ = summarized
 
     @cached_property
     def _functions(self) -> tuple[casadi.Function, casadi.Function]:
-        """(e, w, lam) -> de/dt, balance of the inflow; (e, w) -> lam."""
-        e, w, lam = casadi.SX.sym("e", len(self.x)), casadi.SX.sym("w", 3), casadi.SX.sym("lam", 2)
-        at = (self.x + e, self.u + self.gain @ e, self.gust * w)
-        function = casadi.Function("deviation", [e, w, lam], list(self.heli.implicit(*at, lam)))
-        return function, casadi.Function("inflow", [e, w], [self.heli.inflow(*at)])
+        """(e, w, c, data, lam) -> de/dt, balance of the inflow; (e, w, c, data) -> lam."""
+        e, w, lam = (casadi.SX.sym(name, k) for name, k in (("e", 10), ("w", 3), ("lam", 2)))
+        c, data = casadi.SX.sym("c", 4), casadi.SX.sym("data", self.reference.data.shape[1])
+        x, moving, u, K = self.reference.between(data, c)
+        at = (x + e, u + K @ e, self.gust * w)
+        xdot, balance = self.heli.implicit(*at, lam)
+        function = casadi.Function("deviation", [e, w, c, data, lam], [xdot - moving, balance])
+        return function, casadi.Function("inflow", [e, w, c, data], [self.heli.inflow(*at)])
 
-    def enclosed(self, factor: Array) -> MatrixSet | None:
-        """The set of F for e = factor z, |z| <= 1, and all gusts; None where there is no bound.
+    def enclosed(
+        self, cells: Sequence[Cell], factors: Array, drifts: Array, share: float = 1.0
+    ) -> list[MatrixSet | None]:
+        """For each cell the set of F for e = factor z, |z| <= 1, and all gusts; None where there is
+        no bound. `share`: of these deviations and gusts, over which the Jacobian is enclosed.
 
         f(e, w) - f(0, 0) = J [e; w] with the average J of the Jacobian over the segment to (e, w):
         the part of J that is linear in (e, w) is halved.
         """
         function, start = self._functions
-        n = len(factor)
-        zero, ball = np.zeros(n), Domain.ellipsoid(np.zeros(3), np.eye(3))
-        over = (Domain.ellipsoid(zero, factor), ball)
-        found = enclose(function, *over, start=start, by=[0, 1])
-        rest = enclose(function, Domain.point(zero), Domain.point(np.zeros(3)), start=start).value
-        if not (found.finite and np.all(np.isfinite(rest.rest))):
-            return None
-        return _coefficients(found.segment_average(), found.symbols, rest, factor)
+        zero, calm = np.zeros(factors.shape[-1]), np.zeros(3)
+        found: list[MatrixSet | None] = []
+        for cell, factor, drift in zip(cells, factors, drifts, strict=True):
+            places, widths, commands, data = self._parts(cell, JACOBIAN_PARTS)
+            ellipsoid = Domain.ellipsoid(zero, share * factor)
+            over = (ellipsoid, Domain.ellipsoid(calm, share * np.eye(3)), commands, data)
+            average, symbols = segment_averages(function, *over, along=[0, 1], start=start)
+            if np.all(np.isfinite(average.rest)):
+                own = _covered(average, symbols, places, widths)
+                found.append(_matrix_set(own, symbols, drift, factor))
+            else:
+                found.append(None)
+        return found
+
+    def drifts(self, cells: Sequence[Cell]) -> Array:
+        """For each cell f(x_r, u_r, 0) - dx_r/dt: centre, rest and the parts linear in the jerk and
+        its derivative, (N, 4, n). Infinite where there is no bound.
+        """
+        function, start = self._functions
+        n = len(self.heli.states)
+        still = (Domain.point(np.zeros(n)), Domain.point(np.zeros(3)))
+        found = []
+        for cell in cells:
+            _, _, commands, data = self._parts(cell, DRIFT_PARTS)
+            value = enclose(function, *still, commands, data, start=start).value
+            by = value.slopes[..., 2:4]
+            radius = (np.abs(value.slopes[..., :2]).sum(axis=-1) + value.rest) * ROUNDED_UP
+            lower, upper = (value.centre - radius).min(axis=0), (value.centre + radius).max(axis=0)
+            middle, linear = 0.5 * (lower + upper), by.mean(axis=0)
+            rest = upper - middle + np.abs(by - linear).max(axis=0).sum(axis=-1)
+            rest += 8 * EPS * (np.abs(middle) + np.abs(linear).sum(axis=-1))
+            found.append([middle, rest * ROUNDED_UP, *linear.T])
+        return np.array(found)
+
+    def _parts(self, cell: Cell, parts: tuple[int, int]) -> tuple[Array, Array, Domain, Domain]:
+        """A cell in so many parts along s and a, with every jerk and its derivative: the parts'
+        places (N, 2) and half widths (2,) in units of the cell's half widths, the commands, and the
+        data of the reference.
+        """
+        centre, half = cell.domain
+        split = [
+            np.arange(1 - k, k, 2) / k if h > 0 else np.zeros(1)
+            for k, h in zip(parts, half, strict=True)
+        ]
+        places = np.stack(np.meshgrid(*split, indexing="ij"), axis=-1).reshape(-1, 2)
+        centres = centre + half * places
+        own = half / [len(side) for side in split] + 4 * EPS * (np.abs(centre) + half)
+        own, unit = np.where(half > 0, own, 0.0), np.where(half > 0, half, 1.0)
+        free = [limit if np.isfinite(limit) else 0.0 for limit in self.reference.limits[1:]]
+        commands = Domain(
+            np.hstack([centres, np.zeros((len(places), 2))]), np.diag([*own, *free]), (1, 1, 1, 1)
+        )
+        data = Domain.point(self.reference.data[cell.interval])
+        return (centres - centre) / unit, own / unit, commands, data
 
 
-def _coefficients(
-    average: AffineForm, symbols: int, at_rest: AffineForm, factor: Array
-) -> MatrixSet:
+def _covered(forms: AffineForm, symbols: int, places: Array, widths: Array) -> AffineForm:
+    """One form of a cell that covers those of its parts, linear in all of s and a.
+
+    `forms` (parts, n, .): their symbols are those of the domains, the last four s, a, j and b, and
+    of kinks.
+    """
+    weights = np.linalg.pinv(np.hstack([np.ones((len(places), 1)), places]))
+    centre, *by = np.tensordot(weights, forms.centre, axes=1)
+    slopes, command = forms.slopes[..., :symbols].mean(axis=0), slice(symbols - 4, symbols - 2)
+    slopes[..., command] = np.stack(by, axis=-1)
+    missed = np.abs(forms.centre - centre - np.tensordot(places, np.array(by), axes=1))
+    own = slopes.copy()
+    own[..., command] *= widths
+    apart = np.abs(forms.slopes[..., :symbols] - own)
+    start = 0
+    for group in forms.groups:
+        if start < symbols:
+            missed = missed + np.linalg.norm(apart[..., start : start + group], axis=-1)
+            start += group
+    kinks, more = _common_kinks(forms.slopes[..., symbols:])
+    size = np.abs(forms.centre) + np.abs(forms.slopes).sum(axis=-1)
+    rest = (forms.rest + missed + 16 * EPS * size).max(axis=0) + more
+    return AffineForm(
+        centre, np.concatenate([slopes, kinks], axis=-1), rest * ROUNDED_UP, forms.groups
+    )
+
+
+def _common_kinks(slopes: Array) -> tuple[Array, Array]:
+    """Factors of numbers in [-1, 1] that differ from part to part (parts, n, ., k): one for all,
+    and the sizes of what that leaves (n, .).
+    """
+    norms = np.sqrt((slopes**2).sum(axis=(1, 2)))
+    if not slopes.shape[-1]:
+        return slopes[0], np.zeros(slopes.shape[1:3])
+    main = np.stack([slopes[norms[:, k].argmax(), ..., k] for k in range(norms.shape[1])], axis=-1)
+    square = (main**2).sum(axis=(0, 1))
+    share = (slopes * main).sum(axis=(1, 2)) / np.where(square > 0, square, 1.0)
+    left = np.abs(slopes - share[:, None, None] * main) + 4 * EPS * np.abs(slopes)
+    return main * np.abs(share).max(axis=0) * ROUNDED_UP, left.max(axis=0).sum(axis=-1)
+
+
+def _matrix_set(average: AffineForm, symbols: int, drift: Array, factor: Array) -> MatrixSet:
     n = len(factor)
     q = n + 4
     units = np.concatenate([np.linalg.norm(factor, axis=1), np.ones(4)])
     slopes = np.zeros((average.slopes.shape[-1], n, q))
     slopes[..., :-1] = np.moveaxis(average.slopes, -1, 0)
-    tube, gust = slopes[:n], slopes[n:symbols]
+    slopes[symbols - 2 : symbols, :, -1] = drift[2:]
+    tube, gust, command = slopes[:n], slopes[n : n + 3], slopes[n + 3 : symbols]
     centre, rest = np.zeros((n, q)), np.zeros((n, q))
-    centre[:, :-1], centre[:, -1] = average.centre, at_rest.centre
-    rest[:, :-1], rest[:, -1] = average.rest, at_rest.rest
+    centre[:, :-1], centre[:, -1] = average.centre, drift[0]
+    rest[:, :-1], rest[:, -1] = average.rest, drift[1]
     # z_k H_k w = y_m G_m e, since z = factor^-1 e and y = w: one multiplier takes both
     inverse, wind = np.linalg.inv(factor), slice(n, n + 3)
     cross = tube[:, :, wind].copy()
@@ -78,8 +197,17 @@ def _coefficients(
     rest[:, :n] += ROUNDED * (products + np.abs(gust[:, :, :n]).sum(axis=0))
     missed = np.abs(np.eye(n) - inverse @ factor) + ROUNDED * np.abs(inverse) @ np.abs(factor)
     rest[:, wind] += missed.sum(axis=1).max() * np.abs(cross).sum(axis=0)
-    left, weights, more = rank_one(slopes[symbols:], units)
-    rows, diagonal = elementwise((rest + more) * ROUNDED_UP, units)
+    # linear in s, a and j: the corners of the cell
+    signs = [(-1, 1) if np.any(part) else (0,) for part in command[:3]]
+    corners = centre + np.tensordot(
+        np.stack(np.meshgrid(*signs, indexing="ij"), -1), command[:3], 1
+    )
+    rest += ROUNDED * (np.abs(centre) + np.abs(command).sum(axis=0))
+    others = np.concatenate([command[3:], slopes[symbols:]])
+    rates = np.abs(others / units[:n, None] * units).max(axis=(1, 2))
+    left, weights, more = rank_one(others[rates > SMALL], units)
+    rest += more + np.abs(others[rates <= SMALL]).sum(axis=0) * ROUNDED_UP
+    rows, diagonal = elementwise(rest * ROUNDED_UP, units)
     return MatrixSet(
-        centre, tube, gust, np.vstack([left, rows]), np.concatenate([weights, diagonal])
+        corners, tube, gust, np.vstack([left, rows]), np.concatenate([weights, diagonal])
     )

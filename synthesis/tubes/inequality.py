@@ -1,18 +1,21 @@
 """The matrix inequality of an invariant ellipsoid, in any arithmetic.
 
-Deviations e follow de/dt = A e + E w + d, where F = [A E d] lies in a set: a centre, matrices times
-the symbols of the ellipsoid (|z| <= 1) and of the gust (|y| <= 1), and terms left right' times a
-number in [-1, 1] each. If multipliers make `block` positive definite, V = e'P e falls wherever V =
-1 and |w| <= 1 (S-procedure; Petersen's lemma).
+Deviations e follow de/dt = A e + E w + d, where F = [A E d] lies in a set: the corners of a cell of
+commands, matrices times the symbols of the ellipsoid (|z| <= 1) and of the gust (|y| <= 1), and
+terms left right' times a number in [-1, 1] each. If multipliers make all `conditions` positive
+definite, V = e'P e falls wherever V = 1 and |w| <= 1 (S-procedure; Petersen's lemma). P may be
+linear in the commanded airspeed, whose rate adds dP/dt.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from synthesis.lpv.affine_program import from_lower
+from synthesis.polynomial.exact import Number
 
 Array = np.ndarray
 
@@ -25,11 +28,12 @@ ROUNDED = 1e-14
 class MatrixSet(NamedTuple):
     """The set of F (n, q); q = n deviations, 3 gust components and 1 constant.
 
-    centre (n, q); tube (n, n, q) and gust (3, n, q), the factors of the symbols; left (k, n) and
-    weights (k, q, q): for each other term, x'F v <= |x'left| sqrt(v' weights v).
+    corners (2, 2, 2, n, q): at the ends of the cell in airspeed, acceleration and jerk, 1 for 2
+    where they are one; tube (n, n, q) and gust (3, n, q), the factors of the symbols; left (k, n)
+    and weights (k, q, q): for each other term, x'F v <= |x'left| sqrt(v' weights v).
     """
 
-    centre: Array
+    corners: Array
     tube: Array
     gust: Array
     left: Array
@@ -37,11 +41,11 @@ class MatrixSet(NamedTuple):
 
     def scaled(self, factor: Array) -> MatrixSet:
         """The set in coordinates z, e = factor z."""
-        n, q = self.centre.shape
+        n, q = self.corners.shape[-2:]
         inverse, right = np.linalg.inv(factor), np.eye(q)
         right[:n, :n] = factor
         return MatrixSet(
-            inverse @ self.centre @ right,
+            inverse @ self.corners @ right,
             inverse @ self.tube @ right,
             inverse @ self.gust @ right,
             self.left @ inverse.T,
@@ -93,35 +97,91 @@ class Multipliers(NamedTuple):
     decay: Any
 
 
-def block(P: Any, over: MatrixSet, by: Multipliers, one: Any = 1.0) -> Any:
-    """The symmetric matrix that must be positive definite.
+class Shares(NamedTuple):
+    """X (n, n) >= P inv(S) P, P inv(T) P, P l inv(r) l'P at one end of a cell."""
 
-        -M
-        P'   S         M = [P A + A'P + alpha P, P E, P d; ., -mu I, 0; ., ., mu - alpha]
-        P'       T         + sum of H'S H and H'T H over the symbols + sum of r times weights
-        l'P          r
+    tube: Any
+    gust: Any
+    terms: Any
 
-    `one` is the number 1 of the arithmetic.
+
+class Motion(NamedTuple):
+    """P (n, n) at the two ends of a cell in airspeed, or one that does not move; its `rate` by
+    airspeed (None: 0); the accelerations at the ends of the cell.
     """
-    n, q = over.centre.shape
-    tall = _in_corner(P, (q, n))
-    product = tall @ over.centre
-    gust, constant = (np.zeros((q, q), dtype=over.centre.dtype) for _ in range(2))
+
+    ends: Sequence[Any]
+    rate: Any
+    accelerations: Sequence[Any]
+
+
+def motion(nodes: Sequence[Any], width: Any, centre: Array, half: Array) -> Motion:
+    """P over a cell, linear between the nodes of its interval, one or two, `width` m/s apart.
+
+    centre, half: of the cell, in the share of the interval and in acceleration.
+    """
+    (s, a), (s_half, a_half) = centre, half
+    if len(nodes) == 1:
+        return Motion(nodes, None, [a])
+    step = nodes[1] - nodes[0]
+    ends = [nodes[0] + (s + side * s_half) * step for side in (-1, 1)]
+    return Motion(ends, step / width, [a - a_half, a + a_half])
+
+
+def conditions(
+    P: Motion, shares: Sequence[Shares], over: MatrixSet, by: Multipliers, number: Number = float
+) -> tuple[list[Any], list[Any]]:
+    """The matrices that must be positive definite, in two lists.
+
+    For each end of the cell, with its shares X: [X_tube, P; P, S], [X_gust, P; P, T] and [X_terms,
+    P l; l'P, r]. For each corner of the cell, as Bernstein coefficients of degree 2 in the
+    airspeed, minus
+
+        [P A + A'P + alpha P + dP/dt, P E, P d; ., -mu I, 0; ., ., mu - alpha]
+        + sum of H'S H and H'T H over the symbols + sum of r times weights
+        + [X_tube + X_gust + X_terms, 0; 0, 0].
+
+    `number` converts a double into the arithmetic.
+    """
+    bounds = []
+    for end, X in zip(P.ends, shares, strict=True):
+        rows = (end, end, np.swapaxes(end @ over.left.T, -1, -2))
+        for own, row, multiplier in zip(X, rows, by[:3], strict=True):
+            bounds.append(from_lower([[own], [row, multiplier]]))
+    fixed = _fixed(P.ends[0], over, by, number)
+    taken = [_in_corner(X.tube + X.gust + X.terms, fixed.shape[-2:]) for X in shares]
+    falls = []
+    for i, a in enumerate(P.accelerations):
+        known = fixed if P.rate is None else fixed + _in_corner(a * P.rate, fixed.shape[-2:])
+        for k in range(over.corners.shape[2]):
+            F = over.corners[:, min(i, over.corners.shape[1] - 1), k]
+            pairs = [(0, 0)] if len(P.ends) == len(F) == 1 else [(0, 0), (0, -1), (-1, 0), (-1, -1)]
+            M = [-(known + _motion(P.ends[e], F[f], by.decay) + taken[e]) for e, f in pairs]
+            falls += M if len(M) == 1 else [M[0], (M[1] + M[2]) * number(0.5), M[3]]
+    return bounds, falls
+
+
+def _motion(P: Any, F: Array, decay: Any) -> Any:
+    q = F.shape[-1]
+    product = _in_corner(P, (q, len(F))) @ F
+    return product + np.swapaxes(product, -1, -2) + decay * _in_corner(P, (q, q))
+
+
+def _fixed(P: Any, over: MatrixSet, by: Multipliers, number: Number) -> Any:
+    """What does not depend on P."""
+    n, q = over.corners.shape[-2:]
+    gust, constant = (np.zeros((q, q), dtype=over.corners.dtype) for _ in range(2))
+    one = number(1.0)
     for i in range(n, n + 3):
         gust[i, i] = -one
     gust[-1, -1], constant[-1, -1] = one, -one
-    M = product + np.swapaxes(product, -1, -2) + by.wind * gust
-    M = M + by.decay * (_in_corner(P, (q, q)) + _known(constant, P))
+    M = by.wind * gust + by.decay * _known(constant, P)
     for symbols, multiplier in ((over.tube, by.tube), (over.gust, by.gust)):
         for H in symbols:
             M = M + H.T @ multiplier @ H
     for k, weight in enumerate(over.weights):
         M = M + by.terms[..., k : k + 1, k : k + 1] * weight
-    tall_left = np.swapaxes(tall @ over.left.T, -1, -2)
-    tall = np.swapaxes(tall, -1, -2)
-    return from_lower(
-        [[-M], [tall, by.tube], [tall, None, by.gust], [tall_left, None, None, by.terms]]
-    )
+    return M
 
 
 def _in_corner(P: Any, shape: tuple[int, int]) -> Any:

@@ -1,13 +1,18 @@
-"""Search for an invariant ellipsoid and its multipliers, in floating point."""
+"""Search for invariant ellipsoids and their multipliers, in floating point."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import numpy as np
+from scipy import sparse
 
 from symheli.lpv import Polynomial
 from synthesis.lpv.affine_program import AffineProgram, BernsteinCell, Variable, from_lower
-from synthesis.program.cone_program import Answer, Solver
-from synthesis.tubes.inequality import MatrixSet, Multipliers, block
+from synthesis.program.cone_program import Answer, ConeProgram, Solver, solve
+from synthesis.tubes.deviations import Cell
+from synthesis.tubes.inequality import MatrixSet, Multipliers, Shares, conditions, motion
 
 Array = np.ndarray
 
@@ -16,83 +21,137 @@ POINT = BernsteinCell(np.zeros((1, 1)), np.ones((1, 1)))
 CONSTANT = Polynomial(0, 0.0, 1.0)
 
 
+PRICE = 1e-8
+"""Cost of the traces of multipliers: they stay finite where nothing else bounds them."""
+NEGLIGIBLE = 1e-12
+"""Size of entries that are left out of a program: numbers near underflow upset solvers."""
+
+
+class Enclosed(NamedTuple):
+    """A cell of commands with the nodes at the ends of its interval, one or two, their distance in
+    m/s, and the set of F for e = factor z, |z| <= 1.
+    """
+
+    cell: Cell
+    nodes: tuple[int, ...]
+    width: float
+    over: MatrixSet
+    factor: Array
+
+
+class Found(NamedTuple):
+    """P (nodes, n, n), the multipliers of each cell, and the mean square of the half widths over
+    those of equal weight.
+    """
+
+    P: Array
+    multipliers: list[Multipliers]
+    size: float
+
+
 def smallest(
-    over: MatrixSet,
-    factor: Array,
+    cells: Sequence[Enclosed],
+    roots: Array,
     sizes: Array,
     decay: float,
     spare: float,
     solver: Solver,
-) -> tuple[Array, float] | None:
-    """The P (n, n) of the smallest ellipsoid that satisfies the inequality with `spare` (1/s) left,
-    and its size: the mean square of its half widths over `sizes` (n,). None: the solver has none.
+) -> Found | None:
+    """The smallest ellipsoids that satisfy the inequality of every cell with `spare` (1/s) left,
+    None: the solver has none.
 
-    e = factor z are the coordinates of the program.
+    roots (nodes, n, n): e = root z are the coordinates at a node in the program. sizes (n,): half
+    widths of equal weight.
     """
-    program, n = AffineProgram(), len(factor)
-    scaled = over.scaled(factor)
-    unknown, inverse = program.symmetric(n, CONSTANT), program.symmetric(n, CONSTANT)
-    variables = _variables(program, scaled)
-    P, identity = program.value(unknown), program.known(np.eye(n))
-    _impose(program, P, scaled, variables, decay, program.known(np.array([[spare]])))
-    program.positive(POINT, from_lower([[program.value(inverse)], [identity, P]]))
-    cost = np.zeros(program.count)
-    weight = factor.T @ np.diag(1 / sizes**2) @ factor / n
-    cost[inverse.columns[0]] = np.tensordot(inverse.entries, weight, axes=2)
-    found = program.minimise(cost, solver)
+    parts = [_Node(root, sizes, len(roots)) for root in roots]
+    count = sum(node.program.count for node in parts)
+    starts = np.cumsum([0, *(node.program.count for node in parts)])
+    columns = [
+        start + np.arange(node.program.count) for start, node in zip(starts, parts, strict=False)
+    ]
+    made = [_Inequality(cell, roots, decay, spare) for cell in cells]
+    for part in made:
+        shared = [columns[i][parts[i].P.columns[0]] for i in part.cell.nodes]
+        own = part.program.count - sum(map(len, shared))
+        columns.append(np.concatenate([*shared, count + np.arange(own)]))
+        count += own
+    programs = [part.program for part in (*parts, *made)]
+    rows = [program.placed(c, count) for program, c in zip(programs, columns, strict=True)]
+    cost = np.zeros(count)
+    for part, c in zip((*parts, *made), columns, strict=True):
+        cost[c] += part.cost
+    A = sparse.csc_matrix(sparse.vstack([A for A, _ in rows]))
+    b = np.concatenate([b for _, b in rows])
+    A.data[np.abs(A.data) < NEGLIGIBLE] = 0.0
+    A.eliminate_zeros()
+    cones = tuple(size for program in programs for size in program.sizes)
+    found = solve(ConeProgram(cost, -A, b, cones), solver)
     if found.answer is not Answer.SOLVED or found.x is None:
         return None
-    own = unknown.coefficients(found.x)[0]
-    if np.linalg.eigvalsh(own)[0] <= 0:
+    x = [found.x[c] for c in columns]
+    P = np.array([node.found(own) for node, own in zip(parts, x, strict=False)])
+    if np.linalg.eigvalsh(P).min() <= 0:
         return None
-    back = np.linalg.inv(factor)
-    return back.T @ own @ back, float(cost @ found.x)
+    by = [part.found(own) for part, own in zip(made, x[len(parts) :], strict=True)]
+    return Found(P, by, float(cost @ found.x))
 
 
-def multipliers(
-    P: Array, over: MatrixSet, factor: Array, decay: float, solver: Solver
-) -> Multipliers | None:
-    """The multipliers that leave the inequality most to spare at a given P; None: no solution."""
-    program = AffineProgram()
-    scaled = over.scaled(factor)
-    variables = _variables(program, scaled)
-    spare = program.variable(np.ones((1, 1, 1)), CONSTANT)
-    left = program.value(spare)
-    known = program.known(factor.T @ P @ factor)
-    _impose(program, known, scaled, variables, decay, left)
-    program.nonnegative(POINT, program.known(np.ones((1, 1))) - left)
-    cost = np.zeros(program.count)
-    cost[spare.columns.ravel()] = -1.0
-    found = program.minimise(cost, solver)
-    if found.answer is not Answer.SOLVED or found.x is None:
-        return None
-    x, back = found.x, np.linalg.inv(factor)
-    own = {name: v.coefficients(x)[0] for name, v in variables.items()}
-    own["tube"], own["gust"] = (back.T @ own[name] @ back for name in ("tube", "gust"))
-    return Multipliers(decay=decay, **own)
+class _Node:
+    """P at a node in the coordinates z, e = root z, and its part of the size."""
+
+    def __init__(self, root: Array, sizes: Array, nodes: int):
+        self.root, self.program = root, AffineProgram()
+        self.P = self.program.symmetric(len(root), CONSTANT)
+        inverse = self.program.symmetric(len(root), CONSTANT)
+        P, above = (self.program.value(v) for v in (self.P, inverse))
+        identity = self.program.known(np.eye(len(root)))
+        self.program.positive(POINT, from_lower([[above], [identity, P]]))
+        self.cost = np.zeros(self.program.count)
+        weight = root.T @ np.diag(1 / sizes**2) @ root / (len(root) * nodes)
+        self.cost[inverse.columns[0]] = np.tensordot(inverse.entries, weight, axes=2)
+
+    def found(self, x: Array) -> Array:
+        back = np.linalg.inv(self.root)
+        return back.T @ self.P.coefficients(x)[0] @ back
 
 
-def _variables(program: AffineProgram, over: MatrixSet) -> dict[str, Variable]:
-    n, terms = len(over.centre), np.eye(len(over.left))
-    return {
-        "tube": program.symmetric(n, CONSTANT),
-        "gust": program.symmetric(n, CONSTANT),
-        "terms": program.variable(terms[:, :, None] * terms, CONSTANT),
-        "wind": program.variable(np.ones((1, 1, 1)), CONSTANT),
-    }
+class _Inequality:
+    """The inequality of a cell in the coordinates of its factor."""
 
+    def __init__(self, cell: Enclosed, roots: Array, decay: float, spare: float):
+        self.cell, self.decay, self.program = cell, decay, AffineProgram()
+        program, n, over = self.program, len(cell.factor), cell.over.scaled(cell.factor)
+        given = [program.symmetric(n, CONSTANT) for _ in cell.nodes]
+        terms = np.eye(len(over.left))
+        self.variables: dict[str, Variable] = {
+            "tube": program.symmetric(n, CONSTANT),
+            "gust": program.symmetric(n, CONSTANT),
+            "terms": program.variable(terms[:, :, None] * terms, CONSTANT),
+            "wind": program.variable(np.ones((1, 1, 1)), CONSTANT),
+        }
+        shares = [program.symmetric(n, CONSTANT) for _ in range(3 * len(given))]
+        nodes = []
+        for variable, i in zip(given, cell.nodes, strict=True):
+            turn = np.linalg.solve(roots[i], cell.factor)
+            nodes.append(turn.T @ program.value(variable) @ turn)
+        values = {name: program.value(v) for name, v in self.variables.items()}
+        by = Multipliers(decay=decay, **values)
+        P = motion(nodes, cell.width, *cell.cell.domain)
+        X = [
+            Shares(*(program.value(v) for v in shares[3 * k : 3 * k + 3]))
+            for k in range(len(given))
+        ]
+        bounds, falls = conditions(P, X, over, by)
+        least = program.known(spare * np.eye(over.corners.shape[-1]))
+        for F in [*bounds, *(M - least for M in falls)]:
+            program.positive(POINT, F)
+        program.nonnegative(POINT, by.wind)
+        self.cost = np.zeros(program.count)
+        for variable in self.variables.values():
+            self.cost[variable.columns[0]] = PRICE * np.einsum("eii->e", variable.entries)
 
-def _impose(
-    program: AffineProgram,
-    P: Array,
-    over: MatrixSet,
-    variables: dict[str, Variable],
-    decay: float,
-    spare: Array,
-) -> None:
-    """The inequality with a multiple `spare` of the identity to spare."""
-    values = {name: program.value(v) for name, v in variables.items()}
-    F = block(P, over, Multipliers(decay=decay, **values))
-    q = over.centre.shape[1]
-    program.positive(POINT, F - spare * np.diag((np.arange(F.shape[-1]) < q).astype(float)))
-    program.nonnegative(POINT, values["wind"])
+    def found(self, x: Array) -> Multipliers:
+        back = np.linalg.inv(self.cell.factor)
+        own = {name: v.coefficients(x)[0] for name, v in self.variables.items()}
+        own["tube"], own["gust"] = (back.T @ own[name] @ back for name in ("tube", "gust"))
+        return Multipliers(decay=self.decay, **own)

@@ -8,7 +8,7 @@ import pytest
 from symheli import Helicopter, trim
 from symheli.codegen.evaluate import evaluate
 from symheli.codegen.translation import operations
-from symheli.enclosure import Domain, enclose, interval
+from symheli.enclosure import Domain, enclose, interval, segment_averages
 from symheli.enclosure.form import AffineForm
 from symheli.enclosure.interval import Interval
 from symheli.errors import InputError
@@ -179,7 +179,8 @@ def test_a_kink_has_one_symbol_for_all_derivatives():
     np.testing.assert_allclose(found.jacobian.rest, 0.0, atol=1e-12)
     # an average over segments halves what is linear in the domain, not what a kink leaves open
     g = function(lambda x: casadi.fabs(x[0]) + x[0] ** 2, 2)
-    average = enclose(g, SQUARE, by=[0]).segment_average()
+    average, symbols = segment_averages(g, SQUARE, along=[0])
+    assert symbols == 2
     np.testing.assert_allclose(average.slopes[0, 0], [1.0, 0.0, 1.0])
 
 
@@ -307,3 +308,42 @@ def test_a_million_samples_lie_inside():
 def test_constants_and_known_forms_keep_their_shape():
     like = enclose(function(lambda x: x, 2), DISK).value
     np.testing.assert_allclose(AffineForm.constant(2.0, like).interval.lower, 2.0, rtol=1e-15)
+
+
+def test_averages_along_segments_are_those_of_quadrature():
+    def build(x):
+        return (
+            casadi.sin(x[0]) * x[1] + x[0] * casadi.fabs(x[1]) + x[1] * (3 + 2 * casadi.fabs(x[1]))
+        )
+
+    f = function(build, 2)
+    slope = casadi.SX.sym("x", 2)
+    jacobian = casadi.Function("j", [slope], [casadi.jacobian(f(slope), slope)])
+    domain = Domain.ellipsoid([0.4, 0.05], [[0.3, 0.1], [0.0, 0.2]])
+    average, symbols = segment_averages(f, domain, along=[0])
+    points, z = domain.sample(RNG, 300)
+    nodes, weights = np.polynomial.legendre.leggauss(200)
+    for x, own in zip(points, z, strict=True):
+        on = domain.centre[:, None] + (x - domain.centre)[:, None] * (nodes + 1) / 2
+        value = np.asarray(jacobian.map(200)(on)).reshape(1, 200, 2).transpose(1, 0, 2)
+        mean = np.tensordot(weights / 2, value, axes=1)
+        off = np.abs(mean - average.centre - average.slopes[..., :symbols] @ own)
+        kinks = np.abs(average.slopes[..., symbols:]).sum(axis=-1)
+        # a quadrature over a kink is off by a jump of 2 over its 200 nodes
+        assert np.all(off <= average.rest + kinks + 2e-2)
+
+
+def test_remainders_of_averages_fall_with_the_pieces_of_a_segment():
+    # derivative 3 x^2, whose form over [-1, 1] is 1.5 +- 1.5: a third of that is left by many
+    f = function(lambda x: x[0] ** 3, 1)
+    box = Domain.box([-1.0], [1.0])
+    rest = [segment_averages(f, box, along=[0], pieces=k)[0].rest.item() for k in (1, 4, 32)]
+    np.testing.assert_allclose(rest, [1.5, 1.5 * (1 + 4 + 9 + 16) / 64, 0.5], rtol=0.05)
+
+
+def test_the_derivative_of_x_times_its_size_has_no_remainder_but_one_symbol():
+    f = function(lambda x: 3 * (2 * x[0] + casadi.fabs(x[1])) * x[1], 2)
+    found = enclose(f, Domain.ellipsoid([1.0, 0.02], 0.1 * np.eye(2)), by=[0])
+    # 2 |x| over [-.08, .12]: between 0 and .24, from a line of slope .2 with half a width of .048
+    np.testing.assert_allclose(found.jacobian.slopes[0, 1], [0.6, 0.12, 0.288], rtol=1e-9)
+    assert found.jacobian.rest.max() < 1e-12

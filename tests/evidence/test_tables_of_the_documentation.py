@@ -22,6 +22,7 @@ from evidence.marks import calibrated, conditions, guarantee, measured
 from evidence.public_files import fetched
 from evidence.reach.measured import gains
 from evidence.tables import DOCS
+from evidence.tubes import TRANSITIONS, remainders
 from studies.controllers.designs import LQR, design, lqr_schedule
 from studies.controllers.flown import WINDS
 from studies.controllers.plant import baseline, flown_plant
@@ -173,6 +174,25 @@ def tube_in_hover():
     found = synthesis.tube(_xcell(), float(airspeed), gust=float(gust))
     assert found.proven
     assert attitude == " ".join(f"{w:.2g}" for w in found.half_widths[6:8])
+
+
+def remainder_of_one_cell():
+    *_, row = remainders([3.0]).splitlines()
+    shown = KEPT["tubes.md", "remainders"].cells("3 to 4")
+    assert shown == [cell.strip() for cell in row.strip("| ").split("|")][1:]
+
+
+def tube_along_a_transition():
+    name = "xcell_kahn_hudson"
+    case = next(case for case in TRANSITIONS if case[0] == name)
+    _, gust, limits, _, attitude, *_ = KEPT["tubes.md", "transitions"].cells(name)
+    acceleration, jerk, snap = case[4:]
+    assert (gust, limits) == (f"{case[3]:g}", f"{acceleration:g}, {jerk:g}, {snap:g}")
+    heli = Helicopter.load(name, governor="ideal")
+    found = synthesis.tube(
+        heli, case[1:3], gust=case[3], acceleration=acceleration, jerk=jerk, snap=snap
+    )
+    assert attitude == (" ".join(f"{w:.2g}" for w in found.half_widths[6:8]) * found.proven)
 
 
 def one_public_log():
@@ -349,6 +369,8 @@ ROWS = {
     ("structured.md", "static output feedback"): static_output_feedback_of_one_helicopter,
     ("structured.md", "gain table"): scheduled_lqr_beside_the_gain_table,
     ("tubes.md", "amplitudes"): tube_in_hover,
+    ("tubes.md", "transitions"): tube_along_a_transition,
+    ("tubes.md", "remainders"): remainder_of_one_cell,
     ("identify.md", "public logs"): one_public_log,
     ("identified.md", "xcell60"): lambda: marks_of_the_worst_seed("xcell60"),
     ("identified.md", "xcell_kahn_hudson"): lambda: marks_of_the_worst_seed(
