@@ -224,6 +224,9 @@ def installed_solvers() -> tuple[str, ...]:
 class ConeProgram:
     """The problem: minimise c' x subject to b - A x in the product of semidefinite cones of
     `sizes`; the first `equalities` rows are zero.
+
+    `own_units`: its variables are of order one; where Clarabel fails numerically, it is tried once
+    more without its own scaling of rows and columns, which can leave a system that is not definite.
     """
 
     c: Array
@@ -231,6 +234,7 @@ class ConeProgram:
     b: Array
     sizes: tuple[int, ...]
     equalities: int = 0
+    own_units: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -323,8 +327,7 @@ def _clarabel(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
     try:
         with no_panic():
             solution = in_thread(work)
-            if str(solution.status) == "NumericalError":
-                # its own scaling of rows and columns can leave a system that is not definite
+            if program.own_units and str(solution.status) == "NumericalError":
                 settings.equilibrate_enable = False
                 solution = in_thread(work)
     except SolverError as error:

@@ -85,7 +85,7 @@ def smallest(
     A.data[np.abs(A.data) < NEGLIGIBLE] = 0.0
     A.eliminate_zeros()
     cones = tuple(size for program in programs for size in program.sizes)
-    found = solve(ConeProgram(cost, -A, b, cones), solver)
+    found = solve(ConeProgram(cost, -A, b, cones, own_units=True), solver)
     if found.answer is not Answer.SOLVED or found.x is None:
         return None
     x = [found.x[c] for c in columns]
