@@ -23,6 +23,9 @@ from synthesis.worst.frozen import norm
 
 Array = np.ndarray
 
+SMALLEST = 1e-150
+"""Gain from all inputs to all outputs, in the units given, whose square is still a number."""
+
 MAX_ENTRY = 1e100
 """Largest entry of a model: Gramians square the entries."""
 
@@ -201,6 +204,11 @@ def model_scaling(model: LinearModel, gain: float, elsewhere: Matrices | None = 
     inverse = linalg.inv(Wc)
     # where inputs and outputs weigh alike: the geometric mean of the Hankel singular values
     level = np.exp(0.5 * (np.linalg.slogdet(Wo)[1] + np.linalg.slogdet(Wc)[1]) / n)
+    if not SMALLEST < level < 1 / SMALLEST:
+        raise InputError(
+            f"a model whose gain is near {level:.0e} cannot be squared; choose other units of its"
+            " inputs and outputs"
+        )
     X = symmetrized(Wo / level + level * inverse)
     side = inverse @ reached
     Q = seen.T @ seen / level + level * (
