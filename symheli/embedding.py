@@ -171,11 +171,9 @@ def embed(
     >>> round(float(found.parameters([0.5, 0.0], [0.0])[0]), 4)  # -9.81 sin(0.5)/0.5
     -9.4063
     """
-    pairs = [
-        *(states.values() if isinstance(states, Mapping) else [None]),
-        *(inputs.values() if isinstance(inputs, Mapping) else [None]),
-    ]
-    if any(np.shape(pair) != (2,) for pair in pairs):
+    named = isinstance(states, Mapping) and isinstance(inputs, Mapping)
+    pairs = [*states.values(), *inputs.values()] if named else []
+    if not named or any(np.shape(pair) != (2,) for pair in pairs):
         raise InputError("states and inputs: expected {name: (low, high)}, two numbers a name")
     x_names, u_names = signals(states), signals(inputs)
     names = (*x_names, *u_names)
@@ -241,7 +239,7 @@ def _moving(
     if wanted is None:
         depends = np.array(casadi.DM(casadi.jacobian_sparsity(J, z), 1.0), bool)
         curved = depends.reshape(len(names), len(rows), len(names)).any(axis=1)
-        return _fewest(curved | curved.T, nx)
+        return _fewest(np.array(curved | curved.T), nx)
     allowed = sorted({_index(name, names) for name in wanted})
     others = [j for j in range(len(names)) if j not in allowed]
     if others:
@@ -263,10 +261,10 @@ def _fewest(curved: Array, nx: int) -> list[int]:
     """Return the smallest set of variables without which no second derivative `curved` (nz, nz) is
     left; of equal ones that with the fewest inputs, the variables from `nx` on.
     """
-    chosen = np.flatnonzero(np.diag(curved))
+    chosen = np.flatnonzero(np.diag(curved)).tolist()
     open_ = curved.copy()
     open_[chosen] = open_[:, chosen] = False
-    rest = np.flatnonzero(open_.any(axis=0))
+    rest = np.flatnonzero(open_.any(axis=0)).tolist()
     if len(rest) > MAX_OPEN:
         return sorted([*chosen, *rest])
 
@@ -275,7 +273,7 @@ def _fewest(curved: Array, nx: int) -> list[int]:
         uncovered = open_[np.ix_(left, left)].any()
         return (len(some) if not uncovered else len(rest) + 1, sum(j >= nx for j in some))
 
-    sets = (some for n in range(len(rest) + 1) for some in combinations(rest.tolist(), n))
+    sets = (some for n in range(len(rest) + 1) for some in combinations(rest, n))
     return sorted([*chosen, *min(sets, key=cost)])
 
 

@@ -265,9 +265,9 @@ class Plant:
         for name, size in sizes.items():
             (i,) = indices([name], self.controls, "control")
             cost, size = Signal(f"{name}_cost", "1"), parts.positive(size, f"the cost of {name}")
-            control = self.controls[i]
+            across: dict[str, float] = {self.controls[i]: size}
             plant = plant._changed(
-                lambda model, new=cost, of={control: size}: with_row(model, new, {}, of),
+                lambda model, new=cost, across=across: with_row(model, new, {}, across),
                 performance=(*plant.performance, cost),
             )
         return plant

@@ -119,7 +119,8 @@ class UserFunctions(Basis):
         p = 0.5 * (low + high) - 0.5 * (high - low) * turn
         values = np.stack([np.broadcast_to(m.value(p), p.shape) for m in each], axis=-1)
         sizes = np.linalg.norm(values, axis=0)
-        _, R, order = qr(values / np.where(sizes > 0, sizes, 1.0), mode="economic", pivoting=True)
+        scaled = values / np.where(sizes > 0, sizes, 1.0)
+        _, R, order = qr(scaled, mode="economic", pivoting=True)  # type: ignore[assignment]
         rank = int(np.sum(np.abs(np.diag(R)) > DEPENDENT))
         kept = [each[j] for j in sorted(order[:rank])]
         slopes = [m.slope for m in kept if m.slope is not None]
