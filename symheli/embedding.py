@@ -261,9 +261,9 @@ def _fewest(curved: Array, nx: int) -> list[int]:
     """Return the smallest set of variables without which no second derivative `curved` (nz, nz) is
     left; of equal ones that with the fewest inputs, the variables from `nx` on.
     """
-    chosen = np.flatnonzero(np.diag(curved)).tolist()
-    open_ = curved.copy()
-    open_[chosen] = open_[:, chosen] = False
+    alone = np.diag(curved)
+    chosen = np.flatnonzero(alone).tolist()
+    open_ = curved & ~alone & ~alone[:, None]
     rest = np.flatnonzero(open_.any(axis=0)).tolist()
     if len(rest) > MAX_OPEN:
         return sorted([*chosen, *rest])
