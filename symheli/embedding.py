@@ -269,7 +269,7 @@ def _fewest(curved: Array, nx: int) -> list[int]:
         return sorted([*chosen, *rest])
 
     def cost(some: tuple[int, ...]) -> tuple[int, int]:
-        left = np.setdiff1d(rest, some)
+        left = np.array([j for j in rest if j not in some], dtype=int)
         uncovered = open_[np.ix_(left, left)].any()
         return (len(some) if not uncovered else len(rest) + 1, sum(j >= nx for j in some))
 
