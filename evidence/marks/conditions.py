@@ -196,7 +196,7 @@ class Condition:
 WIND, ANOTHER = 5.0, 50_000
 """m/s; what is added to the seed for a second flight."""
 
-AROUND = 7.0
+AROUND = 12.0
 """How far from the airspeeds that are flown a speed over ground may be, m/s."""
 
 OVER_GROUND = "speed_command"

@@ -211,7 +211,7 @@ class FilterError(Method):
         scores = sum(s.scores(theta, noise) for s, noise in flights) + np.diag(prior)
         covariance = inverse @ scores @ inverse  # type: ignore[operator]
         covariance = 0.5 * (covariance + covariance.T)
-        deviations = np.sqrt(np.diag(covariance)[6 * n :])
+        beside = arx.found(z.tolist(), np.sqrt(np.diag(covariance)[6 * n :]).tolist())
         residual = np.average([s.residual(theta) for s, _ in flights], axis=0, weights=weights)
         estimate = Estimate(
             theta=theta,
@@ -226,9 +226,9 @@ class FilterError(Method):
                 "gust": self.gust,
                 "gust_remains": air[1],
             }
-            | arx.found(z.tolist(), deviations.tolist()),
+            | beside,
             remarks=(
-                *_unknown_wind(arx.found(z.tolist(), deviations.tolist()).get("wind", {})),
+                *_unknown_wind(beside.get("wind", {})),
                 *(
                     ()
                     if settled or steps == 1

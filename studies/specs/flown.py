@@ -31,6 +31,7 @@ from symheli.flight import XCELL_SERVOS
 from symheli.flight.flight_data import FlightData
 from symheli.progress import tracked
 from symheli.values.arrays import Array
+from symheli.values.kinematics import GRAVITY
 from symheli.values.named_vector import NamedVector
 from synthesis.sheet.measures import rate_over_change
 from synthesis.sheet.sheet import Axis, Sheet
@@ -51,9 +52,6 @@ size gives.
 
 SWITCH_AT, SWITCH_FOR = 1.5, 2.0
 """When a controller takes over, and how long the flight is watched, s."""
-
-GRAVITY = 9.81
-"""Unit of the acceleration at a switch, m/s^2."""
 
 OF_A_FLIGHT = ("speed", "track", "altitude", "heading", "attitude", "rotor_speed")
 OF_A_CONTROL = ("effort", "stops")

@@ -14,7 +14,7 @@ from symheli.lpv import LFT, LPVStateSpace, Polynomial, Scheduling, UncertainSta
 from symheli.threads import with_one_thread
 from symheli.values.summary import summarized
 from synthesis.analysis.questions import stability
-from synthesis.robust.lower_bound import best_reals, worst_closing
+from synthesis.robust.lower_bound import ACCURACY, ROUGH, best_reals, worst_closing
 from synthesis.robust.structure import DynamicBlock, Loop, loop_of
 from synthesis.robust.upper_bound import proven_level
 from synthesis.worst.frozen import frozen_gain
@@ -23,12 +23,6 @@ SHARES = (0.9995, 0.998, 0.995, 0.99, 0.98, 0.95, 0.9, 0.75, 0.5)
 """Parts of the upper bound for which a proof is tried, in turn."""
 MIN_SCALE = 1e-6
 """A model that does not bear this part of its uncertainty counts as unstable without any."""
-ACCURACY = 1e-6
-"""Relative accuracy of the upper bound."""
-GROWTH = 1.001
-"""Factor by which a level is raised above the least at the frequency that decides."""
-ROUGH = 1e-4
-"""The same while real parameters are searched."""
 STEPS = 3
 """Doublings of the factor in which the loss of a loop is looked for."""
 POINTS = 21
@@ -173,7 +167,7 @@ def _of_blocks(
     _, d = best_reals(lambda d: _lost(loop, d, largest), loop.reals)
     upper = _lost(loop, d, largest, refine=True)
     borne = upper >= largest
-    level = proven_level(loop, 1 / upper, performance=False, growth=GROWTH).level
+    level = proven_level(loop, 1 / upper, performance=False).level
     closed = loop.closed(min(upper, largest) * d)
     found = worst_closing(closed, refine=True) if closed.stable and closed.parts else None
     return RobustMargin(

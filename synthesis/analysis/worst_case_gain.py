@@ -12,17 +12,11 @@ from scipy.optimize import brentq
 from symheli.lpv import LFT, LPVStateSpace
 from symheli.threads import with_one_thread
 from symheli.values.summary import summarized
-from synthesis.robust.lower_bound import best_reals, worst_closing
+from synthesis.robust.lower_bound import ACCURACY, ROUGH, best_reals, worst_closing
 from synthesis.robust.structure import DynamicBlock, Loop, loop_of
 from synthesis.robust.upper_bound import proven_level
 from synthesis.worst.frozen import norm
 
-GROWTH = 1.001
-"""Factor by which a level is raised above the least at the frequency that decides."""
-ACCURACY = 1e-6
-"""Relative accuracy of the gain for given real parameters."""
-ROUGH = 1e-4
-"""The same while real parameters are searched."""
 LARGEST_RATIO = 1e6
 """A gain this many times that without dynamics counts as none."""
 
@@ -99,7 +93,7 @@ def worst_case_gain(
         return WorstCaseGain(math.inf, math.inf, loop.physical(d), math.nan)
     if lower == 0.0:
         return WorstCaseGain(0.0, 0.0, nowhere, math.nan)
-    proven = proven_level(loop, lower, performance=True, growth=GROWTH)
+    proven = proven_level(loop, lower, performance=True)
     inner = None
     if delta is not None:  # without the last block, the performance
         last = loop.parts[-1]

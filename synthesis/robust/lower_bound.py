@@ -39,6 +39,8 @@ MAX_CORNERS = 64
 """Largest number of corners that are all tried."""
 DESCENTS = 20
 """Evaluations of each descent a real parameter."""
+ACCURACY, ROUGH = 1e-6, 1e-4
+"""Relative accuracy of a level by bisection, and of one while real parameters are searched."""
 
 
 class Closing(NamedTuple):

@@ -42,6 +42,8 @@ NARROW = 1e-9
 """Relative width of an interval of frequencies below which its level is raised."""
 BISECTIONS = 14
 """Of the level at one frequency."""
+GROWTH = 1.001
+"""Factor by which a level is raised above the least at the frequency that decides."""
 MAX_LEVEL = 1e4
 """Largest level, in units of the start, that is looked for."""
 
@@ -62,8 +64,8 @@ class Upper(NamedTuple):
     covered: bool
 
 
-def proven_level(loop: Loop, start: float, *, performance: bool, growth: float) -> Upper:
-    """Return the least level, from `start` on in steps of `growth`, that no block exceeds at any
+def proven_level(loop: Loop, start: float, *, performance: bool) -> Upper:
+    """Return the least level, from `start` on in steps of `GROWTH`, that no block exceeds at any
     frequency: of all blocks, or of the performance alone beside blocks of norm 1.
     """
     loop = loop.in_units(start, performance)
@@ -74,7 +76,7 @@ def proven_level(loop: Loop, start: float, *, performance: bool, growth: float) 
         if failed is None:
             return Upper(start * level, decides, True)
         decides = failed
-        level = max(level_at(loop, failed, level, performance), level) * growth
+        level = max(level_at(loop, failed, level, performance), level) * GROWTH
     return Upper(math.inf, decides, False)
 
 

@@ -40,8 +40,8 @@ def frozen_gain(
     lpv : LPVStateSpace or LFT
         The model.
     points : int
-        Of the grid whose highest peaks are climbed, of one parameter; the breaks of a spline are on
-        it too. Of two parameters 15 values each are, of more 7 or 3.
+        Of the grid whose highest peaks are climbed, of one parameter: of two 15 each, of more 7 or
+        3. The breaks of a spline are on it too.
     tolerance : float
         Relative accuracy of each norm, from below; less than 1.
 
@@ -66,7 +66,11 @@ def frozen_gain(
     """
     if not 0 < tolerance < 1:
         raise InputError(f"tolerance: expected a number between 0 and 1, got {tolerance!r:.60}")
-    if isinstance(lpv, LPVStateSpace | LFT) and len(lpv.parameters) > 1:
+    if isinstance(lpv, LFT) and len(lpv.parameters) > 1:
+        from synthesis.worst.lft import frozen_box_gain
+
+        return FrozenGain(*frozen_box_gain(lpv, tolerance=tolerance))
+    if isinstance(lpv, LPVStateSpace) and len(lpv.parameters) > 1:
         return _over_a_box(lpv, tolerance)
     low, high = lpv.scheduling.low, lpv.scheduling.high
     grid = np.linspace(low, high, whole(points, "points", 2))
@@ -82,16 +86,17 @@ def frozen_gain(
     return FrozenGain(gamma, p, norm(*lpv.matrices(p), lpv.dt, tolerance)[1])
 
 
-def _over_a_box(lpv: LPVStateSpace | LFT, tolerance: float) -> FrozenGain:
-    def at(p: Array) -> tuple[float, float]:
-        m = lpv.at(*map(float, p))
-        return norm(m.A, m.B, m.C, m.D, lpv.dt, tolerance)
+def _over_a_box(lpv: LPVStateSpace, tolerance: float) -> FrozenGain:
+    from synthesis.polynomial.pieces import pieces
+    from synthesis.worst.box import worst_frozen
 
-    points = {2: 15, 3: 7}.get(len(lpv.parameters), 3)
-    axes = [np.linspace(s.low, s.high, points) for s in lpv.parameters]
-    gamma, p = worst_over(lambda q: at(q)[0], axes)
-    omega = math.nan if math.isinf(gamma) else at(p)[1]
-    return FrozenGain(gamma, tuple(map(float, p)), omega)
+    def at(A: Array, B: Array, C: Array, D: Array) -> tuple[float, float]:
+        return norm(A, B, C, D, lpv.dt, tolerance)
+
+    gamma, p, _ = worst_frozen(pieces(lpv), lambda A, B, C, D: at(A, B, C, D)[0])
+    m = lpv.at(*(p or ()))
+    omega = math.nan if math.isinf(gamma) else at(m.A, m.B, m.C, m.D)[1]
+    return FrozenGain(gamma, p, omega)
 
 
 def norm(
