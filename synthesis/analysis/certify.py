@@ -6,13 +6,14 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv import LFT, LPVStateSpace, Scheduling, UncertainStateSpace
+from synthesis.analysis.adjoint import ADJOINT, FAR_ABOVE, backwards
 from synthesis.analysis.apart import apart
 from synthesis.analysis.general_search import General
 from synthesis.analysis.hypotheses import VERIFIED, hypotheses
@@ -93,11 +94,24 @@ def certify(problem: Problem) -> Certificate:
         if worst is not None:
             return report.nothing(Status.GROWING, beaten._replace(worst=worst), ladder)
     cert = report.found(best, beaten, ladder)
-    return (
-        cert
-        if stability
-        else cert.resting_on(search_hypothesis(search and search.seconds, beaten.seconds))
-    )
+    if stability:
+        return cert
+    other = None if best.bound <= FAR_ABOVE * frozen.value else backwards(problem)
+    if other is not None:
+        cert = _lower(cert, _of_adjoint(other, beaten))
+    return cert.resting_on(search_hypothesis(search and search.seconds, beaten.seconds))
+
+
+def _of_adjoint(problem: Problem, beaten: Beaten) -> Certificate:
+    """Search a proof of the adjoint of a loop, whose lower bound is known."""
+    ladder = route(problem)
+    return Report(problem).found(ladder.search(beaten.frozen), beaten, ladder).resting_on([ADJOINT])
+
+
+def _lower(first: Certificate, second: Certificate) -> Certificate:
+    """Return the certificate with the lower proven gain, with the programs tried for both."""
+    better = second if second.verified and not first.proven <= second.proven else first
+    return replace(better, attempts=(*first.attempts, *second.attempts))
 
 
 class _Member(NamedTuple):

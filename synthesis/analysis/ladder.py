@@ -179,9 +179,12 @@ class Ladder(ABC):
 
     def _whether_any(self, answer: Answer) -> Answer:
         """Decide whether any P exists. Solvers handle this bounded problem better than an infinite
-        gain.
+        gain; not where it takes all inequalities at once of a model with many states, which fill
+        gigabytes.
         """
         problem = self.problem
+        if problem.by_points:
+            return answer
         other = type(self)(problem._replace(demand=problem.demand._replace(kind="stability")))
         stable = other.search(math.inf)
         self.attempts += other.attempts

@@ -23,7 +23,8 @@ Model = LPVStateSpace | LFT | UncertainStateSpace
 
 class Problem(NamedTuple):
     """A model in polynomial pieces, the kind of bound and the options; `uncertain`: the set of
-    models for which the bound must hold, with `model` as its nominal one.
+    models for which the bound must hold, with `model` as its nominal one; `usual`: whether form,
+    impose and solver were left out.
     """
 
     model: Pieces
@@ -33,6 +34,7 @@ class Problem(NamedTuple):
     solver: Solver
     search: Search | None
     uncertain: UncertainStateSpace | None = None
+    usual: bool = False
 
     @property
     def one_parameter(self) -> bool:
@@ -86,6 +88,7 @@ def pose(
 
     Raises `InputError` for an option that has no meaning for the problem.
     """
+    usual = form is None and impose is None and solver is None
     form, impose = form or Spline(), impose or Bernstein()
     if not isinstance(form, Spline | Memory | HigherOrder):
         raise InputError(f"form must be a Spline, Memory or HigherOrder, got {form!r:.60}")
@@ -107,7 +110,8 @@ def pose(
     if uncertain is not None:
         uncertain = uncertain.with_scheduling(model.parameters)
     demand = Demand(kind, motion)
-    problem = Problem(pieces(model), demand, form, impose, Solver("CLARABEL"), search, uncertain)
+    problem = Problem(pieces(model), demand, form, impose, Solver("CLARABEL"), search)
+    problem = problem._replace(uncertain=uncertain, usual=usual)
     _check_channels(problem)
     _check_options(problem)
     _check_block(problem)

@@ -28,12 +28,6 @@ if TYPE_CHECKING:
     from synthesis.plant.plant import Plant
 
 
-ADJOINT = (
-    "proven of the adjoint of the loop, A(p)', C(p)', B(p)', D(p)': over all motions of p within"
-    " its range and rates, which are the same backwards, its gain is that of the loop"
-)
-
-
 SAMPLED = (
     "proven of the sampled loop: the plant with its inputs, disturbances too, held over each"
     " {dt:g} s; the statement does not include the time between the samples"
@@ -41,11 +35,13 @@ SAMPLED = (
 
 
 GAIN_TOLERANCE = 1.05
-"""Ratio of a proven gain to its lower bound up to which no richer P is tried, where the synthesis
-promised no gain.
+"""Ratio of a proven gain to the promised one, or to its lower bound where none is promised, up to
+which no richer P is tried.
 """
-ADJOINT_USUAL = {"form": Spline(degree=2, segments=(1, 4)), "solver": LYAPUNOV}
-
+AS_PROMISED = 1.002
+"""Ratio of a proven gain to the promised one up to which the other of loop and adjoint is not
+tried.
+"""
 RICHER_SEARCH = {
     "form": Spline(degree=4, segments=4, grading=1.0),
     "impose": Bernstein(floor=1e-2),
@@ -179,6 +175,7 @@ class Controller:
         so, with the misfit of the sampled plant. `synthesis.certify_sampled` proves that of a plant
         with servos and delay as they are.
         """
+        from synthesis.analysis.adjoint import ADJOINT, adjoint_options
         from synthesis.analysis.questions import l2_gain
 
         loop = self.closed()
@@ -188,9 +185,11 @@ class Controller:
         usual = not {"form", "impose", "solver"} & set(options)
 
         def proof(adjoint: bool, richer: bool = False) -> Certificate:
-            usually: dict[str, Any] = {}
-            if richer or (adjoint and usual and len(moving) == 1):
-                usually = RICHER_SEARCH if richer else ADJOINT_USUAL
+            usually: dict[str, Any] = {"form": Spline()} if usual else {}
+            if richer:
+                usually = RICHER_SEARCH
+            elif adjoint and usual:
+                usually |= adjoint_options(len(moving))
             if not adjoint:
                 return l2_gain(loop, rate, **usually | options).resting_on(rests)
             proven = l2_gain(loop.adjoint(), rate, **usually | options)
@@ -205,7 +204,7 @@ class Controller:
             # at once where the usual P proves nothing
             others.insert(found.verified, lambda: proof(self.by_adjoint, richer=True))
         for k, other in enumerate(others):
-            if found.gamma <= (GAIN_TOLERANCE if k else 1.0) * enough:
+            if found.gamma <= (GAIN_TOLERANCE if k else AS_PROMISED) * enough:
                 break
             found = min(found, other(), key=_proven)
         return found

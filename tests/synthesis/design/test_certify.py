@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from scheduled_plants import RATE, spring
 
 from symheli import Scheduling
 from symheli.errors import InputError
+from symheli.lpv import LPVStateSpace
 from synthesis import Memory, Search, Spline, l2_gain, lower_bound, output_feedback
-from synthesis.loops.controller import ADJOINT
+from synthesis.analysis.adjoint import ADJOINT, FAR_ABOVE, backwards
+from synthesis.analysis.problem import pose
 from synthesis.lyapunov.spline import MemoryLyapunov
 
 GLANCE = Search(levels=6, dwells=5, starts=1, nodes=30, evaluations=8, samples=5000)
@@ -59,6 +63,45 @@ def test_a_controller_is_proven_by_the_adjoint_where_y_moves(made):
     assert proof.gamma <= made.promised * (1 + 1e-6)
     fixed = output_feedback(spring(), RATE, X=2, Y=0)
     assert ADJOINT not in fixed.certify(RATE, search=None).hypotheses
+
+
+def wandering():
+    """b c = (2 - p)(1 + p): the gain of the moving p is above the worst frozen one."""
+    p = Scheduling("p", "1", 0.0, 1.0, rate=0.5)
+    B, C = [[[2.0]], [[-1.0]]], [[[1.0]], [[1.0]]]
+    return LPVStateSpace.polynomial([[[-1.0]]], B, C, [[[0.0]]], p)
+
+
+@pytest.mark.slow
+def test_a_gain_far_above_the_frozen_one_is_looked_for_of_the_adjoint_too(monkeypatch):
+    alone = l2_gain(wandering(), search=None)
+    assert alone.gamma < FAR_ABOVE * alone.frozen
+    assert ADJOINT not in alone.hypotheses
+    monkeypatch.setattr("synthesis.analysis.certify.FAR_ABOVE", 1.0)
+    both = l2_gain(wandering(), search=None)
+    # the lower of two proven gains, and the programs of both
+    assert both.gamma <= alone.gamma
+    assert both.verify(rigorous=True)
+    assert len(both.attempts) > len(alone.attempts)
+
+
+@pytest.mark.parametrize(
+    ("kind", "rate", "form", "tried"),
+    [
+        ("l2 gain", 0.5, None, True),
+        # what the user chose is done as it is
+        ("l2 gain", 0.5, Spline(), False),
+        # P is constant: its inverse proves the same
+        ("l2 gain", math.inf, None, False),
+        ("decay rate", 0.5, None, False),
+    ],
+)
+def test_when_the_adjoint_is_of_use(kind, rate, form, tried):
+    problem = backwards(pose(wandering(), rate, kind, form, None, None, None))
+    assert (problem is not None) == tried
+    if problem:
+        assert np.array_equal(problem.model.source.B, wandering().C)
+        assert backwards(problem) is None
 
 
 def test_a_rate_that_is_another_parameter_is_not_turned_around(loop):
