@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from synthesis.polynomial.exact import positive_definite
+from synthesis.polynomial.exact import integers, nearest, positive_definite
 from synthesis.polynomial.matrix import PolynomialMatrix
 
 Array = np.ndarray
@@ -31,7 +31,7 @@ def negative_definite(F: PolynomialMatrix, cells: int = MAX_BOXES) -> bool:
         below = values[..., -1] < limit
         if not np.all(
             below.reshape(len(waiting), *waiting.shape[1 : m + 1])[
-                _corners(waiting.shape[1 : m + 1])
+                (slice(None), *_corners(waiting.shape[1 : m + 1]))
             ]
         ):
             return False
@@ -42,25 +42,28 @@ def negative_definite(F: PolynomialMatrix, cells: int = MAX_BOXES) -> bool:
 
 
 def negative_definite_exactly(F: PolynomialMatrix, cells: int = MAX_BOXES) -> bool:
-    """Check in the exact arithmetic of the coefficients, by an LDL' factorisation of each."""
-    waiting, spent = [F], 0
+    """Check in exact arithmetic, of coefficients that are rationals; only their lower triangles are
+    read.
+    """
+    m, spent = len(F.box), 0
+    # a positive factor changes nothing, and integers are halved without divisions
+    waiting = [integers(-F.coefficients)]
     while waiting:
         spent += 1
         if spent > cells:
             return False
         G = waiting.pop()
-        matrices = G.coefficients.reshape(-1, *G.shape)
-        numbers = matrices.astype(float)
+        numbers = nearest(G)
         # a check in floating point that fails saves the exact one
-        promising = bool(np.all(np.linalg.eigvalsh(_normalised(numbers))[:, -1] < 0))
-        if promising and all(positive_definite(-M) for M in matrices):
+        promising = bool(np.all(np.linalg.eigvalsh(_normalised(numbers))[..., 0] > 0))
+        if promising and all(map(positive_definite, G.reshape(-1, *F.shape))):
             continue
-        if not all(positive_definite(-M) for M in G.corners()):
+        if not all(map(positive_definite, G[_corners(G.shape[:m])].reshape(-1, *F.shape))):
             return False
-        curvature = _curvature(numbers.reshape(1, *G.coefficients.shape), len(G.box))[0]
+        curvature = _curvature(numbers[None], m)[0]
         if curvature.max() == 0.0:
             return False
-        waiting += G.split(int(np.argmax(curvature)))
+        waiting += _bisect(G, int(np.argmax(curvature)))
     return True
 
 
@@ -74,7 +77,7 @@ def _normalised(F: Array) -> Array:
 
 
 def _corners(shape: tuple[int, ...]) -> tuple[slice, ...]:
-    return (slice(None), *(slice(None, None, max(n - 1, 1)) for n in shape))
+    return tuple(slice(None, None, max(n - 1, 1)) for n in shape)
 
 
 def _curvature(c: Array, m: int) -> Array:
@@ -101,11 +104,15 @@ def _halves(c: Array, m: int) -> Array:
 
 
 def _bisect(c: Array, axis: int) -> list[Array]:
-    """Apply de Casteljau's algorithm at the middle of one axis."""
+    """Apply de Casteljau's algorithm at the middle of one axis. Of integers the coefficients are
+    those of a polynomial 2^degree times as large, so that they stay integers.
+    """
     row = np.moveaxis(c, axis, 0)
-    left, right = [row[0]], [row[-1]]
-    while len(row) > 1:
-        row = 0.5 * (row[1:] + row[:-1])
-        left.append(row[0])
-        right.append(row[-1])
+    degree, whole = len(row) - 1, c.dtype == object
+    left, right = [], []
+    for k in range(degree + 1):
+        factor = 2 ** (degree - k) if whole else 0.5**k
+        left.append(row[0] * factor)
+        right.append(row[-1] * factor)
+        row = row[1:] + row[:-1]
     return [np.moveaxis(np.stack(part), 0, axis) for part in (left, right[::-1])]

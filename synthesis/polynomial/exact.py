@@ -29,45 +29,72 @@ def rational() -> Number:
 
 
 def positive_definite(M: Array) -> bool:
-    """Whether the symmetric rational matrix is positive definite; only its lower triangle is read.
+    """Whether the symmetric matrix of integers or rationals is positive definite; only its lower
+    triangle is read.
 
     Shown by a congruence with rounded numbers that leaves nearly the identity, where that is
-    strictly dominant in its diagonal: a few products of integers. Else all pivots of an LDL'
-    factorisation decide, whose numbers grow with every row.
+    strictly dominant in its diagonal: a few products of integers. Else all pivots of an elimination
+    decide, whose numbers grow with every row.
     """
-    return (len(M) > MAX_DIRECT_ROWS and _dominant(M)) or _pivots_are_positive(M)
+    own = _mirrored(integers(M))
+    return (len(own) > MAX_DIRECT_ROWS and _dominant(own)) or _pivots_are_positive(own)
 
 
 MAX_DIRECT_ROWS = 6
-"""Number of rows up to which the exact factorisation is as fast as the congruence."""
+"""Number of rows up to which the exact elimination is as fast as the congruence."""
 CONGRUENCE_BITS = 50
 """Number of bits to which the entries of the congruence are rounded."""
+FLOAT_BITS = 900
+"""Number of bits beyond which integers are divided by a power of two before they become doubles."""
 
 
-def _dominant(M: Array) -> bool:
+def integers(values: Array) -> Array:
+    """Return integers or rationals (...) as integers, all times the same positive number."""
+    flat = values.ravel().tolist()
+    if not all(isinstance(v, int) for v in flat):
+        parts = [(int(v.numerator), int(v.denominator)) for v in flat]
+        common = math.lcm(*{below for _, below in parts})
+        flat = [above * (common // below) for above, below in parts]
+    out = np.empty(len(flat), dtype=object)
+    out[:] = flat
+    return out.reshape(values.shape)
+
+
+def nearest(whole: Array) -> Array:
+    """Return integers as doubles, all times the same power of two where they are large."""
+    bits = max((abs(v).bit_length() for v in whole.ravel().tolist()), default=0)
+    unit = 1 << max(bits - FLOAT_BITS, 0)
+    return np.array([v / unit for v in whole.ravel().tolist()]).reshape(whole.shape)
+
+
+def _mirrored(M: Array) -> Array:
+    """Return the symmetric matrix of this lower triangle."""
+    out = M.copy()
+    rows, columns = np.tril_indices(len(M), -1)
+    out[columns, rows] = out[rows, columns]
+    return out
+
+
+def _dominant(own: Array) -> bool:
     """Whether R' M R is strictly diagonally dominant, R the rounded inverse of a Cholesky factor in
-    floating point: it is then positive definite, and R regular, so that M is too. Exact.
+    floating point: it is then positive definite, and R regular, so that M is too. Exact, of
+    integers.
     """
-    try:
-        rounded = M.astype(float)
-    except OverflowError:
-        return False
+    rounded = nearest(own)
     size = np.diag(rounded).copy()
-    if not np.all(np.isfinite(rounded)) or not np.all(size > 0):
+    if not np.all(size > 0):
         return False
     size = 1.0 / np.sqrt(size)
-    lower = np.tril(rounded * size * size[:, None])
     try:
-        factor = np.linalg.cholesky(lower + np.tril(lower, -1).T)
+        factor = np.linalg.cholesky(rounded * size * size[:, None])
     except np.linalg.LinAlgError:
         return False
-    R = size[:, None] * linalg.solve_triangular(factor, np.eye(len(M)), lower=True).T
+    R = size[:, None] * linalg.solve_triangular(factor, np.eye(len(own)), lower=True).T
     exponents = np.frexp(np.abs(R).max(axis=0))[1]
     if not np.all(np.isfinite(R)):
         return False
     # R is `whole` times a power of two a column
     whole = np.rint(np.ldexp(R, CONGRUENCE_BITS - exponents)).astype(np.int64).astype(object)
-    own = _whole(M)
     Q = whole.T @ (own @ whole)
     steps = [1 << int(e) for e in exponents - exponents.min()]
     for i, row in enumerate(Q):
@@ -79,32 +106,17 @@ def _dominant(M: Array) -> bool:
     return True
 
 
-def _whole(M: Array) -> Array:
-    """Return the symmetric matrix of this lower triangle times a factor that makes all entries
-    integers.
+def _pivots_are_positive(own: Array) -> bool:
+    """Whether all leading minors of a symmetric matrix of integers are positive, by Bareiss'
+    elimination without fractions.
     """
-    denominators = {int(v.denominator) for v in M.ravel()}
-    common = math.lcm(*denominators)
-    out = np.array(
-        [[int(v.numerator) * (common // int(v.denominator)) for v in row] for row in M],
-        dtype=object,
-    )
-    rows, columns = np.tril_indices(len(M), -1)
-    out[columns, rows] = out[rows, columns]
-    return out
-
-
-def _pivots_are_positive(M: Array) -> bool:
-    M = M.copy()
-    for k in range(len(M)):
-        pivot = M[k, k]
+    M, before = own, 1
+    while len(M):
+        pivot = M[0, 0]
         if not pivot > 0:
             return False
-        for i in range(k + 1, len(M)):
-            if M[i, k] != 0:
-                factor = M[i, k] / pivot
-                for j in range(k + 1, i + 1):
-                    M[i, j] = M[i, j] - factor * M[j, k]
+        M = (M[1:, 1:] * pivot - np.multiply.outer(M[1:, 0], M[0, 1:])) // before
+        before = pivot
     return True
 
 
