@@ -257,11 +257,20 @@ class OneParameter(Ladder):
         return found
 
     def _proven(self, scaled: ScaledProblem, P: Lyapunov, answer: Answer) -> Found:
-        """Verify P, given in scaled units, in physical units as it is stored."""
+        """Verify P, given in scaled units, in physical units as it is stored; with its coordinates
+        where rounding to those units takes too much.
+        """
         units, evidence = scaled.units, scaled.evidence(self.elevation)
-        P = P.in_units(units.left, units.channel**2, 1.0 / units.time, units.multiplier)
+        own, P = P, P.in_units(units.left, units.channel**2, 1.0 / units.time, units.multiplier)
         least, conditioning = evidence.least_gain(P)
+        if isinstance(own, SplineLyapunov) and own.order == 1 and own.multiplier is None:
+            kept = own.kept_in(units.left, units.channel**2)
+            unrounded, condition = evidence.least_gain(kept)
+            if unrounded * (1 + CLOSE_TO_LOWER) < least:
+                P, least, conditioning = kept, unrounded, condition
         gamma, proof = inflated(least, units.channel, self.sampling_error), Proof(evidence, P)
-        if math.isinf(least) or not evidence.floating(P, gamma) or not self.believed(proof, gamma):
+        exactly = P.coordinates is not None and math.isfinite(least)
+        believed = proof.exact(gamma) if exactly else self.believed(proof, gamma)
+        if math.isinf(least) or not evidence.floating(P, gamma) or not believed:
             return Found(math.inf, None, answer)
         return Found(gamma, proof, answer, conditioning)

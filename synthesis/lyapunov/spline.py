@@ -39,7 +39,8 @@ class SplineLyapunov:
     `symmetric_power`), n = N then. `slack` (blocks, null space): what was added to each Bernstein
     coefficient of -dV/dt to make it definite. `multiplier` (K e + 1,) >= 0 of a norm-bounded block:
     Bernstein coefficients of lambda(p), a continuous spline of degree e on the same knots, in
-    squared outputs per squared output of the block.
+    squared outputs per squared output of the block. `coordinates` T (n, n), for order 1: V is
+    (T x)' P(p) (T x), where rounding P to the units of the states would take its margin.
     """
 
     knots: Array
@@ -48,11 +49,13 @@ class SplineLyapunov:
     order: int = 1
     slack: Array | None = None
     multiplier: Array | None = None
+    coordinates: Array | None = None
 
     __repr__ = summarized
 
     def __post_init__(self) -> None:
-        given = (name for name in ("slack", "multiplier") if getattr(self, name) is not None)
+        optional = ("slack", "multiplier", "coordinates")
+        given = (name for name in optional if getattr(self, name) is not None)
         _freeze(self, "knots", "coefficients", *given)
         if self.fault:
             raise InputError(self.fault)
@@ -76,7 +79,13 @@ class SplineLyapunov:
         return structure.first(
             structure.symmetric(self.coefficients, (self.segments * self.degree + 1, n, n)),
             self._fault_of_multiplier(self.multiplier),
+            self._fault_of_coordinates(self.coordinates, n),
         )
+
+    def _fault_of_coordinates(self, T: Array | None, n: int) -> str | None:
+        if T is None or (self.order == 1 and T.shape == (n, n) and np.all(np.isfinite(T))):
+            return None
+        return f"coordinates must be a finite matrix of shape {(n, n)}, for order 1"
 
     def _fault_of_multiplier(self, values: Array | None) -> str | None:
         if values is None:
@@ -141,12 +150,19 @@ class SplineLyapunov:
             slack = null_weights(
                 factor * time * lifted.T @ null_matrix(slack, n, self.order) @ lifted, n, self.order
             )
+        if self.coordinates is not None:
+            lifted = self.coordinates @ lifted
         return replace(
             self,
             coefficients=_congruent(self.coefficients, lifted, factor),
+            coordinates=None,
             slack=slack,
             multiplier=None if self.multiplier is None else multiplier * self.multiplier,
         )
+
+    def kept_in(self, T: Array, factor: float = 1.0) -> SplineLyapunov:
+        """Return factor V as a function of the states x, z = T x, with these `coordinates`."""
+        return replace(self, coefficients=factor * self.coefficients, coordinates=T)
 
     def segment(self, j: int) -> Array:
         """Bernstein coefficients (d + 1, n, n) on segment j."""
@@ -159,9 +175,11 @@ class SplineLyapunov:
         return self.multiplier[j * e : (j + 1) * e + 1]
 
     def at(self, p: float | Array) -> Array:
-        """P at p, shape p.shape + (n, n). Raises `InputError` outside the knots."""
+        """P at p in the units of the states, shape p.shape + (n, n). Raises `InputError` outside
+        the knots.
+        """
         j, t = self._locate(p)
-        return self._sum(self.coefficients, self.degree, j * self.degree, t)
+        return self._of_states(self._sum(self.coefficients, self.degree, j * self.degree, t))
 
     def derivative(self, p: float | Array) -> Array:
         """dP/dp at p (per unit of p), the right-hand one at a knot, shape p.shape + (n, n)."""
@@ -169,12 +187,11 @@ class SplineLyapunov:
         if self.degree == 0:
             return np.zeros((*np.shape(t), *self.coefficients.shape[1:]))
         widths = np.repeat(np.diff(self.knots), self.degree)[:, None, None]
-        return self._sum(
-            self.degree * np.diff(self.coefficients, axis=0) / widths,
-            self.degree - 1,
-            j * self.degree,
-            t,
-        )
+        slopes = self.degree * np.diff(self.coefficients, axis=0) / widths
+        return self._of_states(self._sum(slopes, self.degree - 1, j * self.degree, t))
+
+    def _of_states(self, P: Array) -> Array:
+        return P if self.coordinates is None else _congruent(P, self.coordinates, 1.0)
 
     @staticmethod
     def _sum(coefficients: Array, degree: int, first: Array, t: Array) -> Array:
@@ -221,6 +238,7 @@ class MemoryLyapunov:
     order = 1
     slack = None
     multiplier = None
+    coordinates = None
 
     def __post_init__(self) -> None:
         _freeze(self, "lead_knots", "coefficients")

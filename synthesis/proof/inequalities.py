@@ -249,17 +249,20 @@ def _polynomials(
         if isinstance(P, MemoryLyapunov):
             yield from _remembering(model_on(model, region, number), region, P, rate, number)
             continue
-        pair = Pair(
-            *(
-                convert(_on_segment(P.knots, P.segment(j), j), number)
-                for (j,) in (region.segment, region.next_segment)
-            )
-        )
+        pair = Pair(*(_of_states(P, j, number) for (j,) in (region.segment, region.next_segment)))
         supply = None if channel is None else _supply(model, region, P, channel, number)
         for F in decrease(own, region, pair, demand, number):
             if supply is not None:
                 F = F + supply.extend(F.box[1:])
             yield F, PolynomialMatrix.constant(one, F.box)
+
+
+def _of_states(P: SplineLyapunov, j: int, number: Number) -> PolynomialMatrix:
+    """Return P on segment j, as a form in the states."""
+    own = convert(_on_segment(P.knots, P.segment(j), j), number)
+    if P.coordinates is None:
+        return own
+    return own.congruence(PolynomialMatrix.constant(exact(P.coordinates, number), own.box))
 
 
 def _on_segment(knots: Array, coefficients: Array, j: int) -> PolynomialMatrix:

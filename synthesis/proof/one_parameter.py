@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -90,11 +91,10 @@ def proven(statement: Statement, gamma: float) -> bool:
     states, n = P.coefficients.shape[-1], statement.strict
     if P.multiplier is not None and not np.all(P.multiplier >= 0):
         return False
-    for coefficient in P.coefficients.reshape(-1, states, states):
-        if not positive_definite(
-            np.array([[number(float(v)) for v in row] for row in coefficient], dtype=object)
-        ):
-            return False
+    # `coordinates` are regular where every block is negative: where T x = 0, it is not
+    forms = P.coefficients.reshape(-1, states, states)
+    if not all(positive_definite(exact(form, number)) for form in forms):
+        return False
     g = None if math.isnan(gamma) else number(gamma) * number(gamma)
     count = sum(1 for _ in lmi_polynomials(statement, float))
     blocks = lmi_polynomials(statement, number)
@@ -186,8 +186,10 @@ class Evidence(NamedTuple):
         return (units.channel * math.sqrt(findings.g) if gains else math.nan), findings.conditioning
 
     def _scaled(self, P: Lyapunov) -> Lyapunov:
-        u = self.units
-        return P.in_units(u.right, u.channel**-2, u.time, 1.0 / u.multiplier)
+        u, back = self.units, self.units.right
+        if P.coordinates is not None and np.array_equal(P.coordinates, u.left):
+            P, back = replace(P, coordinates=None), np.eye(len(back))
+        return P.in_units(back, u.channel**-2, u.time, 1.0 / u.multiplier)
 
     @property
     def _rate(self) -> float:

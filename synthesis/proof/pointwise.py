@@ -9,7 +9,7 @@ inequalities themselves) is not used here, so that an error in it is detected.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import combinations_with_replacement, pairwise, product
 from math import comb
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -265,6 +265,8 @@ def inequalities(
     else:
         knots, degrees = P.knots, P.degrees
     here, slopes = tensor_spline(knots, degrees, P.coefficients, p, number)
+    states = _states_of(P, number)
+    here, slopes = states(here), [*map(states, slopes)]
     yield -here
     g = number(bound) * number(bound) if demand.kind.endswith("gain") else None
     if demand.of_gramian:
@@ -288,8 +290,16 @@ def inequalities(
         return
     growth = number(growth_of(bound, dt)) if decay else number(1.0)
     for q in reached(p, spans(p, demand.rates, motion.ties, degrees, motion.box, dt), motion.box):
-        after = tensor_spline(knots, degrees, P.coefficients, q, number)[0] * growth
+        after = states(tensor_spline(knots, degrees, P.coefficients, q, number)[0]) * growth
         yield dissipation(model, here, None, after, g, supplied)
+
+
+def _states_of(P: SplineLyapunov | BoxLyapunov, number: Number) -> Callable[[Array], Array]:
+    """Return the function that makes forms in the coordinates of P forms in the states."""
+    if isinstance(P, BoxLyapunov) or P.coordinates is None:
+        return lambda form: form
+    T = exact(P.coordinates, number)
+    return lambda form: T.T @ form @ T
 
 
 def _output_form(P: Array, model: Matrices, kind: str, dt: float | None, g: Any) -> Array:
