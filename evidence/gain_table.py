@@ -13,8 +13,8 @@ import numpy as np
 import symheli
 import synthesis
 from evidence.tables import DOCS, keep, markdown
-from studies.controllers.asked import RATE, SIZES, TOP
 from studies.controllers.certified import FORM, SOLVER
+from studies.controllers.design_choices import RATE, SIZES, TOP
 from studies.controllers.designs import lqr_schedule
 from studies.controllers.flown import transition
 from studies.controllers.measures import Measures, measured

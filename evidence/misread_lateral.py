@@ -19,7 +19,7 @@ KNOTS = 3
 """Of the table: as few as cost the frozen gain nothing."""
 PROOF = Spline(degree=1, segments=2)
 BIAS, LAG = 1.0, 0.5
-"""Asked for: m/s, and seconds at the certified acceleration."""
+"""DesignChoices for: m/s, and seconds at the certified acceleration."""
 MOST = 6.0
 """Largest error that is tried, m/s."""
 

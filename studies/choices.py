@@ -24,14 +24,14 @@ FILES = ("vehicle", "model")
 """Fields that may name a file."""
 
 
-def about(said: str, least: float | None = None, empty: bool = False) -> dict[str, Any]:
+def about(meaning: str, least: float | None = None, empty: bool = False) -> dict[str, Any]:
     """Metadata of a field: numbers are at least `least`, lists and texts may be `empty`."""
-    return {"said": said, "least": least, "empty": empty}
+    return {"meaning": meaning, "least": least, "empty": empty}
 
 
-def choice(default: Any, said: str, least: float | None = None, empty: bool = False) -> Any:
+def choice(default: Any, meaning: str, least: float | None = None, empty: bool = False) -> Any:
     """A field with this default and `about` it."""
-    return field(default=default, metadata=about(said, least, empty))
+    return field(default=default, metadata=about(meaning, least, empty))
 
 
 class _Wrong(Exception):
@@ -97,9 +97,9 @@ def entries(path: Path, verb: str, out: Path | None = None) -> dict[str, Any]:
     if out is not None:
         found.setdefault("out", str(out))
     for name in ("out", *FILES):
-        said = found.get(name)
-        if isinstance(said, str) and (name == "out" or (path.parent / said).is_file()):
-            found[name] = str(path.parent / said)
+        given = found.get(name)
+        if isinstance(given, str) and (name == "out" or (path.parent / given).is_file()):
+            found[name] = str(path.parent / given)
     return found
 
 
@@ -118,17 +118,17 @@ def beside(thing: Any, name: str, folder: Path) -> Any:
 
 def sentence(kind: type, name: str) -> str:
     """Return the description of a field."""
-    return next((f.metadata.get("said", "") for f in fields(kind) if f.name == name), "")
+    return next((f.metadata.get("meaning", "") for f in fields(kind) if f.name == name), "")
 
 
-def commented(entry: str, said: str) -> tuple[str, ...]:
+def commented(entry: str, meaning: str) -> tuple[str, ...]:
     """Return the lines of an entry of a file with its description, if any: beside it where there is
     room, else before it.
     """
-    if not said:
+    if not meaning:
         return (entry,)
-    beside_it = f"{entry}  # {said}"
-    return (beside_it,) if len(beside_it) <= WIDTH else (f"# {said}:", entry)
+    beside_it = f"{entry}  # {meaning}"
+    return (beside_it,) if len(beside_it) <= WIDTH else (f"# {meaning}:", entry)
 
 
 def default(kind: type, name: str) -> Any:

@@ -150,9 +150,9 @@ def _fail(error: Exception, asks_json: bool, sentence: str = "", status: int = 1
     sentence = sentence or "\n  ".join(" ".join(s.split()) for s in str(error).splitlines())
     print(f"symheli: {sentence}", file=sys.stderr)
     if asks_json:
-        told = {"error": {"type": type(error).__name__, "message": sentence}}
+        report = {"error": {"type": type(error).__name__, "message": sentence}}
         with contextlib.suppress(OSError):  # it may be stdout that failed
-            print(as_json(told), flush=True)
+            print(as_json(report), flush=True)
     return status
 
 

@@ -22,16 +22,16 @@ FIRST, EVERY = 2.0, 10.0
 
 @dataclass
 class _Open:
-    """A task under way, begun at `since` and at its last step when `told` (s)."""
+    """A task under way, begun at `since` and at its last step when `stepped` (s)."""
 
     at: Progress
     since: float
-    told: float
+    stepped: float
 
     def step(self, at: Progress, now: float) -> None:
         """Note where it is."""
         if at.done > self.at.done:
-            self.told = now
+            self.stepped = now
         self.at = at
 
     def remaining(self, now: float) -> float | None:
@@ -40,8 +40,8 @@ class _Open:
         """
         if not self.at.total or not self.at.total / 20 <= self.at.done <= self.at.total:
             return None
-        left = (self.told - self.since) * (self.at.total - self.at.done) / self.at.done
-        return left - (now - self.told) if left >= now - self.told else None
+        left = (self.stepped - self.since) * (self.at.total - self.at.done) / self.at.done
+        return left - (now - self.stepped) if left >= now - self.stepped else None
 
 
 class _Shown(Protocol):
@@ -112,13 +112,13 @@ class Lines:
         if not tasks or now < self._next or now - tasks[0].since < FIRST:
             return
         ends = tasks if len(tasks) < 3 else [tasks[0], tasks[-1]]
-        said = "; ".join(str(one.at) for one in ends)
-        if said == self._last:
+        line = "; ".join(str(one.at) for one in ends)
+        if line == self._last:
             return
         left = next((task.remaining(now) for task in tasks if task.at.total), None)
-        self._next, self._last = now + EVERY, said
+        self._next, self._last = now + EVERY, line
         words = "" if left is None else f", about {duration(left)} left"
-        sys.stderr.write(f"symheli: {said}{words}\n")  # at once: other threads write there, too
+        sys.stderr.write(f"symheli: {line}{words}\n")  # at once: other threads write there, too
         sys.stderr.flush()
 
     def close(self) -> None:

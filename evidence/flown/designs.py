@@ -16,7 +16,7 @@ import symheli
 from evidence import gain_table
 from evidence.tables import DOCS
 from studies.campaigns.trials.control import identified
-from studies.controllers.asked import (
+from studies.controllers.design_choices import (
     CONTROLS,
     GUSTS,
     MEASUREMENTS,

@@ -13,7 +13,7 @@ from scipy.optimize import minimize
 
 from evidence.flown import designs
 from evidence.tables import DOCS, keep, markdown
-from studies.controllers.asked import PERIOD
+from studies.controllers.design_choices import PERIOD
 from studies.controllers.flown import BEYOND, WINDS, measures, plan
 from symheli import Helicopter, LPVStateSpace
 from symheli.errors import SymheliError

@@ -172,7 +172,7 @@ def write(
     words.
     """
     heli = Helicopter.load(vehicle, governor="ideal")
-    made, told, lost = sweeps(heli, axis, limits)
+    made, compared, lost = sweeps(heli, axis, limits)
     written = []
     for number, experiment in enumerate(found.plan.experiments, 1):
         candidate = next(c for c in candidates if c.name == experiment.name)
@@ -200,22 +200,22 @@ def write(
         "step": STEP,
         "airspeed": [0.0, TOP],
         "flights": [_data(one) for one in found.plan.experiments],
-        "sweeps": [_data(one) for one in told],
+        "sweeps": [_data(one) for one in compared],
     }
     write_text(folder / "plan.json", json.dumps(plan, indent=1))
     written += [folder / "play.py", folder / "plan.json"]
-    return written, _words(found.plan, told, lost)
+    return written, _words(found.plan, compared, lost)
 
 
-def _words(plan: Plan, told: Sequence[Experiment], lost: dict[str, str]) -> str:
+def _words(plan: Plan, compared: Sequence[Experiment], lost: dict[str, str]) -> str:
     best = float(np.median(plan.bounds))
     lines = []
-    if told:
-        swept = Plan(tuple(told), ()).bounds
+    if compared:
+        swept = Plan(tuple(compared), ()).bounds
         seen = np.isfinite(swept)
         lines.append(
-            f"sweeps as SystemID flies them, {len(told)} airspeeds from 0 to {TOP:g} m/s: median"
-            f" standard error {np.median(swept[seen]) / best:.2f} of that of the plan;"
+            f"sweeps as SystemID flies them, {len(compared)} airspeeds from 0 to {TOP:g} m/s:"
+            f" median standard error {np.median(swept[seen]) / best:.2f} of that of the plan;"
             f" {int((~seen).sum())} of {len(swept)} coefficients stay unknown, since the airspeed"
             " is held"
         )
@@ -327,14 +327,14 @@ def flown(plan: Path, records: Sequence[FlightRecord], *, sweeps: bool = False) 
     if any(len(f.factor) != len(structure.regressor_names) for f in flights):
         raise InputError(f"{plan}: written for another structure; write the plan once more")
     held = {f"record {i}": _fitting(r, axis, step) for i, r in enumerate(records, 1)}
-    told = compare_experiments(structure, held, {})
+    compared = compare_experiments(structure, held, {})
     planned = Plan(flights, ()).bounds
     speed = np.concatenate([held_one[SCHEDULING] for held_one in held.values()])
-    asked = np.isfinite(planned)
+    excited = np.isfinite(planned)
     return Flown(
-        Plan(told, ()).bounds[asked] / planned[asked],
-        tuple(n for n, wanted in zip(structure.regressor_names, asked, strict=True) if wanted),
-        sum(one.duration for one in told),
+        Plan(compared, ()).bounds[excited] / planned[excited],
+        tuple(n for n, wanted in zip(structure.regressor_names, excited, strict=True) if wanted),
+        sum(one.duration for one in compared),
         (float(np.nanmin(speed)), float(np.nanmax(speed))),
         (low, high),
     )

@@ -67,8 +67,8 @@ def where_scheduling_pays(
             "windy": plan.windy,
             "ramps": plan.ramps,
         }
-        asked = Campaign(TRIAL, grid={"seed": range(seeds + 1)}, fixed=fixed)
-        found = columns_of(asked, on, path)
+        campaign = Campaign(TRIAL, grid={"seed": range(seeds + 1)}, fixed=fixed)
+        found = columns_of(campaign, on, path)
         yield from (
             _line(condition, axis, output, found) for axis in AXES for output in axis.outputs
         )

@@ -199,5 +199,5 @@ class _ProgressLines:
 
     def _print(self, more: str) -> None:
         failed = f"{self._failed} failed" if self._failed else ""
-        said = ", ".join(filter(None, (f"{self._done} of {self._count} cases", failed, more)))
-        progress(f"  {said}")
+        line = ", ".join(filter(None, (f"{self._done} of {self._count} cases", failed, more)))
+        progress(f"  {line}")

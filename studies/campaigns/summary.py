@@ -38,14 +38,14 @@ def table(campaign: Campaign, dataset: CampaignDataset, show: list[str] | None =
         good = [i for i in at if rows[i] not in reasons]
         medians = [f"{_median(values[n][good]):.5g}" for n in shown]
         lines.append([*map(str, point), f"{len(good)}/{len(at)}", *medians])
-    said = [
+    out = [
         f"{campaign.trial.name}: medians of {len(rows)} cases, {len(reasons)} failed",
         columns(lines, left=len(campaign.grid)),
     ]
     if len(points) > MAX_POINTS:
-        said.append(f"... and {len(points) - MAX_POINTS} points more")
-    said += [f"failed: {n} x {why}" for why, n in _counted(reasons).items()]
-    return "\n".join([*said, f"every case: {dataset.path}"])
+        out.append(f"... and {len(points) - MAX_POINTS} points more")
+    out += [f"failed: {n} x {why}" for why, n in _counted(reasons).items()]
+    return "\n".join([*out, f"every case: {dataset.path}"])
 
 
 def data(campaign: Campaign, dataset: CampaignDataset) -> dict[str, Any]:

@@ -73,7 +73,7 @@ def run(arguments: argparse.Namespace) -> Output:
             " slower, same numbers to rounding (install gcc or set CC)"
         )
     level = next(iter(compiled_kernels("double"))) if compiled_kernel("double") else None
-    said = (
+    lines = (
         f"machine code, level {level}"
         if level
         else (
@@ -85,7 +85,7 @@ def run(arguments: argparse.Namespace) -> Output:
         (
             columns(rows, left=3),
             compiling,
-            f"recursive estimator: {said}",
+            f"recursive estimator: {lines}",
             f"solvers for matrix inequalities: {', '.join(solvers) or 'NONE'}",
             f"cache of compiled models: {cache} ({problem or 'writable'})",
         )

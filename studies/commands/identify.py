@@ -291,8 +291,8 @@ def _contents(arguments: argparse.Namespace, log: Path) -> Contents:
 
     kind = _log_format(arguments, log)
     if not arguments.map or kind in OWN_CLOCKS:
-        told = log.stat() if log.is_file() else None
-        return _all_of(log, kind, *((told.st_mtime_ns, told.st_size) if told else (0, 0)))
+        status = log.stat() if log.is_file() else None
+        return _all_of(log, kind, *((status.st_mtime_ns, status.st_size) if status else (0, 0)))
     record = FlightRecord.from_map(log, arguments.map)
     columns = {str(s): Column(record.time, record[s], s.unit) for s in record.signals}
     return Contents("mapped", columns)

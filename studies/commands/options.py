@@ -238,8 +238,8 @@ def choices_written(text: Callable[[Path], str], target: str) -> Output:
     Raises `InputError` for a file that is there.
     """
     if target == STANDARD_OUTPUT:
-        told = text(Path())
-        return Output(told.rstrip("\n"), {"configuration": told})
+        shown = text(Path())
+        return Output(shown.rstrip("\n"), {"configuration": shown})
     path = Path(target)
     if path.exists():
         raise InputError(f"{path} already exists; give another name, or remove it")

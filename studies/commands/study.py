@@ -55,8 +55,8 @@ def run(arguments: argparse.Namespace) -> Output:
 
     result = run_study(configuration, resume=arguments.resume)
     report = configuration.out / "report.html"
-    told = f"\nnumbers: {configuration.out / 'results.json'}\nreport: {report}"
-    return Output(f"{result.summary()}\n{told}", result.to_dict())
+    written = f"\nnumbers: {configuration.out / 'results.json'}\nreport: {report}"
+    return Output(f"{result.summary()}\n{written}", result.to_dict())
 
 
 def _configuration(arguments: argparse.Namespace) -> Configuration:

@@ -12,7 +12,7 @@ from studies.output import Output
 from symheli.errors import InputError
 
 if TYPE_CHECKING:
-    from studies.controllers.asked import Asked
+    from studies.controllers.design_choices import DesignChoices
 
 HELP = (
     "design a scheduled controller, prove its gain as it flies (reduced, sampled, tabulated, behind"
@@ -45,30 +45,30 @@ ARGUMENTS = (
 
 def run(arguments: argparse.Namespace) -> Output:
     """Everything, and what came of it; status 1 where nothing is proven or a flight was lost."""
-    from studies.controllers.asked import Asked
+    from studies.controllers.design_choices import DesignChoices
 
     given = {name: getattr(arguments, name) for name in OVERRIDE}
-    asked = Asked.read(arguments.file, {k: v for k, v in given.items() if v is not None})
+    choices = DesignChoices.read(arguments.file, {k: v for k, v in given.items() if v is not None})
     if arguments.write_config is not None:
-        return options.choices_written(asked.text, arguments.write_config)
+        return options.choices_written(choices.text, arguments.write_config)
     from studies.controllers import synthesized_report as report
     from studies.controllers.synthesized import synthesized
 
-    found = synthesized(asked, _given(asked))
+    found = synthesized(choices, _given(choices))
     written = report.write(found)
     failed = not found.sampled.certificate.verified or found.lost > 0
     data = {**report.data(found), "written": written}
     return Output(report.text(found, written), data, status=int(failed))
 
 
-def _given(asked: Asked):
+def _given(choices: DesignChoices):
     """The model of a file that is designed for."""
     from studies.commands.given_model import read
     from symheli.lpv import LinearFamily
 
-    if not asked.model:
+    if not choices.model:
         return None
-    path = Path(asked.model)
+    path = Path(choices.model)
     if not path.is_file():
         raise InputError(
             f"model: there is no file {path}, neither beside the file of choices nor here; symheli"

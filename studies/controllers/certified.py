@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import synthesis
-from studies.controllers.asked import RATE
+from studies.controllers.design_choices import RATE
 from studies.controllers.designs import BASELINE, LFT, NAMES, Designs
 from studies.controllers.plant import closed
 from studies.transition.guarantees import CONSTANT, PLAIN, Bound
@@ -57,12 +57,12 @@ def controller_questions(
     or of the LPV controller from the baseline alone, or none.
     """
     names = NAMES if certified_controllers else (BASELINE,) * first_certificate
-    asked = [
+    calls = [
         partial(proofs, design.name, closed(controllers.plant, design.controller))
         for design in controllers.designs
         if design.name in names and design.controller is not None
     ]
-    return Questions(asked, lambda bounds: CertifiedControllers(bounds=bounds))
+    return Questions(calls, lambda bounds: CertifiedControllers(bounds=bounds))
 
 
 def proofs(name: str, loop: LPVStateSpace) -> list[Bound]:

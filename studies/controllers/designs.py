@@ -13,7 +13,7 @@ import numpy as np
 
 import symheli
 from identification import FitForControl, KinematicModel, fit_for_control
-from studies.controllers.asked import (
+from studies.controllers.design_choices import (
     BACK_OFF,
     BACK_OFFS,
     PERIOD,
@@ -128,8 +128,8 @@ def design_questions(
         record = symheli.fly(heli, flights.aggressive(seed, autopilot_for(heli)))
     last = partial(from_flights, from_data(identified), flown, identified, record)
     ways = from_equations(heli, base, design_points)
-    asked = [partial(design, name, make, flown) for name, make in ways.items()]
-    return Questions([*asked, last], lambda designs: Designs(designs=designs, plant=flown), [last])
+    calls = [partial(design, name, make, flown) for name, make in ways.items()]
+    return Questions([*calls, last], lambda designs: Designs(designs=designs, plant=flown), [last])
 
 
 def from_equations(

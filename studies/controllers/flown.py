@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from studies.controllers.asked import (
+from studies.controllers.design_choices import (
     CONTROLS,
     DELAY,
     MEASUREMENTS,
@@ -141,8 +141,8 @@ def fly_controllers(vehicle: str, designs: Designs, seeds: Sequence[int]) -> Flo
     of them.
     """
     heli = Helicopter.load(vehicle, governor="pi")
-    asked = list(plans(designs))
-    each = measures(heli, [p for *_, p in asked], seeds) if asked else []
+    planned = list(plans(designs))
+    each = measures(heli, [p for *_, p in planned], seeds) if planned else []
     n = len(seeds)
     return FlownControllers(
         flown=tuple(
@@ -152,7 +152,7 @@ def fly_controllers(vehicle: str, designs: Designs, seeds: Sequence[int]) -> Flo
                 gust=float(Dryden(wind, ALTITUDE).intensities[0]),
                 flights=tuple(each[i * n : (i + 1) * n]),
             )
-            for i, (name, wind, _) in enumerate(asked)
+            for i, (name, wind, _) in enumerate(planned)
         ),
         seeds=n,
         duration=transition().duration,

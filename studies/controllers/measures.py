@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from studies.controllers.asked import CONTROLS, GUSTS, MEASUREMENTS, Asked
+from studies.controllers.design_choices import CONTROLS, GUSTS, MEASUREMENTS, DesignChoices
 from studies.controllers.plant import STUDY
 from symheli.flight import FlightPlan
 from symheli.flight.disturbance import Disturbances
@@ -44,12 +44,12 @@ class Measures:
     beyond: float
 
 
-def measured(flights: Iterable[FlightData], asked: Asked = STUDY) -> list[Measures]:
+def measured(flights: Iterable[FlightData], choices: DesignChoices = STUDY) -> list[Measures]:
     """Return the measures of every flight."""
-    return [of_flight(flown, asked) for flown in flights]
+    return [of_flight(flown, choices) for flown in flights]
 
 
-def of_flight(flown: FlightData, asked: Asked = STUDY) -> Measures:
+def of_flight(flown: FlightData, choices: DesignChoices = STUDY) -> Measures:
     """Return the measures of one flight, for the performance and the disturbances of the
     controller's specification.
     """
@@ -57,34 +57,40 @@ def of_flight(flown: FlightData, asked: Asked = STUDY) -> Measures:
     noise = noise_of(flown)
     true = {y: column[y] - noise[:, i] for i, y in enumerate(MEASUREMENTS)}
     gusts, forward = air(column, true, flown.plan)
-    z = performance(column, true, asked)
-    felt = [gusts[:, GUSTS.index(g)] / asked.sizes[g] for g in asked.disturbances if g in GUSTS]
-    heard = [noise[:, MEASUREMENTS.index(y)] / asked.noise[y] for y in asked.measurements]
-    w = np.column_stack([*felt, *heard])
+    z = performance(column, true, choices)
+    winds = [
+        gusts[:, GUSTS.index(g)] / choices.sizes[g] for g in choices.disturbances if g in GUSTS
+    ]
+    noises = [noise[:, MEASUREMENTS.index(y)] / choices.noise[y] for y in choices.measurements]
+    w = np.column_stack([*winds, *noises])
     commands = np.column_stack([column[f"{u}_command"] for u in CONTROLS])
-    low, high = asked.airspeeds
+    low, high = choices.airspeeds
     change = np.gradient(forward, flown.plan.dt) if len(forward) > 1 else np.zeros(len(forward))
     return Measures(
         lost=flown.lost >= 0,
         speed=rms(forward - column["airspeed_command"]),
         deviation=rms(np.linalg.norm(z, axis=1)),
-        deviations={name: rms(z[:, i]) for i, name in enumerate(asked.sizes_of_performance)},
+        deviations={name: rms(z[:, i]) for i, name in enumerate(choices.sizes_of_performance)},
         attitude=float(max(np.abs(true["phi"]).max(), np.abs(true["theta"]).max())),
         stops=float(np.any(np.abs(commands) >= AT_THE_STOP * travel, axis=1).mean()),
         ratio=energy_ratio(z, w),
         outside=float(np.mean((forward < low) | (forward > high))),
-        faster=float(np.mean(np.abs(change) > asked.acceleration)),
+        faster=float(np.mean(np.abs(change) > choices.acceleration)),
         beyond=float(np.mean(column["airspeed"] > Validity.of(flown.heli).harmless[0])),
     )
 
 
-def performance(column: dict[str, Array], true: dict[str, Array], asked: Asked = STUDY) -> Array:
+def performance(
+    column: dict[str, Array], true: dict[str, Array], choices: DesignChoices = STUDY
+) -> Array:
     """Deviations from the reference (n, 12 of the study), each in its size: measured states, then
     commands.
     """
-    size = asked.sizes
-    parts = [(true[y] - column[f"{y}_reference"]) / size[y] for y in asked.measurements]
-    parts += [(column[f"{u}_command"] - column[f"{u}_reference"]) / size[u] for u in asked.controls]
+    size = choices.sizes
+    parts = [(true[y] - column[f"{y}_reference"]) / size[y] for y in choices.measurements]
+    parts += [
+        (column[f"{u}_command"] - column[f"{u}_reference"]) / size[u] for u in choices.controls
+    ]
     return np.column_stack(parts)
 
 

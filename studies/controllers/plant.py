@@ -10,33 +10,33 @@ from dataclasses import replace
 import numpy as np
 
 import symheli
-from studies.controllers.asked import PERIOD, SAMPLED_DEGREE, Asked
+from studies.controllers.design_choices import PERIOD, SAMPLED_DEGREE, DesignChoices
 from symheli import Helicopter, LinearFamily, LinearModel, LPVStateSpace
 from symheli.flight import Servo
 from symheli.values.signal import Signal, indices, signals
 from synthesis import Plant
 from synthesis.plant import parts
 
-STUDY = Asked()
+STUDY = DesignChoices()
 
 
-def baseline(heli: Helicopter, asked: Asked = STUDY) -> LPVStateSpace:
+def baseline(heli: Helicopter, choices: DesignChoices = STUDY) -> LPVStateSpace:
     """The helicopter over airspeed with its controls and gusts, interpolated element by element."""
-    speeds = np.linspace(asked.airspeeds[0], asked.airspeeds[1], asked.points).tolist()
-    inputs = dict.fromkeys((*asked.controls, *asked.disturbances))
+    speeds = np.linspace(choices.airspeeds[0], choices.airspeeds[1], choices.points).tolist()
+    inputs = dict.fromkeys((*choices.controls, *choices.disturbances))
     family = symheli.sweep(heli, speeds, inputs=tuple(inputs))
-    return disturbed(of_family(family, asked), asked)
+    return disturbed(of_family(family, choices), choices)
 
 
-def of_family(family: LinearFamily, asked: Asked) -> LPVStateSpace:
+def of_family(family: LinearFamily, choices: DesignChoices) -> LPVStateSpace:
     """Interpolate linear models along airspeed, with the requested states of them."""
-    kept = family.select(asked.states) if asked.states else family
-    return kept.interpolate("polynomial", asked.degree, rate=asked.acceleration)
+    kept = family.select(choices.states) if choices.states else family
+    return kept.interpolate("polynomial", choices.degree, rate=choices.acceleration)
 
 
-def disturbed(model: LPVStateSpace, asked: Asked) -> LPVStateSpace:
+def disturbed(model: LPVStateSpace, choices: DesignChoices) -> LPVStateSpace:
     """Add an input for the disturbance of a control, where requested."""
-    both = [name for name in asked.disturbances if name in asked.controls]
+    both = [name for name in choices.disturbances if name in choices.controls]
     if not both:
         return model
     own = [model.inputs[i] for i in indices(both, model.inputs, "input")]
@@ -69,47 +69,51 @@ def actuator(servo: Servo, name: str, late: float) -> LinearModel:
     )
 
 
-def unweighted(model: LPVStateSpace, asked: Asked = STUDY) -> Plant:
+def unweighted(model: LPVStateSpace, choices: DesignChoices = STUDY) -> Plant:
     """Return the plant with gusts, controls, and the measured states and commands as
     performance.
     """
     return Plant(
         model,
-        disturbances=signals(asked.sizes_of_disturbances),
-        performance=signals(asked.sizes_of_performance),
-        controls=signals(asked.controls),
-        measurements=signals(asked.measurements),
+        disturbances=signals(choices.sizes_of_disturbances),
+        performance=signals(choices.sizes_of_performance),
+        controls=signals(choices.controls),
+        measurements=signals(choices.measurements),
     )
 
 
-def weighted(plant: Plant, asked: Asked = STUDY) -> Plant:
+def weighted(plant: Plant, choices: DesignChoices = STUDY) -> Plant:
     """Return the plant with every signal in its size, and noise on the measurements."""
-    sizes = {name: 1 / size for name, size in asked.sizes_of_performance.items()}
-    noise = {name: asked.noise[name] for name in asked.measurements}
-    return plant.weighted({**asked.sizes_of_disturbances, **sizes}).with_noise(noise)
+    sizes = {name: 1 / size for name, size in choices.sizes_of_performance.items()}
+    noise = {name: choices.noise[name] for name in choices.measurements}
+    return plant.weighted({**choices.sizes_of_disturbances, **sizes}).with_noise(noise)
 
 
-def design_plant(model: LPVStateSpace, held: float = PERIOD / 2, asked: Asked = STUDY) -> Plant:
+def design_plant(
+    model: LPVStateSpace, held: float = PERIOD / 2, choices: DesignChoices = STUDY
+) -> Plant:
     """Return the plant of the design: continuous, with actuators of low order behind the delay and
     the half sample that a command is `held` for, where the model does not have that already.
     """
-    servos = {u: asked.servo(u) for u in asked.controls}
-    late = asked.delay + held
+    servos = {u: choices.servo(u) for u in choices.controls}
+    late = choices.delay + held
     actuators = {u: actuator(servo, u, late) for u, servo in servos.items() if servo is not None}
-    behind = unweighted(model, asked).with_servo(actuators)
+    behind = unweighted(model, choices).with_servo(actuators)
     bare = [u for u, servo in servos.items() if servo is None]
-    return weighted(behind.with_delay(late, bare, order=1) if bare and late else behind, asked)
+    return weighted(behind.with_delay(late, bare, order=1) if bare and late else behind, choices)
 
 
-def flown_plant(model: LPVStateSpace, asked: Asked = STUDY) -> Plant:
+def flown_plant(model: LPVStateSpace, choices: DesignChoices = STUDY) -> Plant:
     """Return the plant of the certificate: the servos unchanged, the delay exact, sampled; a
     sampled model stays unchanged.
     """
-    servos = {u: asked.servo(u) for u in asked.controls}
-    behind = unweighted(model, asked).with_servo({u: s for u, s in servos.items() if s is not None})
+    servos = {u: choices.servo(u) for u in choices.controls}
+    behind = unweighted(model, choices).with_servo(
+        {u: s for u, s in servos.items() if s is not None}
+    )
     if model.dt is None:
-        behind = behind.sampled(asked.period, degree=SAMPLED_DEGREE)
-    return weighted(behind.with_delay(asked.delay) if asked.delay else behind, asked)
+        behind = behind.sampled(choices.period, degree=SAMPLED_DEGREE)
+    return weighted(behind.with_delay(choices.delay) if choices.delay else behind, choices)
 
 
 def closed(plant: Plant, controller: object) -> LPVStateSpace:

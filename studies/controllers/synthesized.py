@@ -17,8 +17,8 @@ import numpy as np
 import symheli
 import synthesis
 from identification import KinematicModel, LPVARXModel
-from studies.controllers.asked import NOISE_SHARE, Asked
 from studies.controllers.certified import FORM, SOLVER
+from studies.controllers.design_choices import NOISE_SHARE, DesignChoices
 from studies.controllers.designs import NEAR
 from studies.controllers.flown import ALTITUDE, STEADY
 from studies.controllers.identified_plant import (
@@ -86,7 +86,7 @@ class Synthesized:
     `flights`, `measures`: each transition; none without a vehicle; `seconds` of each step.
     """
 
-    asked: Asked
+    choices: DesignChoices
     made: synthesis.Controller
     table: TableController
     sampled: SampledLoop
@@ -104,7 +104,7 @@ class Synthesized:
         """Median and largest energy ratio of the flights; NaN where none has one: no flight, or
         disturbances that no flight has.
         """
-        gusts = set(self.asked.disturbances) - set(self.asked.controls)
+        gusts = set(self.choices.disturbances) - set(self.choices.controls)
         if not self.measures or not gusts:
             return math.nan, math.nan
         each = [one.ratio for one in self.measures]
@@ -144,38 +144,38 @@ class BesideAutopilot:
         return u, (own, autopilot)
 
 
-def synthesized(asked: Asked, given: Given | None = None) -> Synthesized:
+def synthesized(choices: DesignChoices, given: Given | None = None) -> Synthesized:
     """Everything, step by step; `given` in place of the linearizations of the vehicle, which then
     is only flown. Raises `SynthesisError` where there is no controller, with the reason.
     """
     seconds: dict[str, float] = {}
     with _timed("trimming and linearizing", seconds):
-        model = model_of(asked, given)
-        design, flying = plants(model, asked)
+        model = model_of(choices, given)
+        design, flying = plants(model, choices)
     with _timed("designing", seconds):
         made = synthesis.output_feedback(
-            design, back_off=asked.back_off, fastest=math.pi / asked.period
+            design, back_off=choices.back_off, fastest=math.pi / choices.period
         )
     with _timed("reducing, sampling, tabulating", seconds):
-        table = tabulated(made, flying, asked)
+        table = tabulated(made, flying, choices)
     with _timed("certifying", seconds):
         sampled = certified(table, flying, made.promised)
     flights: tuple[FlightData, ...] = ()
-    if asked.vehicle:
+    if choices.vehicle:
         with _timed("flying", seconds):
-            flights = flights_of(table, asked)
+            flights = flights_of(table, choices)
     return Synthesized(
-        asked=asked,
+        choices=choices,
         made=made,
         table=table,
         sampled=sampled,
         flights=flights,
-        measures=tuple(measured(flights, asked)),
+        measures=tuple(measured(flights, choices)),
         seconds=seconds,
     )
 
 
-def model_of(asked: Asked, given: Given | None = None) -> LPVStateSpace:
+def model_of(choices: DesignChoices, given: Given | None = None) -> LPVStateSpace:
     """Return the model of the design over airspeed, with its disturbances; sampled where it was
     identified.
 
@@ -183,35 +183,35 @@ def model_of(asked: Asked, given: Given | None = None) -> LPVStateSpace:
     airspeed or not over all that are asked for, and for what it does not have.
     """
     if given is None:
-        return baseline(Helicopter.load(asked.vehicle, governor="ideal"), asked)
+        return baseline(Helicopter.load(choices.vehicle, governor="ideal"), choices)
     if isinstance(given, LinearFamily):
-        model = of_family(given, asked)
-    elif asked.states:
+        model = of_family(given, choices)
+    elif choices.states:
         raise InputError("states: an identified model keeps its own; leave them out")
     elif isinstance(given, KinematicModel):
         model = with_gusts(given.to_state_space(held=moving_with_commands(given)))
     else:
         model = given.to_state_space()
-    airspeed = _airspeed(model, asked)
-    gusts = [name for name in asked.disturbances if name not in model.inputs]
+    airspeed = _airspeed(model, choices)
+    gusts = [name for name in choices.disturbances if name not in model.inputs]
     if gusts and isinstance(given, LPVARXModel):
         raise InputError(
             f"disturbances: the model has no {', '.join(gusts)}; give names of"
             f" {', '.join(model.inputs)} (added to that control), or a model with known kinematics"
         )
-    if model.dt is not None and abs(model.dt - asked.period) > 1e-9:
+    if model.dt is not None and abs(model.dt - choices.period) > 1e-9:
         raise InputError(
             f"period: the model is sampled every {model.dt:g} s, the controller every"
-            f" {asked.period:g} s; give the same"
+            f" {choices.period:g} s; give the same"
         )
-    return disturbed(model.with_scheduling(airspeed), asked)
+    return disturbed(model.with_scheduling(airspeed), choices)
 
 
-def _airspeed(model: LPVStateSpace, asked: Asked) -> Scheduling:
+def _airspeed(model: LPVStateSpace, choices: DesignChoices) -> Scheduling:
     """Return the requested range of airspeeds; raise `InputError` where the model is not
     over them.
     """
-    low, high = asked.airspeeds
+    low, high = choices.airspeeds
     over = ", ".join(f"{p.name} ({p.unit})" for p in model.parameters)
     size = ratio("m/s", model.parameters[0].unit)
     if len(model.parameters) != 1 or size is None:
@@ -224,47 +224,48 @@ def _airspeed(model: LPVStateSpace, asked: Asked) -> Scheduling:
         raise InputError(
             f"airspeeds: the model is known from {least:.6g} to {most:.6g} m/s; ask for no more"
         )
-    return Scheduling("airspeed", "m/s", low, high, rate=asked.acceleration)
+    return Scheduling("airspeed", "m/s", low, high, rate=choices.acceleration)
 
 
-def plants(model: LPVStateSpace, asked: Asked) -> tuple[Plant, Plant]:
+def plants(model: LPVStateSpace, choices: DesignChoices) -> tuple[Plant, Plant]:
     """Return the plant of the design, in continuous time, and that of the simulation, sampled."""
     if model.dt is None:
-        return design_plant(model, asked.period / 2, asked), flown_plant(model, asked)
+        return design_plant(model, choices.period / 2, choices), flown_plant(model, choices)
     smooth = of_degree(continuous(model), DEGREE)  # the half sample of the hold is in it
-    return design_plant(smooth, 0.0, asked), flown_plant(model, asked)
+    return design_plant(smooth, 0.0, choices), flown_plant(model, choices)
 
 
-def tabulated(made: synthesis.Controller, plant: Plant, asked: Asked) -> TableController:
+def tabulated(made: synthesis.Controller, plant: Plant, choices: DesignChoices) -> TableController:
     """The sampled controller of fewest states and then fewest airspeeds whose frozen gain on the
     plant is `NEAR` that of all states; as many as are asked for.
 
     Raises `SynthesisError` where the loop that flies is not stable at some frozen airspeed.
     """
-    speeds = np.linspace(asked.airspeeds[0], asked.airspeeds[1], LOOKED_AT)
+    speeds = np.linspace(choices.airspeeds[0], choices.airspeeds[1], LOOKED_AT)
 
     def gain(controller: object) -> float:
         loop = closed(plant, controller)
         return max(norm(*loop.matrices(float(v)), loop.dt)[0] for v in speeds)
 
-    limits = _limits(asked)
-    whole = made.discretize(asked.period)
+    limits = _limits(choices)
+    whole = made.discretize(choices.period)
     most = NEAR * gain(whole.model)
     if not math.isfinite(most):
         raise SynthesisError(
-            f"sampled every {asked.period:g} s, behind its servos and a delay of {asked.delay:g} s,"
-            " the loop of the controller is unstable at a frozen airspeed: ask for less (larger"
-            " sizes of the deviations, smaller ones of the commands, more noise)"
+            f"sampled every {choices.period:g} s, behind its servos and a delay of"
+            f" {choices.delay:g} s, the loop of the controller is unstable at a frozen airspeed:"
+            " ask for less (larger sizes of the deviations, smaller ones of the commands, more"
+            " noise)"
         )
     sampled = whole
-    if asked.order:
-        sampled = made.reduce(asked.order).discretize(asked.period)
+    if choices.order:
+        sampled = made.reduce(choices.order).discretize(choices.period)
     else:
-        fewer = fewest(made, lambda k: gain(k.discretize(asked.period).model), most)
-        sampled = fewer.discretize(asked.period)
-    for knots in (asked.knots,) if asked.knots else KNOTS:
+        fewer = fewest(made, lambda k: gain(k.discretize(choices.period).model), most)
+        sampled = fewer.discretize(choices.period)
+    for knots in (choices.knots,) if choices.knots else KNOTS:
         table = TableController.of(sampled.model, knots, limits=limits)
-        if asked.knots or gain(table) <= most:
+        if choices.knots or gain(table) <= most:
             break
     return table
 
@@ -280,43 +281,43 @@ def certified(table: TableController, plant: Plant, promised: float) -> SampledL
     )
 
 
-def flights_of(table: TableController, asked: Asked) -> tuple[FlightData, ...]:
+def flights_of(table: TableController, choices: DesignChoices) -> tuple[FlightData, ...]:
     """Transitions of the nonlinear helicopter, its engine governed, in turbulence, the table with
     its arithmetic and limits.
     """
-    heli = Helicopter.load(asked.vehicle, governor="pi")
-    low, high = asked.airspeeds
+    heli = Helicopter.load(choices.vehicle, governor="pi")
+    low, high = choices.airspeeds
     ends = low + RANGE_MARGINS[0] * (high - low), high - RANGE_MARGINS[1] * (high - low)
     controller: object = table
     if len(table.outputs) < len(heli.inputs):
-        ideal = Helicopter.load(asked.vehicle, governor="ideal")
-        lqr = symheli.gain_scheduled_lqr(ideal, low, high, asked.period)
+        ideal = Helicopter.load(choices.vehicle, governor="ideal")
+        lqr = symheli.gain_scheduled_lqr(ideal, low, high, choices.period)
         controller = BesideAutopilot(table, lqr.scheduled_controller)
-    servos = {u: asked.servo(u) for u in map(str, heli.inputs)}
+    servos = {u: choices.servo(u) for u in map(str, heli.inputs)}
     plan = FlightPlan(
-        AirspeedSchedule.transition(*ends, acceleration=asked.acceleration or 1.0, hold=3.0),
-        dt=asked.period,
+        AirspeedSchedule.transition(*ends, acceleration=choices.acceleration or 1.0, hold=3.0),
+        dt=choices.period,
         controller=controller,
-        wind=Wind(STEADY, turbulence=Dryden(asked.turbulence, ALTITUDE))
-        if asked.turbulence
+        wind=Wind(STEADY, turbulence=Dryden(choices.turbulence, ALTITUDE))
+        if choices.turbulence
         else Wind(),
         servos=servos if all(servos.values()) else None,  # type: ignore[arg-type]
-        sensors={y: Sensor(noise=NOISE_SHARE * asked.noise[y]) for y in asked.measurements},
-        delay=asked.delay,
+        sensors={y: Sensor(noise=NOISE_SHARE * choices.noise[y]) for y in choices.measurements},
+        delay=choices.delay,
     )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ValidityWarning)
         warnings.simplefilter("ignore", CompilerWarning)
-        return fly_batch(heli, [plan], seeds=range(asked.flights)).data
+        return fly_batch(heli, [plan], seeds=range(choices.flights)).data
 
 
-def _limits(asked: Asked) -> dict[str, tuple[float, float]]:
+def _limits(choices: DesignChoices) -> dict[str, tuple[float, float]]:
     """The travel of the controls, where there is a vehicle."""
-    if not asked.vehicle:
+    if not choices.vehicle:
         return {}
-    heli = Helicopter.load(asked.vehicle, governor="ideal")
+    heli = Helicopter.load(choices.vehicle, governor="ideal")
     travel = dict(zip(map(str, heli.inputs), map(float, heli.travel), strict=True))
-    return {u: (-travel[u], travel[u]) for u in asked.controls}
+    return {u: (-travel[u], travel[u]) for u in choices.controls}
 
 
 @contextmanager

@@ -39,13 +39,13 @@ FLIGHT = (
 
 def write(found: Synthesized) -> list[Path]:
     """Write table, certificate, choices, numbers and page into the requested folder."""
-    out = found.asked.out
+    out = found.choices.out
     out.mkdir(parents=True, exist_ok=True)
     written = [found.table.save(out / TABLE)]
     found.sampled.certificate.save(out / CERTIFICATE)
     written += [
         out / CERTIFICATE,
-        found.asked.write(out / CHOICES),
+        found.choices.write(out / CHOICES),
         write_text(out / NUMBERS, json.dumps(plain(data(found)), indent=1) + "\n"),
         write_text(out / PAGE, page(found)),
     ]
@@ -54,7 +54,7 @@ def write(found: Synthesized) -> list[Path]:
 
 def answer(found: Synthesized) -> str:
     """One sentence: what is proven of what flies."""
-    a, table = found.asked, found.table
+    a, table = found.choices, found.table
     low, high = a.airspeeds
     flies = f"A table of {len(table.knots)} airspeeds and {table.order} states"
     held = f"from {low:g} to {high:g} m/s and up to {a.acceleration:g} m/s^2"
@@ -65,7 +65,7 @@ def answer(found: Synthesized) -> str:
 
 def sentences(found: Synthesized) -> list[str]:
     """Return further remarks."""
-    a = found.asked
+    a = found.choices
     worst = found.sampled.certificate.frozen
     out = [
         f"{', '.join(a.controls)} from {', '.join(a.measurements)}, every {1000 * a.period:g} ms,"
@@ -108,7 +108,7 @@ def sentences(found: Synthesized) -> list[str]:
 def gains(found: Synthesized) -> list[tuple[str, str, str]]:
     """Return the promised, frozen, proven and simulated gains, each with its meaning."""
     certificate, (median, most) = found.sampled.certificate, found.ratios
-    a = found.asked
+    a = found.choices
     low, high = a.airspeeds
     rows = [
         ("promised", found.made.promised, f"the synthesis, of {found.made.order} states"),
@@ -132,13 +132,13 @@ def text(found: Synthesized, written: list[Path]) -> str:
     wrapped = "\n".join(_wrapped(sentences(found)))
     lines = [*_wrapped([answer(found)]), ""]
     lines += [f"  {name:9s} {value:>5s}  {of}" for name, value, of in gains(found)]
-    where = f"wrote {', '.join(path.name for path in written)} into {found.asked.out}"
+    where = f"wrote {', '.join(path.name for path in written)} into {found.choices.out}"
     return "\n".join([*lines, "", wrapped, "", where])
 
 
 def data(found: Synthesized) -> dict[str, Any]:
     """Return the data for a program."""
-    a, certificate, (median, most) = found.asked, found.sampled.certificate, found.ratios
+    a, certificate, (median, most) = found.choices, found.sampled.certificate, found.ratios
     return {
         "vehicle": a.vehicle,
         "airspeeds": a.airspeeds,
@@ -181,7 +181,7 @@ def page(found: Synthesized) -> str:
     from symheli import Helicopter, __version__
 
     templates = environment()
-    a = found.asked
+    a = found.choices
     pictures = []
     if found.flights:
         caption = FLIGHT.format(n=len(found.flights))
@@ -217,7 +217,7 @@ def flights(found: Synthesized) -> Figure:
         for y, colour in (("phi", BLUE), ("theta", ORANGE)):
             label = y if first else None
             axes[1].plot(t, np.degrees(column[y]), color=colour, lw=0.8, label=label)
-        for i, u in enumerate(found.asked.controls):
+        for i, u in enumerate(found.choices.controls):
             moved = np.degrees(column[f"{u}_command"] - column[f"{u}_reference"])
             label = u if first else None
             axes[2].plot(t, moved, color=f"C{i}", lw=0.6, label=label)
@@ -233,8 +233,8 @@ def flights(found: Synthesized) -> Figure:
     return figure
 
 
-def _wrapped(said: list[str]) -> Iterator[str]:
+def _wrapped(sentences: list[str]) -> Iterator[str]:
     import textwrap
 
-    for sentence in said:
+    for sentence in sentences:
         yield from textwrap.wrap(sentence, 98)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from studies.controllers.asked import RATE, TOP
+from studies.controllers.design_choices import RATE, TOP
 from studies.controllers.designs import LQR
 from studies.controllers.flown import WINDS
 from studies.transition.guarantees import CONSTANT, PLAIN, proven

@@ -34,10 +34,10 @@ def chosen(found: Sequence[Segment], which: str, log: Path) -> tuple[Segment, ..
     if which == SERVING:
         if out := serving(found):
             return out
-        said = "; ".join(f"{s.start:.2f} to {s.stop:.2f} s {s.what}" for s in found[:4])
+        phases = "; ".join(f"{s.start:.2f} to {s.stop:.2f} s {s.what}" for s in found[:4])
         more = f"; and {len(found) - 4} more" if len(found) > 4 else ""
         raise InputError(
-            f"{log}: no segment is flight of at least {MIN_DURATION:g} s: {said}{more};"
+            f"{log}: no segment is flight of at least {MIN_DURATION:g} s: {phases}{more};"
             " --segments all takes the log as it is"
         )
     try:

@@ -129,8 +129,8 @@ def _reading(found: Survey, used: list[Guess], dt: float | None) -> list[str]:
             out += ["--time-unit", found.clock.unit]
         if dt or not found.clock.even:
             out += ["--dt", f"{dt or found.clock.step:.3g}"]
-    told = [g for g in used if found.units[g.column] is None]
-    return [*out, *(["--units", *(f"{g.column}={g.unit}" for g in told)] if told else [])]
+    unitless = [g for g in used if found.units[g.column] is None]
+    return [*out, *(["--units", *(f"{g.column}={g.unit}" for g in unitless)] if unitless else [])]
 
 
 def _map(used: list[Guess], found: Survey, dt: float) -> str:

@@ -49,18 +49,21 @@ class Between:
         low, high = self.airspeeds[0], self.airspeeds[-1]
         where = f"for every V(t) from {low:g} to {high:g} m/s with |dV/dt| <= {self.rate:g} m/s^2"
         if self.exact:
-            said = f"Proven, in rational arithmetic: the changed loops are stable {where}"
+            sentence = f"Proven, in rational arithmetic: the changed loops are stable {where}"
         else:
-            said = f"NOT PROVEN that the changed loops are stable {where}: {self._reason}"
-        said += f"; of {self.drawn} drawn helicopters {self.proven} are proven" * bool(self.drawn)
+            sentence = f"NOT PROVEN that the changed loops are stable {where}: {self._reason}"
+        sentence += f"; of {self.drawn} drawn helicopters {self.proven} are proven" * bool(
+            self.drawn
+        )
         straight = (
             ". The linear model about the moving trim is sampled, and straight between trims at"
             f" {', '.join(f'{v:g}' for v in self.airspeeds)} m/s; half-way its entries are"
             f" within {self.misfit:.1g} of the exact ones, with which the loops"
         )
         if not self.unstable:
-            return f"{said}{straight} are stable there too."
-        return f"{said}{straight} are UNSTABLE at {', '.join(f'{v:g}' for v in self.unstable)} m/s."
+            return f"{sentence}{straight} are stable there too."
+        unstable = ", ".join(f"{v:g}" for v in self.unstable)
+        return f"{sentence}{straight} are UNSTABLE at {unstable} m/s."
 
     @property
     def _reason(self) -> str:

@@ -143,7 +143,7 @@ def _at(
     plant = actuated(model, servos, delay, loops.dt)
     closed = closed_loops(plant, loops)
     unknown = Responses(*[math.nan] * len(Responses._fields))
-    felt = responses(closed, RESPOND) if closed.is_stable() else dict.fromkeys(CONTROLS, unknown)
+    reached = responses(closed, RESPOND) if closed.is_stable() else dict.fromkeys(CONTROLS, unknown)
     out = []
     for control in CONTROLS:
         found = margins(loop(plant, loops.linear, control))
@@ -151,7 +151,7 @@ def _at(
         gain = min(*decibels, LARGEST) if found.stable else 0.0
         phase = min(math.degrees(found.phase), 180.0)
         crossover = max(found.crossover, default=0.0)
-        out.append([float(found.stable), crossover, gain, phase, *felt[control]])
+        out.append([float(found.stable), crossover, gain, phase, *reached[control]])
     return out
 
 

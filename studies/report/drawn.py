@@ -71,10 +71,10 @@ def drawn(pictures: Iterable[tuple[str, str, str, Figure]], folder: Path) -> lis
         for ending, content in files.items():
             write_bytes(folder / f"{name}.{ending}", content)
         svg = inside_a_page(files["svg"].decode("utf-8"), name)
-        told: dict[str, Any] = {"axes": axes}
+        numbers: dict[str, Any] = {"axes": axes}
         if len(svg) > LARGEST:
-            svg, told["points"] = _pixels(svg, files["png"]), points
-        data = "".join(f' data-{key}="{escape(_packed(what))}"' for key, what in told.items())
+            svg, numbers["points"] = _pixels(svg, files["png"]), points
+        data = "".join(f' data-{key}="{escape(_packed(what))}"' for key, what in numbers.items())
         words = f'<svg role="img" aria-label="{escape(caption)}"{data}'
         out.append(Drawn(name, caption, source, svg.replace("<svg", words, 1)))
     return out

@@ -200,8 +200,8 @@ def without_certificate(study: Outcome) -> list[str]:
 def _proofs(study: Outcome) -> Iterator[Row]:
     for one in _unproven(study):
         what = "The proof of a gain failed" if one.failed else "No certificate of a gain"
-        said = f"{what}, {one.channel} channel, {one.model}: {', '.join(one.tests)}."
-        yield Row(said, _capital(one.why), one.path, "certificate", one.failed)
+        heading = f"{what}, {one.channel} channel, {one.model}: {', '.join(one.tests)}."
+        yield Row(heading, _capital(one.why), one.path, "certificate", one.failed)
     for sentence in not_about_the_helicopter(study.bounds):
         why = "The model differs from the helicopter by more than this loop's margin."
         yield Row(sentence, why, "guarantees.bounds", "certificate")

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from studies.controllers.asked import CONTROLS, DELAY, PERIOD, SERVO_RATE
+from studies.controllers.design_choices import CONTROLS, DELAY, PERIOD, SERVO_RATE
 from studies.controllers.flown import HIGH, LOW, WINDS, plan
 from studies.controllers.measures import AT_THE_STOP, heading, noise_of, of_flight, rms, to_body
 from studies.controllers.measures import MEASUREMENTS as MEASURED
@@ -137,8 +137,8 @@ def measured(one: FlightData) -> dict[tuple[str, str], float]:
     rest = np.zeros(len(psi))
     held = to_body(column["phi_reference"], column["theta_reference"], rest)
     reference = np.column_stack([column[f"{s}_reference"] for s in ("u", "v", "w")])
-    asked = np.einsum("nij,ni->nj", held, reference) - np.array(one.plan.wind.steady)
-    gone = np.cumsum(level - asked, axis=0) * dt
+    commanded = np.einsum("nij,ni->nj", held, reference) - np.array(one.plan.wind.steady)
+    gone = np.cumsum(level - commanded, axis=0) * dt
     whole = of_flight(one)
     out = {
         ("speed", ""): whole.speed,

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 import symheli
-from studies.controllers.asked import CONTROLS, DELAY, POINTS, SERVO_RATE, TOP
 from studies.controllers.certified import FORM, SOLVER
+from studies.controllers.design_choices import CONTROLS, DELAY, POINTS, SERVO_RATE, TOP
 from studies.controllers.designs import (
     IDENTIFIED,
     NAMES,

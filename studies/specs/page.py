@@ -106,13 +106,13 @@ def _margins(table: SpecificationTable) -> list[dict[str, Any]]:
 
 def _cell(r: Reached, unit: str) -> dict[str, str]:
     at = "" if math.isnan(r.at) else f" at {r.at:.4g} {unit}"
-    told = worst(r) + at
+    text = worst(r) + at
     if r.failure:
-        return {"text": r.failure, "level": "three", "title": told}
+        return {"text": r.failure, "level": "three", "title": text}
     if math.isnan(r.margin):
-        return {"text": worst(r), "level": "open", "title": told}
+        return {"text": worst(r), "level": "open", "title": text}
     level = "one" if r.margin >= 0 else "two" if r.margin >= -100 else "three"
-    return {"text": margin(r), "level": level, "title": told}
+    return {"text": margin(r), "level": level, "title": text}
 
 
 def _sources(table: SpecificationTable) -> list[list[str]]:

@@ -60,7 +60,7 @@ class Row:
         return short <= self.scatter and sign * (self.mark - self.median) <= 0
 
     @property
-    def said(self) -> tuple[str, str]:
+    def words(self) -> tuple[str, str]:
         """The mark as the table shows it, and whether it is missed."""
         if self.mark is None:
             return "", ""
@@ -87,7 +87,7 @@ class MarksOverSeeds:
         rows = [["", "default", "median", "worst", "mark", ""]]
         for r in self.rows:
             numbers = r.values[0], r.median, r.worst
-            rows.append([r.name, *(f"{number:.2f}" for number in numbers), *r.said])
+            rows.append([r.name, *(f"{number:.2f}" for number in numbers), *r.words])
         return f"{head}\n{columns(rows)}"
 
     def to_dict(self) -> dict[str, Any]:
@@ -116,8 +116,8 @@ def run_campaign(
     excitation and noise each); a case is a seed, stored in the dataset at `path` and computed only
     once.
     """
-    asked = Campaign(marks.TRIAL, grid={"seed": range(seeds + 1)}, fixed={"vehicle": vehicle})
-    return MarksOverSeeds(tuple(_rows(columns_of(asked, on, path))), seeds)
+    campaign = Campaign(marks.TRIAL, grid={"seed": range(seeds + 1)}, fixed={"vehicle": vehicle})
+    return MarksOverSeeds(tuple(_rows(columns_of(campaign, on, path))), seeds)
 
 
 def _rows(found: Mapping[str, np.ndarray]) -> Iterator[Row]:

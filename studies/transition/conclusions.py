@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from studies.controllers.asked import RATE
+from studies.controllers.design_choices import RATE
 from studies.controllers.designs import BASELINE, LFT
 from studies.controllers.flown import WINDS
 from studies.controllers.tables import hypotheses
@@ -105,16 +105,16 @@ def _first_controller(study: Outcome) -> Iterator[str]:
         if math.isfinite(proof)
         else f"not proven (frozen gain {gain(made.frozen)})"
     )
-    said = f"A first controller of {made.order} states, behind servos and delay at 50 Hz, is"
+    sentence = f"A first controller of {made.order} states, behind servos and delay at 50 Hz, is"
     flights = (
         [one for wind in WINDS for one in flown.at(wind) if one.name == BASELINE] if (flown) else []
     )
     if not flights:
-        yield f"{said} {proven}."
+        yield f"{sentence} {proven}."
         return
     lost, count = sum(one.lost for one in flights), sum(len(one.flights) for one in flights)
-    told = "lost none of" if not lost else f"lost {lost} of"
-    yield f"{said} {proven} and {told} {count} flights in turbulence."
+    losses = "lost none of" if not lost else f"lost {lost} of"
+    yield f"{sentence} {proven} and {losses} {count} flights in turbulence."
 
 
 def abstract(study: Outcome) -> list[str]:
@@ -163,12 +163,12 @@ def _answer(study: Outcome) -> Iterator[str]:
         least = min(curve.jumping.values(), default=math.inf)
         if tried and math.isfinite(least):
             more = f"{gain(least)} for an airspeed that jumps, {_more(least, curve.frozen)}"
-            said = f"{more} than the frozen {gain(curve.frozen)}"
+            excess = f"{more} than the frozen {gain(curve.frozen)}"
             if _cheap(curve):
-                yield f"In {curve.title} the LFT is enough: its tests prove a gain of {said}."
+                yield f"In {curve.title} the LFT is enough: its tests prove a gain of {excess}."
             else:
                 also = f"; {bounded}" if bounded else ""
-                yield f"In {curve.title} the LFT tests prove a gain of {said}{also}."
+                yield f"In {curve.title} the LFT tests prove a gain of {excess}{also}."
         elif tried:
             never = (
                 ", and none can: an airspeed that jumps makes the state grow"
@@ -350,11 +350,11 @@ def _controllers(study: Outcome) -> Iterator[str]:
         names = list(dict.fromkeys(b.model for b in proofs.bounds))
         held = [name for name in names if math.isfinite(proofs.gain(name))]
         over = [name for name in held if found.exceeded(name, proofs.gain(name)) is not None]
-        said = f"Gains are proven of {len(held)} of {len(names)} loops that fly"
+        sentence = f"Gains are proven of {len(held)} of {len(names)} loops that fly"
         yield (
-            f"{said}; a flight exceeded that of {', '.join(over)}."
+            f"{sentence}; a flight exceeded that of {', '.join(over)}."
             if over
-            else (f"{said}; no flight exceeded one of them.")
+            else (f"{sentence}; no flight exceeded one of them.")
         )
     yield from _limits(study)
 
@@ -366,9 +366,9 @@ def certificates(study: Outcome) -> list[str]:
     own = [b for b in study.bounds if b.channel == "robust" and b.certificate.kind == "l2 gain"]
     out = []
     for rate in sorted({b.rate for b in own}):
-        told = list(_statements([b for b in own if b.rate == rate]))
-        if told:
-            out.append(f"Loop with a margin, {rate_text(rate)}: {'; '.join(told)}.")
+        statements = list(_statements([b for b in own if b.rate == rate]))
+        if statements:
+            out.append(f"Loop with a margin, {rate_text(rate)}: {'; '.join(statements)}.")
     return out
 
 
@@ -392,8 +392,8 @@ def _statements(own: list[Bound]) -> Iterator[str]:
             "no certificate": "could not be given",
         }
         if allowed is not None:
-            said = words[verdict(proven(allowed), *truth)]
-            yield f"the certificate from the flights {said}"
+            answer = words[verdict(proven(allowed), *truth)]
+            yield f"the certificate from the flights {answer}"
         if estimate is not None:
-            said = words[verdict(proven(estimate), *truth)]
-            yield f"that of the estimate alone {said}, and nothing in it could tell"
+            answer = words[verdict(proven(estimate), *truth)]
+            yield f"that of the estimate alone {answer}, and nothing in it could tell"

@@ -65,8 +65,8 @@ class Configuration:
         with everything that is wrong in it.
         """
         usual = default(cls, "out")
-        said = {} if path is None else entries(path, "study", usual)
-        return cls.of({**said, **options}, str(path or "options"))
+        given = {} if path is None else entries(path, "study", usual)
+        return cls.of({**given, **options}, str(path or "options"))
 
     def write(self, path: Path) -> Path:
         """Write all options, defaults too."""
@@ -114,9 +114,9 @@ def _entries_of(thing: Any, table: str, mark: str) -> Iterator[str]:
         if is_dataclass(value):
             inner.append((f.name, value))
         elif value is not None:
-            entry, said = f"{mark}{f.name} = {toml(value)}", sentence(type(thing), f.name)
-            yield from commented(entry, said)
+            entry, comment = f"{mark}{f.name} = {toml(value)}", sentence(type(thing), f.name)
+            yield from commented(entry, comment)
     for name, value in inner:
-        said = sentence(type(thing), name)
-        yield from ("", f"{mark}[{table}.{name}]  # {said}")
+        comment = sentence(type(thing), name)
+        yield from ("", f"{mark}[{table}.{name}]  # {comment}")
         yield from _entries_of(value, f"{table}.{name}", mark)

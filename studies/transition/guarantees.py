@@ -184,9 +184,9 @@ def _bound(
     return found
 
 
-def answered(asked: Sequence[Proof]) -> list[Bound]:
+def answered(proofs: Sequence[Proof]) -> list[Bound]:
     """All answers, here and one after the other."""
-    return [bound for proof in asked for bound in proof()]
+    return [bound for proof in proofs for bound in proof()]
 
 
 def memory_bounds(

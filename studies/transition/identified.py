@@ -72,14 +72,14 @@ def identify_axes(heli: Helicopter, flights: Flights) -> Identification:
             # MIMO by batch least squares: the same numbers as the recursion, which is shown on the
             # two-input axes
             model = identify(axis, flights.training[noise], "rls" if axis in AXES else "ls")
-            told = judged(heli, axis, model, flights.test[noise])
+            verdict = judged(heli, axis, model, flights.test[noise])
             found.append(
                 IdentifiedAxis(
                     axis=axis,
                     noise=noise,
                     model=model,
-                    scores=told.scores,
-                    mode_miss=told.mode_miss,
+                    scores=verdict.scores,
+                    mode_miss=verdict.mode_miss,
                 )
             )
     noisy = flights.training[NOISY]

@@ -91,16 +91,16 @@ def gust_questions(
     """About the baseline, with `thorough` the exact models too; continuous time."""
     loop, form = guarantees.gust_loop(baseline.nodes), Spline(segments=gust_segments)
     baseline_proofs = guarantees.bounds("baseline", "gust", loop, gust_rates, form, search)
-    asked = [*baseline_proofs, *guarantees.lft_bounds("baseline", "gust", loop)]
+    proofs = [*baseline_proofs, *guarantees.lft_bounds("baseline", "gust", loop)]
     long: list[Proof] = []
     if thorough:
         long = guarantees.memory_bounds("baseline", "gust", loop, gust_rates, search)
-        asked += long
+        proofs += long
         exact = ExactLateral.of(heli).loop("gust")
-        asked += guarantees.bounds("exact", "gust", exact, exact_rates, form, search)
+        proofs += guarantees.bounds("exact", "gust", exact, exact_rates, form, search)
     exact_frozen = guarantees.exact_frozen_gain(baseline.nodes, sampled=False)
     return Questions(
-        asked, lambda bounds: GustProofs(bounds=bounds, exact_frozen=exact_frozen), long[::-1]
+        proofs, lambda bounds: GustProofs(bounds=bounds, exact_frozen=exact_frozen), long[::-1]
     )
 
 
@@ -110,9 +110,9 @@ def longitudinal_questions(
     """About the baseline, continuous time."""
     loop, channel = longitudinal_loop(heli), "longitudinal"
     form = Spline(segments=gust_segments)
-    asked = guarantees.bounds("baseline", channel, loop, longitudinal_rates, form, GLANCE)
-    asked += guarantees.lft_bounds("baseline", channel, loop)
-    return Questions(asked, lambda bounds: LongitudinalProofs(bounds=bounds))
+    proofs = guarantees.bounds("baseline", channel, loop, longitudinal_rates, form, GLANCE)
+    proofs += guarantees.lft_bounds("baseline", channel, loop)
+    return Questions(proofs, lambda bounds: LongitudinalProofs(bounds=bounds))
 
 
 def servo_questions(
@@ -128,16 +128,16 @@ def servo_questions(
     loops = guarantees.servo_loops(
         heli if thorough else None, baseline.nodes, identification.gentle, aggressive
     )
-    asked: list[Proof] = []
+    proofs: list[Proof] = []
     form = Spline(segments=servo_segments)
     for name, loop in loops.items():
-        asked += guarantees.bounds(name, "servo", loop, servo_rates, form, GLANCE)
+        proofs += guarantees.bounds(name, "servo", loop, servo_rates, form, GLANCE)
         if thorough and guarantees.has_lft(loop):
-            asked += guarantees.lft_bounds(name, "servo", loop)
+            proofs += guarantees.lft_bounds(name, "servo", loop)
     exact_frozen = guarantees.exact_frozen_gain(baseline.nodes, sampled=True)
     peaks = {name: frozen_gain(loop) for name, loop in loops.items()}
     return Questions(
-        asked,
+        proofs,
         lambda bounds: ServoProofs(bounds=bounds, exact_frozen=exact_frozen, frozen_peaks=peaks),
     )
 
@@ -166,10 +166,10 @@ def robust_questions(
     if thorough:
         exact = ExactLateral.of(heli, 0.0, TOP).loop("inputs", PERIOD, FEEDBACK)
         loops = {"exact": guarantees.scaled(exact)} | loops
-    asked: list[Proof] = []
+    proofs: list[Proof] = []
     for name, loop in loops.items():
-        asked += guarantees.bounds(name, channel, loop, rates, robust_form, GLANCE)
+        proofs += guarantees.bounds(name, channel, loop, rates, robust_form, GLANCE)
     if thorough:
-        asked += guarantees.lft_bounds("baseline", channel, loops["baseline"])
-    asked += long
-    return Questions(asked, lambda bounds: RobustProofs(bounds=bounds), long)
+        proofs += guarantees.lft_bounds("baseline", channel, loops["baseline"])
+    proofs += long
+    return Questions(proofs, lambda bounds: RobustProofs(bounds=bounds), long)

@@ -84,7 +84,7 @@ def page(study: Outcome, pictures: dict[str, Drawn], results: dict[str, Any]) ->
     templates = environment()
     templates.filters["whole"] = whole
     template = templates.get_template(TEMPLATE)
-    said = {
+    texts = {
         "study": study,
         "pictures": pictures,
         "axes": AXES,
@@ -98,8 +98,8 @@ def page(study: Outcome, pictures: dict[str, Drawn], results: dict[str, Any]) ->
         **_headline(study),
     }
     first = Labels()
-    template.render(labels=first, contents=[], **said)
-    text = template.render(labels=Labels(first.given), contents=first.contents, **said)
+    template.render(labels=first, contents=[], **texts)
+    text = template.render(labels=Labels(first.given), contents=first.contents, **texts)
     return text.replace("m/s^2", "m/s²")
 
 

@@ -122,7 +122,7 @@ class _Run:
     processes: Executor
     progress: Task
     done: float = 0.0
-    asked: dict[str, tuple[Stage, Questions, list[Future[Stored]]]] = field(default_factory=dict)
+    running: dict[str, tuple[Stage, Questions, list[Future[Stored]]]] = field(default_factory=dict)
 
     def finish(self, todo: Sequence[Stage]) -> Study:
         """Every stage in order; questions are answered meanwhile, and awaited where another stage
@@ -136,10 +136,10 @@ class _Run:
                 result = stage.found(self.study, self.study.effort)
                 seconds = time.perf_counter() - begin
             if isinstance(result, Questions):
-                self.asked[stage.name] = stage, result, self._submitted(stage, result)
+                self.running[stage.name] = stage, result, self._submitted(stage, result)
             else:
                 self._keep(stage, Stored(result=result, seconds=seconds))
-        for name in list(self.asked):
+        for name in list(self.running):
             self._await(name)
         return replace(self.study, complete=True)
 
@@ -165,9 +165,9 @@ class _Run:
 
     def _await(self, name: str) -> None:
         """Wait for the answers to the questions of a stage, if there are any."""
-        if name not in self.asked:
+        if name not in self.running:
             return
-        stage, questions, answers = self.asked.pop(name)
+        stage, questions, answers = self.running.pop(name)
         cost, found = stage.cost[self.study.quick], []
         with task(stage.title):
             for k, answer in enumerate(tracked("answers", answers)):

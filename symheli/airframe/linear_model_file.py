@@ -64,13 +64,13 @@ class LinearModelFile:
         """The equations; raises one `InputError` with everything that is wrong, in the order of the
         file.
         """
-        asked = {table: self._table(table) for table in TABLES}
-        states, inputs = (self._signals(asked[table], table) for table in ("states", "inputs"))
-        self._read_parameters(asked["parameters"])
-        self._named_once(asked)
-        equations = self._equations(asked["equations"], asked["states"])
-        signals = [*asked["states"], *asked["inputs"]]
-        known = [*signals, *asked["parameters"]]
+        sections = {table: self._table(table) for table in TABLES}
+        states, inputs = (self._signals(sections[table], table) for table in ("states", "inputs"))
+        self._read_parameters(sections["parameters"])
+        self._named_once(sections)
+        equations = self._equations(sections["equations"], sections["states"])
+        signals = [*sections["states"], *sections["inputs"]]
+        known = [*signals, *sections["parameters"]]
         rows = {state: self._row(state, text, signals, known) for state, text in equations.items()}
         refuse(self.path, self.problems)
         coefficients = np.array([rows[state] for state in states])
@@ -128,13 +128,13 @@ class LinearModelFile:
             except InputError as error:
                 self._wrong("parameters", name, str(error))
 
-    def _named_once(self, asked: Mapping[str, Mapping[str, Any]]) -> None:
+    def _named_once(self, tables: Mapping[str, Mapping[str, Any]]) -> None:
         """Note every name that means two things."""
         sections = ("states", "inputs", "parameters")
         for k, section in enumerate(sections):
-            for name in asked[section]:
+            for name in tables[section]:
                 for earlier in sections[:k]:
-                    if name in asked[earlier]:
+                    if name in tables[earlier]:
                         self._wrong(section, name, f"is the name of one of [{earlier}], too")
 
     def _equations(self, table: Mapping[str, Any], states: Mapping[str, Any]) -> dict[str, str]:
@@ -251,8 +251,8 @@ def _parsed(text: str) -> tuple[ast.AST, list[str]]:
     except InputError:
         raise
     except (SyntaxError, ValueError, RecursionError) as error:
-        said = getattr(error, "msg", error)
-        raise InputError(f"{text!r} cannot be evaluated: {said}") from error
+        reason = getattr(error, "msg", error)
+        raise InputError(f"{text!r} cannot be evaluated: {reason}") from error
     return tree, list(dict.fromkeys(names))
 
 

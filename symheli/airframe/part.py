@@ -36,8 +36,8 @@ class Part:
     def entries(self) -> dict[str, Entry]:
         """Entries of its section, without optional entries that are absent."""
         own = self.component.entries
-        asked = {name: e for name, e in own.items() if not e.optional or name in self.given}
-        return {**asked, **(PLACE if self.placed else {})}
+        required = {name: e for name, e in own.items() if not e.optional or name in self.given}
+        return {**required, **(PLACE if self.placed else {})}
 
     @property
     def subscript(self) -> str:

@@ -98,12 +98,12 @@ def impossibilities(
     """(section, entry, what is wrong) of every quantity that cannot be."""
     for section, quantities in sections.items():
         for name, q in quantities.items():
-            asked = entries[section][name]
+            entry = entries[section][name]
             if q.ref:
                 continue
-            if asked.least is not None and not (q.value >= asked.least and q.value % 1 == 0):
-                yield section, name, f"must be a whole number >= {asked.least}, got {q.value:g}"
-            elif asked.positive and not q.value > 0:
+            if entry.least is not None and not (q.value >= entry.least and q.value % 1 == 0):
+                yield section, name, f"must be a whole number >= {entry.least}, got {q.value:g}"
+            elif entry.positive and not q.value > 0:
                 yield section, name, f"must be > 0 {q.unit}, got {q.value:g}"
             elif q.unit == "m^2" and q.value < 0:
                 yield section, name, f"an area must be >= 0 m^2, got {q.value:g}"
@@ -188,5 +188,5 @@ def _meant(q: Quantity, kind: Range, scale: Scale | None) -> str:
     units.sort(key=lambda u: u != USUAL_SOURCE.get(q.unit))
     values = {unit: number * to_si(unit, q.unit)[0] for unit in units}
     fit = [unit for unit in units if kind.among(values[unit], scale)[1]][:2]
-    said = " or ".join(f"{number:g} {u}, {values[u]:.4g} {q.unit}" for u in fit)
-    return f"; did you mean {said}?" if said else ""
+    readings = " or ".join(f"{number:g} {u}, {values[u]:.4g} {q.unit}" for u in fit)
+    return f"; did you mean {readings}?" if readings else ""

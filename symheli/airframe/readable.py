@@ -30,12 +30,12 @@ def readable(text: str) -> tuple[dict[str, Any], list[tuple[int, str]]]:
         try:
             return tomllib.loads("\n".join(lines) + "\n"), wrong
         except tomllib.TOMLDecodeError as error:
-            said = re.search(r"^(.*) \(at line (\d+), column (\d+)\)$", str(error), re.DOTALL)
-            number = int(said[2]) if said else len(lines)
+            found = re.search(r"^(.*) \(at line (\d+), column (\d+)\)$", str(error), re.DOTALL)
+            number = int(found[2]) if found else len(lines)
             while number > 1 and (number > len(lines) or not lines[number - 1].strip()):
                 number -= 1
             line = lines[number - 1]
-            what = f"{said[1]} (column {said[3]})" if said else str(error)
+            what = f"{found[1]} (column {found[3]})" if found else str(error)
             if number not in [earlier for earlier, _ in wrong]:
                 wrong.append((number, f"{what}{_hint(line, what)}"))
             lines[number - 1] = _stand_in(line)
@@ -91,11 +91,11 @@ def refuse(path: str, problems: list[Problem]) -> None:
     """Raise one `InputError` with everything that is wrong, in the order of the file, where there
     is anything.
     """
-    said = [text for _, text in sorted(problems, key=lambda problem: problem[0])]
-    if len(said) == 1:
-        raise InputError(f"{path}, {said[0]}")
-    if said:
-        raise InputError("\n  ".join([f"{path}: {len(said)} things to put right", *said]))
+    messages = [text for _, text in sorted(problems, key=lambda problem: problem[0])]
+    if len(messages) == 1:
+        raise InputError(f"{path}, {messages[0]}")
+    if messages:
+        raise InputError("\n  ".join([f"{path}: {len(messages)} things to put right", *messages]))
 
 
 def _line(lines: Sequence[str], section: str, entry: str) -> int | None:

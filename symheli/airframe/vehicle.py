@@ -134,10 +134,10 @@ class Vehicle:
             for section, entry, _ in implausibilities(self.sections, self.entries)
             if self.sections[section][entry].value == changed.sections[section][entry].value
         }
-        said = [f"{s}.{e}: {wrong}" for (s, e), wrong in doubts.items() if (s, e) not in known]
-        if said:
+        doubtful = [f"{s}.{e}: {wrong}" for (s, e), wrong in doubts.items() if (s, e) not in known]
+        if doubtful:
             head = f"{changed.title} has numbers that no helicopter has:"
-            warnings.warn("\n  ".join([head, *said]), DataWarning, level_of_caller())
+            warnings.warn("\n  ".join([head, *doubtful]), DataWarning, level_of_caller())
 
     def _map(self, change: Callable[[str, Quantity], Quantity]) -> Vehicle:
         """Every quantity changed; one that refers to another is changed as the other."""

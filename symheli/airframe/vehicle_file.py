@@ -126,27 +126,27 @@ class VehicleFile:
         """Every number that can be read; what cannot, and what is missing or unknown, is noted."""
         for required in FIXED:
             if required not in tables:
-                asked = ", ".join(f"{name} ({e.unit})" for name, e in FIXED[required].items())
+                expected = ", ".join(f"{name} ({e.unit})" for name, e in FIXED[required].items())
                 self.problems.append(
-                    (len(self.lines) + 1, f"section [{required}] is missing: it has {asked}")
+                    (len(self.lines) + 1, f"section [{required}] is missing: it has {expected}")
                 )
         out: dict[str, dict[str, Quantity]] = {section: {} for section in entries}
-        for section, asked in entries.items():
+        for section, expected in entries.items():
             table = tables[section]
-            known = (*asked, *(() if section in FIXED else (*WIRING, *PLACE)))
+            known = (*expected, *(() if section in FIXED else (*WIRING, *PLACE)))
             if section in parts:
                 known += tuple(parts[section].component.entries)
             for name in table:
                 if name not in known:
-                    self._problem(section, name, str(UnknownNameError("entry", name, asked)))
+                    self._problem(section, name, str(UnknownNameError("entry", name, expected)))
                     free = [
-                        e for e in asked if e not in table and (section, e) not in self._entries
+                        e for e in expected if e not in table and (section, e) not in self._entries
                     ]
                     for near in difflib.get_close_matches(name, free, n=1, cutoff=0.6):
                         self._entries[section, near] = name
         for by_reference in (False, True):  # what is referred to comes first
-            for section, asked in entries.items():
-                for name, entry in asked.items():
+            for section, expected in entries.items():
+                for name, entry in expected.items():
                     written = self._entries.get((section, name), name)
                     if _refers(tables[section].get(written)) != by_reference:
                         continue
@@ -246,8 +246,8 @@ class VehicleFile:
         nothing; None where no section has such an entry.
         """
         section, _, entry = str(table["ref"]).partition(".")
-        asked = self.tables.get(self._written.get(section, section))
-        target = asked.get(self._entries.get((section, entry), entry)) if asked else None
+        expected = self.tables.get(self._written.get(section, section))
+        target = expected.get(self._entries.get((section, entry), entry)) if expected else None
         if target is None and entry in self._asked.get(section, {}):
             return {"ref": ""}
         return target if isinstance(target, Mapping) else None

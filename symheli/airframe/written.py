@@ -35,8 +35,8 @@ def as_toml(vehicle: Vehicle) -> str:
         lines += _wiring(part) if part else []
         for name, q in quantities.items():
             if not (name in PLACE and part and part.placed and q.source.startswith("not given")):
-                asked = entries[section][name]
-                lines += [*_comment(asked), f"{name} = {_entry(q)}"]
+                expected = entries[section][name]
+                lines += [*_comment(expected), f"{name} = {_entry(q)}"]
     return "\n".join(lines) + "\n"
 
 
@@ -86,8 +86,8 @@ def _others(entry: Entry) -> str:
 
 def _comment(entry: Entry) -> Iterator[str]:
     """Yield the comment above an entry."""
-    said = (entry.meaning, entry.unit if dimension(entry.unit) else "", _bounds(entry))
-    yield f"# {'; '.join(text for text in said if text)}"
+    comments = (entry.meaning, entry.unit if dimension(entry.unit) else "", _bounds(entry))
+    yield f"# {'; '.join(text for text in comments if text)}"
 
 
 def _about(component: Component | None, mark: str = "# ") -> list[str]:

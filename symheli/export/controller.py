@@ -145,8 +145,8 @@ def _read(controller: TableController, name: str) -> str:
 def _said(controller: TableController, output: str) -> str:
     """Limits of a command, and whether it integrates."""
     ends = controller.limits.get(output)
-    said = [f"{ends[0]:g} to {ends[1]:g}"] if ends else []
-    return ", ".join([*said, *(["integrates"] if output in controller.integrates else [])])
+    notes = [f"{ends[0]:g} to {ends[1]:g}"] if ends else []
+    return ", ".join([*notes, *(["integrates"] if output in controller.integrates else [])])
 
 
 def _tables(controller: TableController) -> str:

@@ -216,9 +216,9 @@ class ScheduledController:
         x = _held(np.zeros(self.order))
         if command is None:
             return x
-        told = frozen(command, "command", (len(self.model.outputs),))
+        commanded = frozen(command, "command", (len(self.model.outputs),))
         left = math.exp(-self.dt / positive(fade, "fade"))
-        return Entered(x, np.zeros(len(INPUTS)), told, left)
+        return Entered(x, np.zeros(len(INPUTS)), commanded, left)
 
     def step(
         self,

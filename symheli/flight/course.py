@@ -75,6 +75,6 @@ class Course:
         """Raises `TrimError` where there is no trim to be held to."""
         time = clock.dt * np.arange(clock.samples(plan))
         speed, rate = plan.schedule(time)
-        felt = rate if plan.trims == "quasi-steady" else np.zeros_like(rate)
-        x0, u0 = references(heli, time, speed, felt, np.array(plan.wind.steady))
+        acceleration = rate if plan.trims == "quasi-steady" else np.zeros_like(rate)
+        x0, u0 = references(heli, time, speed, acceleration, np.array(plan.wind.steady))
         return cls(time, np.column_stack([speed, rate]), np.hstack([x0, u0]))

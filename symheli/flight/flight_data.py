@@ -132,8 +132,8 @@ def _table(heli: Helicopter, plan: FlightPlan) -> list[tuple[Signal, str, int]]:
     table = [(s, "out", i) for i, s in enumerate((*heli.states, *heli.inputs))]
     table += [(Signal(f"e_{s}", s.unit), "added", i) for i, s in enumerate(heli.inputs)]
     if plan.servos is not None or plan.delay:
-        asked = (Signal(f"{s}_command", s.unit) for s in heli.inputs)
-        table += [(s, "out", nx + 4 + i) for i, s in enumerate(asked)]
+        commands = (Signal(f"{s}_command", s.unit) for s in heli.inputs)
+        table += [(s, "out", nx + 4 + i) for i, s in enumerate(commands)]
     if not plan.wind.is_steady:
         table += [(Signal(name), "wind", i) for i, name in enumerate(WIND)]
     table += [(Signal("airspeed"), "out", nx + 8), (Signal("airspeed_command"), "command", 0)]

@@ -174,7 +174,7 @@ class Loops:
         """
         answer = begun(self.equipment.controller)
         names = signals((*self.heli.states, *self.heli.inputs))
-        told = READINGS if governed(self.heli) else READINGS[: len(READ)]
+        readings = READINGS if governed(self.heli) else READINGS[: len(READ)]
         try:
             for k in range(len(course.time)):
                 reading = plant.read(k)
@@ -183,7 +183,7 @@ class Loops:
                 if self._stop[0]:
                     raise KeyboardInterrupt
                 command = answer(
-                    NamedVector(told, reading[: len(told)]),
+                    NamedVector(readings, reading[: len(readings)]),
                     NamedVector(names, course.reference[k]),
                     NamedVector(SCHEDULING, course.p[k]),
                 )

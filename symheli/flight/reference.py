@@ -27,10 +27,10 @@ def references(
     """
     stride = max(round(INTERVAL / (time[1] - time[0])), 1)
     knots = np.append(np.arange(0, len(time) - 1, stride), len(time) - 1)
-    asked, which = np.unique(
+    first, which = np.unique(
         np.column_stack([speed, rate])[knots], axis=0, return_index=True, return_inverse=True
     )[1:]
-    order = np.sort(asked)  # in the order of the flight, each started from one before
+    order = np.sort(first)  # in the order of the flight, each started from one before
     conditions = FlightConditions(speed[knots[order]], acceleration=rate[knots[order]], wind=wind)
     flights = SteadyFlights.of(heli, conditions)
     points = trimmed(flights, hover(flights), one_after_another(len(flights)), throw=False)
@@ -43,7 +43,7 @@ def references(
             " accelerations",
             points[worst],
         )
-    at = np.searchsorted(order, asked)[which.ravel()]
+    at = np.searchsorted(order, first)[which.ravel()]
 
     def spread(values: np.ndarray) -> np.ndarray:
         return np.column_stack([np.interp(time, time[knots], column) for column in values[at].T])

@@ -442,14 +442,14 @@ class TableController:
         known = {f"{y}{COMMAND}": y for y in self.integrates}
         return {str(s): known[s] for s in self.inputs if s in known}
 
-    def _provided(self, told: NamedVector) -> float:
+    def _provided(self, provided: NamedVector) -> float:
         """Return the parameter in the unit of the table from the signals of a flight."""
         if self.parameter == UNSCHEDULED.name:
             return UNSCHEDULED.middle
-        for signal, value in zip(told.signals, told.array, strict=True):
+        for signal, value in zip(provided.signals, provided.array, strict=True):
             if signal == self.parameter and (size := ratio(signal.unit, self.parameter.unit)):
                 return size * float(value)
-        known = ", ".join(f"{s} ({s.unit})" for s in told.signals)
+        known = ", ".join(f"{s} ({s.unit})" for s in provided.signals)
         raise InputError(
             f"the table is over {self.parameter} ({self.parameter.unit}), and a flight provides"
             f" {known} where it follows the {self.follow}: pass its parameter by .update(state,"

@@ -21,16 +21,16 @@ Chunk = TypeVar("Chunk")
 Result = TypeVar("Result")
 
 
-def workers_of(asked: int | None) -> int:
+def workers_of(workers: int | None) -> int:
     """Return the requested number of threads, or of the cores this process may use; `InputError`
     below 1.
     """
-    if asked is None:
+    if workers is None:
         usable = getattr(os, "sched_getaffinity", None)
         return len(usable(0)) if usable else os.cpu_count() or 1
-    if isinstance(asked, bool) or not isinstance(asked, int) or asked < 1:
-        raise InputError(f"workers must be at least 1, got {asked!r}")
-    return asked
+    if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
+        raise InputError(f"workers must be at least 1, got {workers!r}")
+    return workers
 
 
 def as_done(

@@ -38,8 +38,8 @@ MAX_LOGS, MAX_FIELDS = 1000, 512
 MAX_JUMP = 10_000_000
 """us: a frame that is later than the one before it by more is damaged."""
 
-TOLD = 2**16
-"""Bytes after which progress is told."""
+REPORT_EVERY = 2**16
+"""Bytes after which progress is reported."""
 
 TERMS = ("axisP", "axisI", "axisD", "axisF", "axisS", "axisB", "axisO")
 """Terms of the controller, of which a firmware has some."""
@@ -314,12 +314,12 @@ def _frames(data: bytes, header: _Header, reached: Callable[[int], None]) -> tup
     before: list[int] | None = None
     earlier, home, lost, size = before, [0, 0], False, len(data)
     constants = _constants(header)
-    told = 0
+    next_report = 0
     while stream.at < size:
         begin = stream.at
-        if begin >= told:
+        if begin >= next_report:
             reached(begin)
-            told = begin + TOLD
+            next_report = begin + REPORT_EVERY
         letter = chr(data[begin])
         stream.at += 1
         try:

@@ -191,19 +191,19 @@ def _read(
     """
     rows: dict[tuple[str, str], _Rows] = {}
     now = np.nan
-    with _opened(path) as (log, said):
+    with _opened(path) as (log, output):
         declared = _declared(log)
         names = dict.fromkeys(form.name for form in log.formats.values())
         present = [name for name in names if name not in ABOUT_THE_LOG]
-        asked = present if wanted is None else wanted
+        chosen = present if wanted is None else wanted
         clock = _Clock(log)
-        for message in _messages(log, {*asked, BATCH[0], clock.name} - {""}):
+        for message in _messages(log, {*chosen, BATCH[0], clock.name} - {""}):
             name, known = message.get_type(), declared.get(message.fmt.type, {})
-            if not clock.places(message) or (name == clock.name and name not in asked):
+            if not clock.places(message) or (name == clock.name and name not in chosen):
                 continue
             if name == BATCH[0]:
                 now = BATCH[2] * float(getattr(message, BATCH[1], np.nan))
-                if name not in asked:
+                if name not in chosen:
                     continue
             field = next((f for f, ids in known.items() if ids.unit == INSTANCE), None)
             key = "" if field is None else str(getattr(message, field))
@@ -219,7 +219,7 @@ def _read(
             f"{path}: no readable message; an ArduPilot log begins with the formats of its"
             " messages, and this one may lack its beginning"
         )
-    if said.getvalue():
+    if output.getvalue():
         warn_of_damage(path)
     for name in wanted or ():
         if name not in out:
@@ -248,9 +248,9 @@ def _opened(path: str | os.PathLike[str]) -> Iterator[tuple[Any, io.StringIO]]:
     if reader is DFReader_binary:
         _refuse_empty_messages(file)
     try:
-        with quiet() as said, _closing(reader) as log:
+        with quiet() as output, _closing(reader) as log:
             log.__init__(str(file))
-            yield log, said
+            yield log, output
     except Exception as error:
         raise InputError(
             f"{file}: not an ArduPilot log, or one that was damaged ({error_text(error)}); download"
@@ -367,21 +367,21 @@ def _columns(rows: _Rows, known: Mapping[str, _FieldUnit]) -> dict[str, Column]:
     now, time, keep = np.array(rows.now), None, np.ones(len(rows.now), bool)
     if clock is not None:
         time = factor * np.array(rows.fields[clock]) + np.array(rows.late)
-    elif (told := np.isfinite(now)).any():
-        time, keep = now[told], told
+    elif (known_times := np.isfinite(now)).any():
+        time, keep = now[known_times], known_times
     out = {}
     for name, field in rows.fields.items():
         if name in (*CLOCKS, clock):
             continue
         values = np.array(field)[keep]
-        said = known.get(name)
-        if said is None or said.factor is None or said.label not in LABELS:
+        unit = known.get(name)
+        if unit is None or unit.factor is None or unit.label not in LABELS:
             out[name] = Column(time, values)
             continue
-        if said.label == HEADING:
+        if unit.label == HEADING:
             values = np.unwrap(values, period=360.0)
-        scaled = values if said.factor == 1 else said.factor * values
-        out[name] = Column(time, scaled, LABELS[said.label])
+        scaled = values if unit.factor == 1 else unit.factor * values
+        out[name] = Column(time, scaled, LABELS[unit.label])
     return out
 
 

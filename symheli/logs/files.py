@@ -59,9 +59,9 @@ def text(path: str | os.PathLike[str]) -> str:
 @contextlib.contextmanager
 def quiet() -> Iterator[io.StringIO]:
     """Capture what a third-party reader prints."""
-    said = io.StringIO()
-    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-        yield said
+    output = io.StringIO()
+    with contextlib.redirect_stdout(output), contextlib.redirect_stderr(output):
+        yield output
 
 
 def error_text(error: Exception) -> str:

@@ -91,21 +91,21 @@ def segments(columns: Mapping[str, Column], guesses: Mapping[str, Guess]) -> tup
     if not times:
         return ()
     first, last = min(t[0] for t in times), max(t[-1] for t in times)
-    heard = without_holes(times, first, last)
-    told, rest = _from_messages(columns), _at_rest(rates)
-    starts = {*heard[:, 0].tolist(), *(told["log"].time.tolist() if "log" in told else ())}
-    stops = {*heard[:, 1].tolist(), *starts, *rest.time[rest.values == 1.0].tolist()}
+    covered = without_holes(times, first, last)
+    marked, rest = _from_messages(columns), _at_rest(rates)
+    starts = {*covered[:, 0].tolist(), *(marked["log"].time.tolist() if "log" in marked else ())}
+    stops = {*covered[:, 1].tolist(), *starts, *rest.time[rest.values == 1.0].tolist()}
     wild = _faster(rates, IMPACT if acrobat else MAX_RATE)
-    states = {"rest": rest, "crashed": _crashed(wild, sorted(starts), sorted(stops)), **told}
-    edges = {*heard.ravel().tolist()}
+    states = {"rest": rest, "crashed": _crashed(wild, sorted(starts), sorted(stops)), **marked}
+    edges = {*covered.ravel().tolist()}
     for state in states.values():
         edges |= {float(t) for t in state.time if first < t < last}
     found: list[Segment] = []
     before: Mapping[str, float] = {}
     for start, stop in pairwise(sorted(edges)):
         middle = 0.5 * (start + stop)
-        if not np.any((heard[:, 0] < middle) & (middle < heard[:, 1])):
-            hole = heard[np.searchsorted(heard[:, 0], middle), 0] - found[-1].stop
+        if not np.any((covered[:, 0] < middle) & (middle < covered[:, 1])):
+            hole = covered[np.searchsorted(covered[:, 0], middle), 0] - found[-1].stop
             found[-1] = replace(found[-1], ends=f"a hole of {hole:.3g} s")
             continue
         now = {name: state.at(middle) for name, state in states.items()}
@@ -212,11 +212,11 @@ def _from_messages(columns: Mapping[str, Column]) -> dict[str, _State]:
     events = columns.get("EV.Id")
     if events is not None and events.time is not None:
         for name, (begin, end) in EVENTS.items():
-            told = np.isin(events.values, [*begin, *end])
-            if name not in out and told.any():
-                on = np.isin(events.values[told], list(begin)).astype(float)
+            marks = np.isin(events.values, [*begin, *end])
+            if name not in out and marks.any():
+                on = np.isin(events.values[marks], list(begin)).astype(float)
                 before = [1.0 - on[0]]  # an event ends what was not so before
-                time = np.concatenate([[-np.inf], events.time[told]])
+                time = np.concatenate([[-np.inf], events.time[marks]])
                 out[name] = _State(time, np.concatenate([before, on]))
     return out
 

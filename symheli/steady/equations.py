@@ -36,7 +36,7 @@ class Flight(NamedTuple):
     x: SX
     u: SX
     wind: SX
-    asked: SX
+    wanted: SX
     xdot: SX
     total: Sum
 
@@ -92,9 +92,9 @@ class SteadyEquations:
             nominal = Signal(self.dynamics.entries["drivetrain"]["nominal_speed"])
             values["Om"] = par[self.dynamics.parameters.index(nominal)]
         x, u = (column([values[s] for s in of]) for of in (self.dynamics.states, INPUTS))
-        asked = column([*push, *[0.0] * (len(self.dynamics.states) - 3)])
+        wanted = column([*push, *[0.0] * (len(self.dynamics.states) - 3)])
         xdot, total = self.dynamics.euler(x, u, column(wind), par, self.dynamics.inflow_solver)
-        return Flight([z, demand, par], x, u, column(wind), asked, xdot, total)
+        return Flight([z, demand, par], x, u, column(wind), wanted, xdot, total)
 
     @cached_property
     def switches(self) -> tuple[str, ...]:
@@ -109,17 +109,17 @@ class SteadyEquations:
             return self.dynamics.euler(flight.x, flight.u, flight.wind, par, solver)
 
         def derive(xdot: SX) -> list[SX]:
-            return [jacobian((xdot - flight.asked)[self.balanced], flight.arguments[0])]
+            return [jacobian((xdot - flight.wanted)[self.balanced], flight.arguments[0])]
 
         slopes = self.dynamics.derived(form, derive)[0]
-        residual = dense(flight.xdot - flight.asked)
+        residual = dense(flight.xdot - flight.wanted)
         return Function("system", flight.arguments, [residual, _by_rows(slopes)])
 
     def _point(self) -> Function:
         flight, total = self._flight, self._flight.total
         # a rotor held at constant speed is turned with the body, and the engine turns it
         torque = total.flow["Q_e"] + total.added_inertia * flight.xdot[5]
-        residual = dense(flight.xdot - flight.asked)
+        residual = dense(flight.xdot - flight.wanted)
         switches = column([*total.switches.values()])
         outputs = [flight.x, flight.wind, flight.xdot, residual, switches, dense(torque)]
         return Function("point", flight.arguments, outputs)

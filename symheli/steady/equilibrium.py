@@ -335,7 +335,7 @@ class Equilibrium:
             key=lambda miss: -abs(miss[0]),
         )
         table = ", ".join(f"d{s}/dt = {r:.2e} {s.unit}" for r, s in misses)
-        said = [
+        causes = [
             f"no trim at {best.condition}: the best point leaves {table}",
             *([_stops(best)] if best.on_stops else []),
             *_throttle(self.heli, best),
@@ -343,7 +343,7 @@ class Equilibrium:
             *(f"and beyond validity, {one}" for one in _beyond(self.heli, best)),
         ]
         advice = "try a nearer condition as `start`, or throw=False for the best point"
-        return TrimError("; ".join(said), best, advice)
+        return TrimError("; ".join(causes), best, advice)
 
     def _jumps(self, z: Array) -> list[str]:
         """Jumps of the equations beside a point that is no trim: within 0.1 of the switch (m/s), as
@@ -374,15 +374,19 @@ class Equilibrium:
         return self.miss(z) < TOLERANCE
 
     def _continue_from_hover(self, steps: int = 12) -> Array:
-        asked, z = self.condition, self.guess()
+        requested, z = self.condition, self.guess()
         for share in np.linspace(0.0, 1.0, steps + 1).tolist():
             stage = replace(
-                asked,
-                airspeed=share * asked.airspeed,
-                climb_rate=share * asked.climb_rate,
-                turn_rate=share * asked.turn_rate,
-                wind=(share * asked.wind[0], share * asked.wind[1], share * asked.wind[2]),
-                acceleration=share * asked.acceleration,
+                requested,
+                airspeed=share * requested.airspeed,
+                climb_rate=share * requested.climb_rate,
+                turn_rate=share * requested.turn_rate,
+                wind=(
+                    share * requested.wind[0],
+                    share * requested.wind[1],
+                    share * requested.wind[2],
+                ),
+                acceleration=share * requested.acceleration,
             )
             z = Equilibrium(self.heli, stage).solve(z)
         return z

@@ -86,7 +86,7 @@ def sweep_grid(
     >>> grid.A.shape
     (2, 3, 10, 10)
     """
-    asked = {
+    requested = {
         "acceleration": acceleration,
         "climb_rate": climb_rate,
         "density": density,
@@ -96,7 +96,7 @@ def sweep_grid(
     }
     given = {
         name: np.atleast_1d(np.asarray(values, float)).tolist()
-        for name, values in asked.items()
+        for name, values in requested.items()
         if values is not None
     }
     if not given:
@@ -107,11 +107,13 @@ def sweep_grid(
     points = [dict(zip(given, point, strict=True)) for point in product(*given.values())]
     helis = [_variant(heli, values) for values in points]
     each = np.repeat(np.arange(len(points)), len(speeds))
-    asked = {
+    requested = {
         name: np.array([values[name] for values in points])[each]
         for name in CONDITION & given.keys()
     }
-    flights = SteadyFlights(helis, each, FlightConditions(np.tile(speeds, len(points)), **asked))
+    flights = SteadyFlights(
+        helis, each, FlightConditions(np.tile(speeds, len(points)), **requested)
+    )
     shape = [len(values) for values in given.values()]
     trims = trimmed(flights, hover(flights), _after_neighbours(shape, len(speeds)))
     warn_of_trims(flights, trims)

@@ -46,11 +46,11 @@ def _crossings(heli: Helicopter, trims: TrimBatch, names: list[str], between: Ar
     ends = trims.conditions.airspeed[at]
     values = np.array([trims.switches[name][k] for name, k in zip(names, at, strict=True)])
     # in each bracket one cut after the other, the brackets side by side
-    asked = trims.conditions[np.tile(between, CUTS)]
+    midway = trims.conditions[np.tile(between, CUTS)]
     start = unknowns(heli, trims)[between]
     while np.any(np.ptp(ends, axis=1) > ACCURACY):
         cuts = _cuts(ends, values)
-        found, heights = _heights(heli, asked, names, cuts, start)
+        found, heights = _heights(heli, midway, names, cuts, start)
         edges = np.column_stack([ends[:, 0], cuts, ends[:, 1]])
         # where there is no trim, as beyond the change
         heights = np.where(found, heights, -values[:, :1])
@@ -62,11 +62,11 @@ def _crossings(heli: Helicopter, trims: TrimBatch, names: list[str], between: Ar
 
 
 def _heights(
-    heli: Helicopter, asked: FlightConditions, names: list[str], cuts: Array, start: Array
+    heli: Helicopter, requested: FlightConditions, names: list[str], cuts: Array, start: Array
 ) -> tuple[Array, Array]:
     """Whether there is a trim at each cut (n, CUTS), and the function of its row there."""
     n, count = cuts.shape
-    conditions = replace(asked, airspeed=cuts.T.ravel())
+    conditions = replace(requested, airspeed=cuts.T.ravel())
     flights = SteadyFlights([heli], np.zeros(n * count, int), conditions)
     after = np.maximum(np.arange(n * count) - n, ALONE)
     z, miss = flights.solved(np.tile(start, (count, 1)), after)

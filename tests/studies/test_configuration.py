@@ -53,7 +53,7 @@ def test_the_template_changes_nothing_and_lists_every_entry(tmp_path, quick):
 
 def test_every_entry_is_explained():
     for f in fields(Effort):
-        assert f.metadata["said"], f.name
+        assert f.metadata["meaning"], f.name
 
 
 def test_what_is_kept_comes_back_whatever_it_was(tmp_path):

@@ -84,8 +84,8 @@ def test_what_is_over_soon_shows_nothing_and_loads_nothing(capfd):
     assert subprocess.run([sys.executable, "-c", code], capture_output=True).returncode == 0
 
 
-def begun(at, since, told):
-    return _Open(at, since=since, told=told)
+def begun(at, since, stepped):
+    return _Open(at, since=since, stepped=stepped)
 
 
 def test_the_remaining_time_is_that_of_the_speed_so_far_less_what_has_passed():

@@ -12,7 +12,8 @@ import pytest
 import symheli
 from identification import Criterion, FitForControl
 from studies.controllers import tables
-from studies.controllers.asked import (
+from studies.controllers.certified import CertifiedControllers, bounded
+from studies.controllers.design_choices import (
     BACK_OFF,
     CONTROLS,
     DELAY,
@@ -23,7 +24,6 @@ from studies.controllers.asked import (
     PERIOD,
     TOP,
 )
-from studies.controllers.certified import CertifiedControllers, bounded
 from studies.controllers.designs import (
     AIRSPEEDS,
     NEAR,

@@ -14,7 +14,7 @@ import identification
 import symheli
 import synthesis
 from studies import cli
-from studies.controllers.asked import Asked
+from studies.controllers.design_choices import DesignChoices
 from studies.controllers.synthesized import (
     BesideAutopilot,
     model_of,
@@ -67,18 +67,18 @@ def family(small):
 
 @pytest.fixture(scope="module")
 def found(small, family):
-    return synthesized(Asked.read(small, {}), family)
+    return synthesized(DesignChoices.read(small, {}), family)
 
 
 def test_what_is_written_with_the_defaults_asks_for_the_defaults(tmp_path):
-    path = Asked().write(tmp_path / "my.toml")
-    assert Asked.read(path, {"out": Asked().out}) == Asked()
+    path = DesignChoices().write(tmp_path / "my.toml")
+    assert DesignChoices.read(path, {"out": DesignChoices().out}) == DesignChoices()
     assert max(map(len, path.read_text().splitlines())) <= 120
 
 
 def test_the_choices_beside_the_results_name_their_folder_again(tmp_path):
-    asked = Asked(out=tmp_path / "controller")
-    assert Asked.read(asked.write(asked.out / "synthesize.toml"), {}) == asked
+    asked = DesignChoices(out=tmp_path / "controller")
+    assert DesignChoices.read(asked.write(asked.out / "synthesize.toml"), {}) == asked
 
 
 def test_everything_that_is_wrong_in_the_file_is_said_at_once(tmp_path):
@@ -88,7 +88,7 @@ def test_everything_that_is_wrong_in_the_file_is_said_at_once(tmp_path):
         "servos = { d_lon = [36] }\nback_off = [1.0]\n"
     )
     with pytest.raises(InputError) as told:
-        Asked.read(path, {})
+        DesignChoices.read(path, {})
     for said in (
         "airspeeds: expected [LOW, HIGH], got [5.0, 2.0]",
         "delay: 0.03 s are no whole samples of 0.02 s",
@@ -100,10 +100,10 @@ def test_everything_that_is_wrong_in_the_file_is_said_at_once(tmp_path):
         assert said in str(told.value)
     path.write_text("[sizes]\nv = 'large'\n")
     with pytest.raises(InputError, match="sizes: expected of v a number, got"):
-        Asked.read(path, {})
+        DesignChoices.read(path, {})
     path.write_text("ordre = 4\n")
     with pytest.raises(InputError, match="ordre is unknown; did you mean order"):
-        Asked.read(path, {})
+        DesignChoices.read(path, {})
 
 
 def test_the_table_the_proof_and_the_page_are_of_what_was_asked_for(
@@ -126,9 +126,9 @@ def test_the_table_the_proof_and_the_page_are_of_what_was_asked_for(
     )
     assert synthesis.Certificate.load(out / "certificate.json").verify()
     assert "keeps a gain of" in (out / "report.html").read_text()
-    assert Asked.read(out / "synthesize.toml", {}).sizes == found.asked.sizes
+    assert DesignChoices.read(out / "synthesize.toml", {}).sizes == found.choices.sizes
     # the loop of the proof is this table around this plant
-    _, plant = plants(model_of(found.asked, family), found.asked)
+    _, plant = plants(model_of(found.choices, family), found.choices)
     assert "d_lat_disturbance" in plant.disturbances
     loop = plant.close(found.table)
     for p in (0.0, 3.0, 8.0):
@@ -146,15 +146,15 @@ def test_what_is_shown_fits_a_terminal_and_names_what_is_known(found):
 
 @pytest.mark.slow
 def test_as_many_states_and_airspeeds_as_are_asked_for(family, found):
-    _, plant = plants(model_of(found.asked, family), found.asked)
-    for asked in (replace(found.asked, knots=5), replace(found.asked, order=1)):
+    _, plant = plants(model_of(found.choices, family), found.choices)
+    for asked in (replace(found.choices, knots=5), replace(found.choices, order=1)):
         table = tabulated(found.made, plant, asked)
         assert len(table.knots) == (asked.knots or len(found.table.knots))
         assert table.order == (asked.order or found.table.order)
 
 
 def test_a_model_sampled_otherwise_than_the_controller_is_refused(small, family):
-    asked = Asked.read(small, {})
+    asked = DesignChoices.read(small, {})
     whole = model_of(asked, family)
 
     class Sampled:
@@ -208,7 +208,7 @@ def test_a_controller_for_a_saved_identified_model_is_proven_around_that_model(t
     assert table.dt == 0.02
     proof = synthesis.Certificate.load(tmp_path / "made" / "certificate.json")
     assert proof.verify()
-    asked = Asked.read(tmp_path / "my.toml", {})
+    asked = DesignChoices.read(tmp_path / "my.toml", {})
     given = identification.LPVARXModel.load(tmp_path / "model.json")
     _, plant = plants(model_of(asked, given), asked)
     worst = 0.0
@@ -263,7 +263,7 @@ def test_a_controller_whose_loop_does_not_stand_the_delay_is_refused_with_what_t
     family, found
 ):
     """Designed without a delay, flown so late."""
-    late = replace(found.asked, delay=1.2)
+    late = replace(found.choices, delay=1.2)
     _, plant = plants(model_of(late, family), late)
     with pytest.raises(SynthesisError, match=r"a delay of 1\.2 s.*unstable.*ask for less"):
         tabulated(found.made, plant, late)
@@ -330,7 +330,7 @@ def with_known_kinematics():
 def test_to_a_model_with_known_kinematics_a_gust_is_the_opposite_velocity(tmp_path):
     """In its forces: what a gust adds to velocities is what they lose of the same velocity."""
     path = with_known_kinematics().save(tmp_path / "model.json")
-    asked = Asked(vehicle="", model=str(path), airspeeds=(0.0, 8.0), delay=0.0, servos={})
+    asked = DesignChoices(vehicle="", model=str(path), airspeeds=(0.0, 8.0), delay=0.0, servos={})
     model = model_of(asked, identification.KinematicModel.load(path))
     at = model.at(3.0)
     gust = [list(map(str, model.inputs)).index(name) for name in ("u_w", "v_w", "w_w")]
@@ -360,7 +360,7 @@ def test_a_controller_for_a_model_with_known_kinematics_is_proven(tmp_path, caps
 
 @pytest.mark.slow
 def test_sideways_alone_the_rest_is_flown_by_an_autopilot(tmp_path):
-    asked = Asked(
+    asked = DesignChoices(
         out=tmp_path / "lateral",
         states=("v", "p", "r", "phi", "b1"),
         controls=("d_lat", "d_ped"),

@@ -82,7 +82,7 @@ def _numbers(servo: Servo) -> tuple[float, ...]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Asked:
+class DesignChoices:
     """Specification of the design, certification and simulation. Raises `InputError` for a wrong
     type, a value out of range, or a signal without a size.
     """
@@ -171,15 +171,15 @@ class Asked:
             raise InputError("; ".join(wrong))
 
     @classmethod
-    def read(cls, path: Path | None, options: Mapping[str, Any]) -> Asked:
+    def read(cls, path: Path | None, options: Mapping[str, Any]) -> DesignChoices:
         """Read the file (None: only defaults) with `options` in place of its entries of these
         names; paths of the file are relative to it.
 
         Raises `InputError` for a file that cannot be read, or with everything that is wrong in it.
         """
-        said = {} if path is None else entries(path, "synthesize")
+        given = {} if path is None else entries(path, "synthesize")
         complaints: list[str] = []
-        found = checked(cls, {**said, **options}, complaints)
+        found = checked(cls, {**given, **options}, complaints)
         if complaints:
             raise InputError(f"{path or 'options'}: {'; '.join(complaints)}")
         try:
