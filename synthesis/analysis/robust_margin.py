@@ -175,7 +175,7 @@ def _of_blocks(
         float("inf") if borne else upper,
         loop.physical(upper * d),
         float("nan") if found is None else loop.frequency(found.omega),
-        None if found is None else loop.unscaled(found.delta),
+        None if found is None else loop.unscaled(found.delta, found.omega),
     )
 
 
