@@ -109,7 +109,8 @@ def servo_weight(bandwidth: Range, damping: Range) -> LinearModel:
     k = np.array([bandwidth.low, bandwidth.high]) / bandwidth.nominal
     z0, z = damping.nominal, np.array([damping.low, damping.high])
     t = np.geomspace(10**-DECADES, 10**DECADES, POINTS[0]) ** 2
-    kk, zz = (g.ravel() for g in np.meshgrid(*(np.linspace(*r, POINTS[1]) for r in (k, z))))
+    lines = (np.linspace(low, high, POINTS[1]) for low, high in (k, z))
+    kk, zz = (g.ravel() for g in np.meshgrid(*lines))
     E, F = _servo_error(t[:, None], kk, zz, z0)
     worst = (E / F).max(axis=1)
 
@@ -190,6 +191,6 @@ def _weight(numerator: Sequence[float] | Array, denominator: Array, pace: float)
     A[-1] = -low[::-1]
     C = (top[1:] - top[0] * low)[::-1]
     states = tuple(Signal(f"weight_{i + 1}") for i in range(n))
-    return LinearModel(
-        pace * A, pace * np.eye(n)[:, -1:], C[None], [[top[0]]], states, ("in",), ("out",)
-    )
+    ends = (Signal("in"),), (Signal("out"),)
+    D = np.array([[top[0]]])
+    return LinearModel(pace * A, pace * np.eye(n)[:, -1:], C[None], D, states, *ends)

@@ -10,10 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv import LFT, LinearModel, LPVStateSpace
+from symheli.lpv import LFT, LinearModel, LPVStateSpace, UncertainStateSpace
 from symheli.lpv.lft.model import parts as slices
+from symheli.lpv.uncertain_state_space import DeltaPart
 from symheli.values.sample_period import same_period
-from symheli.values.signal import indices
+from symheli.values.signal import Signal, indices
 from synthesis.lti.weights import as_weight
 from synthesis.plant import parts
 from synthesis.program.scaling import balance
@@ -285,9 +286,21 @@ def loop_of(
     A, B, C, D = _behind(A, B, C, D, every, model.dt)
     if model.dt is not None:
         A, B, C, D = to_continuous(A, B, C, D)
-    box = np.array([(s.middle, s.radius * (size > 0)) for s, size in model.blocks])
+    middles = np.array([s.middle for s, _ in model.blocks])
+    radii = np.array([s.radius * (size > 0) for s, size in model.blocks])
     whole = (*real, *full)
-    return Loop(A, B, C, D, whole, model.dt, units[:, 0], *box.reshape(-1, 2).T, weights)
+    return Loop(A, B, C, D, whole, model.dt, units[:, 0], middles, radii, weights)
+
+
+def loop_at(unc: UncertainStateSpace, p: float) -> Loop:
+    """Return the loop of the parts of Delta around the model frozen at p."""
+    block = unc.model.select(inputs=unc.perturbation_inputs, outputs=unc.perturbation_outputs)
+    one = block.at(p)
+    A, B, C, D = one.A, one.B, unc.bound * one.C, unc.bound * one.D
+    if unc.dt is not None:
+        A, B, C, D = to_continuous(A, B, C, D)
+    full = tuple(Part(rows, columns, False) for columns, rows in unc.places)
+    return Loop(A, B, C, D, full, unc.dt, np.full(len(C), unc.bound), np.array([p]), np.zeros(1))
 
 
 def channels_of(
@@ -309,6 +322,29 @@ def channels_of(
         if len({*chain(*group)}) < len(list(chain(*group))):
             raise InputError("blocks: an input or an output belongs to one block only")
     return columns, rows
+
+
+def opened(
+    model: LPVStateSpace, blocks: Sequence[DynamicBlock]
+) -> tuple[LPVStateSpace, list[Signal], list[Signal], tuple[DeltaPart, ...]]:
+    """Return the model with each block of gain 1 and no weight, the inputs and outputs of all, and
+    the parts of Delta; raise as `loop_of`.
+    """
+    if not isinstance(model, LPVStateSpace):
+        raise InputError(f"model: expected an LPVStateSpace, got {type(model).__name__}")
+    if not blocks:
+        raise InputError("blocks: expected one or more")
+    columns, rows = channels_of(model, blocks)
+    d = [model.inputs[i] for i in chain(*columns)]
+    v = [model.outputs[i] for i in chain(*rows)]
+    parts = tuple(DeltaPart(len(a), len(b), True) for a, b in zip(columns, rows, strict=True))
+    for block, own in zip(blocks, rows, strict=True):
+        names = [str(model.outputs[i]) for i in own]
+        weight = stable_weight(block, model.dt)
+        if weight is not None:
+            model = model.filtered_by(dict.fromkeys(names, weight))
+        model = model.scaled(outputs=dict.fromkeys(names, 1 / block.bound))
+    return model, d, v, parts
 
 
 def stable_weight(block: DynamicBlock, dt: float | None) -> LinearModel | None:
@@ -333,7 +369,7 @@ def _behind(
 ) -> tuple[Array, Array, Array, Array]:
     """Return a model whose first outputs pass these weights."""
     every = [1.0 if w is None else w for w in [*weights, *[None] * (len(C) - len(weights))]]
-    W = as_weight(every, "weight", [f"v{i}" for i in range(len(C))], dt)
+    W = as_weight(every, "weight", [Signal(f"v{i}") for i in range(len(C))], dt)
     return (
         np.block([[A, np.zeros((len(A), len(W.A)))], [W.B @ C, W.A]]),
         np.vstack([B, W.B @ D]),
