@@ -3,8 +3,8 @@
 For d = Delta v, |Delta| <= bound, and any lambda >= 0 the supply lambda (bound^2 v'v - d'd) is not
 negative: a dissipation inequality that holds with it added holds for every such Delta, constant or
 moving. Of Delta = diag(Delta_1, ...) each part has its own lambda; that of dynamics, whose supply
-is not negative over time from rest only, does not depend on p. Source: Boyd, El Ghaoui, Feron and Balakrishnan, "Linear Matrix Inequalities in System and
-Control Theory" (1994), sections 5.1 and 6.3.
+is not negative over time from rest only, does not depend on p. Source: Boyd, El Ghaoui, Feron and
+Balakrishnan, "Linear Matrix Inequalities in System and Control Theory" (1994), sections 5.1, 6.3.
 """
 
 from __future__ import annotations
@@ -106,4 +106,4 @@ def open_block(unc: UncertainStateSpace, *, channels: bool) -> tuple[LPVStateSpa
     model = unc.model.select(
         inputs=(*unc.perturbation_inputs, *u), outputs=(*y, *unc.perturbation_outputs)
     )
-    return model, NormBounded(*unc.shape, unc.bound, tuple(map(tuple, unc.parts)))
+    return model, NormBounded(*unc.shape, unc.bound, tuple((d, v, own) for d, v, own in unc.parts))

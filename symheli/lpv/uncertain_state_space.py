@@ -179,8 +179,8 @@ class UncertainStateSpace:
         A saturation is in the sector from 0 to 1; up to |v| = limit/low it is in that from `low`
         on. d = (low + high)/2 v + Delta v with a diagonal Delta of norm (high - low)/2 that moves
         in any way: what `l2_gain` and `stability` prove of the set is the circle criterion with a
-        multiplier for each function that is a function of p. of several functions its Delta is any matrix of that
-        norm, which is more than need be. `perturbed(Delta)` has the gain (low + high)/2 + Delta.
+        multiplier for each function, itself a function of p. `perturbed(Delta)` has the gain (low +
+        high)/2 + Delta.
 
         Raises `InputError` for numbers of inputs and outputs that differ and for a low end that is
         not below the high one, `UnknownNameError` for other names.
@@ -241,19 +241,19 @@ class UncertainStateSpace:
         ...     inputs=["u", "a", "b"], outputs=["y", "v", "w"])
         >>> loops = symheli.UncertainStateSpace.of_blocks(
         ...     lag, [DynamicBlock("a", "v", 0.5), DynamicBlock("b", "w", 0.4)])
-        >>> cert = synthesis.l2_gain(loops)  # 1.4/(2 - .5)
+        >>> cert = synthesis.l2_gain(loops, search=None)  # 1.4/(2 - .5)
         >>> print(f"{cert.lower:.3f} <= gain <= {cert.gamma:.3f}")
         0.933 <= gain <= 0.933
         """
         from synthesis.robust.structure import opened
 
-        wide, d, v, parts = opened(model.model if isinstance(model, cls) else model, blocks)
-        if isinstance(model, cls):
+        if isinstance(model, UncertainStateSpace):
+            wide, d, v, parts = opened(model.model, blocks)
             sized = wide.scaled(outputs=dict.fromkeys(model.perturbation_outputs, 1 / model.bound))
-            own = (model.perturbation_inputs, model.perturbation_outputs)
-            whole = (*model.every_part, *parts)
-            source = f"{model.source}; {source}"
-            return cls(sized, (*own[0], *d), (*own[1], *v), 1.0, model.probability, source, whole)
+            d, v = (*model.perturbation_inputs, *d), (*model.perturbation_outputs, *v)
+            whole, source = (*model.every_part, *parts), f"{model.source}; {source}"
+            return cls(sized, d, v, 1.0, model.probability, source, whole)
+        wide, d, v, parts = opened(model, blocks)
         return cls(wide, signals(d), signals(v), 1.0, 1.0, source, parts)
 
     @property

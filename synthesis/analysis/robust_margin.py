@@ -134,12 +134,13 @@ def robust_margin(
         return 1 - min(_worst_closing(grown(r))[0], 2.0)
 
     if excess(MIN_SCALE) <= 0:
-        return _at(grown(MIN_SCALE), 0.0, MIN_SCALE)
+        _, omega, p, delta = _worst_closing(grown(MIN_SCALE))
+        return RobustMargin(0.0, MIN_SCALE, p, omega, delta)
     borne = excess(largest) >= 0
     upper = largest if borne else float(brentq(excess, MIN_SCALE, largest, rtol=ACCURACY))  # type: ignore[arg-type]
     lower = _proven(lambda r: stability(grown(r), 0.0, search=None).verified, upper, borne)
-    found = _at(grown(upper), lower, upper)
-    return found._replace(upper=math.inf) if borne else found
+    _, omega, p, delta = _worst_closing(grown(upper))
+    return RobustMargin(lower, math.inf if borne else upper, p, omega, delta)
 
 
 def _set_of(
@@ -148,12 +149,14 @@ def _set_of(
     """Return the set of all loops around these blocks."""
     if isinstance(model, UncertainStateSpace):
         return model
-    return UncertainStateSpace.of_blocks(model.to_lpv() if isinstance(model, LFT) else model, blocks)
+    return UncertainStateSpace.of_blocks(
+        model.to_lpv() if isinstance(model, LFT) else model, blocks
+    )
 
 
 def _while_moving(unc: UncertainStateSpace, rate: Rate, largest: float) -> RobustMargin:
     """Return the factor of the blocks alone, p within its range."""
-    level, _, p, _ = _worst_closing(unc)
+    level, omega, p, delta = _worst_closing(unc)
     if math.isinf(level):
         return RobustMargin(0.0, MIN_SCALE, p, math.nan)
     borne = level * largest <= 1
@@ -162,8 +165,8 @@ def _while_moving(unc: UncertainStateSpace, rate: Rate, largest: float) -> Robus
     def proven(r: float) -> bool:
         return stability(unc.with_bound(r * unc.bound), rate, search=None).verified
 
-    found = _at(unc.with_bound(upper * unc.bound), _proven(proven, upper, borne), upper)
-    return found._replace(upper=math.inf) if borne else found
+    lower = _proven(proven, upper, borne)
+    return RobustMargin(lower, math.inf if borne else upper, p, omega, delta)
 
 
 def _proven(stable: Callable[[float], bool], upper: float, borne: bool) -> float:
@@ -203,12 +206,8 @@ def _worst_closing(unc: UncertainStateSpace) -> tuple[float, float, float, np.nd
         return math.inf, math.nan, float(p), None
     loop = loop_at(unc, float(p))
     found = worst_closing(loop, refine=True)
-    return found.level, loop.frequency(found.omega), float(p), loop.unscaled(found.delta, found.omega)
-
-
-def _at(unc: UncertainStateSpace, lower: float, upper: float) -> RobustMargin:
-    _, omega, p, delta = _worst_closing(unc)
-    return RobustMargin(lower, upper, p, omega, delta)
+    delta = loop.unscaled(found.delta, found.omega)
+    return found.level, loop.frequency(found.omega), float(p), delta
 
 
 def _grown(lpv: LPVStateSpace, r: float) -> LPVStateSpace:

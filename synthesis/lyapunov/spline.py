@@ -37,9 +37,9 @@ class SplineLyapunov:
 
     `order` m > 1: V = z' P(p) z with the N monomials z of degree m in the states (see
     `symmetric_power`), n = N then. `slack` (blocks, null space): what was added to each Bernstein
-    coefficient of -dV/dt to make it definite. `multiplier` (K e + 1,) >= 0 of a norm-bounded block, (K
-    e + 1, parts) of one of several parts: Bernstein coefficients of lambda(p), a continuous spline
-    of degree e on the same knots, in squared outputs per squared output of the block.
+    coefficient of -dV/dt to make it definite. `multiplier` (K e + 1,) >= 0 of a norm-bounded block,
+    (K e + 1, parts) of one of several parts: Bernstein coefficients of lambda(p), a continuous
+    spline of degree e on the same knots, in squared outputs per squared output of the block.
     """
 
     knots: Array
