@@ -90,6 +90,8 @@ from synthesis.lti.h2 import h2 as h2
 from synthesis.lti.hinf import hinf as hinf
 from synthesis.lti.loop_shaping import ncf as ncf
 from synthesis.lti.mixed_sensitivity import mixed_sensitivity as mixed_sensitivity
+from synthesis.lti.mu_synthesis import MuDesign as MuDesign
+from synthesis.lti.mu_synthesis import mu_synthesis as mu_synthesis
 from synthesis.lti.point_design import DesignStatus as DesignStatus
 from synthesis.plant.plant import Plant as Plant
 from synthesis.polynomial.matrix import PolynomialMatrix as PolynomialMatrix

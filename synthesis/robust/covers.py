@@ -81,7 +81,7 @@ def delay_weight(longest: object) -> LinearModel:
     c, zeros, poles = (float(v) for v in (CORNER, ZEROS, POLES))
     numerator = np.polymul([1.0, 0.0], [1 / c**2, 2 * zeros / c, 1.0])
     denominator = np.polymul([0.5, 1.0], [1 / c**2, 2 * poles / c, 1.0])
-    return _weight(numerator, denominator, 1 / T)
+    return rational(numerator, denominator, 1 / T)
 
 
 def lag_weight(bandwidth: Range) -> LinearModel:
@@ -94,7 +94,7 @@ def lag_weight(bandwidth: Range) -> LinearModel:
     ends = np.array([bandwidth.low, bandwidth.high])
     sizes = np.abs(ends / bandwidth.nominal - 1)
     h, k = sizes.max(), (sizes / ends).max()
-    return _weight(np.array([h, 0.0]), np.array([1.0, h / k]), 1.0)
+    return rational(np.array([h, 0.0]), np.array([1.0, h / k]), 1.0)
 
 
 def servo_weight(bandwidth: Range, damping: Range) -> LinearModel:
@@ -131,7 +131,7 @@ def servo_weight(bandwidth: Range, damping: Range) -> LinearModel:
     for _ in range(MAX_RAISES):
         a, c = RAISED * a, RAISED * c
         if _covers(a, c, (n, own), k, z, z0):
-            return _weight(
+            return rational(
                 np.array([math.sqrt(a), math.sqrt(c), 0.0]),
                 np.array([1.0, 2 * own * n, n * n]),
                 bandwidth.nominal,
@@ -182,7 +182,7 @@ def _add(terms: dict[tuple[int, int, int], float], at: tuple[int, int, int], val
     terms[at] = terms.get(at, 0.0) + value
 
 
-def _weight(numerator: Sequence[float] | Array, denominator: Array, pace: float) -> LinearModel:
+def rational(numerator: Sequence[float] | Array, denominator: Array, pace: float) -> LinearModel:
     """Return N(s)/D(s) of equal degrees, s in units of `pace` (rad/s), in controllable form."""
     scale = denominator[0]
     low, top = denominator[1:] / scale, np.asarray(numerator) / scale

@@ -283,7 +283,7 @@ def loop_of(
     ]
     A = model.M22[:x, :x]
     every = [*([None] * n), *(w for w, own in zip(weights, rows, strict=False) for _ in own)]
-    A, B, C, D = _behind(A, B, C, D, every, model.dt)
+    A, B, C, D = behind(A, B, C, D, every, model.dt)
     if model.dt is not None:
         A, B, C, D = to_continuous(A, B, C, D)
     middles = np.array([s.middle for s, _ in model.blocks])
@@ -364,7 +364,7 @@ def stable_weight(block: DynamicBlock, dt: float | None) -> LinearModel | None:
     return found
 
 
-def _behind(
+def behind(
     A: Array, B: Array, C: Array, D: Array, weights: Sequence[LinearModel | None], dt: float | None
 ) -> tuple[Array, Array, Array, Array]:
     """Return a model whose first outputs pass these weights."""
