@@ -45,8 +45,8 @@ GAINED = 1e-3
 ends the search.
 """
 FAR = 3.0
-"""Step of the scalings towards those found for the last loop, from the second iteration on: near the
-end these are close, and plain steps many (1.0: plain ones).
+"""Step of the scalings towards those found for the last loop, from the second iteration on: near
+the end these are close, and plain steps many (1.0: plain ones).
 """
 
 
@@ -309,7 +309,7 @@ class _Filter(NamedTuple):
             return root[:, None] * self._of(own).slopes(omega)
 
         found = [
-            optimize.least_squares(misfit, own, slope, bounds=(-LIMIT, LIMIT), max_nfev=FITS)
+            optimize.least_squares(misfit, own, slope, (-LIMIT, LIMIT), max_nfev=FITS)  # type: ignore[arg-type]
             for own in starts
         ]
         return self._of(min(found, key=lambda f: f.cost).x)
@@ -331,8 +331,8 @@ class _Filter(NamedTuple):
         s = 1j * omega[:, None] / self.pace
         a, b, c, e = self.quadratics.T
         above, below = s * s + a * s + b, s * s + c * s + e
-        each = np.stack([a * s / above, b / above, -c * s / below, -e / below], axis=2)
-        return np.column_stack([np.ones(len(omega)), each.real.reshape(len(omega), -1)])
+        each = np.real(np.stack([a * s / above, b / above, -c * s / below, -e / below], axis=2))
+        return np.column_stack([np.ones(len(omega)), each.reshape(len(omega), -1)])
 
     def model(self) -> LinearModel:
         """Return the filter as a linear model of one input and output."""
@@ -371,7 +371,7 @@ def _scalings(loop: Loop, omega: Array) -> tuple[Array, Array]:
             slope = np.bincount(rows, np.abs(left[:, 0]) ** 2, free + 1)
             slope -= np.bincount(columns, np.abs(right[0]) ** 2, free + 1)
             near = x - before
-            return math.log(values[0]) + NEAR * near @ near, slope[:free] + 2 * NEAR * near
+            return float(math.log(values[0]) + NEAR * near @ near), slope[:free] + 2 * NEAR * near
 
         if free:
             before = optimize.minimize(size, before, jac=True, method="BFGS").x

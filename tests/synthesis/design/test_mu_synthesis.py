@@ -62,7 +62,7 @@ def test_the_worst_gain_within_one_over_mu_is_below_mu(design):
 
 
 def test_without_uncertainty_it_is_the_least_norm():
-    found = mu_synthesis(lag(1e-6), ["u"], ["y"], BLOCK, order=0, iterations=1)
+    found = mu_synthesis(lag(1e-6), ["u"], ["y"], BLOCK, order=0, iterations=2)
     plain = lag().select(inputs=["w", "n", "u"], outputs=["z", "cost", "y"])
     assert found.mu == pytest.approx(hinf(plain, ["u"], ["y"]).optimum, rel=5e-3)
 
