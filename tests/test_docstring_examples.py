@@ -116,6 +116,7 @@ LONG = (
     "symheli.lpv-simulate",
     "synthesis-robust_margin",
     "synthesis-worst_case_gain",
+    "synthesis-mu_synthesis",
     "synthesis-loop_shaping",
     "synthesis-DwellTime",
     "synthesis-SwitchedController",

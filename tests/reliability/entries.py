@@ -114,6 +114,7 @@ SLOW = {
         "synthesis.bounded_truncation",
         "synthesis.robust_margin",
         "synthesis.worst_case_gain",
+        "synthesis.mu_synthesis",
         "synthesis.loop_shaping",
     ),
 }
