@@ -97,6 +97,8 @@ from synthesis.plant.plant import Plant as Plant
 from synthesis.polynomial.matrix import PolynomialMatrix as PolynomialMatrix
 from synthesis.program.cone_program import Solver as Solver
 from synthesis.program.cone_program import installed_solvers as installed_solvers
+from synthesis.robust.slope import SlopeMargin as SlopeMargin
+from synthesis.robust.slope import slope_margin as slope_margin
 from synthesis.robust.structure import DynamicBlock as DynamicBlock
 from synthesis.sheet.evaluation import SpecificationTable as SpecificationTable
 from synthesis.sheet.evaluation import specifications as specifications

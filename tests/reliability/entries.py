@@ -76,6 +76,8 @@ EXEMPT: dict[str, str] = {
                 "RobustMargin",
                 "WorstCaseGain",
                 "LoopShaping",
+                "MuDesign",
+                "SlopeMargin",
                 "SpecificationTable",
                 "StructuredController",
                 "Tube",
