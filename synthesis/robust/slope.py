@@ -260,8 +260,8 @@ class _Loop(NamedTuple):
         a = np.tile(trial.poles, ORDER)
         n, m, q = len(self.A), len(a), len(trial.poles)
         chain = np.diag(a[q:], -q) - np.diag(a)
-        A = block_diag(self.A, chain, chain)
-        A[n : n + q, :n] = -np.outer(a[:q], self.c)  # filters of F, then of the input
+        A = np.array(block_diag(self.A, chain, chain))
+        A[n : n + q, :n] = np.array(-np.outer(a[:q], self.c))  # filters of F, then of the input
         top = 1 / trial.slope - self.d
         first = np.r_[a[:q], np.zeros(m - q)]
         B = np.r_[self.b, first * top, first]
