@@ -129,11 +129,12 @@ def slope_margin(
     --------
     1/(s + 1)^3 under negative feedback: 4 by the circle criterion, and 8 by Popov's, as of a gain.
 
+    >>> from symheli.lpv import LinearModel
     >>> A = [[-1.0, 1.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, -1.0]]
-    >>> lags = symheli.LinearModel(
+    >>> lags = LinearModel(
     ...     A, [[0.0], [0.0], [-1.0]], [[1.0, 0.0, 0.0]], [[0.0]], ["a", "b", "c"], ["d"], ["v"])
     >>> print(*(f"{slope_margin(lags, 'd', 'v', each).slope:.2f}" for each in ("circle", "Popov")))
-    4.00 7.99
+    4.00 8.00
     """
     model = as_model(model)
     if criterion not in CRITERIA:
