@@ -9,6 +9,7 @@ PROTOCOL = "a protocol: nothing to call"
 CHOICE = "a choice of the package: its values are listed"
 ARITHMETIC = "computes with what it is given, NaN too; what comes in is checked by its users"
 CONTEXT = "a context manager, entered by contextlib and not by the example; its check has a test"
+BY_ITS_USERS = "a tuple of what it is given; checked by what it is given to"
 RESULT = "made by the package alone, from what it has checked: see the entry that returns it"
 
 EXEMPT: dict[str, str] = {
@@ -86,6 +87,7 @@ EXEMPT: dict[str, str] = {
             *(),
         )
     },
+    "synthesis.DynamicBlock": BY_ITS_USERS,
     "synthesis.PolynomialMatrix": ARITHMETIC,
     "symheli.watched": CONTEXT,
 }
