@@ -90,11 +90,15 @@ from synthesis.lti.h2 import h2 as h2
 from synthesis.lti.hinf import hinf as hinf
 from synthesis.lti.loop_shaping import ncf as ncf
 from synthesis.lti.mixed_sensitivity import mixed_sensitivity as mixed_sensitivity
+from synthesis.lti.mu_synthesis import MuDesign as MuDesign
+from synthesis.lti.mu_synthesis import mu_synthesis as mu_synthesis
 from synthesis.lti.point_design import DesignStatus as DesignStatus
 from synthesis.plant.plant import Plant as Plant
 from synthesis.polynomial.matrix import PolynomialMatrix as PolynomialMatrix
 from synthesis.program.cone_program import Solver as Solver
 from synthesis.program.cone_program import installed_solvers as installed_solvers
+from synthesis.robust.slope import SlopeMargin as SlopeMargin
+from synthesis.robust.slope import slope_margin as slope_margin
 from synthesis.robust.structure import DynamicBlock as DynamicBlock
 from synthesis.sheet.evaluation import SpecificationTable as SpecificationTable
 from synthesis.sheet.evaluation import specifications as specifications

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from itertools import pairwise
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -22,6 +23,16 @@ SAFETY = 2.0
 
 ROUNDING = 1e-12
 """Relative excess of a perturbation over its bound that counts as rounding."""
+
+
+class DeltaPart(NamedTuple):
+    """A full block on the diagonal of Delta, of this many rows and columns: a matrix, constant or
+    moving in any way; `dynamic`: any causal dynamics of that gain, at rest at the start.
+    """
+
+    inputs: int
+    outputs: int
+    dynamic: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,12 +56,15 @@ class UncertainStateSpace:
         With which the bound holds of what was modelled, in (0, 1].
     source : str
         What the bound promises, and by which argument: a sentence of every certificate.
+    parts : sequence of DeltaPart, optional
+        Delta = diag(Delta_1, ...), each of the parts of norm at most `bound`; empty: one full
+        matrix.
 
     Raises
     ------
     InputError
         Names that the model does not have, a block without channels, a bound that is negative or
-        not finite, a probability outside (0, 1], no source.
+        not finite, a probability outside (0, 1], no source, parts that are not those of Delta.
 
     Examples
     --------
@@ -71,6 +85,7 @@ class UncertainStateSpace:
     bound: float
     probability: float
     source: str
+    parts: tuple[DeltaPart, ...] = ()
 
     __repr__ = summarized
     _repr_html_ = as_table
@@ -100,6 +115,13 @@ class UncertainStateSpace:
         if not isinstance(self.source, str) or not self.source.strip():
             raise InputError(
                 f"source: expected a sentence on the meaning of the bound, got {self.source!r:.60}"
+            )
+        object.__setattr__(self, "parts", tuple(DeltaPart(*part) for part in self.parts))
+        sums = tuple(sum(part[i] for part in self.parts) for i in range(2))
+        if self.parts and (sums != self.shape or min(min(part[:2]) for part in self.parts) < 1):
+            raise InputError(
+                f"parts: expected blocks of at least 1 x 1 that make a Delta of {self.shape}, got"
+                f" {self.parts!r:.80}"
             )
 
     @classmethod
@@ -157,8 +179,8 @@ class UncertainStateSpace:
         A saturation is in the sector from 0 to 1; up to |v| = limit/low it is in that from `low`
         on. d = (low + high)/2 v + Delta v with a diagonal Delta of norm (high - low)/2 that moves
         in any way: what `l2_gain` and `stability` prove of the set is the circle criterion with a
-        multiplier that is a function of p; of several functions its Delta is any matrix of that
-        norm, which is more than need be. `perturbed(Delta)` has the gain (low + high)/2 + Delta.
+        multiplier for each function, itself a function of p. `perturbed(Delta)` has the gain (low +
+        high)/2 + Delta.
 
         Raises `InputError` for numbers of inputs and outputs that differ and for a low end that is
         not below the high one, `UnknownNameError` for other names.
@@ -188,8 +210,62 @@ class UncertainStateSpace:
         middle = 0.5 * (low + high)
         turned = model.feedback({pair: middle for pair in zip(d, v, strict=True)})
         source = f"static functions in the sector from {low:g} to {high:g}, or time-varying gains"
-        half = 0.5 * (high - low)
-        return cls(turned, signals(d), signals(v), half, 1.0, source)
+        half, parts = 0.5 * (high - low), (DeltaPart(1, 1),) * len(d)
+        return cls(turned, signals(d), signals(v), half, 1.0, source, parts if len(d) > 1 else ())
+
+    @classmethod
+    def of_blocks(
+        cls,
+        model: LPVStateSpace | UncertainStateSpace,
+        blocks: Sequence[Any],
+        source: str = "blocks of bounded gain",
+    ) -> UncertainStateSpace:
+        """Return the set of all loops of a model around several `synthesis.DynamicBlock`, each any
+        causal dynamics within its bound (and weight), at rest at the start; beside the block that
+        the model has where it is an uncertain one.
+
+        Each bound becomes a unit of the outputs of its block, weights become states. `perturbed`
+        has constant matrices for the dynamics. Raises as `synthesis.robust_margin` for blocks that
+        are none, or not of the model.
+
+        Examples
+        --------
+        A lag that moves, behind dynamics of gain .4 and beside a pole known to .5:
+
+        >>> import symheli, synthesis
+        >>> from synthesis import DynamicBlock
+        >>> p = symheli.Scheduling("p", "1", low=1.0, high=2.0, rate=1.0)
+        >>> lag = symheli.LPVStateSpace.polynomial(
+        ...     [[[-1.0]], [[-1.0]]], [[[1.0, 1.0, 1.0]]], [[[1.0], [1.0], [0.0]]],
+        ...     [[[0, 0, 0], [0, 0, 0], [1, 0, 0]]], p,
+        ...     inputs=["u", "a", "b"], outputs=["y", "v", "w"])
+        >>> loops = symheli.UncertainStateSpace.of_blocks(
+        ...     lag, [DynamicBlock("a", "v", 0.5), DynamicBlock("b", "w", 0.4)])
+        >>> cert = synthesis.l2_gain(loops, search=None)  # 1.4/(2 - .5)
+        >>> print(f"{cert.lower:.3f} <= gain <= {cert.gamma:.3f}")
+        0.933 <= gain <= 0.933
+        """
+        from synthesis.robust.structure import opened
+
+        if isinstance(model, UncertainStateSpace):
+            wide, d, v, parts = opened(model.model, blocks)
+            sized = wide.scaled(outputs=dict.fromkeys(model.perturbation_outputs, 1 / model.bound))
+            d, v = (*model.perturbation_inputs, *d), (*model.perturbation_outputs, *v)
+            whole, source = (*model.every_part, *parts), f"{model.source}; {source}"
+            return cls(sized, d, v, 1.0, model.probability, source, whole)
+        wide, d, v, parts = opened(model, blocks)
+        return cls(wide, signals(d), signals(v), 1.0, 1.0, source, parts)
+
+    @property
+    def every_part(self) -> tuple[DeltaPart, ...]:
+        """The blocks on the diagonal of Delta, of a full one that itself."""
+        return self.parts or (DeltaPart(*self.shape),)
+
+    @property
+    def places(self) -> tuple[tuple[slice, slice], ...]:
+        """Rows and columns of Delta of each part."""
+        ends = np.cumsum([(0, 0), *(part[:2] for part in self.every_part)], axis=0)
+        return tuple((slice(a, b), slice(c, d)) for (a, c), (b, d) in pairwise(ends.tolist()))
 
     @property
     def states(self) -> tuple[Signal, ...]:
@@ -241,6 +317,11 @@ class UncertainStateSpace:
         from symheli.lpv.lower_feedback import close_static
 
         delta = frozen(delta, "delta", self.shape)
+        own = np.zeros(self.shape)
+        for place in self.places:
+            own[place] = delta[place]
+        if not np.array_equal(own, delta):
+            raise InputError(f"delta: expected zeros outside its parts, {self.every_part!r:.80}")
         size = float(np.linalg.norm(delta, 2))
         if size > self.bound * (1 + ROUNDING):
             raise InputError(f"delta: expected a norm of at most {self.bound:g}, got {size:g}")
@@ -263,8 +344,15 @@ class UncertainStateSpace:
             raise InputError(f"count: expected an integer >= 1, got {count!r:.60}")
         if where not in ("ball", "boundary"):
             raise InputError(f"where: expected 'ball' or 'boundary', got {where!r:.60}")
-        rng = np.random.default_rng(seed)
-        short, long = sorted(self.shape)
+        rng, out = np.random.default_rng(seed), np.zeros((count, *self.shape))
+        for place, part in zip(self.places, self.every_part, strict=True):
+            out[(slice(None), *place)] = self._drawn(rng, count, part[:2], where)
+        return out
+
+    def _drawn(
+        self, rng: np.random.Generator, count: int, shape: tuple[int, int], where: str
+    ) -> Array:
+        short, long = sorted(shape)
         X = rng.standard_normal((count, short, long))
         inner = X @ np.swapaxes(X, -1, -2)
         if where == "ball":
@@ -275,7 +363,7 @@ class UncertainStateSpace:
         values, vectors = np.linalg.eigh(inner)
         root = (vectors / np.sqrt(values)[:, None, :]) @ np.swapaxes(vectors, -1, -2)
         delta = self.bound * root @ X
-        return delta if self.shape[0] == short else np.swapaxes(delta, -1, -2)
+        return delta if shape[0] == short else np.swapaxes(delta, -1, -2)
 
     def draws(
         self, count: int, seed: int, where: Literal["ball", "boundary"] = "ball"

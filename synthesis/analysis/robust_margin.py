@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -15,12 +16,16 @@ from symheli.threads import with_one_thread
 from symheli.values.summary import summarized
 from synthesis.analysis.questions import stability
 from synthesis.robust.lower_bound import ACCURACY, ROUGH, best_reals, worst_closing
-from synthesis.robust.structure import DynamicBlock, Loop, loop_of
+from synthesis.robust.structure import DynamicBlock, Loop, loop_at, loop_of
 from synthesis.robust.upper_bound import proven_level
 from synthesis.worst.frozen import frozen_gain
+from synthesis.worst.over_box import worst_over
+from synthesis.worst.rates import Rate
 
-SHARES = (0.9995, 0.998, 0.995, 0.99, 0.98, 0.95, 0.9, 0.75, 0.5)
-"""Parts of the upper bound for which a proof is tried, in turn."""
+SHARE, APART = 0.9995, 1.002
+"""Part of the upper bound for which a proof is tried first; ratio of a factor that is not proven to
+one that is at which the search between them ends.
+"""
 MIN_SCALE = 1e-6
 """A model that does not bear this part of its uncertainty counts as unstable without any."""
 STEPS = 3
@@ -52,15 +57,18 @@ def robust_margin(
     model: UncertainStateSpace | LFT | LPVStateSpace,
     blocks: Sequence[DynamicBlock] = (),
     *,
+    rate: Rate = None,
     largest: float = 10.0,
 ) -> RobustMargin:
     """Compute the factor by which the ranges of constant parameters about their middles, and the
     bounds of blocks of any linear dynamics, may grow together before a model of the set is
-    unstable.
+    unstable; with a `rate` that of the blocks alone, while the parameter moves within its range.
 
-    The upper bound is attained by the parameters and the perturbation returned. The lower one, of
-    an `UncertainStateSpace`, is proven by `stability` for that set; of several blocks by D and G
-    scalings over intervals of frequency that leave none out, in floating point.
+    The upper bound is attained by the parameters and the perturbation returned, p constant. The
+    lower one, of an `UncertainStateSpace` and where p moves, is proven by `stability` for that set,
+    with P(p) and a scaling for each block, and dynamics of any kind; of several blocks beside
+    constant parameters by D and G scalings over intervals of frequency that leave none out, in
+    floating point.
 
     Parameters
     ----------
@@ -70,6 +78,9 @@ def robust_margin(
         other channels play no part.
     blocks : sequence of DynamicBlock
         Channels of an LFT or LPVStateSpace that unknown dynamics close.
+    rate : float, optional
+        Largest |dp/dt| of the one parameter of an LPV model, which keeps to its range; None: all
+        parameters are constant, not known, and their ranges grow.
     largest : float
         No larger factor is looked for.
 
@@ -102,38 +113,101 @@ def robust_margin(
     >>> bool(1.98 < found.lower <= 2.0), round(found.upper, 4)
     (True, 2.0)
     """
+    if isinstance(model, UncertainStateSpace) and blocks:
+        raise InputError("an UncertainStateSpace has its block: give blocks with its .model")
+    if not largest > MIN_SCALE:
+        raise InputError(f"largest: expected a factor above {MIN_SCALE:g}, got {largest!r:.40}")
+    if rate is not None:
+        return _while_moving(_set_of(model, blocks), rate, largest)
     if not isinstance(model, UncertainStateSpace):
         return _of_blocks(model, blocks, largest)
-    if blocks:
-        raise InputError("an UncertainStateSpace has its block: give blocks with its .model")
     if not isinstance(model.model.basis, Polynomial):
         raise InputError("expected a model that is polynomial in one parameter, which is grown")
-    if not (model.bound > 0 and largest > MIN_SCALE):
-        raise InputError("expected a block with a bound > 0 and a largest factor > 0")
-    block = model.model.select(inputs=model.perturbation_inputs, outputs=model.perturbation_outputs)
+    if not model.bound > 0:
+        raise InputError("expected a block with a bound > 0")
+
+    def grown(r: float) -> UncertainStateSpace:
+        return replace(model, model=_grown(model.model, r), bound=r * model.bound)
 
     def excess(r: float) -> float:
         """1 where no model is lost, 0 at the margin, below it beyond."""
-        return 1 - min(r * model.bound * frozen_gain(_grown(block, r), points=POINTS).gain, 2.0)
+        return 1 - min(_worst_closing(grown(r))[0], 2.0)
 
     if excess(MIN_SCALE) <= 0:
-        return _at(block, 0.0, MIN_SCALE)
+        _, omega, p, delta = _worst_closing(grown(MIN_SCALE))
+        return RobustMargin(0.0, MIN_SCALE, p, omega, delta)
     borne = excess(largest) >= 0
     upper = largest if borne else float(brentq(excess, MIN_SCALE, largest, rtol=ACCURACY))  # type: ignore[arg-type]
-    for share in (1.0 if borne else SHARES[0], *SHARES[1:]):
-        r = share * upper
-        grown = replace(model, model=_grown(model.model, r), bound=r * model.bound)
-        if stability(grown, 0.0, search=None).verified:
-            break
-    else:
-        r = 0.0
-    found = _at(block, r, upper)
-    return found._replace(upper=float("inf")) if borne else found
+    lower = _proven(lambda r: stability(grown(r), 0.0, search=None).verified, upper, borne)
+    _, omega, p, delta = _worst_closing(grown(upper))
+    return RobustMargin(lower, math.inf if borne else upper, p, omega, delta)
 
 
-def _at(block: LPVStateSpace, lower: float, upper: float) -> RobustMargin:
-    worst = frozen_gain(_grown(block, upper))
-    return RobustMargin(lower, upper, worst.p, worst.omega)
+def _set_of(
+    model: UncertainStateSpace | LFT | LPVStateSpace, blocks: Sequence[DynamicBlock]
+) -> UncertainStateSpace:
+    """Return the set of all loops around these blocks."""
+    if isinstance(model, UncertainStateSpace):
+        return model
+    return UncertainStateSpace.of_blocks(
+        model.to_lpv() if isinstance(model, LFT) else model, blocks
+    )
+
+
+def _while_moving(unc: UncertainStateSpace, rate: Rate, largest: float) -> RobustMargin:
+    """Return the factor of the blocks alone, p within its range."""
+    level, omega, p, delta = _worst_closing(unc)
+    if math.isinf(level):
+        return RobustMargin(0.0, MIN_SCALE, p, math.nan)
+    borne = level * largest <= 1
+    upper = largest if borne else 1 / level
+
+    def proven(r: float) -> bool:
+        return stability(unc.with_bound(r * unc.bound), rate, search=None).verified
+
+    lower = _proven(proven, upper, borne)
+    return RobustMargin(lower, math.inf if borne else upper, p, omega, delta)
+
+
+def _proven(stable: Callable[[float], bool], upper: float, borne: bool) -> float:
+    """Return a factor up to `upper` for which stability is proven, to `APART` of the largest one
+    that was tried; 0 where there is none.
+    """
+    high = upper if borne else SHARE * upper
+    if stable(high):
+        return high
+    low = 0.5 * high
+    while not stable(low):
+        low, high = 0.5 * low, low
+        if low < MIN_SCALE * upper:
+            return 0.0
+    while high / low > APART:
+        middle = math.sqrt(low * high)
+        low, high = (middle, high) if stable(middle) else (low, middle)
+    return low
+
+
+def _worst_closing(unc: UncertainStateSpace) -> tuple[float, float, float, np.ndarray | None]:
+    """Return the level of the frozen model that is lost the soonest, inf where one is unstable, its
+    frequency, p and the perturbation of that level.
+    """
+    s = unc.scheduling
+    if len(unc.every_part) == 1:
+        block = unc.model.select(inputs=unc.perturbation_inputs, outputs=unc.perturbation_outputs)
+        worst = frozen_gain(block, points=POINTS)
+        return unc.bound * worst.gain, worst.omega, worst.p, None
+
+    def level(p: np.ndarray, refine: bool = False) -> float:
+        loop = loop_at(unc, float(p[0]))
+        return worst_closing(loop, refine).level if loop.stable else math.inf
+
+    value, (p,) = worst_over(level, [np.linspace(s.low, s.high, POINTS)])
+    if math.isinf(value):
+        return math.inf, math.nan, float(p), None
+    loop = loop_at(unc, float(p))
+    found = worst_closing(loop, refine=True)
+    delta = loop.unscaled(found.delta, found.omega)
+    return found.level, loop.frequency(found.omega), float(p), delta
 
 
 def _grown(lpv: LPVStateSpace, r: float) -> LPVStateSpace:
@@ -160,8 +234,6 @@ def _of_blocks(
     model: LFT | LPVStateSpace, blocks: Sequence[DynamicBlock], largest: float
 ) -> RobustMargin:
     loop = loop_of(model, blocks)
-    if not largest > MIN_SCALE:
-        raise InputError(f"largest: expected a factor above {MIN_SCALE:g}, got {largest!r:.40}")
     if not loop.stable:
         return RobustMargin(0.0, MIN_SCALE, loop.physical(np.zeros(loop.reals)), float("nan"))
     _, d = best_reals(lambda d: _lost(loop, d, largest), loop.reals)
@@ -175,7 +247,7 @@ def _of_blocks(
         float("inf") if borne else upper,
         loop.physical(upper * d),
         float("nan") if found is None else loop.frequency(found.omega),
-        None if found is None else loop.unscaled(found.delta),
+        None if found is None else loop.unscaled(found.delta, found.omega),
     )
 
 

@@ -98,7 +98,7 @@ def worst_case_gain(
     if delta is not None:  # without the last block, the performance
         last = loop.parts[-1]
         columns, rows = last.columns.stop - last.columns.start, last.rows.stop - last.rows.start
-        inner = loop.unscaled(delta)[: len(delta) - columns, : len(loop.sizes) - rows]
+        inner = loop.unscaled(delta, omega)[: len(delta) - columns, : len(loop.sizes) - rows]
     return WorstCaseGain(lower, proven.level, loop.physical(d), loop.frequency(omega), inner)
 
 

@@ -12,7 +12,8 @@ discrete time, P+ = P(p(k+1)), |p(k+1) - p(k)| <= rate dt:
 
 With a norm-bounded block d = Delta v, v = G x + J d + H u, |Delta| <= beta, the inputs are (d, u),
 C and D are those of y alone, g belongs to u alone, and lambda(p) (beta^2 [G J H]'[G J H] - diag(0,
-I, 0)) is added with lambda >= 0, a spline on the knots of P.
+I, 0)) is added with lambda >= 0, a spline on the knots of P; of a block of several parts one for
+each.
 
 Source: Wu, Yang, Packard and Becker, "Induced L2-norm control for LPV systems with bounded
 parameter variation rates", Int. J. Robust and Nonlinear Control 6 (1996), theorem 3.1.
@@ -94,10 +95,17 @@ class Supply(NamedTuple):
 
 
 class Multiplier(NamedTuple):
-    """The multiplier lambda of a `block`: a spline of `degree` on the knots of P."""
+    """The multiplier lambda of each part of a `block`: a spline of `degree` on the knots of P, one
+    number where the part is dynamic.
+    """
 
     block: NormBounded
     degree: int
+
+    def sizes(self, segments: int) -> list[int]:
+        """Numbers of coefficients, part by part."""
+        each = segments * self.degree + 1
+        return [1 if dynamic else each for *_, dynamic in self.block.every_part]
 
 
 def continuous_blocks(
@@ -381,43 +389,49 @@ def output_terms(cell: Cell, multiplier: Multiplier | None = None) -> Array:
 
 
 class SupplyTerms(NamedTuple):
-    """Bernstein coefficients `squares` (r, N, N) of the supply of a block over a cell for lambda =
-    1, lambda of `degree_in_p`; none without a block.
+    """Bernstein coefficients `squares` (parts, r, N, N) of the supply of each part of a block over
+    a cell for lambda = 1; none without a block. `by`: the multipliers.
     """
 
     squares: Array
-    degree_in_p: int
+    by: Multiplier | None
 
     @property
     def degree(self) -> int:
         """Degree of the supply rate with lambda; -1 without a block."""
-        return len(self.squares) - 1 + self.degree_in_p
+        return -1 if self.by is None else self.squares.shape[1] - 1 + self.by.degree
 
     def over(self, cell: Cell, knots: Array, degree: int) -> Supply | None:
         """Return the supply rate as added to each of the degree + 1 coefficients."""
-        if not len(self.squares):
+        if self.by is None:
             return None
-        e, (a, b, _) = self.degree_in_p, local_coordinates(cell, knots)
+        e, (a, b, _) = self.by.degree, local_coordinates(cell, knots)
         shares = np.einsum(
             "qm,mri,ij->qrj",
             elevation_matrix(self.degree, degree),
-            product_weights(len(self.squares) - 1, e),
+            product_weights(self.squares.shape[1] - 1, e),
             restriction(e, a, b),
         )
-        linear = np.einsum("qrj,rl->qjl", shares, svec(self.squares))
-        return Supply(cell.segment * e + np.arange(e + 1), linear)
+        columns, linear, first = [], [], 0
+        for count, own in zip(self.by.sizes(len(knots) - 1), self.squares, strict=True):
+            each = np.einsum("qrj,rl->qjl", shares, svec(own))
+            varies = count > 1
+            columns.append(first + (cell.segment * e + np.arange(e + 1) if varies else np.zeros(1)))
+            linear.append(each if varies else each.sum(axis=1, keepdims=True))
+            first += count
+        return Supply(np.concatenate(columns).astype(int), np.concatenate(linear, axis=1))
 
 
 def supply_terms(cell: Cell, multiplier: Multiplier | None) -> SupplyTerms:
-    """bound^2 [G J H]'[G J H] - diag(0, I, 0) over the cell."""
+    """bound^2 [G J H]'[G J H] - diag(0, I, 0) over the cell, of each part."""
     if multiplier is None:
-        return SupplyTerms(np.zeros((0, 0, 0)), 0)
-    block, degree = multiplier
-    own = slice(-block.outputs, None)
-    squares = block.bound**2 * _squared(cell.piece.C[:, own], cell.piece.D[:, own], cell)
-    d = cell.piece.A.shape[1] + np.arange(block.inputs)
-    squares[:, d, d] -= 1.0
-    return SupplyTerms(squares, degree)
+        return SupplyTerms(np.zeros((0, 0, 0, 0)), None)
+    block, every = multiplier.block, []
+    for d, v in block.places(cell.piece.A.shape[1], cell.piece.C.shape[1]):
+        squares = block.bound**2 * _squared(cell.piece.C[:, v], cell.piece.D[:, v], cell)
+        squares[:, d, d] -= 1.0
+        every.append(squares)
+    return SupplyTerms(np.stack(every), multiplier)
 
 
 def _squared(C: Array, D: Array, cell: Cell) -> Array:

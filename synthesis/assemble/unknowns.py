@@ -139,14 +139,12 @@ class Unknown(ABC):
 
 @dataclass(frozen=True, eq=False)
 class Quadratic(Unknown):
-    """V = x' P(p) x, P a spline; around a block with a multiplier of `multiplier_degree`, None
-    without.
-    """
+    """V = x' P(p) x, P a spline; around a block with its multipliers `by`, None without."""
 
     knots: Array
     degree: int
     size: int
-    multiplier_degree: int | None = None
+    by: Multiplier | None = None
 
     @property
     def unknowns(self) -> int:
@@ -155,34 +153,28 @@ class Quadratic(Unknown):
 
     @property
     def multipliers(self) -> int:  # type: ignore[override]
-        """Number of coefficients of the multiplier."""
-        e = self.multiplier_degree
-        return 0 if e is None else (len(self.knots) - 1) * e + 1
+        """Number of coefficients of the multipliers."""
+        return 0 if self.by is None else sum(self.by.sizes(len(self.knots) - 1))
 
     def blocks(self, problem: ScaledProblem, extra: int) -> list[Blocks]:
         """One block per Bernstein coefficient, cell or strip, and sign of the rate."""
-        own = self._multiplier(problem)
         if problem.lpv.dt is None:
             rate = problem.scaled_rate if self.degree else 0.0
             regions = cells(problem.scaled, self.knots)
-            return list(continuous_blocks(regions, self.knots, self.degree, rate, extra, own))
-        return list(discrete_blocks(self._strips(problem), self.knots, self.degree, extra, own))
-
-    def _multiplier(self, problem: ScaledProblem) -> Multiplier | None:
-        e, block = self.multiplier_degree, problem.block
-        return None if e is None or block is None else Multiplier(block, e)
+            return list(continuous_blocks(regions, self.knots, self.degree, rate, extra, self.by))
+        return list(discrete_blocks(self._strips(problem), self.knots, self.degree, extra, self.by))
 
     def products(self, problem: ScaledProblem, extra: int) -> tuple[LyapunovBlocks, ...]:
         """Return the same blocks as products with P, with states of different rates equally
         weighted.
         """
-        own = self._multiplier(problem)
         if problem.lpv.dt is None:
             rate = problem.scaled_rate if self.degree else 0.0
             regions = cells(problem.scaled, self.knots)
-            every = continuous_products(regions, self.knots, self.degree, rate, extra, own)
+            every = continuous_products(regions, self.knots, self.degree, rate, extra, self.by)
         else:
-            every = discrete_products(self._strips(problem), self.knots, self.degree, extra, own)
+            across = self._strips(problem)
+            every = discrete_products(across, self.knots, self.degree, extra, self.by)
         W = extended(problem.units.weight, len(problem.lpv.inputs))
         return tuple(block.congruent(W) for block in every)
 
@@ -196,8 +188,18 @@ class Quadratic(Unknown):
             self.knots,
             self.degree,
             smat(self.coefficients(x), self.size),
-            multiplier=self.multiplier(x) if self.multipliers else None,
+            multiplier=self._spread(self.multiplier(x)),
         )
+
+    def _spread(self, values: Array) -> Array | None:
+        """Return the coefficients (K e + 1,) of the multiplier, or (K e + 1, parts)."""
+        if self.by is None:
+            return None
+        sizes = self.by.sizes(len(self.knots) - 1)
+        count = (len(self.knots) - 1) * self.by.degree + 1
+        each = np.split(values, np.cumsum(sizes)[:-1])
+        whole = np.stack([np.broadcast_to(own, count) for own in each], axis=1)
+        return whole if self.by.block.parts else whole[:, 0]
 
 
 class OfMonomials(Quadratic):
@@ -313,14 +315,14 @@ def unknowns(problem: ScaledProblem, form: LyapunovForm) -> Iterator[Unknown]:
         elif isinstance(form, HigherOrder):
             yield OfMonomials(knots, degree, n, form.order)
         else:
-            yield Quadratic(knots, degree, n, _multiplier_degree(problem, degree))
+            yield Quadratic(knots, degree, n, _multiplier(problem, degree))
 
 
-def _multiplier_degree(problem: ScaledProblem, degree: int) -> int | None:
-    """Return the degree of the multiplier: that of P, which sets the degree of the LMIs, and at
-    least 1, because a constant P does not show where the block matters most.
+def _multiplier(problem: ScaledProblem, degree: int) -> Multiplier | None:
+    """Return the multipliers, of the degree of P, which sets the degree of the LMIs, and at least
+    1, because a constant P does not show where the block matters most.
     """
-    return None if problem.block is None else max(degree, 1)
+    return None if problem.block is None else Multiplier(problem.block, max(degree, 1))
 
 
 def constant(problem: ScaledProblem, form: LyapunovForm) -> Unknown:
@@ -328,7 +330,7 @@ def constant(problem: ScaledProblem, form: LyapunovForm) -> Unknown:
     n, knots = len(problem.lpv.states), _knots(problem, form, 8, 0)
     if isinstance(form, HigherOrder):
         return OfMonomials(knots, 0, n, form.order)
-    return Quadratic(knots, 0, n, _multiplier_degree(problem, 0))
+    return Quadratic(knots, 0, n, _multiplier(problem, 0))
 
 
 def _knots(problem: ScaledProblem, form: LyapunovForm, segments: int, degree: int) -> Array:

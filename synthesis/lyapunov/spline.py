@@ -37,10 +37,11 @@ class SplineLyapunov:
 
     `order` m > 1: V = z' P(p) z with the N monomials z of degree m in the states (see
     `symmetric_power`), n = N then. `slack` (blocks, null space): what was added to each Bernstein
-    coefficient of -dV/dt to make it definite. `multiplier` (K e + 1,) >= 0 of a norm-bounded block:
-    Bernstein coefficients of lambda(p), a continuous spline of degree e on the same knots, in
-    squared outputs per squared output of the block. `coordinates` T (n, n), for order 1: V is
-    (T x)' P(p) (T x), where rounding P to the units of the states would take its margin.
+    coefficient of -dV/dt to make it definite. `multiplier` (K e + 1,) >= 0 of a norm-bounded block,
+    (K e + 1, parts) of one of several parts: Bernstein coefficients of lambda(p), a continuous
+    spline of degree e on the same knots, in squared outputs per squared output of the block.
+    `coordinates` T (n, n), for order 1: V is (T x)' P(p) (T x), where rounding P to the units of
+    the states would take its margin.
     """
 
     knots: Array
@@ -90,7 +91,7 @@ class SplineLyapunov:
     def _fault_of_multiplier(self, values: Array | None) -> str | None:
         if values is None:
             return None
-        if values.ndim != 1 or not len(values) or (len(values) - 1) % self.segments:
+        if values.ndim not in (1, 2) or not values.size or (len(values) - 1) % self.segments:
             return (
                 f"a multiplier on {self.segments} segment(s) has a multiple of that many"
                 f" coefficients and one, got shape {values.shape}"
@@ -168,11 +169,16 @@ class SplineLyapunov:
         """Bernstein coefficients (d + 1, n, n) on segment j."""
         return self.coefficients[j * self.degree : (j + 1) * self.degree + 1]
 
-    def multiplier_segment(self, j: int) -> Array:
-        """Bernstein coefficients (e + 1,) of the multiplier on segment j."""
+    @property
+    def multipliers(self) -> Array:
+        """Bernstein coefficients (K e + 1, parts) of the multipliers."""
         assert self.multiplier is not None  # noqa: S101 - see the callers
+        return self.multiplier.reshape(len(self.multiplier), -1)
+
+    def multiplier_segment(self, j: int) -> Array:
+        """Bernstein coefficients (e + 1, parts) of the multipliers on segment j."""
         e = self.multiplier_degree
-        return self.multiplier[j * e : (j + 1) * e + 1]
+        return self.multipliers[j * e : (j + 1) * e + 1]
 
     def at(self, p: float | Array) -> Array:
         """P at p in the units of the states, shape p.shape + (n, n). Raises `InputError` outside

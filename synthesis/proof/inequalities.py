@@ -297,18 +297,22 @@ def _supply(
     model: Pieces, region: Region, P: SplineLyapunov, channel: NormBounded, number: Number
 ) -> PolynomialMatrix:
     """Return lambda (bound^2 [G J H]'[G J H] - diag(0, I, 0)) on a region for a block d = Delta v,
-    v = G x + J d + H u.
+    v = G x + J d + H u: the sum over its parts.
     """
     _, _, C, D = (M.T for M in model_on(model, region, number))
-    v, bound = slice(-channel.outputs, None), number(channel.bound)
-    rows = block([[PolynomialMatrix(M.box, M.coefficients[..., v])] for M in (C, D)])
-    nx, nu, _ = model.sizes
-    of_d = np.diag(np.r_[np.zeros(nx), np.ones(channel.inputs), np.zeros(nu - channel.inputs)])
-    (j,) = region.segment
-    factor = _on_segment(P.knots, P.multiplier_segment(j)[:, None, None], j)
-    factor = now(convert(factor, number), region, number)
-    whole = rows @ rows.T * (bound * bound)
-    return _scaled(factor, whole - PolynomialMatrix.constant(exact(of_d, number), whole.box))
+    (nx, nu, ny), bound = model.sizes, number(channel.bound)
+    (j,), total = region.segment, None
+    for (d, v), values in zip(channel.places(nx, ny), P.multiplier_segment(j).T, strict=True):
+        rows = block([[PolynomialMatrix(M.box, M.coefficients[..., v])] for M in (C, D)])
+        of_d = np.zeros((nx + nu, nx + nu))
+        of_d[d, d] = 1.0
+        factor = _on_segment(P.knots, values[:, None, None], j)
+        factor = now(convert(factor, number), region, number)
+        whole = rows @ rows.T * (bound * bound)
+        own = whole - PolynomialMatrix.constant(exact(of_d, number), whole.box)
+        total = _scaled(factor, own) if total is None else total + _scaled(factor, own)
+    assert total is not None  # noqa: S101 - a block has a part
+    return total
 
 
 def _remembering(

@@ -162,9 +162,9 @@ class Evidence(NamedTuple):
             return None if P.multiplier is None else "a multiplier needs a norm-bounded block"
         if not isinstance(self.block, NormBounded):
             return f"expected a NormBounded block or None, got {self.block!r:.60}"
-        if P.multiplier is None or P.order > 1:
+        if not isinstance(P, SplineLyapunov) or P.multiplier is None or P.order > 1:
             return "a norm-bounded block needs V = x' P(p) x with a multiplier"
-        return self.block.fault(self.lpv)
+        return self.block.fault(self.lpv) or self.block.multiplier_fault(P.multipliers)
 
     @property
     def sentences(self) -> tuple[str, ...]:

@@ -144,14 +144,13 @@ def _at(coefficients: Array, local: Sequence[Any]) -> Array:
 
 
 class Supplied(NamedTuple):
-    """A norm-bounded block of `inputs` d and `outputs` v, |d| <= bound |v|, with its multiplier at
-    one p.
+    """A norm-bounded block, |d| <= bound |v| of each part, with the multipliers (parts,) at one
+    p.
     """
 
-    inputs: int
-    outputs: int
+    block: NormBounded
     bound: Any
-    multiplier: Any
+    multipliers: Array
 
 
 def dissipation(
@@ -163,16 +162,17 @@ def dissipation(
     block: Supplied | None = None,
 ) -> Array:
     """Return the bounded real inequality at one p as a quadratic form in x, d and u: dV/dt + |y|^2
-    - g |u|^2 + multiplier (bound^2 |v|^2 - |d|^2), the last term around a `block` d = Delta v.
+    - g |u|^2 + multiplier (bound^2 |v|^2 - |d|^2), the last term around each part of a `block` d =
+    Delta v.
 
     `drift` is dP/dt, `after` P(p(k+1)) in discrete time. g None: dV/dt and the last term alone, in
     x and d.
     """
     A, B, C, D = model
-    inputs, outputs = (0, 0) if block is None else (block.inputs, block.outputs)
+    inputs, outputs = (0, 0) if block is None else block.block[:2]
     n, m, y = len(A), B.shape[1], len(C) - outputs
     one = np.eye(n + m, dtype=int)
-    x, d, u = one[:n], one[n : n + inputs], one[n + inputs :]
+    x, u = one[:n], one[n + inputs :]
     move, out = np.hstack([A, B]), np.hstack([C, D])
     if after is None:
         change = x.T @ (P @ move) + (x.T @ (P @ move)).T
@@ -180,8 +180,10 @@ def dissipation(
     else:
         change = move.T @ (after @ move) - x.T @ (P @ x)
     if block is not None:
-        v = out[y:]
-        change = change + block.multiplier * (block.bound * block.bound * (v.T @ v) - d.T @ d)
+        places = block.block.places(n, len(C))
+        for (rows, columns), factor in zip(places, block.multipliers, strict=True):
+            d, v = one[rows], out[columns]
+            change = change + factor * (block.bound * block.bound * (v.T @ v) - d.T @ d)
     if g is None:
         return change[: n + inputs, : n + inputs]
     return change + out[:y].T @ out[:y] - g * (u.T @ u)
@@ -275,11 +277,11 @@ def inequalities(
         model, g = model._replace(C=model.C * 0, D=model.D * 0), number(1.0)
     supplied = None
     if channel is not None and isinstance(P, SplineLyapunov) and P.multiplier is not None:
-        values = np.reshape(P.multiplier, (-1, 1, 1))
-        multiplier, _ = spline(P.knots, P.multiplier_degree, values, p[0], number)
-        yield -multiplier
-        limit = number(channel.bound)
-        supplied = Supplied(channel.inputs, channel.outputs, limit, multiplier[0, 0])
+        values = P.multipliers[:, None, :]
+        (multipliers,), _ = spline(P.knots, P.multiplier_degree, values, p[0], number)
+        for multiplier in multipliers:
+            yield -np.array([[multiplier]])
+        supplied = Supplied(channel, number(channel.bound), multipliers)
     decay, motion = demand.kind == "decay rate", demand.motion
     if dt is None:
         for pace in paces(p, demand.rates, motion.ties, degrees, number):

@@ -4,15 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from itertools import chain
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv import LFT, LPVStateSpace
-from symheli.lpv.lft.model import parts
-from symheli.values.signal import indices
+from symheli.lpv import LFT, LinearModel, LPVStateSpace, UncertainStateSpace
+from symheli.lpv.lft.model import parts as slices
+from symheli.lpv.uncertain_state_space import DeltaPart
+from symheli.values.sample_period import same_period
+from symheli.values.signal import Signal, indices
+from synthesis.lti.weights import as_weight
+from synthesis.plant import parts
 from synthesis.program.scaling import balance
+from synthesis.robust import covers
 from synthesis.worst.frozen import stable, to_continuous
 
 Array = np.ndarray
@@ -20,7 +26,9 @@ Array = np.ndarray
 
 class DynamicBlock(NamedTuple):
     """Unknown stable linear dynamics from `outputs` of a model back to its `inputs`, of gain at
-    most `bound` at every frequency, in units of the inputs per unit of the outputs.
+    most `bound` at every frequency, in units of the inputs per unit of the outputs; of gain at most
+    `bound` |W(j omega)| with a stable `weight` W of one input and output, a `LinearModel` or a
+    system of python-control, continuous (a sampled model takes it by Tustin's rule) or sampled.
 
     Examples
     --------
@@ -31,6 +39,78 @@ class DynamicBlock(NamedTuple):
     inputs: Sequence[str]
     outputs: Sequence[str]
     bound: float = 1.0
+    weight: Any = None
+
+    @classmethod
+    def of_delay(
+        cls, inputs: Sequence[str], outputs: Sequence[str], longest: float
+    ) -> DynamicBlock:
+        """Return the block that makes `outputs` v late by any constant time up to `longest` (s)
+        where the model adds d to v: v + d = v(t - T), 0 <= T <= longest.
+
+        The weight is above |exp(-j omega T) - 1| at every frequency, by 2.1 % at most; it covers T
+        < 0 too, so that a delay within `longest` of a nominal one is meant by the same block. A
+        block of several channels covers a delay of its own in each. In a sampled model T is a
+        number of samples.
+
+        Raises `InputError` for a delay that is not > 0 and for numbers of channels that differ.
+
+        References
+        ----------
+        Skogestad and Postlethwaite, Multivariable Feedback Control (2005), eq. 7.27.
+
+        Examples
+        --------
+        An integrator with a gain of 1 rad/s bears pi/2 s of delay; whatever the phase of what has
+        the size of the error of a delay, 1.4 s:
+
+        >>> k = symheli.Scheduling("k", "rad/s", 1.0, 1.0 + 1e-9)
+        >>> loop = symheli.LPVStateSpace.constant(
+        ...     symheli.LinearModel([[-1.0]], [[-1.0]], [[1.0]], [[0.0]], ["x"], ["d"], ["v"]), k)
+        >>> late = [DynamicBlock.of_delay("d", "v", T) for T in (1.4, 1.57)]
+        >>> [bool(synthesis.robust_margin(loop, [block]).lower > 1) for block in late]
+        [True, False]
+        """
+        return cls(*_paired(inputs, outputs), 1.0, covers.delay_weight(longest))
+
+    @classmethod
+    def of_servo(
+        cls,
+        inputs: Sequence[str],
+        outputs: Sequence[str],
+        bandwidth: tuple[float, float],
+        damping: tuple[float, float] | None = None,
+        *,
+        nominal: tuple[float, float] | float | None = None,
+    ) -> DynamicBlock:
+        """Return the block that turns the nominal servo of a model into any constant one of these
+        ranges, where the model adds d to its command (or to its position) v.
+
+        Without `damping` a servo is the lag b/(s + b), with it w^2/(s^2 + 2 z w s + w^2);
+        `bandwidth` b or w in rad/s. `nominal`: that of the model, (bandwidth, damping), or the
+        bandwidth alone; by default the middle of each range. The weight is shown to be above the
+        relative error at all frequencies. As parameters of an LFT the same numbers cost less than
+        as a block, and time.
+
+        Raises `InputError` for ranges that are not 0 < low < high, and for numbers of channels that
+        differ.
+
+        Examples
+        --------
+        >>> slow = DynamicBlock.of_servo("d", "v", (30.0, 42.0))  # about 36/(s + 36)
+        >>> size = abs(slow.weight.frequency_response([30.0]).item())  # of 30/(s + 30)
+        >>> bool(np.isclose(size, abs((1 + 1j * 30 / 36) / (1 + 1j) - 1)))
+        True
+        """
+        given = nominal if isinstance(nominal, Sequence) else (nominal, None)
+        if len(given) != 2:
+            raise InputError(f"nominal: expected (bandwidth, damping), got {nominal!r:.60}")
+        own = covers.Range.of(bandwidth, given[0], "bandwidth")
+        if damping is None:
+            weight = covers.lag_weight(own)
+        else:
+            weight = covers.servo_weight(own, covers.Range.of(damping, given[1], "damping"))
+        return cls(*_paired(inputs, outputs), 1.0, weight)
 
 
 class Part(NamedTuple):
@@ -44,8 +124,8 @@ class Part(NamedTuple):
 class Loop(NamedTuple):
     """x' = A x + B w, z = C x + D w, w = Delta z with one block of norm <= 1 a part; the last part
     may be the performance. Sampled models stand as continuous ones of the same norms. `sizes` (nz,)
-    of the outputs of full blocks in units of the model, `middles` and `radii` of the parameters, 0
-    of those that the model does not depend on.
+    of the outputs of full blocks in units of the model, `weights` of the blocks; `middles` and
+    `radii` of the parameters, 0 of those that the model does not depend on.
     """
 
     A: Array
@@ -57,6 +137,7 @@ class Loop(NamedTuple):
     sizes: Array
     middles: Array
     radii: Array
+    weights: tuple[LinearModel | None, ...] = ()
 
     @property
     def reals(self) -> int:
@@ -70,9 +151,19 @@ class Loop(NamedTuple):
         found = tuple(map(float, p))
         return found[0] if len(found) == 1 else found
 
-    def unscaled(self, delta: Array) -> Array:
-        """Return full blocks (nw, nz) in units of the model."""
-        return delta * self.sizes
+    def unscaled(self, delta: Array, omega: float) -> Array:
+        """Return full blocks (nw, nz), with their weights, at a frequency of the continuous model
+        in units of the model.
+        """
+        by = self.sizes.astype(complex)
+        for part, weight in zip((p for p in self.parts if not p.real), self.weights, strict=False):
+            if weight is not None:
+                first = len(self.C) - len(by)
+                rows = slice(part.rows.start - first, part.rows.stop - first)
+                at = self.frequency(omega)
+                value = weight.D if math.isinf(at) else weight.frequency_response([at])
+                by[rows] *= value.item()
+        return delta * by
 
     def response(self, omega: float) -> Array:
         """Return the matrix from w to z at a frequency of the continuous model; inf: D."""
@@ -163,19 +254,10 @@ def loop_of(
             f"model: expected an LFT, or an LPVStateSpace that is polynomial, got"
             f" {type(model).__name__}"
         )
-    into, out, sizes, columns, rows = [], [], [], [], []
-    for each in blocks:
-        if not isinstance(each, DynamicBlock) or not 0 < float(each.bound) < math.inf:
-            raise InputError(
-                "blocks: expected DynamicBlock(inputs, outputs, bound) with a finite bound > 0, got"
-                f" {each!r:.80}"
-            )
-        columns.append(indices(_names(each.inputs), model.inputs, "input"))
-        rows.append(indices(_names(each.outputs), model.outputs, "output"))
-        into, out = [*into, *columns[-1]], [*out, *rows[-1]]
-        sizes += [each.bound] * len(rows[-1])
-    if len({*into}) < len(into) or len({*out}) < len(out):
-        raise InputError("blocks: an input or an output belongs to one block only")
+    columns, rows = channels_of(model, blocks)
+    into, out = list(chain(*columns)), list(chain(*rows))
+    sizes = [b.bound for b, own in zip(blocks, rows, strict=True) for _ in own]
+    weights = tuple(stable_weight(block, model.dt) for block in blocks)
     if performance:
         columns.append([i for i in range(len(model.inputs)) if i not in into])
         rows.append([i for i in range(len(model.outputs)) if i not in out])
@@ -194,16 +276,118 @@ def loop_of(
             [units * model.M21[x:][out], units * model.M22[x:, x:][np.ix_(out, into)]],
         ]
     )
-    real = [Part(part, part, True) for part in parts(model.sizes) if part.stop > part.start]
+    real = [Part(part, part, True) for part in slices(model.sizes) if part.stop > part.start]
     full = [
         Part(slice(n + a.start, n + a.stop), slice(n + b.start, n + b.stop), False)
-        for a, b in zip(parts([*map(len, rows)]), parts([*map(len, columns)]), strict=True)
+        for a, b in zip(slices([*map(len, rows)]), slices([*map(len, columns)]), strict=True)
     ]
     A = model.M22[:x, :x]
+    every = [*([None] * n), *(w for w, own in zip(weights, rows, strict=False) for _ in own)]
+    A, B, C, D = behind(A, B, C, D, every, model.dt)
     if model.dt is not None:
         A, B, C, D = to_continuous(A, B, C, D)
-    box = np.array([(s.middle, s.radius * (size > 0)) for s, size in model.blocks])
-    return Loop(A, B, C, D, (*real, *full), model.dt, units[:, 0], *box.reshape(-1, 2).T)
+    middles = np.array([s.middle for s, _ in model.blocks])
+    radii = np.array([s.radius * (size > 0) for s, size in model.blocks])
+    whole = (*real, *full)
+    return Loop(A, B, C, D, whole, model.dt, units[:, 0], middles, radii, weights)
+
+
+def loop_at(unc: UncertainStateSpace, p: float) -> Loop:
+    """Return the loop of the parts of Delta around the model frozen at p."""
+    block = unc.model.select(inputs=unc.perturbation_inputs, outputs=unc.perturbation_outputs)
+    one = block.at(p)
+    A, B, C, D = one.A, one.B, unc.bound * one.C, unc.bound * one.D
+    if unc.dt is not None:
+        A, B, C, D = to_continuous(A, B, C, D)
+    full = tuple(Part(rows, columns, False) for columns, rows in unc.places)
+    return Loop(A, B, C, D, full, unc.dt, np.full(len(C), unc.bound), np.array([p]), np.zeros(1))
+
+
+def channels_of(
+    model: LFT | LPVStateSpace, blocks: Sequence[DynamicBlock]
+) -> tuple[list[list[int]], list[list[int]]]:
+    """Return the positions of the inputs and of the outputs of each block in the model; raise as
+    `loop_of` for those that are none.
+    """
+    columns, rows = [], []
+    for each in blocks:
+        if not isinstance(each, DynamicBlock) or not 0 < float(each.bound) < math.inf:
+            raise InputError(
+                "blocks: expected DynamicBlock(inputs, outputs, bound) with a finite bound > 0, got"
+                f" {each!r:.80}"
+            )
+        columns.append(indices(_names(each.inputs), model.inputs, "input"))
+        rows.append(indices(_names(each.outputs), model.outputs, "output"))
+    for group in (columns, rows):
+        if len({*chain(*group)}) < len(list(chain(*group))):
+            raise InputError("blocks: an input or an output belongs to one block only")
+    return columns, rows
+
+
+def opened(
+    model: LPVStateSpace, blocks: Sequence[DynamicBlock]
+) -> tuple[LPVStateSpace, list[Signal], list[Signal], tuple[DeltaPart, ...]]:
+    """Return the model with each block of gain 1 and no weight, the inputs and outputs of all, and
+    the parts of Delta; raise as `loop_of`.
+    """
+    if not isinstance(model, LPVStateSpace):
+        raise InputError(f"model: expected an LPVStateSpace, got {type(model).__name__}")
+    if not blocks:
+        raise InputError("blocks: expected one or more")
+    columns, rows = channels_of(model, blocks)
+    d = [model.inputs[i] for i in chain(*columns)]
+    v = [model.outputs[i] for i in chain(*rows)]
+    parts = tuple(DeltaPart(len(a), len(b), True) for a, b in zip(columns, rows, strict=True))
+    for block, own in zip(blocks, rows, strict=True):
+        names = [str(model.outputs[i]) for i in own]
+        weight = stable_weight(block, model.dt)
+        if weight is not None:
+            model = model.filtered_by(dict.fromkeys(names, weight))
+        model = model.scaled(outputs=dict.fromkeys(names, 1 / block.bound))
+    return model, d, v, parts
+
+
+def stable_weight(block: DynamicBlock, dt: float | None) -> LinearModel | None:
+    """Return the weight of a block as a model of this sample period; None where it has none.
+
+    Raises `InputError` for one that is not stable, or not of one input and output.
+    """
+    if block.weight is None:
+        return None
+    found = parts.weight(block.weight, ", ".join(_names(block.outputs)), dt)
+    if not isinstance(found, LinearModel) or (len(found.inputs), len(found.outputs)) != (1, 1):
+        raise InputError("weight of a block: expected a LinearModel of one input and one output")
+    if not (same_period(found.dt, dt) or not found.states) or not found.is_stable():
+        raise InputError(
+            "weight of a block: expected a stable one, continuous or sampled as the model is"
+        )
+    return found
+
+
+def behind(
+    A: Array, B: Array, C: Array, D: Array, weights: Sequence[LinearModel | None], dt: float | None
+) -> tuple[Array, Array, Array, Array]:
+    """Return a model whose first outputs pass these weights."""
+    every = [1.0 if w is None else w for w in [*weights, *[None] * (len(C) - len(weights))]]
+    W = as_weight(every, "weight", [Signal(f"v{i}") for i in range(len(C))], dt)
+    return (
+        np.block([[A, np.zeros((len(A), len(W.A)))], [W.B @ C, W.A]]),
+        np.vstack([B, W.B @ D]),
+        np.hstack([W.D @ C, W.C]),
+        W.D @ D,
+    )
+
+
+def _paired(
+    inputs: Sequence[str], outputs: Sequence[str]
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return as many inputs as outputs; raise `InputError` for other numbers."""
+    d, v = tuple(_names(inputs)), tuple(_names(outputs))
+    if len(d) != len(v):
+        raise InputError(
+            f"expected an output for each input, got {len(d)} inputs and {len(v)} outputs"
+        )
+    return d, v
 
 
 def _shifted(part: slice, by: int) -> slice:

@@ -154,11 +154,13 @@ class _Frozen(NamedTuple):
     def climbed(self, delta: Array, value: float, p: float, bound: float) -> tuple[Array, float]:
         """Return a better Delta at this p, and its value; the same where none was found."""
         for _ in range(MAX_STEPS):
-            at = self.closed(delta, p)
-            left, sizes, right = np.linalg.svd(self.slope(at), full_matrices=False)
-            # where it does not matter Delta stays: directions of no slope are rounding
-            felt = sizes > 1e-8 * max(float(sizes[0]), 1e-300)
-            towards = bound * (left[:, felt] @ right[felt])
+            slope = self.slope(self.closed(delta, p))
+            towards = np.zeros_like(delta)
+            for place in self.unc.places:
+                left, sizes, right = np.linalg.svd(slope[place], full_matrices=False)
+                # where it does not matter Delta stays: directions of no slope are rounding
+                felt = sizes > 1e-8 * max(float(sizes[0]), 1e-300)
+                towards[place] = bound * (left[:, felt] @ right[felt])
             for share in (1.0, 0.5, 0.2, 0.05):
                 trial = delta + share * (towards - delta)
                 found = self.value(trial, p)

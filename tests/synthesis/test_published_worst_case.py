@@ -9,7 +9,7 @@ import sympy
 
 from symheli import LPVStateSpace, Scheduling, UncertainStateSpace
 from symheli.lpv import Polynomial
-from synthesis import Search, l2_gain
+from synthesis import DynamicBlock, Search, l2_gain
 
 DEGREE = 10
 """Of the polynomials in place of roots and quotients."""
@@ -56,3 +56,19 @@ def test_the_bound_is_below_what_the_page_prints(rate, printed, known):
     cert = l2_gain(loop(), rate, search=Search(seconds=2))
     assert cert.verified
     assert cert.lower <= cert.gamma <= known < printed
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("rate", "printed", "known"), [(math.inf, 63.8659, 63.7), (0.1, 1.8925, 2.08)]
+)
+def test_the_bound_for_dynamics_beside_what_the_page_prints(rate, printed, known):
+    """The page has multipliers that depend on frequency, on a grid: less than one number at .1."""
+    given = loop()
+    dynamics = UncertainStateSpace.of_blocks(given.model, [DynamicBlock("d", "u", 0.1)])
+    cert = l2_gain(dynamics, rate, search=None)
+    assert cert.verified
+    assert cert.gamma == pytest.approx(known, rel=5e-3)
+    assert 0.99 * printed < cert.gamma < 1.1 * printed
+    moving = l2_gain(given, rate, search=None)
+    assert moving.gamma < cert.gamma

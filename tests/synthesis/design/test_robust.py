@@ -1,11 +1,13 @@
 """Output feedback for every model of a set."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scheduled_plants import RATE, spring
 
 from symheli import LPVStateSpace, Scheduling, UncertainStateSpace
-from synthesis import Plant, l2_gain, output_feedback
+from synthesis import DynamicBlock, Plant, l2_gain, output_feedback
 from synthesis.worst.frozen import norm
 
 BACK_OFF = 1.02
@@ -62,3 +64,37 @@ def test_the_larger_the_set_the_larger_the_gain():
     ]
     assert gains == sorted(gains)
     assert np.all(np.diff(gains) > 0)
+
+
+def two_blocks():
+    """The spring with dynamics of gain .05 beside its damping, and of .1 at the control."""
+    model = LPVStateSpace.polynomial(
+        [[[0, 1], [-1, -0.4]], [[0, 0], [-2, 0.6]]],
+        [[[0, 0, 0, 0, 0], [1, 0, 1, 1, 1]]],
+        [[[1, 0], [0, 0], [1, 0], [0, 1], [0, 0]]],
+        [[[0] * 5, [0, 0, 0.3, 0, 0], [0, 0.1, 0, 0, 0], [0] * 5, [0, 0, 1, 0, 0]]],
+        Scheduling("p", "1", 0.0, 1.0, rate=RATE),
+        states=["x", "v"],
+        inputs=["w", "n", "u", "d", "e"],
+        outputs=["z", "z_u", "y", "v_d", "v_e"],
+    )
+    blocks = [DynamicBlock("d", "v_d", 0.05), DynamicBlock("e", "v_e", 0.1)]
+    return Plant(
+        UncertainStateSpace.of_blocks(model, blocks), ["w", "n"], ["z", "z_u"], ["u"], ["y"]
+    )
+
+
+@pytest.mark.slow
+def test_two_blocks_have_a_scale_each_and_the_loop_is_proven():
+    plant = two_blocks()
+    made = output_feedback(plant, X=0, Y=2, back_off=BACK_OFF)
+    proof = l2_gain(made.closed(), search=None)
+    assert proof.verified
+    assert proof.gamma <= made.promised * (1 + 1e-3)
+    one = replace(plant, model=replace(plant.model, parts=()))
+    full = output_feedback(one, X=0, Y=2, back_off=BACK_OFF)
+    assert made.promised < full.promised
+    loop = made.closed()
+    for member in loop.draws(8, 0, "boundary"):
+        for p in (0.0, 0.5, 1.0):
+            assert norm(*member.matrices(p))[0] <= proof.gamma * (1 + 1e-9)

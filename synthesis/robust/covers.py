@@ -1,0 +1,196 @@
+"""Weights that cover the relative error of a delay or a servo at every frequency.
+
+For each G of a family around G0: |G/G0 - 1| <= |W| on the whole imaginary axis, so that G = G0 (1 +
+W Delta) with a stable Delta of gain at most one. What is shown of each weight is shown for all
+frequencies: of a delay in exact arithmetic, of a lag in closed form, of a servo by Bernstein
+coefficients over frequency, bandwidth and damping.
+
+References
+----------
+Skogestad and Postlethwaite, Multivariable Feedback Control (2005), sec. 7.4.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+from itertools import product
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy import optimize
+
+from symheli.errors import InputError
+from symheli.lpv import LinearModel
+from symheli.values.signal import Signal
+from synthesis.polynomial.definite import negative_definite
+from synthesis.polynomial.matrix import PolynomialMatrix
+
+Array = np.ndarray
+
+CORNER, ZEROS, POLES = Fraction(2363, 1000), Fraction(838, 1000), Fraction(685, 1000)
+"""Corner frequency (times the delay) and damping of the second-order factor of the weight of a
+delay: Skogestad and Postlethwaite, eq. 7.27 (published). At every frequency it is above the error,
+by 2.1 % at most.
+"""
+POINTS = 200, 9
+"""Frequencies, and values of bandwidth and damping each, at which a weight of a servo is fitted."""
+DECADES = 2.0
+"""Decades of frequency about the bandwidth at which it is."""
+RAISED = 1.001
+"""Factor by which a weight is raised until it is shown to cover."""
+MAX_RAISES = 200
+CELLS = 20000
+"""Boxes of (frequency, bandwidth, damping) after which a weight counts as not shown."""
+
+
+class Range(NamedTuple):
+    """A number between `low` and `high`, both > 0, and that of the model, `nominal`."""
+
+    low: float
+    nominal: float
+    high: float
+
+    @classmethod
+    def of(cls, given: object, nominal: object, name: str) -> Range:
+        """Return the range; the middle is nominal where none is given. Raises `InputError`."""
+        try:
+            low, high = (float(v) for v in given)  # type: ignore[attr-defined]
+            middle = 0.5 * (low + high) if nominal is None else float(nominal)  # type: ignore[arg-type]
+        except (TypeError, ValueError):
+            low = high = middle = math.nan
+        if not (0 < low < high < math.inf and 0 < middle < math.inf):
+            raise InputError(
+                f"{name}: expected (low, high) with 0 < low < high, and a nominal value > 0, got"
+                f" {given!r:.60} and {nominal!r:.40}"
+            )
+        return cls(low, middle, high)
+
+
+def delay_weight(longest: object) -> LinearModel:
+    """Return W of order 3 with |exp(-j w T) - 1| <= |W(j w)| for every |T| <= `longest`, s.
+
+    Raises `InputError` unless it is a finite number > 0.
+    """
+    if isinstance(longest, bool) or not isinstance(longest, int | float | np.number):
+        longest = math.nan
+    T = float(longest)
+    if not 0 < T < math.inf:
+        raise InputError(f"longest: expected a delay > 0 s, got {longest!r:.40}")
+    c, zeros, poles = (float(v) for v in (CORNER, ZEROS, POLES))
+    numerator = np.polymul([1.0, 0.0], [1 / c**2, 2 * zeros / c, 1.0])
+    denominator = np.polymul([0.5, 1.0], [1 / c**2, 2 * poles / c, 1.0])
+    return rational(numerator, denominator, 1 / T)
+
+
+def lag_weight(bandwidth: Range) -> LinearModel:
+    """Return W of order 1 that covers b/(s + b) around that of the nominal bandwidth, rad/s.
+
+    The error of b is h s/(s + b) with h = b/b0 - 1; of any b between, it is below that of an end.
+    h s/(s + h/k) with the larger |h| and the larger |h|/b of the ends is above both. About the
+    middle of the range it is the error of the slowest lag itself.
+    """
+    ends = np.array([bandwidth.low, bandwidth.high])
+    sizes = np.abs(ends / bandwidth.nominal - 1)
+    h, k = sizes.max(), (sizes / ends).max()
+    return rational(np.array([h, 0.0]), np.array([1.0, h / k]), 1.0)
+
+
+def servo_weight(bandwidth: Range, damping: Range) -> LinearModel:
+    """Return W of order 2 that covers w^2/(s^2 + 2 z w s + w^2) around the nominal w (rad/s), z.
+
+    With s in units of the nominal w, k = w/w0 and t = -s^2 the squared error is t E(t, k, z)/F(t,
+    k, z), the squared weight t (a t + c)/G(t): a and c are the least for the best G found, and
+    raised until (a t + c) F - E G > 0 is shown for all t >= 0, k and z.
+
+    Raises `InputError` where none is found, for ranges that are too wide.
+    """
+    k = np.array([bandwidth.low, bandwidth.high]) / bandwidth.nominal
+    z0, z = damping.nominal, np.array([damping.low, damping.high])
+    t = np.geomspace(10**-DECADES, 10**DECADES, POINTS[0]) ** 2
+    lines = (np.linspace(low, high, POINTS[1]) for low, high in (k, z))
+    kk, zz = (g.ravel() for g in np.meshgrid(*lines))
+    E, F = _servo_error(t[:, None], kk, zz, z0)
+    worst = (E / F).max(axis=1)
+
+    def fitted(x: Array) -> tuple[float, Array]:
+        """Return the largest excess of the least weight with these n, z and c/a, and (a, c)."""
+        n, own, ratio = np.exp(x)
+        most, own = worst * _denominator(t, n, own), t + ratio
+        a = max((most / own).max(), ends[1], ends[0] * n**4 / ratio)
+        return (a * own / most).max(), a * np.array([1.0, ratio])
+
+    # of frequency 0 and infinite
+    ends = [(E0 / F0).max() for E0, F0 in (_servo_error(0.0, kk, zz, z0), ((kk**2 - 1) ** 2, 1.0))]
+    starts = product(np.log(k), np.log([*z, 1.0]), [-1.0, 1.0])
+    tried = [optimize.minimize(lambda x: fitted(x)[0], x, method="Nelder-Mead") for x in starts]
+    x = min(tried, key=lambda found: found.fun).x
+    a, c = fitted(x)[1]
+    n, own = np.exp(x[:2])
+    for _ in range(MAX_RAISES):
+        a, c = RAISED * a, RAISED * c
+        if _covers(a, c, (n, own), k, z, z0):
+            return rational(
+                np.array([math.sqrt(a), math.sqrt(c), 0.0]),
+                np.array([1.0, 2 * own * n, n * n]),
+                bandwidth.nominal,
+            )
+    raise InputError("bandwidth, damping: no weight is found that covers them: narrow the ranges")
+
+
+def _servo_error(t: Any, k: Array, z: Array, z0: float) -> tuple[Array, Array]:
+    """Return E and F: the squared relative error is t E/F."""
+    return (k * k - 1) ** 2 * t + 4 * k * k * (z0 * k - z) ** 2, (k * k - t) ** 2 + (
+        4 * z * z * k * k * t
+    )
+
+
+def _denominator(t: Array, n: float, own: float) -> Array:
+    return (n * n - t) ** 2 + 4 * own * own * n * n * t
+
+
+def _covers(a: float, c: float, by: tuple[float, float], k: Array, z: Array, z0: float) -> bool:
+    """Show (a t + c) F - E G > 0 for t in [0, inf), as a polynomial in u = t/(1 + t), k and z."""
+    n, own = by
+    middle = 4 * own * own * n * n - 2 * n * n
+    G = {0: n**4, 1: middle, 2: 1.0}
+    # powers (of t, k, z)
+    F = {(0, 4, 0): 1.0, (1, 2, 0): -2.0, (2, 0, 0): 1.0, (1, 2, 2): 4.0}
+    E = {
+        **{(1, 4, 0): 1.0, (1, 2, 0): -2.0, (1, 0, 0): 1.0},
+        **{(0, 4, 0): 4 * z0 * z0, (0, 3, 1): -8 * z0, (0, 2, 2): 4.0},
+    }
+    terms: dict[tuple[int, int, int], float] = {}
+    for power, factor in ((1, a), (0, c)):
+        for (i, j, l), value in F.items():
+            _add(terms, (i + power, j, l), factor * value)
+    for power, factor in G.items():
+        for (i, j, l), value in E.items():
+            _add(terms, (i + power, j, l), -factor * value)
+    # t^i (1 - u)^3 = u^i (1 - u)^(3 - i)
+    whole: dict[tuple[int, int, int], float] = {}
+    for (i, j, l), value in terms.items():
+        for m in range(4 - i):
+            _add(whole, (i + m, j, l), value * math.comb(3 - i, m) * (-1.0) ** m)
+    box = ((0.0, 1.0), (float(k[0]), float(k[1])), (float(z[0]), float(z[1])))
+    left = {powers: [[-value]] for powers, value in whole.items()}
+    return negative_definite(PolynomialMatrix.from_monomials(left, box), CELLS)
+
+
+def _add(terms: dict[tuple[int, int, int], float], at: tuple[int, int, int], value: float) -> None:
+    terms[at] = terms.get(at, 0.0) + value
+
+
+def rational(numerator: Sequence[float] | Array, denominator: Array, pace: float) -> LinearModel:
+    """Return N(s)/D(s) of equal degrees, s in units of `pace` (rad/s), in controllable form."""
+    scale = denominator[0]
+    low, top = denominator[1:] / scale, np.asarray(numerator) / scale
+    n = len(low)
+    A = np.eye(n, k=1)
+    A[-1] = -low[::-1]
+    C = (top[1:] - top[0] * low)[::-1]
+    states = tuple(Signal(f"weight_{i + 1}") for i in range(n))
+    ends = (Signal("in"),), (Signal("out"),)
+    D = np.array([[top[0]]])
+    return LinearModel(pace * A, pace * np.eye(n)[:, -1:], C[None], D, states, *ends)
