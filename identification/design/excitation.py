@@ -101,6 +101,7 @@ class ExcitationReport:
             raise ExcitationError(self.reason, self)
 
     def __str__(self) -> str:
+        scheduled = self.needed > 1
         return "\n".join(
             [
                 (
@@ -111,9 +112,13 @@ class ExcitationReport:
                     f"  regressors {len(self.names)}, samples {self.samples}, rank {self.rank},"
                     f" scaled condition {self.condition:.3g}"
                 ),
-                f"  distinct values of {self.scheduling}: {self.distinct}, needed {self.needed}",
+                *(
+                    [f"  distinct values of {self.scheduling}: {self.distinct}, needed {self.needed}"]
+                    if scheduled
+                    else []
+                ),
                 f"  worst determined: {self.worst_direction}",
-                *self._bars(),
+                *(self._bars() if scheduled else []),
             ]
         )
 

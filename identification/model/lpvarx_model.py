@@ -191,14 +191,13 @@ class LPVARXModel:
         return prediction.named_fit(self.outputs, record, guess)
 
     def at(self, *p: float) -> LinearModel:
-        """The discrete model with the scheduling held at p (one number a parameter), in observer
-        form.
+        """The discrete model with the scheduling held at p (one number a parameter, none where
+        coefficients are constant), in observer form.
 
         The offsets are left out: deviation dynamics.
         """
-        return realization.at(
-            self.coefficients, realization.held_value(p), self.outputs, self.inputs, self.dt
-        )
+        held = realization.held_value(p, self.structure.basis)
+        return realization.at(self.coefficients, held, self.outputs, self.inputs, self.dt)
 
     def to_state_space(self, route: Literal["shifted", "direct"] | None = None) -> LPVStateSpace:
         """The discrete LPV model with static dependence on p(k) that responds exactly as this one,
@@ -274,7 +273,8 @@ class LPVARXModel:
         """Raises `InputError` where `record` has another sample period, or a signal of the model in
         another unit.
         """
-        check_units((*self.outputs, *self.inputs, *self.parameters), record)
+        parameters = () if self.structure.constant else self.parameters
+        check_units((*self.outputs, *self.inputs, *parameters), record)
         if not same_period(record.dt, self.dt, JITTER):
             raise InputError(
                 f"the model was identified at dt = {self.dt:.4g} s, the record has {record.dt:.4g}"

@@ -1,0 +1,87 @@
+"""Prior of coefficients from a simulated flight, as wide as the measured flights say."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.structure.lpvarx import LPVARX
+from symheli.values.arrays import Array
+
+ROUNDS = 20
+"""Number of updates of the variances a Gauss-Newton step: the next one goes on from there."""
+
+LEAST = 1e-12
+"""Least variance of a departure, in squares of the size of a coefficient: beyond it a group is the
+simulator's.
+"""
+
+
+@dataclass(eq=False)
+class SimulatorPrior:
+    """Unknowns (m,) are normally distributed about a `mean`, independent of each other: those of a
+    group with one variance, which is estimated (empirical Bayes, the maximum of the marginal
+    likelihood).
+
+    A group is what one signal at one lag does in one equation: where the simulator is right there,
+    its functions of p are taken over, and where the flights contradict it, it counts for nothing.
+    The functions of an offset are free: trims are not dynamics.
+
+    Parameters
+    ----------
+    mean, size : array (m,)
+        In units of the unknowns; a departure counts in `size`.
+    group : array (m,)
+        Number of each unknown's group; -1: its variance is infinite, -2: it is `size` squared.
+    variance : array (groups,)
+        Of departures from the mean, in squares of their size.
+
+    References
+    ----------
+    MacKay (1992), Bayesian interpolation, Neural Computation 4; Dempster, Laird and Rubin (1977)
+    for the update.
+    """
+
+    mean: Array
+    size: Array
+    group: Array
+    variance: Array
+
+    @classmethod
+    def of(cls, arx: LPVARX, theta: Array, sizes: tuple[Array, Array], unknown: int) -> SimulatorPrior:
+        """About the coefficients theta (n, ny) of a simulated flight, equation by equation, then
+        `unknown` others about 0 with variance 1; `sizes` are the root mean squares of regressors
+        and outputs.
+        """
+        regressors, outputs = (np.where(s > 0, s, 1.0) for s in sizes)
+        offset = np.array([e.kind in ("offset", "increment") for e in arx.entries])
+        entry = np.cumsum(~offset) - 1
+        of_one = np.repeat(np.where(offset, -1, entry), arx.basis.size)
+        count = int(entry[-1]) + 1
+        groups = [np.where(of_one < 0, -1, of_one + count * y) for y in range(arx.ny)]
+        return cls(
+            np.append(theta.T.reshape(-1), np.zeros(unknown)),
+            np.append((outputs[:, None] / regressors).reshape(-1), np.ones(unknown)),
+            np.concatenate([*groups, np.full(unknown, -2)]),
+            np.ones(count * arx.ny),
+        )
+
+    def precision(self) -> Array:
+        """(m,) the inverse variance of each unknown, in its unit."""
+        inverse = np.append(1.0 / self.variance, [1.0, 0.0])
+        return inverse[self.group] / self.size**2
+
+    def learn(self, normal: Array, right: Array, at: Array) -> None:
+        """Move the variances towards the largest marginal likelihood of data whose normal equations
+        about the unknowns `at` (m,) are normal (m, m) and right (m,).
+        """
+        scaled = normal * np.outer(self.size, self.size)
+        pulled = self.size * (right + normal @ (at - self.mean))
+        inside = self.group >= 0
+        members = np.bincount(self.group[inside], minlength=len(self.variance))
+        for _ in range(ROUNDS):
+            covariance = np.linalg.inv(scaled + np.diag(self.precision() * self.size**2))
+            squares = (covariance @ pulled) ** 2 + np.diag(covariance)
+            sums = np.bincount(self.group[inside], squares[inside], len(self.variance))
+            self.variance = np.maximum(sums / members, LEAST)
