@@ -30,7 +30,9 @@ from identification.estimators.lasso import Lasso as Lasso
 from identification.estimators.least_squares import LeastSquares as LeastSquares
 from identification.estimators.method import Estimate as Estimate
 from identification.estimators.method import Method as Method
-from identification.estimators.output_error import OutputError as OutputError
+from identification.estimators.prediction_error import ARMAX as ARMAX
+from identification.estimators.prediction_error import BoxJenkins as BoxJenkins
+from identification.estimators.prediction_error import OutputError as OutputError
 from identification.estimators.recursion import Recursion as Recursion
 from identification.estimators.refined_instruments import RefinedInstruments as RefinedInstruments
 from identification.estimators.ridge import Ridge as Ridge
@@ -78,6 +80,7 @@ from identification.judge.slow_modes import slow_modes as slow_modes
 from identification.judge.uncertainty import uncertainty as uncertainty
 from identification.judge.unseen_flight import unseen_flight as unseen_flight
 from identification.model.coefficients import Coefficients as Coefficients
+from identification.model.noise_model import NoiseModel as NoiseModel
 from identification.model.kinematic_model import KinematicModel as KinematicModel
 from identification.model.lpvarx_model import LPVARXModel as LPVARXModel
 from identification.model.prediction import fit_percent as fit_percent

@@ -12,7 +12,7 @@ from identification.design.leakage import warn_of_leakage
 from identification.estimators import (  # noqa: F401  known by their shorthand once loaded
     instrumental_variables,
     lasso,
-    output_error,
+    prediction_error,
     recursion,
     refined_instruments,
     ridge,
@@ -71,7 +71,8 @@ def fit(
         - `InstrumentalVariables`, "iv": unbiased by noise in closed loop; it needs the external
           excitation, so the shorthand alone is refused;
         - `RefinedInstruments`, "riv": the model's own response as instruments and filters;
-        - `OutputError`, "oe": the closest free run.
+        - `OutputError`, "oe": the closest free run; `BoxJenkins`, "bj": the same beside coloured
+          noise at the outputs; `ARMAX`, "armax": with coloured noise in the equations.
 
         Any other subclass of `Method` will do.
 
@@ -194,4 +195,5 @@ def _fitted(
         excitation=report,
         details=found.details,
         covariance=found.covariance,
+        noise=found.noise,
     )

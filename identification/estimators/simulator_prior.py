@@ -9,13 +9,22 @@ import numpy as np
 from identification.structure.lpvarx import LPVARX
 from symheli.values.arrays import Array
 
-ROUNDS = 20
-"""Number of updates of the variances a Gauss-Newton step: the next one goes on from there."""
+ROUNDS = 100
+"""Number of updates of the variances a Gauss-Newton step, at most."""
 
-LEAST = 1e-12
-"""Least variance of a departure, in squares of the size of a coefficient: beyond it a group is the
-simulator's.
+CLOSE = 0.01
+"""Relative change of the variances that ends them: coefficients move by less than that, of their
+standard deviations.
 """
+
+LEAST = 1e-4
+"""Least variance of a departure, in squares of the size of a coefficient: no simulator is believed
+beyond a hundredth.
+"""
+
+LARGEST = 1e6
+"""Largest: a group counts for nothing."""
+
 
 
 @dataclass(eq=False)
@@ -39,8 +48,7 @@ class SimulatorPrior:
 
     References
     ----------
-    MacKay (1992), Bayesian interpolation, Neural Computation 4; Dempster, Laird and Rubin (1977)
-    for the update.
+    MacKay (1992), Bayesian interpolation, Neural Computation 4, eq. 4.9 for the update.
     """
 
     mean: Array
@@ -79,9 +87,14 @@ class SimulatorPrior:
         scaled = normal * np.outer(self.size, self.size)
         pulled = self.size * (right + normal @ (at - self.mean))
         inside = self.group >= 0
-        members = np.bincount(self.group[inside], minlength=len(self.variance))
         for _ in range(ROUNDS):
-            covariance = np.linalg.inv(scaled + np.diag(self.precision() * self.size**2))
-            squares = (covariance @ pulled) ** 2 + np.diag(covariance)
-            sums = np.bincount(self.group[inside], squares[inside], len(self.variance))
-            self.variance = np.maximum(sums / members, LEAST)
+            before, own = self.variance, self.precision() * self.size**2
+            covariance = np.linalg.inv(scaled + np.diag(own))
+            squares, told = (covariance @ pulled) ** 2, 1.0 - own * np.diag(covariance)
+            sums, count = (
+                np.bincount(self.group[inside], v[inside], len(before)) for v in (squares, told)
+            )
+            found = sums / np.maximum(count, np.finfo(float).tiny)
+            self.variance = np.clip(found, LEAST, LARGEST)
+            if np.all(np.abs(np.log(self.variance / before)) < CLOSE):
+                break

@@ -13,6 +13,7 @@ import numpy as np
 from identification.design.excitation import ExcitationReport
 from identification.model import prediction, realization
 from identification.model.coefficients import Coefficients
+from identification.model.noise_model import NoiseModel
 from identification.structure.lpvarx import LPVARX
 from identification.structure.regressors import check_units
 from symheli.errors import InputError
@@ -63,6 +64,8 @@ class LPVARXModel:
         Of all coefficients together, theta[i, y] with theta[j, z] at [y, i, z, j], under the
         hypothesis of the method that `fit` names; None where the method gives none. Zero for
         coefficients an equation does not have.
+    noise : NoiseModel, optional
+        Of the outputs or the equations, as "bj" and "armax" find it: predictions go on with it.
 
     Raises
     ------
@@ -91,6 +94,7 @@ class LPVARXModel:
     excitation: ExcitationReport | None = field(default=None, repr=False)
     details: Mapping[str, Any] = field(default_factory=dict, repr=False)
     covariance: Array | None = field(default=None, repr=False)
+    noise: NoiseModel | None = field(default=None, repr=False)
 
     __repr__ = summarized
     _repr_html_ = as_table
@@ -152,9 +156,11 @@ class LPVARXModel:
         another sample period or unit.
         """
         if hold_p:
+            if self.noise is not None:
+                raise InputError("hold_p: a model with coloured noise is predicted with p as it is")
             self.require_same_kind(record)
             return prediction.predict_holding(self.structure, self.theta, record, horizon)
-        return prediction.predict(self._along(record), horizon)
+        return prediction.predict(self._along(record), horizon, self.noise)
 
     def simulate(self, record: FlightRecord) -> Array:
         """Free run (n, ny) from the first samples of each segment with the record's inputs and p.

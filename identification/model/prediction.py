@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.model.coefficients import Coefficients
+from identification.model.noise_model import NoiseModel
 from identification.structure.lpvarx import LPVARX
 from identification.structure.regressors import Samples, regressor_rows
 from symheli.errors import InputError
@@ -70,20 +71,27 @@ class Recursion:
         return self.A.shape[1]
 
 
-def predict(run: Recursion, horizon: int) -> Array:
+def predict(run: Recursion, horizon: int, noise: NoiseModel | None = None) -> Array:
     """Predictions (n, ny) of y(t) from outputs up to t - horizon, inputs and p up to t; NaN where
     not available.
 
-    All starts advance together: P_j(t) = known(t) - sum_i A_i(t) P_{max(j-i, 0)}(t-i), where P_0 =
-    y and P_j(t) is the prediction of y(t) made j steps before.
+    All starts advance together: P_j(t) = known(t) + v_j(t) - sum_i A_i(t) P_{max(j-i, 0)}(t-i),
+    where P_0 = y and P_j(t) is the prediction of y(t) made j steps before, v_j(t) that of what the
+    equation leaves. With noise at the outputs it is the free run and the prediction of what it
+    leaves.
     """
     require_horizon(horizon)
+    if noise is not None and noise.enters == "output":
+        free = simulate(run)
+        return free + noise.ahead(run.y - free, int(horizon))
     if horizon >= max(part.stop - part.start for part in run.segments):
         return np.full_like(run.y, np.nan)
-    ahead = [run.y]
+    ahead, left = [run.y], None if noise is None else run.y - predict(run, 1)
     with np.errstate(all="ignore"):
         for j in range(1, int(horizon) + 1):
             new = run.known.copy()
+            if noise is not None and left is not None:
+                new += noise.ahead(left, j)
             for i in range(1, run.na + 1):
                 past = ahead[max(j - i, 0) - j]  # P_{j-1} is ahead[-1]
                 new[i:] -= np.einsum("kij,kj->ki", run.A[i:, i - 1], past[:-i])

