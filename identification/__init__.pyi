@@ -61,6 +61,12 @@ from identification.judge.fit_for_control import (
     fit_for_control as fit_for_control,
 )
 from identification.judge.frequency_response import frequency_response as frequency_response
+from identification.judge.frozen_stability import (
+    FrozenStability as FrozenStability,
+)
+from identification.judge.frozen_stability import (
+    frozen_stability as frozen_stability,
+)
 from identification.judge.frozen_models import (
     FrozenModels as FrozenModels,
 )
@@ -81,6 +87,7 @@ from identification.judge.uncertainty import uncertainty as uncertainty
 from identification.judge.unseen_flight import unseen_flight as unseen_flight
 from identification.model.coefficients import Coefficients as Coefficients
 from identification.model.noise_model import NoiseModel as NoiseModel
+from identification.model.state_space_model import StateSpaceModel as StateSpaceModel
 from identification.model.kinematic_model import KinematicModel as KinematicModel
 from identification.model.lpvarx_model import LPVARXModel as LPVARXModel
 from identification.model.prediction import fit_percent as fit_percent
@@ -127,3 +134,4 @@ from symheli.lpv import (
 )
 
 __version__: str
+from identification.structure.state_space import StateSpace as StateSpace

@@ -113,7 +113,9 @@ class ExcitationReport:
                     f" scaled condition {self.condition:.3g}"
                 ),
                 *(
-                    [f"  distinct values of {self.scheduling}: {self.distinct}, needed {self.needed}"]
+                    [
+                        f"  distinct values of {self.scheduling}: {self.distinct}, needed {self.needed}"
+                    ]
                     if scheduled
                     else []
                 ),

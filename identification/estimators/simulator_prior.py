@@ -26,7 +26,6 @@ LARGEST = 1e6
 """Largest: a group counts for nothing."""
 
 
-
 @dataclass(eq=False)
 class SimulatorPrior:
     """Unknowns (m,) are normally distributed about a `mean`, independent of each other: those of a
@@ -57,7 +56,9 @@ class SimulatorPrior:
     variance: Array
 
     @classmethod
-    def of(cls, arx: LPVARX, theta: Array, sizes: tuple[Array, Array], unknown: int) -> SimulatorPrior:
+    def of(
+        cls, arx: LPVARX, theta: Array, sizes: tuple[Array, Array], unknown: int
+    ) -> SimulatorPrior:
         """About the coefficients theta (n, ny) of a simulated flight, equation by equation, then
         `unknown` others about 0 with variance 1; `sizes` are the root mean squares of regressors
         and outputs.

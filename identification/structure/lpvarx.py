@@ -369,8 +369,7 @@ class LPVARX:
         """One name a regressor, such as "theta(k-1) f2(airspeed(k-1))"."""
         return tuple(
             f"{name}{_at(t.lag) if t.kind in ('output', 'input') else ''}"
-            + f" f{j}({', '.join(p + _at(t.p_lag) for p in self.parameters)})"
-            * (not self.constant)
+            + f" f{j}({', '.join(p + _at(t.p_lag) for p in self.parameters)})" * (not self.constant)
             for t in self.terms
             for name in self.channels(t)
             for j in range(self.basis.size)
