@@ -29,8 +29,8 @@ COLOUR = (1.0, -1.0, 0.2)
 """Denominator of the noise."""
 
 STRUCTURE = idn.LPVARX(
-    "y",
-    "u",
+    ("y",),
+    ("u",),
     "p",
     na=2,
     nb=2,
@@ -55,7 +55,7 @@ def record(seed: int) -> FlightRecord:
     (a1, a2, b1, b2), x = TRUE @ np.stack([np.ones_like(p), p, p**2]), np.zeros(SAMPLES)
     for i in range(2, SAMPLES):
         x[i] = -a1[i] * x[i - 1] - a2[i] * x[i - 2] + b1[i] * u[i - 1] + b2[i] * u[i - 2]
-    v = lfilter([1.0], COLOUR, rng.normal(size=SAMPLES))
+    v = np.asarray(lfilter([1.0], COLOUR, rng.normal(size=SAMPLES)))
     v *= x.std() / v.std() / 10.0 ** (NOISE_DB / 20.0)
     return FlightRecord.from_arrays(k.astype(float), dict.fromkeys("yup", "1"), y=x + v, u=u, p=p)
 

@@ -61,12 +61,6 @@ from identification.judge.fit_for_control import (
     fit_for_control as fit_for_control,
 )
 from identification.judge.frequency_response import frequency_response as frequency_response
-from identification.judge.frozen_stability import (
-    FrozenStability as FrozenStability,
-)
-from identification.judge.frozen_stability import (
-    frozen_stability as frozen_stability,
-)
 from identification.judge.frozen_models import (
     FrozenModels as FrozenModels,
 )
@@ -75,6 +69,12 @@ from identification.judge.frozen_models import (
 )
 from identification.judge.frozen_models import (
     pole_miss as pole_miss,
+)
+from identification.judge.frozen_stability import (
+    FrozenStability as FrozenStability,
+)
+from identification.judge.frozen_stability import (
+    frozen_stability as frozen_stability,
 )
 from identification.judge.matrix_ellipsoid import matrix_ellipsoid as matrix_ellipsoid
 from identification.judge.order_scan import order_scan as order_scan
@@ -86,11 +86,11 @@ from identification.judge.slow_modes import slow_modes as slow_modes
 from identification.judge.uncertainty import uncertainty as uncertainty
 from identification.judge.unseen_flight import unseen_flight as unseen_flight
 from identification.model.coefficients import Coefficients as Coefficients
-from identification.model.noise_model import NoiseModel as NoiseModel
-from identification.model.state_space_model import StateSpaceModel as StateSpaceModel
 from identification.model.kinematic_model import KinematicModel as KinematicModel
 from identification.model.lpvarx_model import LPVARXModel as LPVARXModel
+from identification.model.noise_model import NoiseModel as NoiseModel
 from identification.model.prediction import fit_percent as fit_percent
+from identification.model.state_space_model import StateSpaceModel as StateSpaceModel
 from identification.recursive.forgetting import (
     Constant as Constant,
 )

@@ -102,6 +102,7 @@ class ExcitationReport:
 
     def __str__(self) -> str:
         scheduled = self.needed > 1
+        distinct = f"  distinct values of {self.scheduling}: {self.distinct}, needed {self.needed}"
         return "\n".join(
             [
                 (
@@ -112,13 +113,7 @@ class ExcitationReport:
                     f"  regressors {len(self.names)}, samples {self.samples}, rank {self.rank},"
                     f" scaled condition {self.condition:.3g}"
                 ),
-                *(
-                    [
-                        f"  distinct values of {self.scheduling}: {self.distinct}, needed {self.needed}"
-                    ]
-                    if scheduled
-                    else []
-                ),
+                *([distinct] if scheduled else []),
                 f"  worst determined: {self.worst_direction}",
                 *(self._bars() if scheduled else []),
             ]

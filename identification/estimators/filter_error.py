@@ -19,7 +19,7 @@ from identification.estimators.instruments import FlightSource, flown_rows
 from identification.estimators.least_squares import least_squares
 from identification.estimators.method import Estimate, Method, not_settled
 from identification.estimators.newey_west import long_run_covariance
-from identification.estimators.simulator_prior import SimulatorPrior
+from identification.estimators.simulator_prior import Simulated, SimulatorPrior
 from identification.structure.kinematic_arx import STATES, Aerodynamics, increments
 from identification.structure.lpvarx import LPVARX
 from identification.structure.regressors import Regression, Samples, regressor_rows, stacked
@@ -92,6 +92,11 @@ class FilterError(Method):
         new coefficient.
     gust_time : float
         s; of the longitudinal Dryden spectrum its length scale over the airspeed.
+    prior : bool
+        Whether coefficients are taken to lie about those of the simulated flight (`SimulatorPrior`),
+        as near, signal by signal and equation by equation, as the flights say: for much noise and
+        short flights. The covariance is then that of the posterior, and modes that the flights do
+        not tell are the simulator's.
     steps : int
         Gauss-Newton steps at most.
 
@@ -125,6 +130,7 @@ class FilterError(Method):
     misfit: float = MISFIT
     gust: float = 0.0
     gust_time: float = 20.0
+    prior: bool = False
     steps: int = 3
     shorthand: ClassVar[str] = "filter error"
 
@@ -182,8 +188,8 @@ class FilterError(Method):
             moved = [there.again(record, arx) for record in records]
             data = stacked(there, moved)
         theta, _ = instrumental_variables(there, moved, data, self.simulator)
-        simulated = self._simulated(there, moved)
-        left = self.misfit * simulated.left
+        simulated, left = self._simulated(there, moved)
+        left = self.misfit * left
         air = self.gust**2, float(np.exp(-records[0].dt / self.gust_time))
         flights = []
         for record, R in zip(records, self._variances(records), strict=True):
@@ -192,7 +198,7 @@ class FilterError(Method):
         weights = [len(s.y) for s, _ in flights]
         R = np.average([noise.R for _, noise in flights], axis=0, weights=weights)
         count, settled, n = 0, False, arx.n_regressors
-        prior = SimulatorPrior.of(arx, simulated.theta, simulated.sizes, unknown)
+        prior = SimulatorPrior.of(arx, simulated, unknown, believed=self.prior)
         steps = self.steps * (SLOWER if unknown else 1)
         for _ in tracked("filter error", range(steps)):
             count += 1
@@ -258,8 +264,10 @@ class FilterError(Method):
         least = 1e-12 * largest + np.finfo(float).tiny
         return list(np.maximum(np.where(known, found, pooled), least))
 
-    def _simulated(self, arx: Aerodynamics, records: Sequence[FlightRecord]) -> Simulated:
-        """The simulated flights in the structure, by least squares."""
+    def _simulated(
+        self, arx: Aerodynamics, records: Sequence[FlightRecord]
+    ) -> tuple[Simulated, Array]:
+        """The simulated flights in the structure, by least squares, and the variance (6,) left."""
         phi, y = [], []
         for record in records:
             rows = flown_rows(arx, record, self.simulator)
@@ -270,17 +278,7 @@ class FilterError(Method):
         F, T = np.vstack(phi), np.vstack(y)
         theta = least_squares(F, T)
         left = np.var(T - F @ theta, axis=0) + 1e-14 * np.var(T, axis=0)
-        return Simulated(theta, left, (np.sqrt(np.mean(F**2, axis=0)), np.std(T, axis=0)))
-
-
-class Simulated(NamedTuple):
-    """Coefficients (n, 6) of simulated flights, the variance (6,) that they leave, and the root
-    mean squares of regressors (n,) and outputs (6,).
-    """
-
-    theta: Array
-    left: Array
-    sizes: tuple[Array, Array]
+        return Simulated(theta, np.sqrt(np.mean(F**2, axis=0)), np.std(T, axis=0)), left
 
 
 class FlightNoise(NamedTuple):

@@ -231,6 +231,7 @@ class Residuals:
 
     def __init__(self, arx: LPVARX, runs: Sequence[Stretch], options: PredictionError):
         self.arx, self.runs, self.estimated = arx, runs, options.estimated_start
+        self.enters: Literal["output", "equation"]
         self.ar, self.ma, self.enters = options.noise
         self.row, self.output = free_of(arx)
         measured = np.concatenate([run.y for run in runs])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,6 +25,16 @@ beyond a hundredth.
 
 LARGEST = 1e6
 """Largest: a group counts for nothing."""
+
+
+class Simulated(NamedTuple):
+    """Coefficients (n, ny) of simulated flights, and the root mean squares of regressors (n,) and
+    outputs (ny,).
+    """
+
+    theta: Array
+    regressors: Array
+    outputs: Array
 
 
 @dataclass(eq=False)
@@ -57,20 +68,19 @@ class SimulatorPrior:
 
     @classmethod
     def of(
-        cls, arx: LPVARX, theta: Array, sizes: tuple[Array, Array], unknown: int
+        cls, arx: LPVARX, simulated: Simulated, unknown: int, *, believed: bool
     ) -> SimulatorPrior:
-        """About the coefficients theta (n, ny) of a simulated flight, equation by equation, then
-        `unknown` others about 0 with variance 1; `sizes` are the root mean squares of regressors
-        and outputs.
+        """About the coefficients of a simulated flight, equation by equation, or where it is not
+        `believed` of infinite variance; then `unknown` others about 0 with variance 1.
         """
-        regressors, outputs = (np.where(s > 0, s, 1.0) for s in sizes)
-        offset = np.array([e.kind in ("offset", "increment") for e in arx.entries])
-        entry = np.cumsum(~offset) - 1
-        of_one = np.repeat(np.where(offset, -1, entry), arx.basis.size)
+        regressors, outputs = (np.where(s > 0, s, 1.0) for s in simulated[1:])
+        free = np.array([not believed or e.kind in ("offset", "increment") for e in arx.entries])
+        entry = np.cumsum(~free) - 1
         count = int(entry[-1]) + 1
+        of_one = np.repeat(np.where(free, -1, entry), arx.basis.size)
         groups = [np.where(of_one < 0, -1, of_one + count * y) for y in range(arx.ny)]
         return cls(
-            np.append(theta.T.reshape(-1), np.zeros(unknown)),
+            np.append(simulated.theta.T.reshape(-1), np.zeros(unknown)),
             np.append((outputs[:, None] / regressors).reshape(-1), np.ones(unknown)),
             np.concatenate([*groups, np.full(unknown, -2)]),
             np.ones(count * arx.ny),
@@ -85,6 +95,8 @@ class SimulatorPrior:
         """Move the variances towards the largest marginal likelihood of data whose normal equations
         about the unknowns `at` (m,) are normal (m, m) and right (m,).
         """
+        if not len(self.variance):
+            return
         scaled = normal * np.outer(self.size, self.size)
         pulled = self.size * (right + normal @ (at - self.mean))
         inside = self.group >= 0

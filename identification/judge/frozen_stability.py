@@ -13,6 +13,7 @@ from identification.judge.frozen_plant import FrozenPlant, Model, Point, text
 from symheli.errors import InputError
 from symheli.values.arrays import Array, frozen
 from symheli.values.numbers import whole
+from symheli.values.summary import summarized
 
 BAND = 1.96
 """Half width of a band in standard deviations: 95 %."""
@@ -49,6 +50,8 @@ class FrozenStability:
     growth: Array
     low: Array
     high: Array
+
+    __repr__ = summarized
 
     def __post_init__(self) -> None:
         for name in ("growth", "low", "high"):

@@ -76,7 +76,7 @@ class NoiseModel:
             e = [np.zeros_like(part) for part in own]
             if ma:
                 long = _regressed(own, e, ar + ma + LONG, 0)
-                e = [lfilter(np.append(1.0, long), 1.0, part) for part in own]
+                e = [np.asarray(lfilter(np.append(1.0, long), 1.0, part)) for part in own]
             found = _regressed(own, e, ar, ma)
             d[y], c[y] = found[:ar], _invertible(found[ar:])
         return cls(d, c, enters)

@@ -102,7 +102,7 @@ def pieces_of(
     """Stretches with all inputs and p: where, and outputs, inputs and p in them."""
     s, out = Samples.of(structure.regression, record), []
     given = s.u if structure.own_scheduling else np.column_stack([s.u, s.f])
-    known = np.isfinite(given).all(axis=1)
+    known = np.asarray(np.isfinite(given).all(axis=1))
     for part in s.segments:
         inside = known[part].astype(int)
         edges = part.start + np.flatnonzero(np.diff(np.concatenate([[0], inside, [0]])))

@@ -12,7 +12,7 @@ from scipy.integrate import cumulative_trapezoid
 
 from identification.structure.actuators import Actuators, bare, behind, pieces
 from identification.structure.late_sensors import LateSensors
-from identification.structure.lpvarx import CONSTANT, UNSCHEDULED, LPVARX
+from identification.structure.lpvarx import CONSTANT, LPVARX, UNSCHEDULED
 from identification.structure.orders import Orders
 from identification.structure.steady_wind import VELOCITY, SteadyWind, of_air
 from symheli.errors import InputError, UnknownNameError
@@ -232,7 +232,8 @@ class KinematicARX:
     basis : FunctionSpace, optional
         The functions of p, on the range they are declared on.
     offset_rate : bool
-        Whether there is d(p), False where nothing is scheduled; with an acceleration among the parameters c(p) says as much.
+        Whether there is d(p), False where nothing is scheduled; with an acceleration among the
+        parameters c(p) says as much.
     actuators : Actuators, optional
         A delay, and servos, between `inputs`, which are then commands (d_lon_command, or d_lon),
         and the deflections; u in the equation is the mean deflection over a sample. What of them is

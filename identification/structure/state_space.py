@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
 
-from identification.structure.lpvarx import CONSTANT, UNSCHEDULED, LPVARX
+from identification.structure.lpvarx import CONSTANT, LPVARX, UNSCHEDULED
 from symheli.errors import InputError
 from symheli.lpv import FunctionSpace
 from symheli.values.numbers import whole
