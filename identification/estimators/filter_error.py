@@ -93,10 +93,10 @@ class FilterError(Method):
     gust_time : float
         s; of the longitudinal Dryden spectrum its length scale over the airspeed.
     prior : bool
-        Whether coefficients are taken to lie about those of the simulated flight (`SimulatorPrior`),
-        as near, signal by signal and equation by equation, as the flights say: for much noise and
-        short flights. The covariance is then that of the posterior, and modes that the flights do
-        not tell are the simulator's.
+        Whether coefficients are taken to lie about those of the simulated flight, as near, signal
+        by signal and equation by equation, as the flights say (`SimulatorPrior`): for much noise
+        and short flights. The covariance is then that of the posterior, and modes that the flights
+        do not tell are the simulator's.
     steps : int
         Gauss-Newton steps at most.
 
