@@ -48,8 +48,8 @@ class StateSpace:
     --------
     >>> structure = idn.StateSpace("y", "u", "p", order=1, basis=idn.Polynomial(1, -1.0, 1.0))
     >>> found = idn.fit(structure, record)
-    >>> print(found.state_space.at(0.0).poles().round(1), found.score(record).round(0))
-    [0.5] (y=98 %)
+    >>> print(found.state_space.at(0.0).poles().round(1), round(float(found.score(record)["y"])))
+    [0.5] 98
     """
 
     outputs: str | tuple[str, ...]

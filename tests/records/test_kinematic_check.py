@@ -279,7 +279,7 @@ def test_a_long_record_is_compared_in_pieces_spread_over_it():
 
 @pytest.mark.slow
 def test_a_record_is_corrected_by_what_contradicts_the_others(ideal):
-    """A scale and a bias of q, and roll three samples late, are taken off again; the others stay."""
+    """A scale and a bias of q, and roll three samples late, are taken off; the others stay."""
     flight = flown(ideal, 1, noise_db=30.0)
     late = np.concatenate([np.full(3, np.nan), flight["phi"][:-3]])
     wrong = flight.with_signals({"q": "rad/s", "phi": "rad"}, q=1.1 * flight["q"] + 0.03, phi=late)

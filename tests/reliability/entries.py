@@ -42,6 +42,7 @@ EXEMPT: dict[str, str] = {
     **{
         f"identification.{name}": RESULT
         for name in (
+            "StateSpaceModel",
             *("AgainstConstant", "Coefficients"),
             *(
                 "Criterion",
