@@ -272,7 +272,7 @@ class Residuals:
         noise = self.noise(unknowns)
         with np.errstate(all="ignore"):
             parts = [
-                (noise.white(v) if noise.stable else np.full_like(v, np.inf))[self._kept(run)]
+                (noise.filtered(v) if noise.stable else np.full_like(v, np.inf))[self._kept(run)]
                 for run, v in self._left(unknowns)
             ]
         return np.concatenate(parts)
@@ -283,8 +283,8 @@ class Residuals:
         for i, (run, v) in enumerate(self._left(unknowns)):
             full = np.zeros((*v.shape, len(unknowns)))
             self._by_model(full, run, i, unknowns)
-            full = noise.white(full / self.scale[None, :, None])
-            full[:, :, len(self.row) : self.first] = noise.by_coefficients(v, noise.white(v))
+            full = noise.filtered(full / self.scale[None, :, None])
+            full[:, :, len(self.row) : self.first] = noise.by_coefficients(v, noise.filtered(v))
             parts.append(full[self._kept(run)])
         return np.concatenate(parts)
 
@@ -377,7 +377,7 @@ def prediction_error(
     )
     noise = problem.noise(found.x)
     error = np.concatenate(
-        [noise.white(v)[-len(run.target) :] for run, v in problem._left(found.x)]
+        [noise.filtered(v)[-len(run.target) :] for run, v in problem._left(found.x)]
     )
     error = error[np.isfinite(error).all(axis=1)] * problem.scale
     covariance = error.T @ error / max(len(error) - problem.first // arx.ny, 1)

@@ -217,7 +217,7 @@ def _equations(
         run.target[:, :, None],
     )
     return tuple(
-        (noise.white(by(part))[noise.ar.shape[1] :] / size[None, :, None]).reshape(
+        (noise.filtered(by(part))[noise.ar.shape[1] :] / size[None, :, None]).reshape(
             -1, *part.shape[2:][: part.shape[2] > 1]
         )
         for part in signals

@@ -54,6 +54,7 @@ class FrozenStability:
     __repr__ = summarized
 
     def __post_init__(self) -> None:
+        frozen([np.ravel(p) for p in self.points], "points")
         for name in ("growth", "low", "high"):
             object.__setattr__(self, name, frozen(getattr(self, name), name, (len(self.points),)))
 
@@ -123,6 +124,8 @@ def frozen_stability(
     draws = whole(draws, "draws", 2)
     thetas = drawn(model.theta, SMALL**2 * covariance, free, draws, seed)
     chosen = tuple(points)
+    if not chosen:
+        raise InputError("points: give at least one value of the scheduling")
     rates = np.array([_growth(plant, p, thetas) for p in chosen]).reshape(len(chosen), -1)
     growth = rates[:, 0]
     spread = np.sqrt(np.mean((rates[:, 1:] - growth[:, None]) ** 2, axis=1)) / SMALL

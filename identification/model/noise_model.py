@@ -12,6 +12,7 @@ from scipy.signal import lfilter
 from identification.design.excitation import column_scale
 from symheli.errors import InputError
 from symheli.values.arrays import Array, frozen
+from symheli.values.numbers import whole
 from symheli.values.summary import summarized
 
 LONG = 10
@@ -87,10 +88,14 @@ class NoiseModel:
         return all(np.abs(np.roots([1.0, *c])).max(initial=0.0) < 1.0 for c in self.ma)
 
     def white(self, v: Array) -> Array:
-        """e (n, ny, ..) of noise v (n, ny, ..), from rest; without orders v itself, missing samples
-        and all.
+        """e (n, ny) of noise v (n, ny), from rest; raises `InputError` for another shape or entries
+        that are not finite.
         """
-        if not self.ar.shape[1] + self.ma.shape[1]:
+        return self.filtered(frozen(v, "v", (None, len(self.ar))))
+
+    def filtered(self, v: Array) -> Array:
+        """The same for v (n, ny, ..) as it is; without orders v itself, missing samples and all."""
+        if not self.ar.shape[1] + self.ma.shape[1] or not len(v):
             return v
         return np.stack(
             [
@@ -113,20 +118,17 @@ class NoiseModel:
         return out.reshape(len(v), ny, -1)
 
     def ahead(self, v: Array, horizon: int) -> Array:
-        """(n, ny) what noise v, known up to `horizon` samples before, makes expect: NaN, behind
-        which it starts from rest, where v is.
+        """(n, ny) what noise v (n, ny), known up to `horizon` samples before, makes expect, from
+        rest; raises `InputError` as `white` does, or for a horizon below 1.
         """
-        out = np.full_like(v, np.nan)
-        known = np.isfinite(v).all(axis=1).astype(int)
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], known, [0]])))
-        impulse = np.zeros(horizon)
-        impulse[0] = 1.0
-        for start, stop in zip(edges[::2], edges[1::2], strict=True):
-            e = self.white(v[start:stop])
-            for y, (d, c) in enumerate(zip(self.ar, self.ma, strict=True)):
-                recent = lfilter(np.append(1.0, c), np.append(1.0, d), impulse)
-                out[start:stop, y] = v[start:stop, y] - lfilter(recent, 1.0, e[:, y])
-        return out
+        e, impulse = self.white(v), np.eye(1, whole(horizon, "horizon", 1))[0]
+        if not len(e):
+            return e
+        recent = [
+            lfilter(lfilter(np.append(1.0, c), np.append(1.0, d), impulse), 1.0, e[:, y])
+            for y, (d, c) in enumerate(zip(self.ar, self.ma, strict=True))
+        ]
+        return np.asarray(v, float) - np.stack(recent, axis=1)
 
     def described(self) -> dict[str, Any]:
         """The model in plain values."""
