@@ -288,16 +288,10 @@ CONDITIONS: Mapping[str, Condition] = {
     ),
     "25 Hz, untold": Condition("logged at 25 Hz, commanded at 50 Hz, not said", 0.10, decimated=2),
     "sensors": Condition(
-        "rates and attitude 40 ms late, found; simulator as prior",
-        0.12,
-        sensors=LateSensors(deviation=ASSUMED),
-        prior=True,
+        "rates and attitude 40 ms late, found", 0.12, sensors=LateSensors(deviation=ASSUMED)
     ),
     "wind": Condition(
-        "steady wind of 5 m/s, two headings, no air data; wind found; simulator as prior",
-        0.12,
-        headings=(-50.0, 50.0),
-        prior=True,
+        "steady wind of 5 m/s, two headings, no air data; wind found", 0.12, headings=(-50.0, 50.0)
     ),
     "airspeed": Condition(
         "the same, airspeed known", 0.08, headings=(-50.0, 50.0), over_ground=False
