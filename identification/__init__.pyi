@@ -30,7 +30,9 @@ from identification.estimators.lasso import Lasso as Lasso
 from identification.estimators.least_squares import LeastSquares as LeastSquares
 from identification.estimators.method import Estimate as Estimate
 from identification.estimators.method import Method as Method
-from identification.estimators.output_error import OutputError as OutputError
+from identification.estimators.prediction_error import ARMAX as ARMAX
+from identification.estimators.prediction_error import BoxJenkins as BoxJenkins
+from identification.estimators.prediction_error import OutputError as OutputError
 from identification.estimators.recursion import Recursion as Recursion
 from identification.estimators.refined_instruments import RefinedInstruments as RefinedInstruments
 from identification.estimators.ridge import Ridge as Ridge
@@ -68,6 +70,12 @@ from identification.judge.frozen_models import (
 from identification.judge.frozen_models import (
     pole_miss as pole_miss,
 )
+from identification.judge.frozen_stability import (
+    FrozenStability as FrozenStability,
+)
+from identification.judge.frozen_stability import (
+    frozen_stability as frozen_stability,
+)
 from identification.judge.matrix_ellipsoid import matrix_ellipsoid as matrix_ellipsoid
 from identification.judge.order_scan import order_scan as order_scan
 from identification.judge.residuals import residual_analysis as residual_analysis
@@ -80,7 +88,9 @@ from identification.judge.unseen_flight import unseen_flight as unseen_flight
 from identification.model.coefficients import Coefficients as Coefficients
 from identification.model.kinematic_model import KinematicModel as KinematicModel
 from identification.model.lpvarx_model import LPVARXModel as LPVARXModel
+from identification.model.noise_model import NoiseModel as NoiseModel
 from identification.model.prediction import fit_percent as fit_percent
+from identification.model.state_space_model import StateSpaceModel as StateSpaceModel
 from identification.recursive.forgetting import (
     Constant as Constant,
 )
@@ -124,3 +134,4 @@ from symheli.lpv import (
 )
 
 __version__: str
+from identification.structure.state_space import StateSpace as StateSpace

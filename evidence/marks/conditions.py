@@ -85,6 +85,8 @@ class Condition:
         What is known of sensors that are 40 ms late.
     headings : tuple of float
         Of the flights, off the one into the wind, deg; empty: still air.
+    prior : bool
+        Whether the coefficients are taken to lie about the simulator's.
     over_ground : bool
         Whether speeds are commanded, and the coefficients scheduled, over ground.
     """
@@ -100,6 +102,7 @@ class Condition:
     sensors: LateSensors | None = None
     headings: tuple[float, ...] = ()
     over_ground: bool = True
+    prior: bool = False
 
     @property
     def period(self) -> float:
@@ -293,8 +296,8 @@ CONDITIONS: Mapping[str, Condition] = {
     "airspeed": Condition(
         "the same, airspeed known", 0.08, headings=(-50.0, 50.0), over_ground=False
     ),
-    "20 dB": Condition("20 dB of noise", 0.12, noise_db=20.0),
-    "half": Condition("half a flight", 0.10, longest=HALF),
+    "20 dB": Condition("20 dB of noise; simulator as prior", 0.12, noise_db=20.0, prior=True),
+    "half": Condition("half a flight; simulator as prior", 0.10, longest=HALF, prior=True),
 }
 
 
@@ -323,7 +326,7 @@ def of_seed(name: str, seed: int, truth: str = "xcell60") -> Marks:
         model = fit(
             condition.structure(records[0]),
             records,
-            method=FilterError(Instruments(SimulatedFlight(simulator))),
+            method=FilterError(Instruments(SimulatedFlight(simulator)), prior=condition.prior),
         )
     gap = condition.truth(heli).compare(frozen_all(model))[ALL]["model"].gap
     return Marks(

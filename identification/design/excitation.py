@@ -101,6 +101,8 @@ class ExcitationReport:
             raise ExcitationError(self.reason, self)
 
     def __str__(self) -> str:
+        scheduled = self.needed > 1
+        distinct = f"  distinct values of {self.scheduling}: {self.distinct}, needed {self.needed}"
         return "\n".join(
             [
                 (
@@ -111,9 +113,9 @@ class ExcitationReport:
                     f"  regressors {len(self.names)}, samples {self.samples}, rank {self.rank},"
                     f" scaled condition {self.condition:.3g}"
                 ),
-                f"  distinct values of {self.scheduling}: {self.distinct}, needed {self.needed}",
+                *([distinct] if scheduled else []),
                 f"  worst determined: {self.worst_direction}",
-                *self._bars(),
+                *(self._bars() if scheduled else []),
             ]
         )
 

@@ -83,6 +83,8 @@ def warn_of_own_past(arx: LPVARX | KinematicARX, record: FlightRecord) -> None:
     now or up to two samples ago: a free run with the measured parameter then uses the measured
     outputs.
     """
+    if arx.constant:
+        return
     y = record.columns(arx.outputs)
     y = (y - np.nanmean(y, axis=0)) / np.maximum(np.nanstd(y, axis=0), np.finfo(float).tiny)
     p = scheduling_values(arx, record).reshape(len(record), -1)

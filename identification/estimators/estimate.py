@@ -12,7 +12,7 @@ from identification.design.leakage import warn_of_leakage
 from identification.estimators import (  # noqa: F401  known by their shorthand once loaded
     instrumental_variables,
     lasso,
-    output_error,
+    prediction_error,
     recursion,
     refined_instruments,
     ridge,
@@ -20,13 +20,17 @@ from identification.estimators import (  # noqa: F401  known by their shorthand 
 from identification.estimators.filter_error import FilterError
 from identification.estimators.least_squares import residual_covariance
 from identification.estimators.method import Method, method_of
+from identification.estimators.prediction_error import OutputError
+from identification.estimators.state_space_search import state_space_of
 from identification.model.kinematic_fit import mean_trim
 from identification.model.kinematic_model import KinematicModel
 from identification.model.lpvarx_model import LPVARXModel
+from identification.model.state_space_model import StateSpaceModel
 from identification.structure.kinematic_arx import KinematicARX
 from identification.structure.lpvarx import LPVARX, require_structure
 from identification.structure.regressors import as_records, stacked, units_of
-from symheli.errors import InputError
+from identification.structure.state_space import StateSpace
+from symheli.errors import ConvergenceWarning, InputError
 from symheli.records import FlightRecord
 
 
@@ -40,6 +44,14 @@ def fit(
 
 @overload
 def fit(
+    structure: StateSpace,
+    records: FlightRecord | Iterable[FlightRecord],
+    method: Method | str = "oe",
+) -> StateSpaceModel: ...
+
+
+@overload
+def fit(
     structure: LPVARX,
     records: FlightRecord | Iterable[FlightRecord],
     method: Method | str = "ls",
@@ -47,22 +59,23 @@ def fit(
 
 
 def fit(
-    structure: LPVARX | KinematicARX,
+    structure: LPVARX | KinematicARX | StateSpace,
     records: FlightRecord | Iterable[FlightRecord],
-    method: Method | str = "ls",
-) -> LPVARXModel | KinematicModel:
+    method: Method | str | None = None,
+) -> LPVARXModel | KinematicModel | StateSpaceModel:
     """Identify the coefficients of a structure from one record or several.
 
     Parameters
     ----------
-    structure : LPVARX or KinematicARX
+    structure : LPVARX, KinematicARX or StateSpace
         Signals, orders, delays and the basis in the scheduling parameters; with known kinematics
-        only the aerodynamics are fitted.
+        only the aerodynamics are fitted, states by the closest free run.
     records : FlightRecord or iterable of FlightRecord
         Of one sample period and in the same units; lags never reach across a gap or from one record
         into the next.
-    method : Method or str
-        An estimator with its options, or the shorthand of one with its defaults:
+    method : Method or str, optional
+        An estimator with its options, or the shorthand of one with its defaults; a `StateSpace`
+        takes "oe" (default) only, the others "ls" (default) and:
 
         - `LeastSquares`, "ls": least squares over all samples;
         - `Recursion`, "rls": the same sample by sample, with forgetting;
@@ -71,13 +84,14 @@ def fit(
         - `InstrumentalVariables`, "iv": unbiased by noise in closed loop; it needs the external
           excitation, so the shorthand alone is refused;
         - `RefinedInstruments`, "riv": the model's own response as instruments and filters;
-        - `OutputError`, "oe": the closest free run.
+        - `OutputError`, "oe": the closest free run; `BoxJenkins`, "bj": the same beside coloured
+          noise at the outputs; `ARMAX`, "armax": with coloured noise in the equations.
 
         Any other subclass of `Method` will do.
 
     Returns
     -------
-    LPVARXModel, or KinematicModel of a KinematicARX
+    LPVARXModel, KinematicModel of a KinematicARX, StateSpaceModel of a StateSpace
         Its `method` is the shorthand, its `excitation` the report on the data, its `details` what
         the method chose (weights, iterations, strength of the instruments), its `covariance`
         (ny, n, ny, n) that of all coefficients together as far as the method knows it:
@@ -125,9 +139,27 @@ def fit(
     >>> print(found.coefficients.at(0.0).A.round(2))
     [[[-0.5]]]
     """
+    if isinstance(structure, StateSpace):
+        return _states(structure, as_records(records), method_of(method or "oe"))
+    method = method_of(method or "ls")
     if isinstance(structure, KinematicARX):
-        return _rigid(structure, as_records(records), method_of(method))
+        return _rigid(structure, as_records(records), method)
     return _fitted(structure, records, method)
+
+
+def _states(
+    structure: StateSpace, records: tuple[FlightRecord, ...], method: Method
+) -> StateSpaceModel:
+    """The model of states, from that of the difference equation by the same method."""
+    if type(method) is not OutputError:
+        raise InputError(
+            "a StateSpace is fitted by the closest free run: OutputError(...), got"
+            f" {method.shorthand!r}"
+        )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ConvergenceWarning)  # of where the search begins
+        begin = _fitted(structure.regression, records, method)
+    return state_space_of(structure, records, begin, method)
 
 
 def _rigid(
@@ -194,4 +226,5 @@ def _fitted(
         excitation=report,
         details=found.details,
         covariance=found.covariance,
+        noise=found.noise,
     )

@@ -19,6 +19,7 @@ from identification.estimators.instruments import FlightSource, flown_rows
 from identification.estimators.least_squares import least_squares
 from identification.estimators.method import Estimate, Method, not_settled
 from identification.estimators.newey_west import long_run_covariance
+from identification.estimators.simulator_prior import Simulated, SimulatorPrior
 from identification.structure.kinematic_arx import STATES, Aerodynamics, increments
 from identification.structure.lpvarx import LPVARX
 from identification.structure.regressors import Regression, Samples, regressor_rows, stacked
@@ -91,6 +92,11 @@ class FilterError(Method):
         new coefficient.
     gust_time : float
         s; of the longitudinal Dryden spectrum its length scale over the airspeed.
+    prior : bool
+        Whether coefficients are taken to lie about those of the simulated flight, as near, signal
+        by signal and equation by equation, as the flights say (`SimulatorPrior`): for much noise
+        and short flights. The covariance is then that of the posterior, and modes that the flights
+        do not tell are the simulator's.
     steps : int
         Gauss-Newton steps at most.
 
@@ -124,6 +130,7 @@ class FilterError(Method):
     misfit: float = MISFIT
     gust: float = 0.0
     gust_time: float = 20.0
+    prior: bool = False
     steps: int = 3
     shorthand: ClassVar[str] = "filter error"
 
@@ -181,7 +188,8 @@ class FilterError(Method):
             moved = [there.again(record, arx) for record in records]
             data = stacked(there, moved)
         theta, _ = instrumental_variables(there, moved, data, self.simulator)
-        left = self.misfit * self._unexplained(there, moved)
+        simulated, left = self._simulated(there, moved)
+        left = self.misfit * left
         air = self.gust**2, float(np.exp(-records[0].dt / self.gust_time))
         flights = []
         for record, R in zip(records, self._variances(records), strict=True):
@@ -190,7 +198,7 @@ class FilterError(Method):
         weights = [len(s.y) for s, _ in flights]
         R = np.average([noise.R for _, noise in flights], axis=0, weights=weights)
         count, settled, n = 0, False, arx.n_regressors
-        prior = np.append(np.zeros(6 * n), np.ones(unknown))
+        prior = SimulatorPrior.of(arx, simulated, unknown, believed=self.prior)
         steps = self.steps * (SLOWER if unknown else 1)
         for _ in tracked("filter error", range(steps)):
             count += 1
@@ -198,8 +206,10 @@ class FilterError(Method):
                 s.follow(z)
             parts = [s.normal(theta, noise) for s, noise in flights]
             normal, right = map(sum, zip(*parts, strict=True))
-            right[6 * n :] -= z  # type: ignore[index]
-            step, inverse = _solved(normal + np.diag(prior), right)  # type: ignore[arg-type]
+            at = np.append(theta.T.reshape(-1), z)
+            prior.learn(normal, right, at)  # type: ignore[arg-type]
+            known = prior.precision()
+            step, inverse = _solved(normal + np.diag(known), right + known * (prior.mean - at))  # type: ignore[operator]
             change, later = step[: 6 * n].reshape(6, -1).T, step[6 * n :]
             for s, noise in flights:
                 s.smooth(theta, change, later, noise)
@@ -208,7 +218,7 @@ class FilterError(Method):
             settled = bool(np.all(np.abs(step) < 0.1 * spread))
             if settled:
                 break
-        scores = sum(s.scores(theta, noise) for s, noise in flights) + np.diag(prior)
+        scores = sum(s.scores(theta, noise) for s, noise in flights) + np.diag(known)
         covariance = inverse @ scores @ inverse  # type: ignore[operator]
         covariance = 0.5 * (covariance + covariance.T)
         beside = arx.found(z.tolist(), np.sqrt(np.diag(covariance)[6 * n :]).tolist())
@@ -254,8 +264,10 @@ class FilterError(Method):
         least = 1e-12 * largest + np.finfo(float).tiny
         return list(np.maximum(np.where(known, found, pooled), least))
 
-    def _unexplained(self, arx: Aerodynamics, records: Sequence[FlightRecord]) -> Array:
-        """Variance (6,) of what the structure leaves of the simulated flights, by least squares."""
+    def _simulated(
+        self, arx: Aerodynamics, records: Sequence[FlightRecord]
+    ) -> tuple[Simulated, Array]:
+        """The simulated flights in the structure, by least squares, and the variance (6,) left."""
         phi, y = [], []
         for record in records:
             rows = flown_rows(arx, record, self.simulator)
@@ -264,7 +276,9 @@ class FilterError(Method):
             phi.append(rows[known])
             y.append(left[known])
         F, T = np.vstack(phi), np.vstack(y)
-        return np.var(T - F @ least_squares(F, T), axis=0) + 1e-14 * np.var(T, axis=0)
+        theta = least_squares(F, T)
+        left = np.var(T - F @ theta, axis=0) + 1e-14 * np.var(T, axis=0)
+        return Simulated(theta, np.sqrt(np.mean(F**2, axis=0)), np.std(T, axis=0)), left
 
 
 class FlightNoise(NamedTuple):

@@ -7,8 +7,10 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from inspect import isabstract
 from typing import Any, ClassVar
 
+from identification.model.noise_model import NoiseModel
 from identification.structure.lpvarx import LPVARX
 from identification.structure.regressors import Regression
 from symheli.errors import ConvergenceWarning, InputError, UnknownNameError
@@ -34,6 +36,8 @@ class Estimate:
     covariance : array (ny, n_regressors, ny, n_regressors), optional
         Of all coefficients together, equation by equation, where the method knows it; `fit` keeps
         it.
+    noise : NoiseModel, optional
+        Where the method finds one; None: white noise in the equations, or at the outputs.
 
     Examples
     --------
@@ -46,6 +50,7 @@ class Estimate:
     remarks: tuple[Warning, ...] = ()
     residual_covariance: Array | None = None
     covariance: Array | None = None
+    noise: NoiseModel | None = None
 
     __repr__ = summarized
 
@@ -93,7 +98,7 @@ def method_of(value: Method | str) -> Method:
     """
     if isinstance(value, Method):
         return value
-    known = {method.shorthand: method for method in _subclasses(Method)}
+    known = {m.shorthand: m for m in _subclasses(Method) if not isabstract(m)}
     if not isinstance(value, str):
         raise InputError(
             f"method: expected one of {', '.join(known)}, or a method with its options such as"

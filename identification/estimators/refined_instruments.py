@@ -19,9 +19,9 @@ from identification.design.excitation import (
 from identification.design.tall_factors import orthonormal
 from identification.estimators.instrumental_variables import starting_point
 from identification.estimators.instruments import Instruments, explained, source_of
-from identification.estimators.least_squares import least_squares
 from identification.estimators.method import Estimate, Method, not_settled
 from identification.estimators.observer import Observer
+from identification.model.noise_model import NoiseModel
 from identification.model.stretches import (
     Stretch,
     contracted,
@@ -108,7 +108,7 @@ class RefinedInstruments(Method):
             details={
                 "iterations": found.iterations,
                 "converged": found.converged,
-                "noise": found.noise.tolist(),
+                "noise": found.noise.ar.tolist(),
             },
             remarks=() if found.converged else (not_settled(self, ADVICE),),
         )
@@ -116,12 +116,12 @@ class RefinedInstruments(Method):
 
 @dataclass(frozen=True, eq=False)
 class Refinement:
-    """theta (n_regressors, ny), `noise` (ny, noise_order) autoregressive coefficients, and whether
-    the iteration `converged`.
+    """theta (n_regressors, ny), the autoregressive `noise` of the outputs, and whether the
+    iteration `converged`.
     """
 
     theta: Array
-    noise: Array
+    noise: NoiseModel
     iterations: int
     converged: bool
 
@@ -158,7 +158,7 @@ def refined_instruments(
     clean = runs if exogenous is None else stretches(arx, exogenous, outputs=True)
     theta, noise, size = (
         start,
-        np.zeros((arx.ny, options.noise_order)),
+        NoiseModel(np.zeros((arx.ny, options.noise_order)), np.zeros((arx.ny, 0))),
         _size([run.target - run.regressors() @ start for run in runs]),
     )
     row, output = free_of(arx)
@@ -169,7 +169,7 @@ def refined_instruments(
         ]
         noise_free = [_response(run, model, by) for run, by in zip(clean, filters, strict=True)]
         errors = [_error(run, model, by) for run, by in zip(runs, filters, strict=True)]
-        size, noise = _size(errors), _noise_model(errors, options.noise_order)
+        size, noise = _size(errors), NoiseModel.of(errors, options.noise_order, 0)
         parts = [
             _equations(run, c, by, noise, size)
             for run, c, by in zip(runs, noise_free, filters, strict=True)
@@ -206,7 +206,7 @@ def _response(run: Stretch, theta: Array, by: Filter) -> Stretch:
 
 
 def _equations(
-    run: Stretch, noise_free: Stretch, by: Filter, noise: Array, size: Array
+    run: Stretch, noise_free: Stretch, by: Filter, noise: NoiseModel, size: Array
 ) -> tuple[Array, ...]:
     """Instruments, regressors (rows, free coefficients) and outputs (rows,) of one stretch,
     filtered and whitened.
@@ -217,18 +217,11 @@ def _equations(
         run.target[:, :, None],
     )
     return tuple(
-        (_whitened(by(part), noise) / size[None, :, None]).reshape(
+        (noise.filtered(by(part))[noise.ar.shape[1] :] / size[None, :, None]).reshape(
             -1, *part.shape[2:][: part.shape[2] > 1]
         )
         for part in signals
     )
-
-
-def _whitened(signal: Array, noise: Array) -> Array:
-    out = signal.copy()
-    for lag in range(1, noise.shape[1] + 1):
-        out[lag:] += noise[None, :, lag - 1, None] * signal[:-lag]
-    return out[noise.shape[1] :]
 
 
 def _instrumented(arx: LPVARX, Z: Array, X: Array, y: Array) -> Array:
@@ -254,21 +247,3 @@ def _instrumented(arx: LPVARX, Z: Array, X: Array, y: Array) -> Array:
 def _size(errors: Sequence[Array]) -> Array:
     size = np.sqrt(np.mean(np.concatenate(errors) ** 2, axis=0))
     return np.where(size > 0, size, 1.0)
-
-
-def _noise_model(errors: Sequence[Array], order: int) -> Array:
-    """Autoregressive coefficients (ny, order) of what the model leaves, v(k) + d_1 v(k-1) + ... =
-    e(k).
-    """
-    out = np.zeros((errors[0].shape[1], order))
-    for y in range(len(out) if order else 0):
-        past = np.vstack(
-            [
-                np.column_stack([-v[order - i : len(v) - i, y] for i in range(1, order + 1)])
-                for v in errors
-            ]
-        )
-        now = np.concatenate([v[order:, y] for v in errors])
-        if np.linalg.matrix_rank(past) == order:
-            out[y] = least_squares(past, now[:, None])[:, 0]
-    return out

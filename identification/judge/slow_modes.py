@@ -226,7 +226,7 @@ def _compensated(model: LPVARXModel, data: Regression) -> list[Array]:
 
 def _poles(model: LPVARXModel, p: Array) -> Array:
     """Of the model with the scheduling held at p, complex, those at zero left out."""
-    A = model.coefficients.at(held_value(p)).A
+    A = model.coefficients.at(held_value(p, model.structure.basis)).A
     na, ny = A.shape[0], A.shape[1]
     companion = np.eye(na * ny, k=-ny)
     companion[:ny] = -A.transpose(1, 0, 2).reshape(ny, na * ny)
@@ -240,8 +240,8 @@ def _standard_error(model: LPVARXModel, joint: Array, p: Array, z: complex) -> f
     """
     arx, A, f = (
         model.structure,
-        model.coefficients.at(held_value(p)).A,
-        np.ravel(model.structure.basis(held_value(p))),
+        model.coefficients.at(held_value(p, model.structure.basis)).A,
+        np.ravel(model.structure.basis(held_value(p, model.structure.basis))),
     )
     powers = [z ** -float(i) for i in range(1, len(A) + 1)]
     M = np.eye(arx.ny) + sum(a * w for a, w in zip(A, powers, strict=True))

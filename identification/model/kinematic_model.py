@@ -258,7 +258,7 @@ class KinematicModel:
 
         With `outputs` and `inputs` only these, as `to_state_space` keeps them.
         """
-        model = self.realization.at(held_value(p), outputs, inputs)
+        model = self.realization.at(held_value(p, self.structure.basis), outputs, inputs)
         return model.driven_by(parts) if (parts := self._actuators(inputs)) else model
 
     def to_state_space(

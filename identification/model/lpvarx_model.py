@@ -13,6 +13,7 @@ import numpy as np
 from identification.design.excitation import ExcitationReport
 from identification.model import prediction, realization
 from identification.model.coefficients import Coefficients
+from identification.model.noise_model import NoiseModel
 from identification.structure.lpvarx import LPVARX
 from identification.structure.regressors import check_units
 from symheli.errors import InputError
@@ -63,6 +64,8 @@ class LPVARXModel:
         Of all coefficients together, theta[i, y] with theta[j, z] at [y, i, z, j], under the
         hypothesis of the method that `fit` names; None where the method gives none. Zero for
         coefficients an equation does not have.
+    noise : NoiseModel, optional
+        Of the outputs or the equations, as "bj" and "armax" find it: predictions go on with it.
 
     Raises
     ------
@@ -91,6 +94,7 @@ class LPVARXModel:
     excitation: ExcitationReport | None = field(default=None, repr=False)
     details: Mapping[str, Any] = field(default_factory=dict, repr=False)
     covariance: Array | None = field(default=None, repr=False)
+    noise: NoiseModel | None = field(default=None, repr=False)
 
     __repr__ = summarized
     _repr_html_ = as_table
@@ -152,9 +156,11 @@ class LPVARXModel:
         another sample period or unit.
         """
         if hold_p:
+            if self.noise is not None:
+                raise InputError("hold_p: a model with coloured noise is predicted with p as it is")
             self.require_same_kind(record)
             return prediction.predict_holding(self.structure, self.theta, record, horizon)
-        return prediction.predict(self._along(record), horizon)
+        return prediction.predict(self._along(record), horizon, self.noise)
 
     def simulate(self, record: FlightRecord) -> Array:
         """Free run (n, ny) from the first samples of each segment with the record's inputs and p.
@@ -191,14 +197,13 @@ class LPVARXModel:
         return prediction.named_fit(self.outputs, record, guess)
 
     def at(self, *p: float) -> LinearModel:
-        """The discrete model with the scheduling held at p (one number a parameter), in observer
-        form.
+        """The discrete model with the scheduling held at p (one number a parameter, none where
+        coefficients are constant), in observer form.
 
         The offsets are left out: deviation dynamics.
         """
-        return realization.at(
-            self.coefficients, realization.held_value(p), self.outputs, self.inputs, self.dt
-        )
+        held = realization.held_value(p, self.structure.basis)
+        return realization.at(self.coefficients, held, self.outputs, self.inputs, self.dt)
 
     def to_state_space(self, route: Literal["shifted", "direct"] | None = None) -> LPVStateSpace:
         """The discrete LPV model with static dependence on p(k) that responds exactly as this one,
@@ -274,7 +279,8 @@ class LPVARXModel:
         """Raises `InputError` where `record` has another sample period, or a signal of the model in
         another unit.
         """
-        check_units((*self.outputs, *self.inputs, *self.parameters), record)
+        parameters = () if self.structure.constant else self.parameters
+        check_units((*self.outputs, *self.inputs, *parameters), record)
         if not same_period(record.dt, self.dt, JITTER):
             raise InputError(
                 f"the model was identified at dt = {self.dt:.4g} s, the record has {record.dt:.4g}"

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.model.coefficients import Coefficients
+from identification.model.noise_model import NoiseModel
 from identification.structure.lpvarx import LPVARX
 from identification.structure.regressors import Samples, regressor_rows
 from symheli.errors import InputError
@@ -70,25 +71,42 @@ class Recursion:
         return self.A.shape[1]
 
 
-def predict(run: Recursion, horizon: int) -> Array:
+def predict(run: Recursion, horizon: int, noise: NoiseModel | None = None) -> Array:
     """Predictions (n, ny) of y(t) from outputs up to t - horizon, inputs and p up to t; NaN where
     not available.
 
-    All starts advance together: P_j(t) = known(t) - sum_i A_i(t) P_{max(j-i, 0)}(t-i), where P_0 =
-    y and P_j(t) is the prediction of y(t) made j steps before.
+    All starts advance together: P_j(t) = known(t) + v_j(t) - sum_i A_i(t) P_{max(j-i, 0)}(t-i),
+    where P_0 = y and P_j(t) is the prediction of y(t) made j steps before, v_j(t) that of what the
+    equation leaves. With noise at the outputs it is the free run and the prediction of what it
+    leaves.
     """
     require_horizon(horizon)
+    if noise is not None and noise.enters == "output":
+        free = simulate(run)
+        return free + _expected(noise, run.y - free, int(horizon))
     if horizon >= max(part.stop - part.start for part in run.segments):
         return np.full_like(run.y, np.nan)
-    ahead = [run.y]
+    ahead, left = [run.y], None if noise is None else run.y - predict(run, 1)
     with np.errstate(all="ignore"):
         for j in range(1, int(horizon) + 1):
             new = run.known.copy()
+            if noise is not None and left is not None:
+                new += _expected(noise, left, j)
             for i in range(1, run.na + 1):
                 past = ahead[max(j - i, 0) - j]  # P_{j-1} is ahead[-1]
                 new[i:] -= np.einsum("kij,kj->ki", run.A[i:, i - 1], past[:-i])
             ahead = [*ahead, np.clip(new, -DIVERGED, DIVERGED)][-(run.na + 1) :]
     return _flagged(ahead[-1])
+
+
+def _expected(noise: NoiseModel, v: Array, horizon: int) -> Array:
+    """(n, ny) what noise v makes expect; NaN, behind which it starts from rest, where v is."""
+    out = np.full_like(v, np.nan)
+    known = np.isfinite(v).all(axis=1).astype(int)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], known, [0]])))
+    for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        out[start:stop] = noise.ahead(v[start:stop], horizon)
+    return out
 
 
 def predict_holding(arx: LPVARX, theta: Array, record: FlightRecord, horizon: int) -> Array:

@@ -112,8 +112,12 @@ def direct(
     return LPVStateSpace(basis, A, B, C, D, parameters, tuple(states), inputs, outputs, dt)
 
 
-def held_value(p: Sequence[Any] | Array) -> Any:
-    """The value of one parameter, or those of several, as `at(*p)` takes them."""
+def held_value(p: Sequence[Any] | Array, basis: FunctionSpace) -> Any:
+    """The value of one parameter, or those of several, as `at(*p)` takes them: none where all
+    functions are constant.
+    """
+    if len(p) == 0 and not any(basis.degrees or (1,)):
+        p = [low for low, _ in basis.ranges]
     return p[0] if len(p) == 1 else p
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from identification.model import model_file
 from identification.model.lpvarx_model import LPVARXModel
+from identification.model.noise_model import NoiseModel
 from identification.structure.lpvarx import LPVARX
 from symheli.lpv import FunctionSpace
 from symheli.lpv.bases.described import basis_of, described_basis, tuples
@@ -50,6 +51,7 @@ def described(model: LPVARXModel) -> dict[str, Any]:
         "rows_dropped": model.rows_dropped,
         "method": model.method,
         "details": dict(model.details),
+        "noise": None if model.noise is None else model.noise.described(),
     }
 
 
@@ -97,6 +99,7 @@ def model_of(structure: LPVARX, content: dict[str, Any]) -> LPVARXModel:
         excitation=None,
         details=content["details"],
         covariance=_covariance_of(structure, content),
+        noise=NoiseModel(**noise) if (noise := content.get("noise")) else None,
     )
 
 

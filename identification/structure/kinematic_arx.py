@@ -12,7 +12,7 @@ from scipy.integrate import cumulative_trapezoid
 
 from identification.structure.actuators import Actuators, bare, behind, pieces
 from identification.structure.late_sensors import LateSensors
-from identification.structure.lpvarx import LPVARX
+from identification.structure.lpvarx import CONSTANT, LPVARX, UNSCHEDULED
 from identification.structure.orders import Orders
 from identification.structure.steady_wind import VELOCITY, SteadyWind, of_air
 from symheli.errors import InputError, UnknownNameError
@@ -138,6 +138,7 @@ class Aerodynamics(LPVARX):
         `UnknownNameError` for a signal it lacks, `InputError` for one in another unit.
         """
         names = [str(s) for s in INCREMENTS]
+        record = super().prepared(record)
         if set(names) <= set(record.signals):
             return record
         return self._completed(record if self.sensors is None else self.sensors.along(record))
@@ -220,17 +221,19 @@ class KinematicARX:
     ----------
     inputs : str or sequence of str
         Controls, as the record names them.
-    scheduling : str or sequence of str
+    scheduling : str or sequence of str, optional
         One parameter, or several: then `basis` is a `Product`. Best a commanded airspeed, and the
-        commanded acceleration beside it where trim attitudes depend on it.
+        commanded acceleration beside it where trim attitudes depend on it. Default, with `basis`:
+        none, the coefficients are constant, about one flight state.
     na : int or {velocity: int}
         Lags of the velocities; the default is that of a rotorcraft, see `FLAPPING`.
     nb : int or {input: int}
         Lags of the inputs, from 1 on.
-    basis : FunctionSpace
+    basis : FunctionSpace, optional
         The functions of p, on the range they are declared on.
     offset_rate : bool
-        Whether there is d(p); with an acceleration among the parameters c(p) says as much.
+        Whether there is d(p), False where nothing is scheduled; with an acceleration among the
+        parameters c(p) says as much.
     actuators : Actuators, optional
         A delay, and servos, between `inputs`, which are then commands (d_lon_command, or d_lon),
         and the deflections; u in the equation is the mean deflection over a sample. What of them is
@@ -272,9 +275,9 @@ class KinematicARX:
     """
 
     inputs: tuple[str, ...]
-    scheduling: str | tuple[str, ...]
+    scheduling: str | tuple[str, ...] = UNSCHEDULED
     _: KW_ONLY
-    basis: FunctionSpace
+    basis: FunctionSpace = CONSTANT
     na: int | Mapping[str, int] | tuple[int, ...] = tuple(FLAPPING.values())
     nb: Orders = 2
     offset_rate: bool = True
@@ -289,6 +292,8 @@ class KinematicARX:
     def __post_init__(self) -> None:
         given = (self.inputs,) if isinstance(self.inputs, str) else tuple(self.inputs)
         object.__setattr__(self, "inputs", given)
+        if self.scheduling == UNSCHEDULED:
+            object.__setattr__(self, "offset_rate", False)
         clash = sorted({*map(str, given)} & set(STATES))
         if clash:
             raise InputError(f"{', '.join(clash)}: a state of the body cannot be an input")
@@ -382,6 +387,11 @@ class KinematicARX:
     def parameters(self) -> tuple[str, ...]:
         """Names of the scheduling parameters, also where there is one."""
         return self.aerodynamics.parameters
+
+    @property
+    def constant(self) -> bool:
+        """Whether nothing depends on the scheduling parameters."""
+        return self.aerodynamics.constant
 
     @property
     def n_regressors(self) -> int:

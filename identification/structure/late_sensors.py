@@ -6,12 +6,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-from scipy.interpolate import CubicSpline
-
-from identification.structure.actuators import pieces
 from symheli.errors import InputError
 from symheli.records import FlightRecord
+from symheli.records.shifted import shifted
 
 LATE = ("p", "q", "r", "phi", "theta")
 
@@ -83,21 +80,7 @@ class LateSensors:
         """The record with its late signals where they belong in time, between samples by cubic
         splines; NaN where what was true then is not in the record.
         """
-        if self.delay == 0:
-            return record
-        names = [s for s in record.signals if s in self.signals]
-        y = record.columns(self.signals)
-        out = np.full_like(y, np.nan)
-        for piece in pieces(record, y):
-            if len(piece) > SPLINE:
-                at = record.time[piece.start : piece.stop]
-                spline = CubicSpline(at, y[piece.start : piece.stop], extrapolate=False)
-                out[piece.start : piece.stop] = spline(at + self.delay)
-        units = {str(s): s.unit for s in names}
-        return record.with_signals(units, **dict(zip(self.signals, out.T, strict=True)))
+        return shifted(record, dict.fromkeys(self.signals, self.delay))
 
-
-SPLINE = 3
-"""Least number of samples of a cubic spline, less one."""
 
 Estimate = tuple[float, float]

@@ -83,6 +83,15 @@ class Group(NamedTuple):
     entries: tuple[int, ...]
 
 
+UNSCHEDULED = "none"
+"""Name of the parameter on which the coefficients of a plant that nothing schedules do not
+depend.
+"""
+
+CONSTANT = Polynomial(0, 0.0, 1.0)
+"""Its functions: the constant."""
+
+
 @dataclass(frozen=True)
 class LPVARX:
     """Linear difference equation whose coefficients are functions of scheduling parameters p, any
@@ -99,17 +108,19 @@ class LPVARX:
     ----------
     outputs, inputs : str or sequence of str
         Signals of the record, no name twice; inputs may be none.
-    scheduling : str or sequence of str
-        One parameter, or several: then `basis` is a `Product`. A scheduling parameter may be an
-        output or an input too. For an output only "lag" without `offset_rate` is causal then, and
-        the offset's functions of p repeat some of the output's.
+    scheduling : str or sequence of str, optional
+        One parameter, or several: then `basis` is a `Product`. Default, with `basis`: none, the
+        coefficients are constant. A scheduling parameter may be an output or an input too. For an
+        output only "lag" without `offset_rate` is causal then, and the offset's functions of p
+        repeat some of the output's.
     na, nb, delay : int or tables
         Numbers for all signals, or tables: {output: number} says it for the equation of each
         output, {input: number} (nb, delay) for each input in all equations, {output: {signal:
         number}} for each signal in each equation; rows of numbers, one an output, say the same.
         Order 0 leaves a signal out of an equation; delay 0 is direct feedthrough.
-    basis : FunctionSpace
-        The functions of p, on the range they are declared on.
+    basis : FunctionSpace, optional
+        The functions of p, on the range they are declared on. Of constants alone, records need no
+        scheduling signal (unless `offset_rate`).
     scheduling_at : {"lag", "now"}
         "lag": each coefficient is taken at p(k - lag of its term), c and d at p(k-1): the form that
         has a minimal state-space realization with static dependence. "now": every coefficient at
@@ -148,16 +159,21 @@ class LPVARX:
     (10, 2)
     >>> arx.regressor_names[0]
     'q(k-1) f0(airspeed(k-1))'
+
+    With constant coefficients, the mean of those that move with p:
+
+    >>> print(idn.fit(idn.LPVARX("y", "u", na=1, nb=1, delay=1), record).at().poles().round(1))
+    [0.6]
     """
 
     outputs: tuple[str, ...]
     inputs: tuple[str, ...]
-    scheduling: str | tuple[str, ...]
+    scheduling: str | tuple[str, ...] = UNSCHEDULED
     _: KW_ONLY
     na: Orders
     nb: Orders
     delay: Orders
-    basis: FunctionSpace
+    basis: FunctionSpace = CONSTANT
     scheduling_at: Literal["lag", "now"] = "lag"
     offset: bool = False
     offset_rate: bool = False
@@ -188,6 +204,11 @@ class LPVARX:
                 f"scheduling names {len(parameters)} parameters ({', '.join(parameters)}) and the"
                 f" basis has {self.basis.dimension}; bases of several parameters are products:"
                 " Product((Polynomial(...), Polynomial(...)))"
+            )
+        if parameters == (UNSCHEDULED,) and (self.offset_rate or any(self.basis.degrees or (1,))):
+            raise InputError(
+                "scheduling: name the signal that the basis, or offset_rate, is a function of; a"
+                " model without one is constant"
             )
         if self.scheduling_at not in ("lag", "now"):
             raise InputError(f'scheduling_at: expected "lag" or "now", got {self.scheduling_at!r}')
@@ -348,17 +369,30 @@ class LPVARX:
         """One name a regressor, such as "theta(k-1) f2(airspeed(k-1))"."""
         return tuple(
             f"{name}{_at(t.lag) if t.kind in ('output', 'input') else ''}"
-            f" f{j}({', '.join(p + _at(t.p_lag) for p in self.parameters)})"
+            + f" f{j}({', '.join(p + _at(t.p_lag) for p in self.parameters)})" * (not self.constant)
             for t in self.terms
             for name in self.channels(t)
             for j in range(self.basis.size)
         )
 
+    @cached_property
+    def constant(self) -> bool:
+        """Whether nothing depends on the scheduling parameters."""
+        return not self.offset_rate and not any(self.basis.degrees or (1,))
+
     def prepared(self, record: FlightRecord) -> FlightRecord:
-        """The record with every signal the structure needs: as it is, unless a structure derives
-        some of them.
+        """The record with every signal the structure needs: where it does not depend on the
+        scheduling parameters, those that the record lacks are in the middle of their ranges.
         """
-        return record
+        if not self.constant:
+            return record
+        middle = zip(self.parameters, self.basis.ranges, strict=True)
+        lacking = {
+            p: np.full(len(record), 0.5 * (low + high))
+            for p, (low, high) in middle
+            if p not in record.signals
+        }
+        return record.with_signals(dict.fromkeys(lacking, "1"), **lacking)
 
     @property
     def simulated(self) -> LPVARX:

@@ -367,6 +367,12 @@ class FlightRecord:
 
         return check_kinematics(self)
 
+    def corrected(self) -> FlightRecord:
+        """The record with the biases, scales and delays taken off that `check_kinematics` finds in
+        sensors that contradict the others; see `symheli.records.KinematicCheck.corrected`.
+        """
+        return self.check_kinematics().corrected(self)
+
     def plot(self, names: Sequence[str] | None = None) -> Array:
         """Axes (signals,) of these signals (default: all) against time; gaps stay empty. See
         `symheli.records.record_plot`.

@@ -27,6 +27,7 @@ from symheli.records.sensor_faults import (
     Faults,
     sensor_faults,
 )
+from symheli.records.shifted import shifted
 from symheli.values.kinematics import GRAVITY
 from symheli.values.signal import Signal
 
@@ -120,6 +121,26 @@ class KinematicCheck:
                     for row in self.inconsistent
                 )
             )
+
+    def corrected(self, record: FlightRecord) -> FlightRecord:
+        """The record with the sensors that contradict the others as these say they are: biases
+        taken off, scales divided by and delays taken back, those beyond `limit` standard errors.
+
+        Wrong columns, and signs of which one of two is turned, are not told apart: read the
+        verdicts.
+        """
+        columns, late = {}, {}
+        for row in self.inconsistent:
+            bias, scale, delay = (
+                estimate.value
+                if estimate and abs(estimate.value - none) > self.limit * estimate.standard_error
+                else none
+                for estimate, none in ((row.bias, 0.0), (row.scale, 1.0), (row.delay, 0.0))
+            )
+            columns[str(row.signal)] = (record[str(row.signal)] - bias) / scale
+            late[str(row.signal)] = delay
+        units = {str(row.signal): row.signal.unit for row in self.inconsistent}
+        return shifted(record.with_signals(units, **columns), late) if columns else record
 
     def __str__(self) -> str:
         heads = ("sensor", "bias", "scale", "delay, s")

@@ -9,7 +9,7 @@ from test_instruments import closed_loop
 
 import identification as idn
 from identification.estimators.observer import Observer
-from identification.estimators.output_error import SimulationError
+from identification.estimators.prediction_error import Residuals
 from identification.estimators.refined_instruments import refined_instruments
 from identification.model.stretches import contracted, filtered, stretches
 from identification.structure.regressors import stacked
@@ -225,8 +225,16 @@ def test_refinement_comes_back_from_a_start_that_diverges():
     np.testing.assert_allclose(found.theta, truth.theta, atol=1e-9)
 
 
-@pytest.mark.parametrize("estimated", [True, False])
-def test_sensitivities_are_the_derivatives_of_the_simulation_error(estimated):
+@pytest.mark.parametrize(
+    "method",
+    [
+        idn.OutputError(),
+        idn.OutputError(initial="measured"),
+        idn.BoxJenkins(ar=2, ma=1),
+        idn.ARMAX(ar=1, ma=2),
+    ],
+)
+def test_sensitivities_are_the_derivatives_of_the_prediction_error(method):
     truth = Truth(structure(**MIMO))
     record = truth.record(moving(90), noise=0.1, noise_seed=50)
     values, t = record.values.copy(), record.time.copy()
@@ -235,9 +243,8 @@ def test_sensitivities_are_the_derivatives_of_the_simulation_error(estimated):
     )  # a measurement, and a scheduling value: the run breaks there
     t[45:] += 9.0
     record = FlightRecord(t, values, record.signals)
-    problem = SimulationError(
-        truth.arx, stretches(truth.arx, [record], outputs=False), estimated=estimated
-    )
+    white = isinstance(method, idn.OutputError) and not isinstance(method, idn.BoxJenkins)
+    problem = Residuals(truth.arx, stretches(truth.arx, [record], outputs=not white), method)
     x = problem.start(0.9 * truth.theta)
     exact = problem.jacobian(x)
     h = 1e-6

@@ -159,6 +159,21 @@ def test_a_missing_sample_cuts_a_record_in_two(vehicle):
 
 
 @pytest.mark.slow
+def test_a_prior_about_a_simulator_that_is_nearly_right_brings_the_model_nearer(vehicle):
+    """Coefficients of the simulator are 5 % off: half the error of the flight alone, or less."""
+    record = vehicle.record(300, sensors=SENSORS)
+
+    def error(scale, **options):
+        other = Vehicle(na=1, nb=1)
+        other.theta = vehicle.theta * scale
+        model = fitted(vehicle, record, other.without_noise(seed=1), steps=8, **options)
+        return np.linalg.norm(model.theta - vehicle.theta)
+
+    alone = error(1.05)
+    assert error(1.05, prior=True) < 0.5 * alone
+
+
+@pytest.mark.slow
 def test_it_is_closer_than_instruments_and_these_than_least_squares(vehicle):
     """Noise on the sensors biases least squares; instruments only scatter; weights scatter less."""
     record, source = vehicle.record(600, sensors=SENSORS), vehicle.without_noise(seed=1)

@@ -275,3 +275,18 @@ def test_a_long_record_is_compared_in_pieces_spread_over_it():
     assert whole.windows <= 120
     late_bias = record["q"] + 0.02 * (record.time > 1800.0)
     assert "q" in {r.signal for r in check_kinematics(changed(record, q=late_bias)).inconsistent}
+
+
+@pytest.mark.slow
+def test_a_record_is_corrected_by_what_contradicts_the_others(ideal):
+    """A scale and a bias of q, and roll three samples late, are taken off; the others stay."""
+    flight = flown(ideal, 1, noise_db=30.0)
+    late = np.concatenate([np.full(3, np.nan), flight["phi"][:-3]])
+    wrong = flight.with_signals({"q": "rad/s", "phi": "rad"}, q=1.1 * flight["q"] + 0.03, phi=late)
+    mended = wrong.corrected()
+    assert not mended.check_kinematics().inconsistent
+    # what the check bears of a rate: 2 % and .3 deg/s
+    assert np.abs(mended["q"] - flight["q"]).max() < 0.02 * np.abs(flight["q"]).max() + 0.005
+    assert np.nanstd(mended["phi"] - flight["phi"]) < 0.1 * np.nanstd(late - flight["phi"])
+    np.testing.assert_array_equal(mended["theta"], wrong["theta"])
+    assert flight.corrected().values.shape == flight.values.shape

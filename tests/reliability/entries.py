@@ -43,6 +43,7 @@ EXEMPT: dict[str, str] = {
     **{
         f"identification.{name}": RESULT
         for name in (
+            "StateSpaceModel",
             *("AgainstConstant", "Coefficients"),
             *(
                 "Criterion",

@@ -1,0 +1,53 @@
+"""Stability with the scheduling held, as far as the coefficients are known."""
+
+import numpy as np
+import pytest
+from known_systems import flown
+
+import identification as idn
+from symheli.errors import InputError
+
+ARX = idn.LPVARX("y", "u", "p", na=1, nb=1, delay=1, basis=idn.Polynomial(1, -1.0, 1.0))
+
+
+@pytest.fixture(scope="module")
+def model():
+    """y(k) = (1 + .05 p(k-1)) y(k-1) + u(k-1) + e: unstable for p > 0."""
+    rng = np.random.default_rng(0)
+    p, u = np.sin(0.4 * np.arange(400)), rng.normal(size=(400, 1))
+    record = flown(
+        ARX,
+        [lambda p: np.array([[-1.0 - 0.05 * p]])],
+        [lambda p: np.array([[1.0]])],
+        p[:, None],
+        u,
+        noise=1.0,
+    )
+    return idn.fit(ARX, record)
+
+
+def test_the_band_is_that_of_the_coefficient(model):
+    """One pole, growth log(-a)/dt with a = theta' f(p): to first order its deviation is
+    sqrt(f' C f)/(|a| dt).
+    """
+    points = [-0.9, 0.0, 0.9]
+    found = idn.frozen_stability(model, points, draws=300)
+    C = model.covariance[0, :2, 0, :2]
+    for p, growth, low, high in zip(points, found.growth, found.low, found.high, strict=True):
+        f = ARX.basis(p)
+        a = -float(f @ model.theta[:2, 0])
+        spread = np.sqrt(f @ C @ f) / a / model.dt
+        assert growth == pytest.approx(np.log(a) / model.dt)
+        # 300 draws: a standard error of 4 %
+        assert (high - low) / 2 == pytest.approx(1.96 * spread, rel=0.15)
+
+
+def test_where_the_band_crosses_the_axis_nothing_is_known(model):
+    found = idn.frozen_stability(model, [-0.9, 0.0, 0.9])
+    assert found.calls == ("stable", "not known", "unstable")
+    assert "not known at 1: p = 0" in str(found)
+
+
+def test_a_model_without_covariance_is_refused(model):
+    with pytest.raises(InputError, match="gives none"):
+        idn.frozen_stability(model.with_theta(model.theta), [0.0])
