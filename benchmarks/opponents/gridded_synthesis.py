@@ -1,5 +1,5 @@
 """Output feedback of an LPV plant as a user of cvxpy writes it: the existence conditions on a grid,
-X constant, Y quadratic in p, both rates, Clarabel.
+X constant, Y of some degree in p, both rates, Clarabel.
 
 Nothing is said between grid points, the solver's word is taken, and there is no controller yet.
 Source: Wu, Yang, Packard and Becker, Int. J. Robust and Nonlinear Control 6 (1996).
@@ -18,20 +18,25 @@ DEGREE = 2
 
 
 def gain(
-    plant: Callable[[float], Any], low: float, high: float, rate: float, points: int = 11
+    plant: Callable[[float], Any],
+    low: float,
+    high: float,
+    rate: float,
+    points: int = 11,
+    degree: int = DEGREE,
 ) -> float:
     """The least gamma of the plant p -> (A, B1, B2, C1, C2, D11, D12, D21, D22) for |dp/dt| <=
-    `rate`, inf where the solver finds none.
+    `rate` (any, where Y is of degree 0), inf where the solver finds none.
     """
     n = len(plant(low).A)
     X = cp.Variable((n, n), symmetric=True)
-    Ys = [cp.Variable((n, n), symmetric=True) for _ in range(DEGREE + 1)]
+    Ys = [cp.Variable((n, n), symmetric=True) for _ in range(degree + 1)]
     gamma = cp.Variable()
     constraints = []
     for p in np.linspace(low, high, points):
         s = (p - low) / (high - low)
-        Y = sum(s**i * Ys[i] for i in range(DEGREE + 1))
-        slope = sum(i * s ** (i - 1) / (high - low) * Ys[i] for i in range(1, DEGREE + 1))
+        Y = sum(s**i * Ys[i] for i in range(degree + 1))
+        slope = sum(i * s ** (i - 1) / (high - low) * Ys[i] for i in range(1, degree + 1))
         P = plant(float(p))
         nw, nz = P.D11.shape[1], P.D11.shape[0]
         one = np.eye(n)
@@ -48,7 +53,7 @@ def gain(
         )
         constraints.append(_negative(N, M))
         N = _blank(np.hstack([P.B2.T, P.D12.T]), nw)
-        for v in (-rate, rate):
+        for v in (-rate, rate) if degree else (0.0,):
             M = cp.bmat(
                 [
                     [P.A @ Y + Y @ P.A.T - v * slope, Y @ P.C1.T, P.B1],
