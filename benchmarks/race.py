@@ -55,9 +55,8 @@ def present(
     --write asks for it.
     """
     rows = [(r.name, f"{r.value:.3g}", r.verdict) for r in ratios]
-    text = "\n\n".join(
-        [*tables, table("### Ratios", rows, ("", "x", "goal")), *(f"- {note}" for note in notes)]
-    )
+    compared = [table("### Ratios", rows, ("", "x", "goal"))] if rows else []
+    text = "\n\n".join([*tables, *compared, *(f"- {note}" for note in notes)])
     print(json.dumps({r.name: r.value for r in ratios}, indent=1) if options.json else text)
     if options.write:
         keep(section, text)
