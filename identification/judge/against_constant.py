@@ -288,11 +288,11 @@ def against_constant(
     first, note = pair(trim == "moving"), ""
     if trim == "auto" and structure.basis.size > 1:
         if leak > MADE_OF_OUTPUTS:
-            told = (
+            verdict = (
                 f"{100 * leak:.0f} % of what is new in {structure.scheduling} is in the outputs of"
                 " the same instant"
             )
-            note = f"offset_rate is not tried: {told}"
+            note = f"offset_rate is not tried: {verdict}"
         else:
             try:
                 second = pair(True)

@@ -136,9 +136,9 @@ def dependence_report(
         model.require_same_kind(record)
     other = replace(arx, scheduling_at="now" if arx.scheduling_at == "lag" else "lag")
     data, extra = stacked(arx, records), stacked(other, records)
-    common, mine, theirs = np.intersect1d(data.rows, extra.rows, return_indices=True)
-    phi, y, psi = data.phi[mine], data.y[mine], extra.phi[theirs]
-    error, m = data.residuals(model.theta)[mine], len(common)
+    common, of_data, theirs = np.intersect1d(data.rows, extra.rows, return_indices=True)
+    phi, y, psi = data.phi[of_data], data.y[of_data], extra.phi[theirs]
+    error, m = data.residuals(model.theta)[of_data], len(common)
     explained, probability = np.zeros(arx.ny), np.ones(arx.ny)
     for group in arx.groups:
         regressors = arx.regressors(group)

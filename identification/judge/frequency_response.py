@@ -267,8 +267,8 @@ def response_of(
     Srr, Sur, Syr = crossed(R, R), crossed(U, R), crossed(Y, R)
     _refuse_dependent(Srr, inputs if R is U else "references")
     # inputs as far as the references explain them: U itself where they are their own
-    told = np.linalg.solve(Srr, np.swapaxes(np.conj(Sur), 1, 2))  # (f, r, u)
-    Suu, Syu = Sur @ told, Syr @ told
+    solved = np.linalg.solve(Srr, np.swapaxes(np.conj(Sur), 1, 2))  # (f, r, u)
+    Suu, Syu = Sur @ solved, Syr @ solved
     _refuse_dependent(Suu, inputs)
     inverse = np.linalg.inv(Suu)
     G = Syu @ inverse
@@ -281,7 +281,7 @@ def response_of(
     own = np.abs(G) ** 2 / np.maximum(np.einsum("fjj->fj", inverse).real, tiny)[:, None, :]
     coherence = own / np.maximum(own + noise[:, :, None], tiny)
     # the error of G is sum_k left_k Z_k^H, and neighbouring windows share noise by their overlap
-    Z = np.einsum("kfr,fru->kfu", np.conj(R), told @ inverse) / count
+    Z = np.einsum("kfr,fru->kfu", np.conj(R), solved @ inverse) / count
     shared = np.einsum("kfu,kl,lfu->fu", np.conj(Z), found.overlap, Z).real
     level = noise * independent / freedom
     return FrequencyResponse(
@@ -299,9 +299,9 @@ def response_of(
 def _refuse_dependent(S: Array, names: tuple[Signal, ...] | str) -> None:
     size = np.sqrt(np.maximum(np.einsum("kii->ki", S).real, 0.0))
     if np.any(size == 0) or np.linalg.cond(S / (size[:, :, None] * size[:, None, :])).max() > 1e8:
-        told = names if isinstance(names, str) else f"inputs {', '.join(names)}"
+        listed = names if isinstance(names, str) else f"inputs {', '.join(names)}"
         raise ExcitationError(
-            f"the {told} move together, or not at all, at some frequency of the band; excite each"
+            f"the {listed} move together, or not at all, at some frequency of the band; excite each"
             " by itself"
         )
 

@@ -69,11 +69,11 @@ class MatrixEllipsoid(NamedTuple):
         if error.shape[-2:] != (len(self.left), self.right.shape[1]):
             shape = f"(..., {len(self.left)}, {self.right.shape[1]})"
             raise InputError(f"error: expected {shape}, got shape {error.shape}")
-        seen, heard = np.any(self.left, axis=1), np.any(self.right, axis=0)
-        left, right = self.left[np.ix_(seen, seen)], self.right[np.ix_(heard, heard)]
-        D = np.linalg.solve(left, error[..., seen, :][..., heard]) @ np.linalg.inv(right)
+        seen, reached = np.any(self.left, axis=1), np.any(self.right, axis=0)
+        left, right = self.left[np.ix_(seen, seen)], self.right[np.ix_(reached, reached)]
+        D = np.linalg.solve(left, error[..., seen, :][..., reached]) @ np.linalg.inv(right)
         known = np.zeros(error.shape[:-2])
-        for rest in (error[..., ~seen, :], error[..., ~heard]):
+        for rest in (error[..., ~seen, :], error[..., ~reached]):
             known = np.maximum(known, np.abs(rest).max(axis=(-2, -1), initial=0.0))
         return (np.linalg.norm(D, 2, axis=(-2, -1)) <= self.bound) & (known == 0.0)
 
@@ -144,16 +144,16 @@ def matrix_ellipsoid(
             "covariance: expected a symmetric array, P[i, a, j, b] = P[j, b, i, a], with variances"
             " >= 0"
         )
-    seen, heard = np.any(variance > 0, axis=0), np.any(variance > 0, axis=1)
+    seen, reached = np.any(variance > 0, axis=0), np.any(variance > 0, axis=1)
     if not np.any(seen):
         raise InputError(
             "covariance: every coefficient is known exactly; an uncertain model needs a variance"
         )
-    P = P[np.ix_(heard, seen, heard, seen)]
+    P = P[np.ix_(reached, seen, reached, seen)]
     P = 0.5 * (P + P.transpose(2, 3, 0, 1))
     left, right, inflation = _cover(P)
     whole_left, whole_right = np.zeros((n, n)), np.zeros((m, m))
-    whole_left[np.ix_(seen, seen)], whole_right[np.ix_(heard, heard)] = left, right
+    whole_left[np.ix_(seen, seen)], whole_right[np.ix_(reached, reached)] = left, right
     if draws:
         bound = _drawn_radius(P, left, right, float(probability), draws, seed)
     else:

@@ -105,8 +105,8 @@ def unseen_flight(model: KinematicModel, record: FlightRecord) -> UnseenFlight:
     prepared = aero.prepared(record)
     model.aerodynamics.require_same_kind(prepared)
     pooled = np.array([details["sensor_noise"][s] for s in STATES]) ** 2
-    said = details.get("sensor_noise_given", ())
-    found = noise_of_flight(prepared, {s: details["sensor_noise"][s] for s in said})
+    given = details.get("sensor_noise_given", ())
+    found = noise_of_flight(prepared, {s: details["sensor_noise"][s] for s in given})
     told = np.isfinite(found.variances)
     R = np.where(told, found.variances, pooled)
     left = np.array(details["equation_variances"])[:6]

@@ -170,8 +170,8 @@ def closed_loop(run: Run, inputs: Sequence[str], record: FlightRecord, controlle
 
     def inputs_at(k: int, y: Array) -> Array:
         measured = NamedVector(MEASURED, np.append(y, np.linalg.norm(y[:3])))
-        told = NamedVector(trim, reference[k])
-        command = answer(measured, told, NamedVector(COMMANDED, p[k]))
+        conditions = NamedVector(trim, reference[k])
+        command = answer(measured, conditions, NamedVector(COMMANDED, p[k]))
         return (np.asarray(command, float) + added[k])[order]
 
     return _alone(run, inputs_at)

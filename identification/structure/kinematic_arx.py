@@ -184,10 +184,10 @@ def _governed(record: FlightRecord, speed: str, wanted: float | None) -> FlightR
     measured = record.columns([speed])
     change, integral = np.full(len(record), np.nan), np.full(len(record), np.nan)
     if f"{speed}_reference" in record.signals:
-        asked = record[f"{speed}_reference"]
+        commanded = record[f"{speed}_reference"]
     else:
-        asked = np.full(len(record), np.nanmean(measured) if wanted is None else wanted)
-    lacking = asked - measured[:, 0]
+        commanded = np.full(len(record), np.nanmean(measured) if wanted is None else wanted)
+    lacking = commanded - measured[:, 0]
     for piece in pieces(record, measured):
         part = slice(piece.start, piece.stop)
         change[piece.start + 1 : piece.stop] = np.diff(measured[part, 0])

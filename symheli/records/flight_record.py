@@ -129,12 +129,12 @@ class FlightRecord:
         """
         if not columns and units:
             named = ", ".join(f"{name}={name}" for name in units)
-            said = ", ".join(
+            example = ", ".join(
                 f"{n!r}: {u if isinstance(u, str) else '...'!r}" for n, u in units.items()
             )
             raise InputError(
                 "no signals: the second argument is their units, the arrays are given by name:"
-                f" from_arrays(t, {{{said}}}, {named})"
+                f" from_arrays(t, {{{example}}}, {named})"
             )
         record = cls._in_si(time, units, note, columns)
         warn_of_odd_steps(record.time)
@@ -263,9 +263,9 @@ class FlightRecord:
         Units are those that the log declares; `units` gives those it does not, "1" else.
         """
         units = units_of(fields, units)
-        asked = {name: (column, units.get(name, "")) for name, column in fields.items()}
+        chosen = {name: (column, units.get(name, "")) for name, column in fields.items()}
         return replace(
-            cls._from_table(*read_blackbox(path, asked, dt), path),
+            cls._from_table(*read_blackbox(path, chosen, dt), path),
             resampled=f"frames interpolated to {dt:g} s",
         )
 

@@ -248,15 +248,17 @@ def _scale(signal: Signal, found: Faults, limit: float) -> list[str]:
     if scale is None or abs(scale.value - 1) <= max(SCALE, limit * scale.standard_error):
         return []
     other, many = UNITS[signal.unit]
-    size, said = abs(scale.value), []
+    size, advice = abs(scale.value), []
     if scale.value < 0:
-        said.append(f"its sign is turned, or that of {_partner(signal, found)}: change it")
+        advice.append(f"its sign is turned, or that of {_partner(signal, found)}: change it")
     if 1 / SCALE_RATIO < size / many < SCALE_RATIO:
         twice = f" (or {DRIVER[signal]} was converted twice)" if signal in DRIVER else ""
-        said.append(f"its scale is {size:.4g}: it is in {other}, declare that unit{twice}")
+        advice.append(f"its scale is {size:.4g}: it is in {other}, declare that unit{twice}")
     elif abs(size - 1) > max(SCALE, limit * scale.standard_error):
-        said.append(f"it reads {size:.4g} of what {_partner(signal, found)} moves by: divide by it")
-    return said
+        advice.append(
+            f"it reads {size:.4g} of what {_partner(signal, found)} moves by: divide by it"
+        )
+    return advice
 
 
 def _partner(signal: str, found: Faults) -> str:

@@ -31,14 +31,16 @@ def apart(gamma: float, lower: float, rounding: float, answer: Answer) -> tuple[
             " either: rounding limits the bound; drop states that are far faster or slower than"
             " what matters",
         )
-    told = "" if math.isnan(rounding) else "of the model frozen at mid-range the same program finds"
-    told = f"{head}; {told} the gain, but" if told else f"{head}:"
+    cause = (
+        "" if math.isnan(rounding) else "of the model frozen at mid-range the same program finds"
+    )
+    cause = f"{head}; {cause} the gain, but" if cause else f"{head}:"
     if answer is not Answer.SOLVED:
         return (
-            f"{told} this one was not solved to its tolerance: the search did not converge;"
+            f"{cause} this one was not solved to its tolerance: the search did not converge;"
             " take another solver, or fewer segments",
         )
     return (
-        f"{told} this one was solved: P of a higher degree or with more segments may prove less, a"
+        f"{cause} this one was solved: P of a higher degree or with more segments may prove less, a"
         " longer search may find a worse trajectory",
     )

@@ -81,14 +81,14 @@ def gain_against_rate(
     >>> curve.certificates["P(p)", 0.5].verified
     True
     """
-    asked = _checked(rates)
+    wanted = _checked(rates)
     s = _parameter(model)
     if lft and not isinstance(model, LPVStateSpace):
         raise InputError("LFT tests do not apply to an uncertain model: leave out lft=")
     options = {"form": form, "impose": impose, "solver": solver, "search": search}
     found = [
         (CONSTANT if math.isinf(rate) else MOVING, rate, l2_gain(model, rate, **options))
-        for rate in asked
+        for rate in wanted
     ]
     if lft:
         assert isinstance(model, LPVStateSpace)  # noqa: S101
@@ -106,13 +106,13 @@ def gain_against_rate(
 
 
 def _checked(rates: Sequence[float]) -> list[float]:
-    asked = sorted(float(rate) for rate in rates)
-    if not asked or not asked[0] >= 0 or len(set(asked)) < len(asked):
+    wanted = sorted(float(rate) for rate in rates)
+    if not wanted or not wanted[0] >= 0 or len(set(wanted)) < len(wanted):
         raise InputError(
             "rates: expected different numbers >= 0 (math.inf: the parameter may jump), got"
             f" {list(rates)!r:.80}"
         )
-    return asked
+    return wanted
 
 
 def _parameter(model: LPVStateSpace | UncertainStateSpace) -> Scheduling:

@@ -58,7 +58,7 @@ def gain_on_grid(
     known = Status.UNPROVEN if math.isfinite(found) else Status.INFEASIBLE
     status = known if math.isfinite(frozen) else Status.UNSTABLE
     rates = tuple(math.nan if isinstance(s.rate, str) else s.rate for s in moving)
-    said = f"the inequalities hold at {impose.points} values of each parameter: no guarantee"
+    hypothesis = f"the inequalities hold at {impose.points} values of each parameter: no guarantee"
     return Certificate(
         kind="l2 gain",
         gamma=math.inf,
@@ -67,7 +67,7 @@ def gain_on_grid(
         status=status,
         verified=False,
         rates=rates,
-        hypotheses=hypotheses("l2 gain", moving, rates, model, (said,)),
+        hypotheses=hypotheses("l2 gain", moving, rates, model, (hypothesis,)),
         method=f"{type(form).__name__}, {impose.found_by}",
         solver=LYAPUNOV,
         seconds=Seconds(solve=time.perf_counter() - start),

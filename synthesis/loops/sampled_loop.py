@@ -86,10 +86,10 @@ class SampledLoop:
             return f"{begin}nothing is proven of the sampled loop ({frozen}):" + (
                 f" {self.certificate.status}"
             )
-        told = f"{begin}the sampled loop is proven for {self.gamma:.4g} ({frozen})"
+        first = f"{begin}the sampled loop is proven for {self.gamma:.4g} ({frozen})"
         if not promised:
-            return told
-        return f"{told}: {abs(100 * self.loss):.3g} % {'more' if self.loss >= 0 else 'less'}"
+            return first
+        return f"{first}: {abs(100 * self.loss):.3g} % {'more' if self.loss >= 0 else 'less'}"
 
 
 @with_one_thread

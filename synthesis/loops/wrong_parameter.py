@@ -127,12 +127,12 @@ def with_wrong_parameter(
     ends = len(plant.disturbances), len(plant.performance)
     points = leave.basis.points(3) if isinstance(leave.basis, Patches) else np.zeros(0)
     model = _in_balanced_units(open_loop, ends, points, U.shape[1], len(seen))
-    said, probability = "", 1.0
+    sentence, probability = "", 1.0
     if isinstance(plant.model, UncertainStateSpace):
-        said, probability = f"{plant.model.source}; ", plant.model.probability
-    said += f"the controller reads {s.name} wrong by at most {error:g} {s.unit}, in any motion"
+        sentence, probability = f"{plant.model.source}; ", plant.model.probability
+    sentence += f"the controller reads {s.name} wrong by at most {error:g} {s.unit}, in any motion"
     d, v = model.inputs[ends[0] :], model.outputs[ends[1] :]
-    return UncertainStateSpace(model, d, v, 1.0, probability, said)
+    return UncertainStateSpace(model, d, v, 1.0, probability, sentence)
 
 
 class _Opened:
@@ -291,16 +291,16 @@ def _scheduled(given: LinearModel | LPVStateSpace, plant: Plant) -> LPVStateSpac
     """Return K over the parameter of the plant, in its sample period."""
     if isinstance(given, LinearModel):
         given = LPVStateSpace.constant(given, plant.parameters)
-    mine, own = given.parameters, plant.parameters[0]
-    if len(mine) != 1 or mine[0].name != own.name or mine[0].unit != own.unit:
+    read, own = given.parameters, plant.parameters[0]
+    if len(read) != 1 or read[0].name != own.name or read[0].unit != own.unit:
         raise InputError(
-            f"the controller reads {', '.join(s.name for s in mine)}, the plant moves with"
+            f"the controller reads {', '.join(s.name for s in read)}, the plant moves with"
             f" {own.name}: both must be over the same one parameter"
         )
     slack = 1e-9 * (own.high - own.low)
-    if mine[0].low > own.low + slack or mine[0].high < own.high - slack:
+    if read[0].low > own.low + slack or read[0].high < own.high - slack:
         raise InputError(
-            f"the controller is known on [{mine[0].low:g}, {mine[0].high:g}] {own.unit}, the plant"
+            f"the controller is known on [{read[0].low:g}, {read[0].high:g}] {own.unit}, the plant"
             f" on [{own.low:g}, {own.high:g}]: narrow the plant, .with_scheduling(...)"
         )
     if given.states and not same_period(plant.dt, given.dt):

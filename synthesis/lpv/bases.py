@@ -56,12 +56,12 @@ class Bases:
         return [s.name for s, x, y in both if x and y and not _rate_known(s)]
 
     def __str__(self) -> str:
-        said = [
+        texts = [
             f"{name} {_described(basis)}"
             for name, basis in (("X", self.X), ("Y", self.Y))
             if basis is not None
         ]
-        return ", ".join(said)
+        return ", ".join(texts)
 
 
 def _described(basis: FunctionSpace) -> str:

@@ -248,10 +248,10 @@ def _not_measured(plant: Plant) -> list[int]:
     """Return the numbers of the states that the measurements, known exactly, leave to be
     computed.
     """
-    p, said = conditions(plant)
+    p, reasons = conditions(plant)
     at = plant.matrices(p)
     ny = len(plant.measurements)
-    _, _, order = linalg.qr(at.C2[len(said) // 2], pivoting=True)  # type: ignore[misc]
+    _, _, order = linalg.qr(at.C2[len(reasons) // 2], pivoting=True)  # type: ignore[misc]
     kept = sorted(order[ny:])
     own = np.delete(at.C2, kept, axis=-1)
     dependent = own.shape[-2] != own.shape[-1] or any(

@@ -302,8 +302,8 @@ def _controllers(
         if still and design.gamma > _far(min(factors)) * floor:
             yield from central()
             still = False
-        told = ", their rates neglected" if own.shape.unmeasured_rates(plant.parameters) else ""
-        method = f"output feedback, {own.shape}{told}"
+        suffix = ", their rates neglected" if own.shape.unmeasured_rates(plant.parameters) else ""
+        method = f"output feedback, {own.shape}{suffix}"
         made = in_plant_units(plant, design.scaled, design.fit, design.gamma, method)
         made = replace(made, optimum=own.gamma, by_adjoint=own.shape.by_y)
         decides = own.existence.bounded(own.found) and own.existence.largest >= MATRIX_BOUNDS[-1]
@@ -312,11 +312,11 @@ def _controllers(
         yield from central()
 
 
-def _far(asked: float) -> float:
+def _far(wanted: float) -> float:
     """Return the ratio to the least gamma above which a design counts as far from it, where the
     least requested back-off is `asked`.
     """
-    return FAR_ABOVE * max(1.0, asked / BACK_OFF[0])
+    return FAR_ABOVE * max(1.0, wanted / BACK_OFF[0])
 
 
 def _advice(names: Sequence[str]) -> tuple[str, ...]:
@@ -354,12 +354,12 @@ def _designs(
             yield other, design
 
 
-def _limited(made: Controller, asked: float, fastest: float) -> tuple[str, ...]:
+def _limited(made: Controller, wanted: float, fastest: float) -> tuple[str, ...]:
     """Return what may have kept the controller from a lower gamma, or from its limits, a sentence
     each.
     """
     out = []
-    if made.optimum and made.promised > _far(asked) * made.optimum:
+    if made.optimum and made.promised > _far(wanted) * made.optimum:
         out.append(
             f"gamma is {made.promised / made.optimum:.2f} times the least one of the"
             " inequalities: no nearer controller had gains that are smooth in the scheduling"

@@ -262,15 +262,15 @@ def _tried(
         reached = max(reached, level_kept(scaled, existence, found, looped, points))
     further = reached / found.gamma
     if further > MAX_RATE_LOSS:
-        said = RATE_UNMEASURED if further > HOPELESS_RATE_LOSS else "as dp/dt is not known"
-        return None, f"{said}, {further:.3g} times as much"
+        outcome = RATE_UNMEASURED if further > HOPELESS_RATE_LOSS else "as dp/dt is not known"
+        return None, f"{outcome}, {further:.3g} times as much"
     if not all(kept(scaled, gains, loop, points, reached * (1 + LEVEL_TOLERANCE))):
         return None, UNKEPT
     fit = fit_of(scaled, gains, loop, points, reached)
     if fit is None:
         return None, SHARP
-    said = f"frozen loops keep it, functions of p within {fit.misfit:.1e}"
-    return Design(scaled, existence, found._replace(gamma=reached), fit), said
+    outcome = f"frozen loops keep it, functions of p within {fit.misfit:.1e}"
+    return Design(scaled, existence, found._replace(gamma=reached), fit), outcome
 
 
 def simplest(

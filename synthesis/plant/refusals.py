@@ -43,10 +43,10 @@ def conditions(plant: Plant) -> tuple[Array, list[str]]:
     """Return some p all over the box, as `Plant.matrices` takes them, and a name for each."""
     p = lobatto_points(5 if len(plant.parameters) == 1 else 3, plant.nominal.box)
     names = [s.name for s in plant.parameters]
-    said = [
+    texts = [
         ", ".join(f"{n} = {v:g}" for n, v in zip(names, np.atleast_1d(q), strict=True)) for q in p
     ]
-    return p, said
+    return p, texts
 
 
 def least_ranks(
@@ -87,7 +87,7 @@ def require_channels(
     return named
 
 
-def failed(plant: Plant, attempts: Sequence[Attempt], asked: Sequence[str] = ()) -> SynthesisError:
+def failed(plant: Plant, attempts: Sequence[Attempt], wanted: Sequence[str] = ()) -> SynthesisError:
     """Return the error with the reasons: the `asked` options, modes, directions and weights, and
     every program tried.
     """
@@ -101,7 +101,7 @@ def failed(plant: Plant, attempts: Sequence[Attempt], asked: Sequence[str] = ())
         at=said,
         gamma=least if math.isfinite(least) else None,
     )
-    lines = (*asked, *why) or (NOTHING_WRONG,)
+    lines = (*wanted, *why) or (NOTHING_WRONG,)
     return SynthesisError(
         "no controller was found:\n  " + "\n  ".join([*lines, *map(str, attempts)]), tuple(lines)
     )

@@ -97,9 +97,9 @@ def _halves(c: Array, m: int) -> Array:
     best = np.argmax(curvature, axis=1)
     out = []
     for axis in range(m):
-        mine = c[(best == axis)]
-        if len(mine):
-            out += _bisect(mine, axis + 1)
+        own = c[(best == axis)]
+        if len(own):
+            out += _bisect(own, axis + 1)
     return np.concatenate(out)
 
 

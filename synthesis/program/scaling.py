@@ -148,10 +148,10 @@ def block_scaling(lpv: LPVStateSpace, block: NormBounded, gain: float) -> Scalin
     into, out = np.ones(len(lpv.inputs)), np.ones(len(lpv.outputs))
     t = 1.0
     if lpv.inputs[u] and lpv.outputs[y] and 0 < gain < math.inf:
-        heard, felt, around = (_response(lpv, *pair) for pair in ((d, y), (u, v), (d, v)))
+        received, caused, around = (_response(lpv, *pair) for pair in ((d, y), (u, v), (d, v)))
         # a block of almost nothing would ask for a multiplier without limit
-        felt = max(block.bound, 1e-6 / around if around > 0 else 0.0) * felt
-        t = math.sqrt(gain * heard / felt) if heard > 0 and felt > 0 else 1.0
+        caused = max(block.bound, 1e-6 / around if around > 0 else 0.0) * caused
+        t = math.sqrt(gain * received / caused) if received > 0 and caused > 0 else 1.0
         into[d] = gain / t
     out[v] = t * block.bound
     weighed = replace(
@@ -218,10 +218,10 @@ def model_scaling(model: LinearModel, gain: float, elsewhere: Matrices | None = 
     weight = powered(root.T @ symmetrized(Q) @ root * (time if continuous else 1.0), -0.5)
     # state by state, so that their units play no part
     alone = _gramian(A, B, continuous, 0.0), _gramian(A.T, C.T, continuous, 0.0)
-    heard = np.sqrt(np.maximum(np.diag(alone[0]) * np.diag(alone[1]), 0.0))
+    received = np.sqrt(np.maximum(np.diag(alone[0]) * np.diag(alone[1]), 0.0))
     # where no state is both reached and seen but for rounding, what hardly is
     response, silent, hardly = (
-        float(np.sum(heard)),
+        float(np.sum(received)),
         *(np.sqrt(np.trace(c) * np.trace(o)) for c, o in (alone, (Wc, Wo))),
     )
     channel = _channel(gain, response if response > NEGLIGIBLE_RESPONSE * silent else hardly)

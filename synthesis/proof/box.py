@@ -211,9 +211,11 @@ class Evidence(NamedTuple):
         """
         if not self.demand.meaningful(self.model.dt, P.degrees) or math.isinf(bound):
             return False
-        asked = self.model, P, self.demand, bound
-        count = sum(1 for _ in polynomials(*asked, float))
-        every = tracked("verifying in rational arithmetic", polynomials(*asked, rational()), count)
+        statement = self.model, P, self.demand, bound
+        count = sum(1 for _ in polynomials(*statement, float))
+        every = tracked(
+            "verifying in rational arithmetic", polynomials(*statement, rational()), count
+        )
         return all(map(negative_definite_exactly, every)) and self.checked_independently(
             P, bound, rational()
         )

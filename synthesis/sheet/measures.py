@@ -140,8 +140,10 @@ class AxisLoop:
             return math.nan
         top = FASTEST if self.closed.dt is None else 0.999 * math.pi / self.closed.dt
         omega = np.geomspace(1e-3 * top, top, SAMPLES)
-        asked = np.abs(self.closed.select(outputs=["control"]).frequency_response(omega)[:, 0, 0])
-        excess = np.log(asked * omega * self.axis.step / self.rate_limit)
+        commanded = np.abs(
+            self.closed.select(outputs=["control"]).frequency_response(omega)[:, 0, 0]
+        )
+        excess = np.log(commanded * omega * self.axis.step / self.rate_limit)
         above = np.flatnonzero(excess >= 0)
         if not len(above):
             return math.nan

@@ -425,9 +425,9 @@ class _Search:
 
     def failed(self) -> SynthesisError:
         """The error where no start became stable."""
-        p, said = conditions(self.plant)
+        p, reasons = conditions(self.plant)
         why = modes_out_of_reach(
-            self.plant.matrices(p), self.plant.channels, dt=self.plant.dt, at=said
+            self.plant.matrices(p), self.plant.channels, dt=self.plant.dt, at=reasons
         )
         line = (
             "no start led to gains with which every loop is stable: the largest real part of a"

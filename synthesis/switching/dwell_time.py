@@ -207,14 +207,14 @@ def _modes(given: Sequence[Any], jumps: Mapping[Any, Any] | None, dt: float | No
         raise InputError("modes: expected at least one")
     n, period = len(models[0].states), models[0].dt
     if any(len(m.states) != n or m.dt != period for m in models):
-        told = ", ".join(f"{len(m.states)} states, dt {m.dt}" for m in models)
-        raise InputError(f"modes: expected the same states and sample period of all, got {told}")
+        sizes = ", ".join(f"{len(m.states)} states, dt {m.dt}" for m in models)
+        raise InputError(f"modes: expected the same states and sample period of all, got {sizes}")
     count = range(len(models))
     every = {(i, j): np.eye(n) for i in count for j in count if i != j}
-    told = every if jumps is None else dict(jumps)
-    if wrong := [key for key in told if key not in every]:
+    resets = every if jumps is None else dict(jumps)
+    if wrong := [key for key in resets if key not in every]:
         raise InputError(f"jumps: {wrong[0]!r} is no pair of different modes of {len(models)}")
-    own = {key: frozen(J, f"jump {key}", (n, n)) for key, J in told.items()}
+    own = {key: frozen(J, f"jump {key}", (n, n)) for key, J in resets.items()}
     A = tuple(tuple(M[0] for M in pieces(m).models.values()) for m in models)
     return Modes(A, own, period)
 

@@ -140,16 +140,16 @@ class _Frozen(NamedTuple):
         u, y = self.u, self.y
         _, omega = norm(A, B[:, u], C[y], D[np.ix_(y, u)], self.unc.dt)
         if math.isinf(omega):
-            into, heard, out = D[np.ix_(y, self.d)], D[np.ix_(self.v, u)], D[np.ix_(y, u)]
+            into, received, out = D[np.ix_(y, self.d)], D[np.ix_(self.v, u)], D[np.ix_(y, u)]
         else:
             dt = self.unc.dt
             z = 1j * omega if dt is None else np.exp(1j * omega * dt)
             X = np.linalg.solve(z * np.eye(len(A)) - A, B)
             into = C[y] @ X[:, self.d] + D[np.ix_(y, self.d)]
-            heard = G @ X[:, u] + D[np.ix_(self.v, u)]
+            received = G @ X[:, u] + D[np.ix_(self.v, u)]
             out = C[y] @ X[:, u] + D[np.ix_(y, u)]
         left, _, right = np.linalg.svd(out)
-        return np.real(np.outer(np.conj(left[:, 0]) @ into, heard @ np.conj(right[0])))
+        return np.real(np.outer(np.conj(left[:, 0]) @ into, received @ np.conj(right[0])))
 
     def climbed(self, delta: Array, value: float, p: float, bound: float) -> tuple[Array, float]:
         """Return a better Delta at this p, and its value; the same where none was found."""
@@ -159,8 +159,8 @@ class _Frozen(NamedTuple):
             for place in self.unc.places:
                 left, sizes, right = np.linalg.svd(slope[place], full_matrices=False)
                 # where it does not matter Delta stays: directions of no slope are rounding
-                felt = sizes > 1e-8 * max(float(sizes[0]), 1e-300)
-                towards[place] = bound * (left[:, felt] @ right[felt])
+                large = sizes > 1e-8 * max(float(sizes[0]), 1e-300)
+                towards[place] = bound * (left[:, large] @ right[large])
             for share in (1.0, 0.5, 0.2, 0.05):
                 trial = delta + share * (towards - delta)
                 found = self.value(trial, p)
