@@ -74,7 +74,7 @@ def flown(
     data, c = casadi.SX.sym("data", reference.data.shape[1]), casadi.SX.sym("c", 4)
     x, w = casadi.SX.sym("e", e.shape[1]), casadi.SX.sym("w", 3)
     x_r, moving, u_r, K = reference.between(data, c)
-    motion = loop.heli.rhs(x_r + x, u_r + K @ x, w) - moving
+    motion = loop.model.rhs(x_r + x, u_r + K @ x, w) - moving
     rhs = casadi.Function("rhs", [x, w, c, data], [motion]).map(count)
     command = command or Command.held(found, count)
 
@@ -107,14 +107,14 @@ class Command:
     @classmethod
     def held(cls, found: Tube, count: int, airspeed: float | None = None) -> Command:
         """An airspeed for all, by default the first."""
-        p = found.airspeeds[0] if airspeed is None else airspeed
+        p = found.nodes[0] if airspeed is None else airspeed
         zero = np.zeros(count)
         return cls(zero + p, zero, zero, zero)
 
     @classmethod
     def drawn(cls, found: Tube, count: int, rng: np.random.Generator) -> Command:
         """As large as range and limits allow, of rates from slow to fast."""
-        low, high = found.airspeeds[0], found.airspeeds[-1]
+        low, high = found.nodes[0], found.nodes[-1]
         rate = np.exp(rng.uniform(np.log(0.1), np.log(4.0), count))
         a, j, b = found.deviations.reference.limits
         size = np.minimum.reduce([a / rate, j / rate**2, b / rate**3, 0 * rate + (high - low) / 2])
@@ -156,14 +156,14 @@ def worst(found: Tube, airspeed: float | None = None) -> float:
     """The largest sqrt(e'P e) of nonlinear flights from the reference at an airspeed (by default
     the first), each in the gust that drives the linear loop furthest in one direction.
     """
-    loop, p = found.deviations, found.airspeeds[0] if airspeed is None else airspeed
+    loop, p = found.deviations, found.nodes[0] if airspeed is None else airspeed
     i, s = loop.reference.place([p])
     c = casadi.SX.sym("c", 4)
     at = casadi.Function(
         "reference", [c], list(loop.reference.between(loop.reference.data[i[0]], c))
     )
     x, _, u, K = (np.asarray(m) for m in at([s[0], 0, 0, 0]))
-    A, B, E = (np.asarray(m) for m in loop.heli.jacobian(x, u, np.zeros(3)))
+    A, B, E = (np.asarray(m) for m in loop.model.jacobian(x, u, np.zeros(3)))
     root = np.linalg.cholesky(found.at(p))
     rng = np.random.default_rng(0)
     drawn = rng.standard_normal((DIRECTIONS - 2 * len(A), len(A)))

@@ -44,7 +44,7 @@ def test_no_nonlinear_flight_leaves_the_tube(proven):
 @pytest.mark.slow
 def test_the_worst_gust_found_fills_a_good_part_of_the_tube(proven):
     # .4 of its size at least: the tube is not much larger than it must be
-    assert 0.4 < worst(proven, float(proven.airspeeds[-1])) < 1
+    assert 0.4 < worst(proven, float(proven.nodes[-1])) < 1
 
 
 @pytest.mark.slow
