@@ -101,12 +101,21 @@ class Deviations:
         x, moving, u, K = r.between(data, c)
         at = (x + e, u + K @ e, self.gust * w)
         if not isinstance(self.model, Helicopter):
-            rate = self.model(*at) - (0 if moving is None else moving)
+            rate = self.model(*at) - (self.model(x, u, 0) if moving is None else moving)
             return casadi.Function("deviation", [e, w, c, data], [casadi.densify(rate)]), None
         lam = casadi.SX.sym("lam", 2)
         xdot, balance = self.model.implicit(*at, lam)
         function = casadi.Function("deviation", [e, w, c, data, lam], [xdot - moving, balance])
         return function, casadi.Function("inflow", [e, w, c, data], [self.model.inflow(*at)])
+
+    @property
+    def rate(self) -> casadi.Function:
+        """(e, w, c, data) -> de/dt: w in units of `gust`, c as `between` of the reference takes."""
+        function, start = self._functions
+        if start is None:
+            return function
+        at = [casadi.SX.sym(f"in{i}", function.size1_in(i)) for i in range(4)]
+        return casadi.Function("rate", at, [function(*at, start(*at))[0]])
 
     def enclosed(
         self, cells: Sequence[Cell], factors: Array, drifts: Array, share: float = 1.0

@@ -58,8 +58,10 @@ multipliers have no bound.
 """
 FIRST_SIZE = 0.3
 """First half widths, in units of `TUBE_SIZES`."""
-FIRST_GROWTH, GROWTH = 1.5, 1.05
-"""Factors on the half widths from one round of the search to the next."""
+GROWTHS = ((1.5, 1.05), (1.15, 1.05), (1.05, 1.02))
+"""Factors on the half widths in the first round of a search, and from one round to the next: where
+the deviations enclosed were too large for any ellipsoid, a smaller start may lead to one.
+"""
 ROUNDS = 15
 SPARE = 0.02
 """Spare of the inequality in the search, 1/s."""
@@ -517,11 +519,15 @@ def _fills(boxes: Array, whole: Array) -> bool:
     )
 
 
+Grown = tuple[Found | None, Array, Array, str]
+"""What was found, factors, P, why nothing was."""
+
+
 def _found(loop: Deviations, cells: tuple[Cell, ...], sizes: Array, solver: Solver) -> Tube:
     """The search: the ellipsoids over which the equations are enclosed grow until the smallest ones
     that satisfy the inequality lie inside.
     """
-    with task("tube", ROUNDS) as progress:
+    with task("tube", len(GROWTHS)) as progress:
         found, factors, P, why = _grown(loop, cells, sizes, solver, progress)
     if found is None:
         return Tube(loop, P, cells, factors, (), False, why)
@@ -533,8 +539,8 @@ def _found(loop: Deviations, cells: tuple[Cell, ...], sizes: Array, solver: Solv
 
 def _grown(
     loop: Deviations, cells: Sequence[Cell], sizes: Array, solver: Solver, progress: Task
-) -> tuple[Found | None, Array, Array, str]:
-    """(what was found, factors, P, why nothing was)."""
+) -> Grown:
+    """The search over all cells, from the ellipsoids of the linear loop."""
     count = len(loop.reference.nodes)
     roots = np.broadcast_to(FIRST_SIZE * np.diag(sizes), (count, len(sizes), len(sizes)))
     factors = np.broadcast_to(roots[0], (len(cells), *roots[0].shape))
@@ -547,9 +553,28 @@ def _grown(
     found = None if decay is None else smallest(linear, roots, sizes, decay, SPARE, solver)
     if decay is None or found is None:
         return None, factors, P, "the linear loop has no invariant ellipsoid"
-    growth = FIRST_GROWTH
+    made: Grown = (None, factors, P, "")
+    for first, growth in GROWTHS:
+        made = _from_below(loop, cells, sizes, drifts, (decay, first, growth), found.P, solver)
+        if made[0] is not None:
+            break
+        progress.step(made[3])
+    return made
+
+
+def _from_below(
+    loop: Deviations,
+    cells: Sequence[Cell],
+    sizes: Array,
+    drifts: Array,
+    numbers: tuple[float, float, float],
+    P: Array,
+    solver: Solver,
+) -> Grown:
+    """As `_grown`, from the ellipsoids P of the linear loop; numbers: decay and growths."""
+    decay, growth, later = numbers
     for _ in range(ROUNDS):
-        P, growth = found.P / growth**2, GROWTH
+        P, growth = P / growth**2, later
         roots = np.linalg.inv(np.swapaxes(np.linalg.cholesky(P), 1, 2))
         factors = np.array([_around(_ends(P, cell)) for cell in cells])
         over = _enclosed(loop, cells, factors, drifts)
@@ -557,20 +582,16 @@ def _grown(
             return None, factors, P, "the equations have no bounds over a tube of the size needed"
         found = smallest(over, roots, sizes, decay, SPARE, solver)
         if found is None:
-            return (
-                None,
-                factors,
-                P,
-                "no ellipsoid satisfies the inequality: the gusts are too large",
-            )
+            why = "no ellipsoid satisfies the inequality: the gusts are too large"
+            return None, factors, P, why
         least = min(
             np.linalg.eigvalsh(L.T @ end @ L)[0]
             for cell, L in zip(cells, factors, strict=True)
             for end in _ends(found.P, cell)
         )
-        progress.step(f"size {found.size**0.5:.3g}, {least**-0.5:.2f} of the deviations enclosed")
         if least * INSIDE > 1:
             return found, factors, found.P, ""
+        P = found.P
     return None, factors, P, f"the tube still grew after {ROUNDS} rounds"
 
 
