@@ -1,12 +1,12 @@
 """The published contraction metrics of the planar VTOL, checked between the points of a grid.
 
-The stored W and Y are polynomials of degree 4 in phi and vx. The published condition, for all states
-within the box and |w| <= 1, is
+The stored W and Y are polynomials of degree 4 in phi and vx. The published condition, for all
+states within the box and |w| <= 1, is
 
     F = [dW/dt - (A W + B Y) - (A W + B Y)' - lambda W, -Bw; -Bw', mu] >= 0.
 
-Published is then a position within alpha = max(mu, max W_pp / lambda); |p|^2 <= max W_pp mu / lambda
-follows too, and is less. F is affine in vz, in phi' and in w: their ends decide.
+Published is then a position within alpha = max(mu, max W_pp / lambda); |p|^2 <= max W_pp mu /
+lambda follows too, and is less. F is affine in vz, in phi' and in w: their ends decide.
 """
 
 from __future__ import annotations

@@ -79,6 +79,7 @@ EXEMPT: dict[str, str] = {
                 "SpecificationTable",
                 "StructuredController",
                 "Tube",
+                "LocalGain",
             ),
             *(),
             *(),
