@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import casadi
 import numpy as np
@@ -21,7 +21,7 @@ from symheli import Helicopter
 from symheli.errors import InputError
 from synthesis import Tube, tube
 from synthesis.tubes.deviations import Cell, Deviations
-from synthesis.tubes.reference import TUBE_SIZES, moving
+from synthesis.tubes.reference import TUBE_SIZES, Reference, moving
 
 Array = np.ndarray
 
@@ -116,7 +116,7 @@ class Command:
         """As large as range and limits allow, of rates from slow to fast."""
         low, high = found.nodes[0], found.nodes[-1]
         rate = np.exp(rng.uniform(np.log(0.1), np.log(4.0), count))
-        a, j, b = found.deviations.reference.limits
+        a, j, b = cast(Reference, found.deviations.reference).limits
         size = np.minimum.reduce([a / rate, j / rate**2, b / rate**3, 0 * rate + (high - low) / 2])
         size = size if high > low else 0 * rate
         middle = rng.uniform(low + size, high - size)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import casadi
 import numpy as np
@@ -73,16 +74,18 @@ class Deviations:
         return own.vehicle.name if isinstance(own, Helicopter) else own.name()
 
     @property
+    def _named(self) -> Any:
+        return self.reference if isinstance(self.reference, Motions) else self.model
+
+    @property
     def states(self) -> tuple[str, ...]:
         """Names of the states."""
-        own = self.model if isinstance(self.model, Helicopter) else self.reference
-        return tuple(own.states)
+        return tuple(self._named.states)
 
     @property
     def inputs(self) -> tuple[str, ...]:
         """Names of the controls."""
-        own = self.model if isinstance(self.model, Helicopter) else self.reference
-        return tuple(own.inputs)
+        return tuple(self._named.inputs)
 
     @property
     def disturbances(self) -> int:

@@ -45,9 +45,20 @@ class LocalGain:
     multipliers : tuple of Multipliers
         Of each cell; their `wind` is (gamma gust)^2.
     bias : float
-        What the reference misses of the equations, per second: 1e-9 gamma^2 gust^2 or less for a
-        held one.
+        What the reference misses of the equations, per second.
     states : tuple of str
+        Of the model.
+
+    Examples
+    --------
+    >>> import casadi
+    >>> from synthesis import Motions, tube
+    >>> x, u, w, c = (casadi.SX.sym(n, k) for n, k in (("x", 1), ("u", 1), ("w", 1), ("c", 0)))
+    >>> model = casadi.Function("cubic", [x, u, w], [u - x**3 + w])
+    >>> rest = casadi.Function("rest", [c], [casadi.SX(0), casadi.SX(0)])
+    >>> found = tube(model, Motions(rest, [[-1.0]]), gust=0.1, sizes=[0.1]).with_gain(["x0"])
+    >>> 1 <= found.gains[0].gamma < 1.02
+    True
     """
 
     outputs: tuple[str, ...]
@@ -146,7 +157,9 @@ def least(
         return None
     scale = size**2
     made = [
-        Multipliers(*(scale * m for m in by[:3]), ABOVE * scale * by.wind, 0.0)
+        Multipliers(
+            scale * by.tube, scale * by.gust, scale * by.terms, ABOVE * scale * by.wind, 0.0
+        )
         for by in found.multipliers
     ]
     return LocalGain(

@@ -211,8 +211,8 @@ class Tube:
         --------
         >>> import symheli
         >>> found = tube(symheli.Helicopter.load("xcell60", governor="ideal"), 3.0, gust=0.1)
-        >>> print(f"{found.with_gain(['theta']).gains[0].gamma:.3f} rad/(m/s)")
-        ... # doctest: +SKIP
+        >>> print(f"{found.with_gain(['theta']).gains[0].gamma:.4f} rad/(m/s)")
+        0.0043 rad/(m/s)
         """
         if not self.proven:
             raise InputError(f"only a proven tube has gains; here {self.why}")
@@ -401,7 +401,9 @@ def tube(
     return _found(loop, tuple(_cells(made)), own, solver or Solver(tolerance=TOLERANCE))
 
 
-def _flight(heli: Helicopter, airspeed: Any, limits: tuple[float, ...], gain: Any) -> Reference:
+def _flight(
+    heli: Helicopter, airspeed: Any, limits: tuple[float, float, float], gain: Any
+) -> Reference:
     """The reference of a helicopter."""
     if heli.governor != "ideal" or len(heli.states) != 10:
         raise InputError(
