@@ -77,7 +77,7 @@ def motions(case: Case) -> Motions:
     nodes, rate = np.linspace(-limit, limit, case.nodes), np.radians(case.turn)
     return Motions(
         casadi.Function("banked", [c], [x, u]),
-        [regulator(bank, case) for bank in nodes],
+        np.array([regulator(bank, case) for bank in nodes]),
         schedule=nodes,
         rate=(-rate, rate),
         others=[thrusts],
