@@ -119,6 +119,12 @@ class Metric:
         W = self.at(x)[0]
         return casadi.Function("position", [x], [_lower(size * casadi.SX.eye(2) - W[:2, :2])])
 
+    @property
+    def positive(self) -> casadi.Function:
+        """(phi, vx) -> W."""
+        x = casadi.SX.sym("x", 2)
+        return casadi.Function("metric", [x], [_lower(self.at(x)[0])])
+
     def smallest(self) -> tuple[float, float, float]:
         """(lambda, mu, W_pp) of the smallest tube on a grid, with spare; proves nothing."""
         phi, vx = (np.linspace(-LIMITS[n], LIMITS[n], GRID) for n in ("phi", "vx"))

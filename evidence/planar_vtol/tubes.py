@@ -102,7 +102,8 @@ def published(name: str) -> tuple[float, float, float, str]:
     """(tube claimed, tube proven of the same metric, position flown, where the claim fails)."""
     metric = Metric.stored(name)
     lam, mu, size = metric.smallest()
-    holds = proven_positive(metric.position(size)) and proven_positive(metric.condition(lam, mu))
+    needed = (metric.positive, metric.position(size), metric.condition(lam, mu))
+    holds = all(map(proven_positive, needed))
     place = refuted(metric, metric.tube)
     where = "" if place is None else ", ".join(f"{v:.4g}" for v in place[0])
     found = (size * mu / lam) ** 0.5 if holds else np.inf
