@@ -27,6 +27,8 @@ ARRAYS = ("airspeeds", "steady", "jerk", "snap", "gain")
 def numbers(values: Any, *shape: int) -> Array:
     """Finite numbers of this shape; raises `ValueError` for others."""
     read = np.asarray(values, float)
+    if not read.size and 0 in shape:
+        read = read.reshape(shape)
     if read.shape != shape or not np.all(np.isfinite(read)):
         raise ValueError(f"expected finite numbers of shape {shape}, got {read.shape}")
     return read
