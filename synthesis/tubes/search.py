@@ -31,7 +31,7 @@ CONSTANT = Polynomial(0, 0.0, 1.0)
 
 
 CONSTANT_SPARE = 1e-6
-"""Spare of the constant in the inequalities, 1/s."""
+"""Spare of the constant in the inequality of a gain, 1/s: its bias is no less."""
 PRICE = 1e-8
 """Cost of the traces of multipliers: they stay finite where nothing else bounds them."""
 NEGLIGIBLE = 1e-12
@@ -206,20 +206,21 @@ class _Inequality:
     def is_invariant(self) -> None:
         """Impose that the ellipsoid is."""
         by = self._multipliers()
-        self._impose(invariant(by, self.over.corners.shape[-2:]))
+        self._impose(invariant(by, self.over.corners.shape[-2:]), self.spare)
         self.program.nonnegative(POINT, by.wind)
 
     def is_bounded(self, output: Array) -> None:
         """Impose the growth of V by the price."""
         by, bias = self._multipliers(), self.program.value(self.bias[0])
         shape = self.over.corners.shape[-2:]
-        self._impose(bounded(by.wind, bias, output @ self.cell.factor, shape))
+        self._impose(bounded(by.wind, bias, output @ self.cell.factor, shape), CONSTANT_SPARE)
 
     def _multipliers(self) -> Multipliers:
         values = {name: self.program.value(v) for name, v in self.variables.items()}
         return Multipliers(decay=self.decay, **values)
 
-    def _impose(self, supply: Array) -> None:
+    def _impose(self, supply: Array, constant: float) -> None:
+        """Impose the inequality with the spare, of the constant another."""
         program, cell = self.program, self.cell
         nodes = []
         for variable, i in zip(self.given, cell.nodes, strict=True):
@@ -229,7 +230,7 @@ class _Inequality:
         values = [program.value(v) for v in self.shares]
         X = [Shares(*values[k : k + 3]) for k in range(0, len(values), 3)]
         bounds, falls = conditions(P, X, self.over, self._multipliers(), supply)
-        least = program.known(np.diag([self.spare] * (len(supply[0, 0]) - 1) + [CONSTANT_SPARE]))
+        least = program.known(np.diag([self.spare] * (len(supply[0, 0]) - 1) + [constant]))
         for F in [*bounds, *(M - least for M in falls)]:
             program.positive(POINT, F)
         self.cost = np.zeros(program.count)
