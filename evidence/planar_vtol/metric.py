@@ -53,8 +53,8 @@ class Metric:
         """The metric "position" (lambda 1.2) or "all" (lambda 1.4), with its tube in position."""
         content = json.loads(STORED.read_text(encoding="utf-8"))
         own = content["metrics"][name]
-        parts = (np.array(own[key]) for key in ("W", "Y"))
-        return cls(*parts, np.array(content["monomials"]), own["tubes"]["tube_xz"])
+        W, Y = np.array(own["W"]), np.array(own["Y"])
+        return cls(W, Y, np.array(content["monomials"]), own["tubes"]["tube_xz"])
 
     def at(self, x: Any) -> tuple[Any, Any, Any, Any]:
         """W, Y, and the slopes of W by phi and by vx, in CasADi; x = (phi, vx)."""
