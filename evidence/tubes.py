@@ -1,5 +1,6 @@
-"""`python -m evidence.tubes`: the largest gusts for which a tube is proven at held airspeeds, and
-tubes along ranges of airspeed, beside the worst gusts found, of both packaged helicopters.
+"""`python -m evidence.tubes`: the largest gusts for which a tube is proven at held airspeeds, tubes
+along ranges of airspeed, beside the worst gusts found, of both packaged helicopters; gains on
+tubes; the planar VTOL.
 """
 
 from __future__ import annotations
@@ -7,18 +8,20 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import casadi
 import numpy as np
 from scipy.linalg import expm
 
+from evidence import tube_gains
+from evidence.planar_vtol import tubes as planar_vtol
 from evidence.tables import DOCS, keep, markdown
 from symheli import Helicopter
 from symheli.errors import InputError
 from synthesis import Tube, tube
 from synthesis.tubes.deviations import Cell, Deviations
-from synthesis.tubes.reference import TUBE_SIZES, moving
+from synthesis.tubes.reference import TUBE_SIZES, Reference, moving
 
 Array = np.ndarray
 
@@ -71,17 +74,14 @@ def flown(
     """
     loop, count = found.deviations, len(e)
     reference = loop.reference
-    data, c = casadi.SX.sym("data", reference.data.shape[1]), casadi.SX.sym("c", 4)
-    x, w = casadi.SX.sym("e", e.shape[1]), casadi.SX.sym("w", 3)
-    x_r, moving, u_r, K = reference.between(data, c)
-    motion = loop.heli.rhs(x_r + x, u_r + K @ x, w) - moving
-    rhs = casadi.Function("rhs", [x, w, c, data], [motion]).map(count)
+    rhs = loop.rate.map(count)
     command = command or Command.held(found, count)
 
     def rate(e: Array, w: Array, t: float) -> Array:
         p, *rest = command.at(t)
         i, s = reference.place(p)
-        return np.asarray(rhs(e.T, w.T, np.stack([s, *rest]), reference.data[i].T)).T
+        size = w.T / (loop.gust or 1.0)
+        return np.asarray(rhs(e.T, size, np.stack([s, *rest]), reference.data[i].T)).T
 
     most = np.zeros(count)
     for k in range(steps):
@@ -107,16 +107,16 @@ class Command:
     @classmethod
     def held(cls, found: Tube, count: int, airspeed: float | None = None) -> Command:
         """An airspeed for all, by default the first."""
-        p = found.airspeeds[0] if airspeed is None else airspeed
+        p = found.nodes[0] if airspeed is None else airspeed
         zero = np.zeros(count)
         return cls(zero + p, zero, zero, zero)
 
     @classmethod
     def drawn(cls, found: Tube, count: int, rng: np.random.Generator) -> Command:
         """As large as range and limits allow, of rates from slow to fast."""
-        low, high = found.airspeeds[0], found.airspeeds[-1]
+        low, high = found.nodes[0], found.nodes[-1]
         rate = np.exp(rng.uniform(np.log(0.1), np.log(4.0), count))
-        a, j, b = found.deviations.reference.limits
+        a, j, b = cast(Reference, found.deviations.reference).limits
         size = np.minimum.reduce([a / rate, j / rate**2, b / rate**3, 0 * rate + (high - low) / 2])
         size = size if high > low else 0 * rate
         middle = rng.uniform(low + size, high - size)
@@ -156,20 +156,19 @@ def worst(found: Tube, airspeed: float | None = None) -> float:
     """The largest sqrt(e'P e) of nonlinear flights from the reference at an airspeed (by default
     the first), each in the gust that drives the linear loop furthest in one direction.
     """
-    loop, p = found.deviations, found.airspeeds[0] if airspeed is None else airspeed
+    loop, p = found.deviations, found.nodes[0] if airspeed is None else airspeed
     i, s = loop.reference.place([p])
-    c = casadi.SX.sym("c", 4)
-    at = casadi.Function(
-        "reference", [c], list(loop.reference.between(loop.reference.data[i[0]], c))
-    )
-    x, _, u, K = (np.asarray(m) for m in at([s[0], 0, 0, 0]))
-    A, B, E = (np.asarray(m) for m in loop.heli.jacobian(x, u, np.zeros(3)))
+    c, data = np.array([s[0], 0, 0, 0]), loop.reference.data[i[0]]
+    e, w = casadi.SX.sym("e", len(loop.states)), casadi.SX.sym("w", 3)
+    rate = loop.rate(e, w, c, data)
+    slopes = casadi.Function("AE", [e, w], [casadi.jacobian(rate, e), casadi.jacobian(rate, w)])
+    A, E = (np.asarray(m) for m in slopes(np.zeros(len(loop.states)), np.zeros(3)))
     root = np.linalg.cholesky(found.at(p))
     rng = np.random.default_rng(0)
     drawn = rng.standard_normal((DIRECTIONS - 2 * len(A), len(A)))
     unit = np.vstack([np.eye(len(A)), -np.eye(len(A)), drawn])
     adjoint = (root @ unit.T).T  # direction of e'P e at the end
-    back, rows = expm((A + B @ K).T * STEP), []
+    back, rows = expm(A.T * STEP), []
     for _ in range(HORIZON):
         rows.append(adjoint @ E)
         adjoint = adjoint @ back.T
@@ -265,7 +264,9 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help="keep the tables in docs/tubes.md")
     parser.add_argument("--quick", action="store_true", help="one helicopter at 0 and 8 m/s")
     parser.add_argument(
-        "--only", choices=("amplitudes", "transitions", "remainders"), help="one of the tables"
+        "--only",
+        choices=("amplitudes", "transitions", "remainders", "gains", "vtol"),
+        help="one of the tables",
     )
     given = parser.parse_args()
     if given.write and given.quick:
@@ -274,6 +275,8 @@ def main() -> None:
         "amplitudes": lambda: table(VEHICLES, AIRSPEEDS),
         "transitions": lambda: transitions(TRANSITIONS, FLIGHTS, SECONDS),
         "remainders": lambda: remainders(INTERVALS),
+        "gains": tube_gains.table,
+        "vtol": planar_vtol.table,
     }
     if given.quick:
         makers = {"amplitudes": lambda: table(VEHICLES[:1], (0.0, 8.0))}

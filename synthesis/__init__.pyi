@@ -111,15 +111,13 @@ from synthesis.switching.dwell_time import DwellTime as DwellTime
 from synthesis.switching.dwell_time import dwell_time as dwell_time
 from synthesis.switching.switched import SwitchedController as SwitchedController
 from synthesis.switching.switched import switched as switched
+from synthesis.tubes.gain import LocalGain as LocalGain
+from synthesis.tubes.motions import Motions as Motions
+from synthesis.tubes.tube import Tube as Tube
+from synthesis.tubes.tube import tube as tube
 from synthesis.worst.frozen import frozen_gain as frozen_gain
 from synthesis.worst.lft import frozen_box_gain as frozen_box_gain
 from synthesis.worst.lower_bound import Search as Search
 from synthesis.worst.lower_bound import lower_bound as lower_bound
 
 __version__: str
-from synthesis.tubes.tube import (
-    Tube as Tube,
-)
-from synthesis.tubes.tube import (
-    tube as tube,
-)

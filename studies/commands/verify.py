@@ -94,7 +94,7 @@ def _tube(file: str) -> tuple[None, str, dict[str, Any]]:
         {
             "file": file,
             "kind": "invariant tube",
-            "airspeeds": found.airspeeds.tolist(),
+            "airspeeds": found.nodes.tolist(),
             "gust": found.deviations.gust,
             "half_widths": found.half_widths.tolist(),
             "exact": found.proven,

@@ -1,5 +1,9 @@
-"""Invariant tubes: sets that the nonlinear helicopter does not leave, whatever the gusts."""
+"""Invariant tubes: sets that a nonlinear helicopter, or any other model, does not leave, whatever
+the gusts.
+"""
 
+from synthesis.tubes.gain import LocalGain
+from synthesis.tubes.motions import Motions
 from synthesis.tubes.tube import Tube, tube
 
-__all__ = ["Tube", "tube"]
+__all__ = ["LocalGain", "Motions", "Tube", "tube"]

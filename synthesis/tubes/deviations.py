@@ -1,10 +1,11 @@
-"""Deviations of a helicopter from its reference under state feedback, over ellipsoids."""
+"""Deviations of a nonlinear model from its reference under state feedback, over ellipsoids."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import casadi
 import numpy as np
@@ -14,33 +15,39 @@ from symheli.enclosure import AffineForm, Domain, enclose, segment_averages
 from symheli.enclosure.form import EPS
 from symheli.values.summary import summarized
 from synthesis.tubes.inequality import ROUNDED, ROUNDED_UP, MatrixSet, elementwise, rank_one
+from synthesis.tubes.motions import Motions
 from synthesis.tubes.reference import Reference
 
 Array = np.ndarray
 
-JACOBIAN_PARTS, DRIFT_PARTS = (4, 4), (16, 16)
-"""Parts of a cell along airspeed and acceleration over which the Jacobian, and the drift of the
-reference, are enclosed.
-"""
 SMALL = 1e-3
 """Rate, 1/s, up to which a term is part of the remainder: the deviations' change over their size.
 """
+CORNERS = 3
+"""Commands at whose ends the inequality is checked; the others are terms of the remainder."""
 
 
 @dataclass(frozen=True)
 class Cell:
-    """Commands between two nodes of the airspeed: shares `s` of the way from one to the other and
-    accelerations `a`, m/s^2, each (lower, upper).
+    """Commands between two nodes of the scheduling command: shares `s` of the way from one to the
+    other, its rates `a`, as accelerations in m/s^2, and `others` that cells split, each (lower,
+    upper).
     """
 
     interval: int
     s: tuple[float, float]
     a: tuple[float, float]
+    others: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def ranges(self) -> tuple[tuple[float, float], ...]:
+        """Of s, a and the others."""
+        return (self.s, self.a, *self.others)
 
     @property
     def domain(self) -> tuple[Array, Array]:
-        """Centre and half widths of (s, a), which cover the cell."""
-        lower, upper = np.array([self.s, self.a]).T
+        """Centre and half widths of the ranges, which cover the cell."""
+        lower, upper = np.array(self.ranges).T
         centre = 0.5 * (lower + upper)
         half = np.maximum(upper - centre, centre - lower)
         return centre, np.where(half > 0, np.nextafter(half, np.inf), 0.0)
@@ -50,25 +57,68 @@ class Cell:
 class Deviations:
     """de/dt of e = x - x_r with u = u_r + K e in gusts of amplitude `gust`.
 
-    gust: m/s, body axes, any direction.
+    model: a helicopter with its `Reference`, or any dx/dt = f(x, u, w) with its `Motions`. gust:
+    m/s, body axes, any direction; or the size of w.
     """
 
-    heli: Helicopter
-    reference: Reference
+    model: Helicopter | casadi.Function
+    reference: Reference | Motions
     gust: float
 
     __repr__ = summarized
 
+    @property
+    def name(self) -> str:
+        """Of the vehicle, or of the model's function."""
+        own = self.model
+        return own.vehicle.name if isinstance(own, Helicopter) else own.name()
+
+    @property
+    def _named(self) -> Any:
+        return self.reference if isinstance(self.reference, Motions) else self.model
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states."""
+        return tuple(self._named.states)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the controls."""
+        return tuple(self._named.inputs)
+
+    @property
+    def disturbances(self) -> int:
+        """Number of components of w."""
+        return 3 if isinstance(self.model, Helicopter) else self.model.size1_in(2)
+
     @cached_property
-    def _functions(self) -> tuple[casadi.Function, casadi.Function]:
-        """(e, w, c, data, lam) -> de/dt, balance of the inflow; (e, w, c, data) -> lam."""
-        e, w, lam = (casadi.SX.sym(name, k) for name, k in (("e", 10), ("w", 3), ("lam", 2)))
-        c, data = casadi.SX.sym("c", 4), casadi.SX.sym("data", self.reference.data.shape[1])
-        x, moving, u, K = self.reference.between(data, c)
+    def _functions(self) -> tuple[casadi.Function, casadi.Function | None]:
+        """(e, w, c, data) -> de/dt; of a helicopter (e, w, c, data, lam) -> de/dt, balance of the
+        inflow, with (e, w, c, data) -> lam.
+        """
+        r = self.reference
+        sizes = (len(self.states), self.disturbances, 1 + len(r.ranges) + len(r.whole))
+        e, w, c = (casadi.SX.sym(name, k) for name, k in zip("ewc", sizes, strict=True))
+        data = casadi.SX.sym("data", r.data.shape[1])
+        x, moving, u, K = r.between(data, c)
         at = (x + e, u + K @ e, self.gust * w)
-        xdot, balance = self.heli.implicit(*at, lam)
+        if not isinstance(self.model, Helicopter):
+            rate = self.model(*at) - (self.model(x, u, 0) if moving is None else moving)
+            return casadi.Function("deviation", [e, w, c, data], [casadi.densify(rate)]), None
+        lam = casadi.SX.sym("lam", 2)
+        xdot, balance = self.model.implicit(*at, lam)
         function = casadi.Function("deviation", [e, w, c, data, lam], [xdot - moving, balance])
-        return function, casadi.Function("inflow", [e, w, c, data], [self.heli.inflow(*at)])
+        return function, casadi.Function("inflow", [e, w, c, data], [self.model.inflow(*at)])
+
+    @property
+    def rate(self) -> casadi.Function:
+        """(e, w, c, data) -> de/dt: w in units of `gust`, c as `between` of the reference takes."""
+        function, start = self._functions
+        if start is None:
+            return function
+        at = [casadi.SX.sym(f"in{i}", function.size1_in(i)) for i in range(4)]
+        return casadi.Function("rate", at, [function(*at, start(*at))[0]])
 
     def enclosed(
         self, cells: Sequence[Cell], factors: Array, drifts: Array, share: float = 1.0
@@ -80,33 +130,38 @@ class Deviations:
         the part of J that is linear in (e, w) is halved.
         """
         function, start = self._functions
-        zero, calm = np.zeros(factors.shape[-1]), np.zeros(3)
+        m, whole = self.disturbances, len(self.reference.whole)
+        zero, calm = np.zeros(factors.shape[-1]), np.zeros(m)
         found: list[MatrixSet | None] = []
         for cell, factor, drift in zip(cells, factors, drifts, strict=True):
-            places, widths, commands, data = self._parts(cell, JACOBIAN_PARTS)
+            places, widths, commands, data = self._parts(cell, self.reference.jacobian_parts)
             ellipsoid = Domain.ellipsoid(zero, share * factor)
-            over = (ellipsoid, Domain.ellipsoid(calm, share * np.eye(3)), commands, data)
+            over = (ellipsoid, Domain.ellipsoid(calm, share * np.eye(m)), commands, data)
             average, symbols = segment_averages(function, *over, along=[0, 1], start=start)
             if np.all(np.isfinite(average.rest)):
-                own = _covered(average, symbols, places, widths)
-                found.append(_matrix_set(own, symbols, drift, factor))
+                own = _covered(average, symbols, places, widths, whole)
+                found.append(_matrix_set(own, symbols, drift, factor, m))
             else:
                 found.append(None)
         return found
 
     def drifts(self, cells: Sequence[Cell]) -> Array:
-        """For each cell f(x_r, u_r, 0) - dx_r/dt: centre, rest and the parts linear in the jerk and
-        its derivative, (N, 4, n). Infinite where there is no bound.
+        """For each cell f(x_r, u_r, 0) - dx_r/dt: centre, rest and the parts linear in the commands
+        that cells do not split (jerk and its derivative), (N, 2 + k, n). Infinite where there is no
+        bound; 0 where the reference is a motion of the equations.
         """
+        n, whole = len(self.states), len(self.reference.whole)
+        if not self.reference.drifts:
+            return np.zeros((len(cells), 2 + whole, n))
         function, start = self._functions
-        n = len(self.heli.states)
-        still = (Domain.point(np.zeros(n)), Domain.point(np.zeros(3)))
+        still = (Domain.point(np.zeros(n)), Domain.point(np.zeros(self.disturbances)))
         found = []
         for cell in cells:
-            _, _, commands, data = self._parts(cell, DRIFT_PARTS)
+            _, _, commands, data = self._parts(cell, self.reference.drift_parts)
             value = enclose(function, *still, commands, data, start=start).value
-            by = value.slopes[..., 2:4]
-            radius = (np.abs(value.slopes[..., :2]).sum(axis=-1) + value.rest) * ROUNDED_UP
+            split = value.slopes.shape[-1] - whole
+            by = value.slopes[..., split:]
+            radius = (np.abs(value.slopes[..., :split]).sum(axis=-1) + value.rest) * ROUNDED_UP
             lower, upper = (value.centre - radius).min(axis=0), (value.centre + radius).max(axis=0)
             middle, linear = 0.5 * (lower + upper), by.mean(axis=0)
             rest = upper - middle + np.abs(by - linear).max(axis=0).sum(axis=-1)
@@ -114,9 +169,9 @@ class Deviations:
             found.append([middle, rest * ROUNDED_UP, *linear.T])
         return np.array(found)
 
-    def _parts(self, cell: Cell, parts: tuple[int, int]) -> tuple[Array, Array, Domain, Domain]:
-        """A cell in so many parts along s and a, with every jerk and its derivative: the parts'
-        places (N, 2) and half widths (2,) in units of the cell's half widths, the commands, and the
+    def _parts(self, cell: Cell, parts: Sequence[int]) -> tuple[Array, Array, Domain, Domain]:
+        """A cell in so many parts along each of its ranges, with all the other commands: the parts'
+        places (N, r) and half widths (r,) in units of the cell's half widths, the commands, and the
         data of the reference.
         """
         centre, half = cell.domain
@@ -124,27 +179,32 @@ class Deviations:
             np.arange(1 - k, k, 2) / k if h > 0 else np.zeros(1)
             for k, h in zip(parts, half, strict=True)
         ]
-        places = np.stack(np.meshgrid(*split, indexing="ij"), axis=-1).reshape(-1, 2)
+        places = np.stack(np.meshgrid(*split, indexing="ij"), axis=-1).reshape(-1, len(half))
         centres = centre + half * places
         own = half / [len(side) for side in split] + 4 * EPS * (np.abs(centre) + half)
         own, unit = np.where(half > 0, own, 0.0), np.where(half > 0, half, 1.0)
-        free = [limit if np.isfinite(limit) else 0.0 for limit in self.reference.limits[1:]]
+        whole = self.reference.whole
+        size = len(half) + len(whole)
         commands = Domain(
-            np.hstack([centres, np.zeros((len(places), 2))]), np.diag([*own, *free]), (1, 1, 1, 1)
+            np.hstack([centres, np.zeros((len(places), len(whole)))]),
+            np.diag([*own, *whole]),
+            (1,) * size,
         )
         data = Domain.point(self.reference.data[cell.interval])
         return (centres - centre) / unit, own / unit, commands, data
 
 
-def _covered(forms: AffineForm, symbols: int, places: Array, widths: Array) -> AffineForm:
-    """One form of a cell that covers those of its parts, linear in all of s and a.
+def _covered(
+    forms: AffineForm, symbols: int, places: Array, widths: Array, whole: int
+) -> AffineForm:
+    """One form of a cell that covers those of its parts, linear in all of its ranges.
 
-    `forms` (parts, n, .): their symbols are those of the domains, the last four s, a, j and b, and
-    of kinks.
+    `forms` (parts, n, .): their symbols are those of the domains, the last ones those of the ranges
+    and of `whole` other commands, and of kinks.
     """
     weights = np.linalg.pinv(np.hstack([np.ones((len(places), 1)), places]))
     centre, *by = np.tensordot(weights, forms.centre, axes=1)
-    slopes, command = forms.slopes[..., :symbols].mean(axis=0), slice(symbols - 4, symbols - 2)
+    slopes, command = forms.slopes[..., :symbols].mean(axis=0), _commands(symbols, places, whole)
     slopes[..., command] = np.stack(by, axis=-1)
     missed = np.abs(forms.centre - centre - np.tensordot(places, np.array(by), axes=1))
     own = slopes.copy()
@@ -163,6 +223,11 @@ def _covered(forms: AffineForm, symbols: int, places: Array, widths: Array) -> A
     )
 
 
+def _commands(symbols: int, places: Array, whole: int) -> slice:
+    """The symbols of the ranges of a cell."""
+    return slice(symbols - whole - places.shape[1], symbols - whole)
+
+
 def _common_kinks(slopes: Array) -> tuple[Array, Array]:
     """Factors of numbers in [-1, 1] that differ from part to part (parts, n, ., k): one for all,
     and the sizes of what that leaves (n, .).
@@ -177,19 +242,21 @@ def _common_kinks(slopes: Array) -> tuple[Array, Array]:
     return main * np.abs(share).max(axis=0) * ROUNDED_UP, left.max(axis=0).sum(axis=-1)
 
 
-def _matrix_set(average: AffineForm, symbols: int, drift: Array, factor: Array) -> MatrixSet:
+def _matrix_set(
+    average: AffineForm, symbols: int, drift: Array, factor: Array, m: int
+) -> MatrixSet:
     n = len(factor)
-    q = n + 4
-    units = np.concatenate([np.linalg.norm(factor, axis=1), np.ones(4)])
+    q = n + m + 1
+    units = np.concatenate([np.linalg.norm(factor, axis=1), np.ones(m + 1)])
     slopes = np.zeros((average.slopes.shape[-1], n, q))
     slopes[..., :-1] = np.moveaxis(average.slopes, -1, 0)
-    slopes[symbols - 2 : symbols, :, -1] = drift[2:]
-    tube, gust, command = slopes[:n], slopes[n : n + 3], slopes[n + 3 : symbols]
+    slopes[symbols - len(drift) + 2 : symbols, :, -1] = drift[2:]
+    tube, gust, command = slopes[:n], slopes[n : n + m], slopes[n + m : symbols]
     centre, rest = np.zeros((n, q)), np.zeros((n, q))
     centre[:, :-1], centre[:, -1] = average.centre, drift[0]
     rest[:, :-1], rest[:, -1] = average.rest, drift[1]
     # z_k H_k w = y_m G_m e, since z = factor^-1 e and y = w: one multiplier takes both
-    inverse, wind = np.linalg.inv(factor), slice(n, n + 3)
+    inverse, wind = np.linalg.inv(factor), slice(n, n + m)
     cross = tube[:, :, wind].copy()
     gust[:, :, :n] += np.einsum("knm,ke->mne", cross, inverse)
     tube[:, :, wind] = 0.0
@@ -198,12 +265,12 @@ def _matrix_set(average: AffineForm, symbols: int, drift: Array, factor: Array) 
     missed = np.abs(np.eye(n) - inverse @ factor) + ROUNDED * np.abs(inverse) @ np.abs(factor)
     rest[:, wind] += missed.sum(axis=1).max() * np.abs(cross).sum(axis=0)
     # linear in s, a and j: the corners of the cell
-    signs = [(-1, 1) if np.any(part) else (0,) for part in command[:3]]
-    corners = centre + np.tensordot(
-        np.stack(np.meshgrid(*signs, indexing="ij"), -1), command[:3], 1
-    )
+    at_ends = np.zeros((CORNERS, n, q))
+    at_ends[: len(command)] = command[:CORNERS]
+    signs = [(-1, 1) if np.any(part) else (0,) for part in at_ends]
+    corners = centre + np.tensordot(np.stack(np.meshgrid(*signs, indexing="ij"), -1), at_ends, 1)
     rest += ROUNDED * (np.abs(centre) + np.abs(command).sum(axis=0))
-    others = np.concatenate([command[3:], slopes[symbols:]])
+    others = np.concatenate([command[CORNERS:], slopes[symbols:]])
     rates = np.abs(others / units[:n, None] * units).max(axis=(1, 2))
     left, weights, more = rank_one(others[rates > SMALL], units)
     rest += more + np.abs(others[rates <= SMALL]).sum(axis=0) * ROUNDED_UP

@@ -1,10 +1,11 @@
-"""The matrix inequality of an invariant ellipsoid, in any arithmetic.
+"""The matrix inequalities of an invariant ellipsoid and of a gain on it, in any arithmetic.
 
 Deviations e follow de/dt = A e + E w + d, where F = [A E d] lies in a set: the corners of a cell of
 commands, matrices times the symbols of the ellipsoid (|z| <= 1) and of the gust (|y| <= 1), and
 terms left right' times a number in [-1, 1] each. If multipliers make all `conditions` positive
-definite, V = e'P e falls wherever V = 1 and |w| <= 1 (S-procedure; Petersen's lemma). P may be
-linear in the commanded airspeed, whose rate adds dP/dt.
+definite, V = e'P e falls wherever V = 1 and |w| <= 1 with the supply of `invariant`, and grows by
+no more than the supply of `bounded` (S-procedure; Petersen's lemma). P may be linear in the
+scheduling command, as the commanded airspeed, whose rate adds dP/dt.
 """
 
 from __future__ import annotations
@@ -26,10 +27,11 @@ ROUNDED = 1e-14
 
 
 class MatrixSet(NamedTuple):
-    """The set of F (n, q); q = n deviations, 3 gust components and 1 constant.
+    """The set of F (n, q); q = n deviations, m gust components and 1 constant.
 
-    corners (2, 2, 2, n, q): at the ends of the cell in airspeed, acceleration and jerk, 1 for 2
-    where they are one; tube (n, n, q) and gust (3, n, q), the factors of the symbols; left (k, n)
+    corners (2, 2, 2, n, q): at the ends of the cell in its first three commands, as airspeed,
+    acceleration and jerk, 1 for 2 where they are one; tube (n, n, q) and gust (m, n, q), the
+    factors of the symbols; left (k, n)
     and weights (k, q, q): for each other term, x'F v <= |x'left| sqrt(v' weights v).
     """
 
@@ -86,8 +88,8 @@ def rank_one(matrices: Array, units: Array) -> tuple[Array, Array, Array]:
 
 
 class Multipliers(NamedTuple):
-    """tube S and gust T (n, n), terms (k, k) diagonal, wind mu (1, 1), decay alpha (a number):
-    numbers, rationals or variables of an `AffineProgram`.
+    """tube S and gust T (n, n), terms (k, k) diagonal, wind mu (1, 1), decay alpha (a number; 0 in
+    a gain): numbers, rationals or variables of an `AffineProgram`.
     """
 
     tube: Any
@@ -128,16 +130,37 @@ def motion(nodes: Sequence[Any], width: Any, centre: Array, half: Array) -> Moti
     return Motion(ends, step / width, [a - a_half, a + a_half])
 
 
+def invariant(by: Multipliers, shape: tuple[int, int], number: Number = float) -> Any:
+    """The supply mu (1 - |w|^2) - alpha in (e, w, 1), for `shape` (n, q)."""
+    wind, constant = _squares(shape, number)
+    return by.wind * (constant - wind) + by.decay * _known(-constant, by.wind)
+
+
+def bounded(
+    price: Any, bias: Any, output: Array, shape: tuple[int, int], number: Number = float
+) -> Any:
+    """The supply |output e|^2 - price |w|^2 - bias in (e, w, 1); price, bias (1, 1)."""
+    wind, constant = _squares(shape, number)
+    q = shape[1]
+    z = _known(_in_corner(output.T @ output, (q, q)), price)
+    return z - price * wind - bias * constant
+
+
 def conditions(
-    P: Motion, shares: Sequence[Shares], over: MatrixSet, by: Multipliers, number: Number = float
+    P: Motion,
+    shares: Sequence[Shares],
+    over: MatrixSet,
+    by: Multipliers,
+    supply: Any,
+    number: Number = float,
 ) -> tuple[list[Any], list[Any]]:
     """The matrices that must be positive definite, in two lists.
 
     For each end of the cell, with its shares X: [X_tube, P; P, S], [X_gust, P; P, T] and [X_terms,
     P l; l'P, r]. For each corner of the cell, as Bernstein coefficients of degree 2 in the
-    airspeed, minus
+    scheduling command, minus
 
-        [P A + A'P + alpha P + dP/dt, P E, P d; ., -mu I, 0; ., ., mu - alpha]
+        [P A + A'P + alpha P + dP/dt, P E, P d; ., 0, 0; ., ., 0] + supply
         + sum of H'S H and H'T H over the symbols + sum of r times weights
         + [X_tube + X_gust + X_terms, 0; 0, 0].
 
@@ -148,7 +171,7 @@ def conditions(
         rows = (end, end, np.swapaxes(end @ over.left.T, -1, -2))
         for own, row, multiplier in zip(X, rows, by[:3], strict=True):
             bounds.append(from_lower([[own], [row, multiplier]]))
-    fixed = _fixed(P.ends[0], over, by, number)
+    fixed = supply + _symbols(over, by)
     taken = [_in_corner(X.tube + X.gust + X.terms, fixed.shape[-2:]) for X in shares]
     falls = []
     for i, a in enumerate(P.accelerations):
@@ -167,21 +190,24 @@ def _motion(P: Any, F: Array, decay: Any) -> Any:
     return product + np.swapaxes(product, -1, -2) + decay * _in_corner(P, (q, q))
 
 
-def _fixed(P: Any, over: MatrixSet, by: Multipliers, number: Number) -> Any:
-    """What does not depend on P."""
-    n, q = over.corners.shape[-2:]
-    gust, constant = (np.zeros((q, q), dtype=over.corners.dtype) for _ in range(2))
-    one = number(1.0)
-    for i in range(n, n + 3):
-        gust[i, i] = -one
-    gust[-1, -1], constant[-1, -1] = one, -one
-    M = by.wind * gust + by.decay * _known(constant, P)
+def _symbols(over: MatrixSet, by: Multipliers) -> Any:
+    """What the multipliers of the symbols and terms take."""
+    M = sum(weight * by.terms[..., k : k + 1, k : k + 1] for k, weight in enumerate(over.weights))
     for symbols, multiplier in ((over.tube, by.tube), (over.gust, by.gust)):
         for H in symbols:
             M = M + H.T @ multiplier @ H
-    for k, weight in enumerate(over.weights):
-        M = M + by.terms[..., k : k + 1, k : k + 1] * weight
     return M
+
+
+def _squares(shape: tuple[int, int], number: Number) -> tuple[Array, Array]:
+    """The matrices (q, q) of |w|^2 and of 1, of n deviations, for `shape` (n, q)."""
+    n, q = shape
+    size = [number(float(i >= n)) for i in range(q - 1)]
+    zero = number(0.0)
+    wind, constant = (np.full((q, q), zero) for _ in range(2))
+    wind[range(q - 1), range(q - 1)] = size
+    constant[-1, -1] = number(1.0)
+    return wind, constant
 
 
 def _in_corner(P: Any, shape: tuple[int, int]) -> Any:

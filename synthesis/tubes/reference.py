@@ -57,6 +57,55 @@ class Reference:
 
     __repr__ = summarized
 
+    jacobian_parts = (4, 4)
+    """Parts of a cell along airspeed and acceleration over which the Jacobian is enclosed,"""
+    drift_parts = (16, 16)
+    """and the drift of the reference."""
+    drifts = True
+    """Whether the reference may miss the equations."""
+
+    @property
+    def nodes(self) -> Array:
+        """Of the scheduling command: the airspeeds."""
+        return self.airspeeds
+
+    @property
+    def ranges(self) -> tuple[tuple[float, float], ...]:
+        """Of the commands that cells split besides the airspeed: the acceleration."""
+        return ((-self.limits[0], self.limits[0]),)
+
+    @property
+    def whole(self) -> tuple[float, ...]:
+        """Largest sizes of the others, jerk and its derivative; 0 where it may jump."""
+        return tuple(limit if np.isfinite(limit) else 0.0 for limit in self.limits[1:])
+
+    @property
+    def jumps(self) -> bool:
+        """Whether a state may jump: with the jerk, or as a command that is held has limits."""
+        n = self.gain.shape[-1]
+        with_jerk = np.any(self.jerk[:, :n]) or np.any(self.snap)
+        held = len(self.airspeeds) == 1 and any(self.limits)
+        return bool(held or (np.isinf(self.limits[2]) and with_jerk))
+
+    def hypotheses(self, name: str, gust: float) -> tuple[str, ...]:
+        """What a tube about it rests on, in sentences."""
+        p, (a, j, b) = self.airspeeds, self.limits
+        command = f"the commanded airspeed is {p[0]:g} m/s"
+        if len(p) > 1:
+            bounded = (
+                f", which changes by at most {b:g} m/s^4" if np.isfinite(b) else " that may jump"
+            )
+            command = (
+                f"the commanded airspeed stays within {p[0]:g} to {p[-1]:g} m/s, its acceleration"
+                f" within {a:g} m/s^2, with a jerk of at most {j:g} m/s^3{bounded}"
+            )
+        return (
+            f"the equations of {name} with an ideal governor; u = u_r + K e in continuous time with"
+            " all ten states known; no servos, no delay",
+            f"{command}; gusts have at most {gust:g} m/s, any direction in body axes and any"
+            " history",
+        )
+
     @property
     def intervals(self) -> int:
         """Number of intervals between nodes, 1 for a held airspeed."""

@@ -1,38 +1,45 @@
-"""Invariant tubes of the nonlinear helicopter about steady flight and along transitions."""
+"""Invariant tubes of the nonlinear helicopter, and of any nonlinear model, about its references."""
 
 from __future__ import annotations
 
 import json
 import math
 import os
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
 
+import casadi
 import numpy as np
 from scipy.linalg import eigh
 
 from symheli import Helicopter
-from symheli.airframe.vehicle import load_vehicle
-from symheli.airframe.written import as_toml
 from symheli.errors import InputError
 from symheli.progress import Task, task, tracked
 from symheli.values.summary import summarized
 from symheli.values.whole_files import write_text
 from synthesis.program.cone_program import Solver
 from synthesis.tubes.deviations import Cell, Deviations
+from synthesis.tubes.files import (
+    numbers,
+    read_loop,
+    read_multipliers,
+    written_loop,
+    written_multipliers,
+)
+from synthesis.tubes.gain import LocalGain, least
 from synthesis.tubes.inequality import Multipliers
+from synthesis.tubes.motions import Motions
 from synthesis.tubes.proof import holds
 from synthesis.tubes.reference import TUBE_SIZES, Reference, held, moving
 from synthesis.tubes.search import Enclosed, Found, smallest
 
 Array = np.ndarray
 
-SCHEMA, VERSION = "symheli tube", 2
+SCHEMA, VERSION = "symheli tube", 3
 INTERVAL = 1.0
 """Largest distance of the nodes of reference, feedback and P along airspeed, m/s."""
 DOWNWARD = 0.75
@@ -42,15 +49,19 @@ acceleration: p a/g.
 GRAVITY = 9.8
 """m/s^2; of the choice of cells only."""
 DECAYS = (1.0, 2.0, 3.0)
-"""Rates alpha that are tried on the linear loop, 1/s."""
+"""Rates alpha that are tried on the linear loop of a helicopter, 1/s,"""
+MORE_DECAYS = (0.3, 0.5, 0.8, 1.2, 2.0, 3.0, 5.0)
+"""and of any other model, whose time scale is not known."""
 FIRST_SHARE = 0.1
 """Share of the deviations and gusts over which the equations are enclosed at first; without any the
 multipliers have no bound.
 """
 FIRST_SIZE = 0.3
 """First half widths, in units of `TUBE_SIZES`."""
-FIRST_GROWTH, GROWTH = 1.5, 1.05
-"""Factors on the half widths from one round of the search to the next."""
+GROWTHS = ((1.5, 1.05), (1.15, 1.05), (1.05, 1.02))
+"""Factors on the half widths in the first round of a search, and from one round to the next: where
+the deviations enclosed were too large for any ellipsoid, a smaller start may lead to one.
+"""
 ROUNDS = 15
 SPARE = 0.02
 """Spare of the inequality in the search, 1/s."""
@@ -62,17 +73,17 @@ TOLERANCE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Tube:
-    """The deviations e = x - x_r with e'P e <= 1, which the nonlinear helicopter does not leave.
+    """The deviations e = x - x_r with e'P e <= 1, which the nonlinear model does not leave.
 
     Made by `tube`; `verify` proves it again from these fields alone.
 
     Attributes
     ----------
     deviations : Deviations
-        The closed loop: helicopter, reference, feedback, gust amplitude.
+        The closed loop: helicopter or model, reference, feedback, gust amplitude.
     P : array (k, n, n)
-        At the k nodes of the airspeed, linear between, in SI units; the search's last ones where
-        nothing was proven.
+        At the k nodes of the airspeed, or of another scheduling command, linear between, in SI
+        units; the search's last ones where nothing was proven.
     cells : tuple of Cell
         Parts of the commands, each with a proof of its own.
     factors : array (cells, n, n)
@@ -83,6 +94,9 @@ class Tube:
         The inequality holds in exact arithmetic for every enclosed matrix.
     why : str
         Why there is no proof; empty where there is one.
+    gains : tuple of LocalGain
+        Bounds of the deviations' energy or peaks by the energy of the gusts, while the flight stays
+        in the tube: `with_gain`.
 
     Raises
     ------
@@ -104,63 +118,53 @@ class Tube:
     multipliers: tuple[Multipliers, ...]
     proven: bool
     why: str
+    gains: tuple[LocalGain, ...] = ()
 
     __repr__ = summarized
 
     @property
-    def airspeeds(self) -> Array:
-        """Nodes of the commanded airspeed, m/s; one where it is held."""
-        return self.deviations.reference.airspeeds
+    def nodes(self) -> Array:
+        """Of the commanded airspeed, m/s, or of another scheduling command; one where it is
+        held.
+        """
+        return self.deviations.reference.nodes
 
-    def at(self, airspeed: float) -> Array:
-        """P (n, n) at a commanded airspeed, m/s."""
-        return self.along([airspeed])[0]
+    def at(self, command: float) -> Array:
+        """P (n, n) at a commanded airspeed, m/s, or another scheduling command."""
+        return self.along([command])[0]
 
-    def along(self, airspeeds: Any) -> Array:
-        """P (N, n, n) at commanded airspeeds (N,), m/s."""
-        i, s = self.deviations.reference.place(airspeeds)
+    def along(self, commands: Any) -> Array:
+        """P (N, n, n) at scheduling commands (N,)."""
+        i, s = self.deviations.reference.place(commands)
         return self.P[i] + s[:, None, None] * (self.P[i + (len(self.P) > 1)] - self.P[i])
 
     @cached_property
     def half_widths(self) -> Array:
-        """Largest deviation of each state at any airspeed, (n,), SI."""
+        """Largest deviation of each state at any command, (n,), SI."""
         # convex in P, which is linear between the nodes
         return np.sqrt(np.diagonal(np.linalg.inv(self.P), axis1=1, axis2=2)).max(axis=0)
 
     @cached_property
     def control_half_widths(self) -> Array:
-        """Largest deviation of each control from that of the reference at the nodes, (4,), rad."""
+        """Largest deviation of each control from that of the reference at the nodes, (k,), SI."""
         K = self.deviations.reference.gain
         return np.sqrt(np.einsum("kui,kij,kuj->ku", K, np.linalg.inv(self.P), K)).max(axis=0)
 
     @property
     def hypotheses(self) -> tuple[str, ...]:
         """What the statement rests on, in sentences."""
-        d, p = self.deviations, self.airspeeds
-        a, j, b = d.reference.limits
-        command = f"the commanded airspeed is {p[0]:g} m/s"
-        if len(p) > 1:
-            bounded = (
-                f", which changes by at most {b:g} m/s^4" if math.isfinite(b) else " that may jump"
-            )
-            command = (
-                f"the commanded airspeed stays within {p[0]:g} to {p[-1]:g} m/s, its acceleration"
-                f" within {a:g} m/s^2, with a jerk of at most {j:g} m/s^3{bounded}"
-            )
+        d = self.deviations
         return (
-            f"the equations of {d.heli.vehicle.name} with an ideal governor; u = u_r + K e in"
-            " continuous time with all ten states known; no servos, no delay",
+            *d.reference.hypotheses(d.name, d.gust),
             "controls within their travel: they differ from those of the reference by no more than"
             " the control deviations",
-            f"{command}; gusts have at most {d.gust:g} m/s, any direction in body axes and any"
-            " history",
             "the deviation lies in the tube at the start",
         )
 
     def __str__(self) -> str:
-        named = zip(self.deviations.heli.states, self.half_widths, strict=True)
+        named = zip(self.deviations.states, self.half_widths, strict=True)
         sizes = ", ".join(f"{name} {width:.3g}" for name, width in named)
-        inputs = zip(self.deviations.heli.inputs, self.control_half_widths, strict=True)
+        inputs = zip(self.deviations.inputs, self.control_half_widths, strict=True)
         controls = ", ".join(f"{name} {width:.3g}" for name, width in inputs)
         if not self.proven:
             return f"no tube: {self.why}"
@@ -168,59 +172,101 @@ class Tube:
             [
                 "invariant tube of the nonlinear equations, proven",
                 f"largest deviations (SI): {sizes}",
-                f"of the controls (rad): {controls}",
+                f"of the controls: {controls}",
+                *(f"{gain}" for gain in self.gains),
                 *(f"- {line}" for line in self.hypotheses),
             ]
         )
 
-    def contains(self, deviation: Any, airspeed: float | None = None) -> bool:
-        """Whether a deviation (n,), SI, lies in the tube at a commanded airspeed, m/s."""
+    def contains(self, deviation: Any, command: float | None = None) -> bool:
+        """Whether a deviation (n,), SI, lies in the tube at a commanded airspeed, m/s, or another
+        scheduling command; by default the first.
+        """
         e = np.asarray(deviation, float)
-        return bool(e @ self.at(self.airspeeds[0] if airspeed is None else airspeed) @ e <= 1)
+        return bool(e @ self.at(self.nodes[0] if command is None else command) @ e <= 1)
+
+    def with_gain(self, outputs: Any, *, energy: bool = True, solver: Solver | None = None) -> Tube:
+        """This tube with one more proven bound from gusts to deviations.
+
+        Parameters
+        ----------
+        outputs : sequence of str
+            States whose deviations are bounded together, as the root of the sum of their squares.
+        energy : bool
+            Bound the energy of these deviations (L2 gain) by that of the gusts; False: their peak.
+        solver : Solver, optional
+            Of the semidefinite program; by default Clarabel.
+
+        Returns
+        -------
+        Tube
+            Its last `gains`.
+
+        Raises
+        ------
+        InputError
+            A tube without a proof, a name that is no state, no proven bound.
+
+        Examples
+        --------
+        >>> import symheli
+        >>> found = tube(symheli.Helicopter.load("xcell60", governor="ideal"), 3.0, gust=0.1)
+        >>> print(f"{found.with_gain(['theta']).gains[0].gamma:.4f} rad/(m/s)")
+        0.0043 rad/(m/s)
+        """
+        if not self.proven:
+            raise InputError(f"only a proven tube has gains; here {self.why}")
+        d, own = self.deviations, solver or Solver(tolerance=TOLERANCE)
+        cells = _enclosed(d, self.cells, self.factors, d.drifts(self.cells))
+        found = least(cells or [], self.P, d.states, outputs, energy, d.gust, own)
+        if (
+            (cells is None)
+            or found is None
+            or not (
+                found.has_storage
+                and all(found.holds_in(k, c, self.nodes) for k, c in enumerate(cells))
+            )
+        ):
+            raise InputError("no bound was proven: over less of the tube there may be one")
+        return replace(self, gains=(*self.gains, found))
 
     def verify(self) -> bool:
         """Enclose the equations again and check the inequality in exact arithmetic."""
-        loop, p = self.deviations, self.airspeeds
+        loop, p = self.deviations, self.nodes
         complete = len(self.cells) == len(self.factors) == len(self.multipliers)
-        if not (complete and _covers(self.cells, loop.reference)):
+        counts = {len(gain.multipliers) for gain in self.gains}
+        if not (complete and counts <= {len(self.cells)} and _covers(self.cells, loop.reference)):
+            return False
+        if not all(gain.has_storage for gain in self.gains):
             return False
         parts = list(zip(self.cells, self.factors, self.multipliers, strict=True))
-        for cell, factor, by in tracked("verifying cells", parts):
-            (over,) = loop.enclosed([cell], factor[None], loop.drifts([cell]))
+        for k, (cell, factor, by) in enumerate(tracked("verifying cells", parts)):
+            made = _enclosed(loop, [cell], factor[None], loop.drifts([cell]))
             nodes = list(_nodes(cell, len(p)))
             if (
-                over is None
-                or by.terms.shape != (len(over.left),) * 2
-                or not holds(self.P[nodes], p[nodes], cell, over, factor, by)
+                made is None
+                or by.terms.shape != (len(made[0].over.left),) * 2
+                or not holds(self.P[nodes], p[nodes], cell, made[0].over, factor, by)
+                or not all(gain.holds_in(k, made[0], p) for gain in self.gains)
             ):
                 return False
         return True
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write the tube as JSON: equations (the vehicle file), feedback and proof."""
+        """Write the tube as JSON: equations (the vehicle file, or the operations of the model),
+        feedback and proof.
+        """
         if not self.proven:
             raise InputError(f"only a proven tube is saved; here {self.why}")
-        d, heli, r = self.deviations, self.deviations.heli, self.deviations.reference
-        proof = [
-            {name: np.asarray(m).tolist() for name, m in by._asdict().items()}
-            for by in self.multipliers
-        ]
-        limits = [limit if math.isfinite(limit) else None for limit in r.limits]
         content = {
             "schema": SCHEMA,
             "version": VERSION,
-            "name": heli.vehicle.name,
-            "vehicle": as_toml(heli.vehicle),
-            "density": heli.density,
-            "smoothing": heli.smoothing,
-            "printed": sorted(heli.printed),
-            "gust": d.gust,
-            "limits": limits,
-            **{name: getattr(r, name).tolist() for name in ARRAYS},
+            **written_loop(self.deviations),
             "P": self.P.tolist(),
-            "cells": [[cell.interval, *cell.s, *cell.a] for cell in self.cells],
+            "cells": [[cell.interval, *map(list, cell.ranges)] for cell in self.cells],
             "factors": self.factors.tolist(),
-            "multipliers": proof,
+            "multipliers": [written_multipliers(by) for by in self.multipliers],
+            "gains": [gain.written for gain in self.gains],
         }
         return write_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
 
@@ -248,102 +294,69 @@ class Tube:
         return replace(found, proven=proven, why=why)
 
 
-ARRAYS = ("airspeeds", "steady", "jerk", "snap", "gain")
-"""Fields of `Reference` that are stored as they are."""
-
-
-ARRAYS = ("airspeeds", "steady", "jerk", "snap", "gain")
-"""Fields of `Reference` that are stored as they are."""
-
-
 def _read(content: dict[str, Any]) -> Tube:
-    with tempfile.TemporaryDirectory(prefix="symheli-") as folder:
-        file = Path(folder) / f"{Path(str(content['name'])).name}.toml"
-        file.write_text(content["vehicle"], encoding="utf-8")
-        vehicle = load_vehicle(file)
-    heli = Helicopter(
-        vehicle,
-        "ideal",
-        float(content["density"]),
-        frozenset(content["printed"]),
-        float(content["smoothing"]),
-    )
-    n = len(heli.states)
-
-    def array(values: Any, *shape: int) -> Array:
-        read = np.asarray(values, float)
-        if read.shape != shape or not np.all(np.isfinite(read)):
-            raise ValueError(f"expected finite numbers of shape {shape}, got {read.shape}")
-        return read
-
-    k, count = len(content["airspeeds"]), len(content["cells"])
-    powers = np.shape(content["steady"])[2]
-    shapes = ((k,), (k, 2, powers, n + 4), (k, n + 4), (k, 4), (k, 4, n))
-    parts = {name: array(content[name], *shape) for name, shape in zip(ARRAYS, shapes, strict=True)}
-    if not (k > 0 and np.all(np.diff(parts["airspeeds"]) > 0)):
-        raise ValueError("the airspeeds do not increase")
-    limits = [math.inf if limit is None else float(limit) for limit in content["limits"]]
-    a, j, snap = limits
-    reference = Reference(**parts, limits=(float(array(a)), float(array(j)), snap))
-
-    def proof(given: dict[str, Any]) -> Multipliers:
-        terms = np.asarray(given["terms"], float)
-        return Multipliers(
-            array(given["tube"], n, n),
-            array(given["gust"], n, n),
-            array(terms, *terms.shape),
-            array(given["wind"], 1, 1),
-            float(array(given["decay"])),
-        )
-
-    cells = [(int(c[0]), tuple(array(c[1:3], 2)), tuple(array(c[3:], 2))) for c in content["cells"]]
+    loop = read_loop(content)
+    n, k, count = len(loop.states), len(loop.reference.nodes), len(content["cells"])
+    cells = []
+    for interval, *ranges in content["cells"]:
+        own = numbers(ranges, 1 + len(loop.reference.ranges), 2).tolist()
+        s, a, *others = ((low, high) for low, high in own)
+        cells.append(Cell(int(interval), s, a, tuple(others)))
     return Tube(
-        Deviations(heli, reference, float(array(content["gust"]))),
-        array(content["P"], k, n, n),
-        tuple(Cell(i, (float(s[0]), float(s[1])), (float(a[0]), float(a[1]))) for i, s, a in cells),
-        array(content["factors"], count, n, n),
-        tuple(proof(given) for given in content["multipliers"]),
+        loop,
+        numbers(content["P"], k, n, n),
+        tuple(cells),
+        numbers(content["factors"], count, n, n),
+        tuple(read_multipliers(given, n) for given in content["multipliers"]),
         False,
         "not verified",
+        tuple(LocalGain.read(given, k, loop.states) for given in content["gains"]),
     )
 
 
 def tube(
-    heli: Helicopter,
-    airspeed: float | tuple[float, float],
+    model: Helicopter | casadi.Function,
+    reference: float | tuple[float, float] | Motions,
     *,
     gust: float,
     acceleration: float = 0.0,
     jerk: float = 0.0,
     snap: float = math.inf,
     gain: Any = None,
+    sizes: Any = None,
     solver: Solver | None = None,
 ) -> Tube:
-    """A proven invariant tube of the nonlinear helicopter in level flight, in gusts.
+    """A proven invariant tube of a nonlinear helicopter in level flight in gusts, or of any other
+    model about its motions.
 
     With u = u_r + K e, the deviation e = x - x_r from the reference stays in e'P e <= 1 for every
-    gust history of the amplitude, and every history of the commanded airspeed within its limits.
-    The difference of the nonlinear equations from those of the reference is an average of their
+    gust history of the amplitude, and every history of the commands within their limits. The
+    difference of the nonlinear equations from those of the reference is an average of their
     Jacobian times (e, w); the Jacobian is enclosed over the whole tube (`symheli.enclosure`), and a
     matrix inequality is checked for all enclosed matrices in rational arithmetic.
 
     Parameters
     ----------
-    heli : Helicopter
-        With governor "ideal": ten states.
-    airspeed : float or (float, float)
-        Held, or the range of the command, m/s.
+    model : Helicopter or casadi.Function
+        With governor "ideal": ten states. Or (x, u, w) -> dx/dt, of dense columns and of the
+        operations that `symheli.enclosure.enclose` knows.
+    reference : float, (float, float) or Motions
+        Of a helicopter the airspeed held, or the range of its command, m/s. Of another model its
+        motions and the feedback about them.
     gust : float
-        Largest size of the gust vector, m/s.
+        Largest size of the gust vector, m/s; of w.
     acceleration, jerk : float
-        Largest sizes of the first and second derivative of the command, m/s^2 and m/s^3; > 0 for a
-        range.
+        Largest sizes of the first and second derivative of the commanded airspeed, m/s^2 and m/s^3;
+        > 0 for a range.
     snap : float
         Largest derivative of the jerk, m/s^4. Infinite: the jerk may jump, and the pitch rate of
         the reference does not follow it.
     gain : array (4, 10) or (nodes, 4, 10), optional
-        K, rad per SI unit, at all airspeeds or at each node. Default: linear-quadratic regulators
-        on all states.
+        K of a helicopter, rad per SI unit, at all airspeeds or at each node. Default:
+        linear-quadratic regulators on all states.
+    sizes : array (n,), optional
+        Half widths of equal weight: the mean square of the tube's half widths over these is made
+        small. Needed for another model than a helicopter.
     solver : Solver, optional
         Of the semidefinite programs; by default Clarabel.
 
@@ -355,8 +368,8 @@ def tube(
     Raises
     ------
     InputError
-        Another governor, a gust that is no number >= 0, limits that do not fit, a gain of another
-        shape.
+        Another governor, a gust that is no number >= 0, limits that do not fit, a gain or sizes of
+        another shape.
     TrimError
         No flight at one of these airspeeds and accelerations.
 
@@ -374,30 +387,75 @@ def tube(
     >>> found.proven, bool(found.half_widths[0] < 0.02)
     (True, True)
     """
+    if not (np.isfinite(gust) and gust >= 0):
+        raise InputError(f"gust must be a number >= 0; got {gust!r:.60}")
+    limits = _limits(acceleration, jerk, snap)
+    if isinstance(model, Helicopter):
+        made = _flight(model, reference, limits, gain)
+    else:
+        made = _checked(model, reference, [*limits[:2], 0 if gain is None else 1], sizes)
+    loop = Deviations(model, made, float(gust))
+    own = np.array(TUBE_SIZES if sizes is None else sizes, float)
+    if own.shape != (len(loop.states),) or not (np.all(np.isfinite(own)) and np.all(own > 0)):
+        raise InputError(f"sizes must be {len(loop.states)} numbers > 0; got {sizes}")
+    return _found(loop, tuple(_cells(made)), own, solver or Solver(tolerance=TOLERANCE))
+
+
+def _flight(
+    heli: Helicopter, airspeed: Any, limits: tuple[float, float, float], gain: Any
+) -> Reference:
+    """The reference of a helicopter."""
     if heli.governor != "ideal" or len(heli.states) != 10:
         raise InputError(
             "a tube needs the ten states of an ideal governor: Helicopter.load(...,"
             " governor='ideal')"
         )
-    if not (np.isfinite(gust) and gust >= 0):
-        raise InputError(f"gust must be a number >= 0, m/s; got {gust!r:.60}")
-    limits = _limits(acceleration, jerk, snap)
-    if np.ndim(airspeed) == 0:
-        if limits[0] or limits[1]:
-            raise InputError(
-                "a held airspeed has no acceleration or jerk: give airspeed=(low, high)"
-            )
-        reference = held(heli, airspeed, gain)
-        cells = [Cell(0, (0.0, 0.0), (0.0, 0.0))]
-    else:
-        reference = moving(heli, _range(airspeed, limits), limits, gain)
-        cells = [
+    if np.ndim(airspeed) > 0 or isinstance(airspeed, Motions):
+        return moving(heli, _range(airspeed, limits), limits, gain)
+    if limits[0] or limits[1]:
+        raise InputError("a held airspeed has no acceleration or jerk: give (low, high)")
+    return held(heli, airspeed, gain)
+
+
+def _checked(model: Any, motions: Any, flight: Sequence[float], sizes: Any) -> Motions:
+    """The motions of another model than a helicopter."""
+    if not (isinstance(model, casadi.Function) and isinstance(motions, Motions)):
+        raise InputError(
+            "a tube needs a Helicopter with airspeeds, or a casadi.Function (x, u, w) -> dx/dt with"
+            f" Motions; got {type(model).__name__} and {type(motions).__name__}"
+        )
+    n, k = len(motions.states), len(motions.inputs)
+    shapes = [model.size_in(i) for i in range(model.n_in())]
+    if shapes[:2] != [(n, 1), (k, 1)] or len(shapes) != 3 or shapes[2][1] != 1:
+        raise InputError(f"the model must take x ({n}), u ({k}) and w, columns; it takes {shapes}")
+    if model.n_out() != 1 or model.size_out(0) != (n, 1):
+        raise InputError(f"the model must return dx/dt ({n}), one column")
+    if any(flight):
+        raise InputError("acceleration, jerk and gain are those of a helicopter: see Motions")
+    if sizes is None:
+        raise InputError(f"sizes are needed: {n} half widths of equal weight")
+    return motions
+
+
+def _cells(reference: Reference | Motions) -> list[Cell]:
+    """The commands in cells."""
+    if isinstance(reference, Reference) and len(reference.nodes) > 1:
+        return [
             Cell(i, (0.0, 1.0), (low, high))
-            for i, p in enumerate(reference.airspeeds[1:])
-            for low, high in pairwise(_accelerations(float(p), limits[0]))
+            for i, p in enumerate(reference.nodes[1:])
+            for low, high in pairwise(_accelerations(float(p), reference.limits[0]))
         ]
-    loop = Deviations(heli, reference, float(gust))
-    return _found(loop, tuple(cells), solver or Solver(tolerance=TOLERANCE))
+    pieces = reference.pieces if isinstance(reference, Motions) else (1,)
+    edges = [
+        np.linspace(*limits, k + 1) for limits, k in zip(reference.ranges, pieces, strict=True)
+    ]
+    sides = [[(float(a), float(b)) for a, b in pairwise(row)] for row in edges]
+    s = (0.0, float(len(reference.nodes) > 1))
+    return [
+        Cell(i, s, own[0], tuple(own[1:]))
+        for i in range(reference.intervals)
+        for own in product(*sides)
+    ]
 
 
 def _limits(*given: Any) -> tuple[float, float, float]:
@@ -435,40 +493,44 @@ def _nodes(cell: Cell, count: int) -> tuple[int, ...]:
     return (0,) if count == 1 else (cell.interval, cell.interval + 1)
 
 
-def _covers(cells: Sequence[Cell], reference: Reference) -> bool:
-    """Whether these cells are all commands: of each interval all s in [0, 1] with every
-    acceleration; and no state of the reference may jump with the jerk.
+def _covers(cells: Sequence[Cell], reference: Reference | Motions) -> bool:
+    """Whether these cells are all commands: of each interval all s in [0, 1] with all commands
+    that cells split; and no state of the reference may jump.
     """
-    limit, still = reference.limits[0], len(reference.airspeeds) == 1
-    n = reference.gain.shape[-1]
-    jumps = np.isinf(reference.limits[2]) and (
-        np.any(reference.jerk[:, :n]) or np.any(reference.snap)
+    if reference.jumps or {c.interval for c in cells} != set(range(reference.intervals)):
+        return False
+    needed = [(0.0, float(len(reference.nodes) > 1)), *reference.ranges]
+    if not all(len(c.ranges) == len(needed) for c in cells):
+        return False
+    return all(
+        _fills(np.array([c.ranges for c in cells if c.interval == i]), np.array(needed))
+        for i in range(reference.intervals)
     )
-    if jumps or (still and any(reference.limits)):
-        return False
-    if not {c.interval for c in cells} <= set(range(reference.intervals)):
-        return False
-    for i in range(reference.intervals):
-        own = [c for c in cells if c.interval == i]
-        edges = sorted({s for c in own for s in c.s})
-        if not own or (not still and (edges[0] > 0 or edges[-1] < 1)):
-            return False
-        for low, high in zip(edges, edges[1:] or edges, strict=False):
-            there = sorted(c.a for c in own if c.s[0] <= low and high <= c.s[1])
-            reach = -limit
-            for a in there:
-                reach = max(reach, a[1]) if a[0] <= reach else reach
-            if not there or there[0][0] > -limit or reach < limit:
-                return False
-    return True
 
 
-def _found(loop: Deviations, cells: tuple[Cell, ...], solver: Solver) -> Tube:
+def _fills(boxes: Array, whole: Array) -> bool:
+    """Whether boxes (N, r, 2) cover a box (r, 2): each part between their edges lies in one."""
+    parts = []
+    for sides, (low, high) in zip(np.moveaxis(boxes, 1, 0), whole, strict=True):
+        inner = sides[(sides > low) & (sides < high)]
+        edges = np.unique([low, *inner, high])
+        parts.append(list(pairwise(edges)) or [(low, high)])
+    return all(
+        np.any(np.all((boxes[..., 0] <= own[:, 0]) & (own[:, 1] <= boxes[..., 1]), axis=1))
+        for own in map(np.array, product(*parts))
+    )
+
+
+Grown = tuple[Found | None, Array, Array, str]
+"""What was found, factors, P, why nothing was."""
+
+
+def _found(loop: Deviations, cells: tuple[Cell, ...], sizes: Array, solver: Solver) -> Tube:
     """The search: the ellipsoids over which the equations are enclosed grow until the smallest ones
     that satisfy the inequality lie inside.
     """
-    with task("tube", ROUNDS) as progress:
-        found, factors, P, why = _grown(loop, cells, solver, progress)
+    with task("tube", len(GROWTHS)) as progress:
+        found, factors, P, why = _grown(loop, cells, sizes, solver, progress)
     if found is None:
         return Tube(loop, P, cells, factors, (), False, why)
     made = Tube(loop, P, cells, factors, tuple(found.multipliers), True, "")
@@ -478,10 +540,10 @@ def _found(loop: Deviations, cells: tuple[Cell, ...], solver: Solver) -> Tube:
 
 
 def _grown(
-    loop: Deviations, cells: Sequence[Cell], solver: Solver, progress: Task
-) -> tuple[Found | None, Array, Array, str]:
-    """(what was found, factors, P, why nothing was)."""
-    sizes, count = np.array(TUBE_SIZES), len(loop.reference.airspeeds)
+    loop: Deviations, cells: Sequence[Cell], sizes: Array, solver: Solver, progress: Task
+) -> Grown:
+    """The search over all cells, from the ellipsoids of the linear loop."""
+    count = len(loop.reference.nodes)
     roots = np.broadcast_to(FIRST_SIZE * np.diag(sizes), (count, len(sizes), len(sizes)))
     factors = np.broadcast_to(roots[0], (len(cells), *roots[0].shape))
     P = np.broadcast_to(np.diag(sizes**-2), roots.shape)
@@ -493,9 +555,28 @@ def _grown(
     found = None if decay is None else smallest(linear, roots, sizes, decay, SPARE, solver)
     if decay is None or found is None:
         return None, factors, P, "the linear loop has no invariant ellipsoid"
-    growth = FIRST_GROWTH
+    made: Grown = (None, factors, P, "")
+    for first, growth in GROWTHS:
+        made = _from_below(loop, cells, sizes, drifts, (decay, first, growth), found.P, solver)
+        if made[0] is not None:
+            break
+        progress.step(made[3])
+    return made
+
+
+def _from_below(
+    loop: Deviations,
+    cells: Sequence[Cell],
+    sizes: Array,
+    drifts: Array,
+    numbers: tuple[float, float, float],
+    P: Array,
+    solver: Solver,
+) -> Grown:
+    """As `_grown`, from the ellipsoids P of the linear loop; numbers: decay and growths."""
+    decay, growth, later = numbers
     for _ in range(ROUNDS):
-        P, growth = found.P / growth**2, GROWTH
+        P, growth = P / growth**2, later
         roots = np.linalg.inv(np.swapaxes(np.linalg.cholesky(P), 1, 2))
         factors = np.array([_around(_ends(P, cell)) for cell in cells])
         over = _enclosed(loop, cells, factors, drifts)
@@ -503,20 +584,16 @@ def _grown(
             return None, factors, P, "the equations have no bounds over a tube of the size needed"
         found = smallest(over, roots, sizes, decay, SPARE, solver)
         if found is None:
-            return (
-                None,
-                factors,
-                P,
-                "no ellipsoid satisfies the inequality: the gusts are too large",
-            )
+            why = "no ellipsoid satisfies the inequality: the gusts are too large"
+            return None, factors, P, why
         least = min(
             np.linalg.eigvalsh(L.T @ end @ L)[0]
             for cell, L in zip(cells, factors, strict=True)
             for end in _ends(found.P, cell)
         )
-        progress.step(f"size {found.size**0.5:.3g}, {least**-0.5:.2f} of the deviations enclosed")
         if least * INSIDE > 1:
             return found, factors, found.P, ""
+        P = found.P
     return None, factors, P, f"the tube still grew after {ROUNDS} rounds"
 
 
@@ -527,10 +604,11 @@ def _decay(
     the middle; None: there are none.
     """
     middle = cells[len(cells) // 2].interval
-    nodes = _nodes(cells[len(cells) // 2], len(loop.reference.airspeeds))
+    nodes = _nodes(cells[len(cells) // 2], len(loop.reference.nodes))
     own = [o._replace(nodes=tuple(range(len(nodes)))) for o in linear if o.cell.interval == middle]
     roots = np.broadcast_to(own[0].factor, (len(nodes), *own[0].factor.shape))
-    tries = [(smallest(own, roots, sizes, decay, SPARE, solver), decay) for decay in DECAYS]
+    rates = DECAYS if isinstance(loop.model, Helicopter) else MORE_DECAYS
+    tries = [(smallest(own, roots, sizes, decay, SPARE, solver), decay) for decay in rates]
     return min(((f.size, decay) for f, decay in tries if f is not None), default=(0.0, None))[1]
 
 
@@ -538,7 +616,7 @@ def _enclosed(
     loop: Deviations, cells: Sequence[Cell], factors: Array, drifts: Array, share: float = 1.0
 ) -> list[Enclosed] | None:
     """The cells with the sets of their F; None where one has no bounds."""
-    p, out = loop.reference.airspeeds, []
+    p, out = loop.reference.nodes, []
     for over, cell, L in zip(
         loop.enclosed(cells, factors, drifts, share), cells, factors, strict=True
     ):

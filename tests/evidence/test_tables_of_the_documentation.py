@@ -13,12 +13,23 @@ from typing import NamedTuple
 import pytest
 
 import synthesis
-from evidence import box_jenkins, gain_table, logs, responses, specs, structured, tuning, two_bands
+from evidence import (
+    box_jenkins,
+    gain_table,
+    logs,
+    responses,
+    specs,
+    structured,
+    tube_gains,
+    tuning,
+    two_bands,
+)
 from evidence.bracket.measured import GAINS, bracket
 from evidence.flown import campaign, designs
 from evidence.flown import tuning as sizes
 from evidence.jerk.measured import TransitionPlan, fastest
 from evidence.marks import calibrated, conditions, guarantee, measured
+from evidence.planar_vtol import tubes as planar_vtol
 from evidence.public_files import fetched
 from evidence.reach.measured import gains
 from evidence.tables import DOCS
@@ -203,6 +214,22 @@ def tube_along_a_transition():
     assert attitude == (" ".join(f"{w:.2g}" for w in found.half_widths[6:8]) * found.proven)
 
 
+def gains_on_one_tube():
+    airspeed, output, _, _, proven, flown = KEPT["tubes.md", "gains"].cells("xcell60")
+    found = synthesis.tube(_xcell(), float(airspeed), gust=tube_gains.GUST)
+    gain = found.with_gain([output.split(",")[0]]).gains[0]
+    assert same(proven, gain.gamma, rel=1e-3)  # the solver stops at 1e-6 of a cost
+    assert float(flown) < gain.gamma
+
+
+def tube_of_the_planar_vtol():
+    case = planar_vtol.CASES[0]
+    _, _, position, control, *_ = KEPT["tubes.md", "vtol"].cells(f"{case.motions}, regulator")
+    found = planar_vtol.sizes(planar_vtol.proven(case))
+    assert same(position, found[0], rel=1e-3)  # as above
+    assert same(control, found[1], rel=1e-3)
+
+
 def one_public_log():
     folder = Path(os.environ.get("SYMHELI_PUBLIC_LOGS", ROOT.parent / "shared" / "data" / "xplane"))
     log = next(log for log in logs.LOGS if log.name == "Data.txt")
@@ -379,6 +406,8 @@ ROWS = {
     ("tubes.md", "amplitudes"): tube_in_hover,
     ("tubes.md", "transitions"): tube_along_a_transition,
     ("tubes.md", "remainders"): remainder_of_one_cell,
+    ("tubes.md", "gains"): gains_on_one_tube,
+    ("tubes.md", "vtol"): tube_of_the_planar_vtol,
     ("identify.md", "public logs"): one_public_log,
     ("identified.md", "xcell60"): lambda: marks_of_the_worst_seed("xcell60"),
     ("identified.md", "xcell_kahn_hudson"): lambda: marks_of_the_worst_seed(

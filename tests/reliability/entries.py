@@ -83,6 +83,7 @@ EXEMPT: dict[str, str] = {
                 "SpecificationTable",
                 "StructuredController",
                 "Tube",
+                "LocalGain",
             ),
             *(),
             *(),

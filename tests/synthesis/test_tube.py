@@ -7,11 +7,18 @@ import casadi
 import numpy as np
 import pytest
 
+from evidence.planar_vtol.flights import from_its_border as vtol_from_its_border
+from evidence.planar_vtol.metric import Metric, proven_positive, refuted
+from evidence.planar_vtol.model import over_ground
+from evidence.planar_vtol.tubes import CASES as VTOL
+from evidence.planar_vtol.tubes import motions, sizes
+from evidence.planar_vtol.tubes import proven as vtol_tube
 from evidence.tubes import from_its_border, worst
 from studies.cli import main
 from symheli import Helicopter
+from symheli.enclosure import equations
 from symheli.errors import InputError
-from synthesis import Tube, tube
+from synthesis import Motions, Tube, tube
 from synthesis.tubes.deviations import Cell, Deviations
 from synthesis.tubes.inequality import elementwise, rank_one
 from synthesis.tubes.reference import moving
@@ -44,7 +51,7 @@ def test_no_nonlinear_flight_leaves_the_tube(proven):
 @pytest.mark.slow
 def test_the_worst_gust_found_fills_a_good_part_of_the_tube(proven):
     # .4 of its size at least: the tube is not much larger than it must be
-    assert 0.4 < worst(proven, float(proven.airspeeds[-1])) < 1
+    assert 0.4 < worst(proven, float(proven.nodes[-1])) < 1
 
 
 @pytest.mark.slow
@@ -241,3 +248,177 @@ def test_terms_of_the_remainder_bound_their_matrices():
         bound = sum(abs(x @ row) * np.sqrt(v @ W @ v) for row, W in zip(one, own, strict=True))
         bound += np.abs(x) @ more @ np.abs(v)
         assert x @ np.tensordot(signs, matrices, axes=1) @ v <= bound * (1 + 1e-12)
+
+
+def _pendulum(reference=None, gain=(-3.0, -2.0), **about):
+    x, u, w = (casadi.SX.sym(n, k) for n, k in (("x", 2), ("u", 1), ("w", 1)))
+    f = casadi.vertcat(x[1], casadi.sin(x[0]) + u + w)
+    if reference is None:
+        c = casadi.SX.sym("c", 0)
+        reference = casadi.Function("upright", [c], [casadi.SX.zeros(2), casadi.SX.zeros(1)])
+    return casadi.Function("pendulum", [x, u, w], [f]), Motions(reference, [list(gain)], **about)
+
+
+@pytest.fixture(scope="module")
+def upright():
+    model, about = _pendulum()
+    found = tube(model, about, gust=0.2, sizes=(0.2, 0.3))
+    assert found.proven, found.why
+    return found.with_gain(["x0"]).with_gain(["x0"], energy=False)
+
+
+def test_a_tube_of_any_model_and_its_gains_are_proven_again_from_the_file(upright, tmp_path):
+    again = Tube.load(upright.save(tmp_path / "tube.json"))
+    assert again.proven
+    assert [gain.gamma for gain in again.gains] == [gain.gamma for gain in upright.gains]
+    assert again.hypotheses == upright.hypotheses
+
+
+@pytest.mark.parametrize(
+    "forgery",
+    [
+        lambda c: c.update(gust=1.2 * c["gust"]),
+        lambda c: c["gains"][0].update(energy=False),
+        lambda c: c["gains"][0]["multipliers"][0].update(
+            wind=(0.9 * np.array(c["gains"][0]["multipliers"][0]["wind"])).tolist()
+        ),
+        lambda c: c["gains"][1].update(Q=(0.9 * np.array(c["gains"][1]["Q"])).tolist()),
+        lambda c: c["gains"][1].update(multipliers=[]),
+        lambda c: c["gains"][0].update(bias=-1e-3),
+    ],
+)
+def test_a_forged_gain_is_not_proven(upright, tmp_path, forgery):
+    path = upright.save(tmp_path / "tube.json")
+    content = json.loads(path.read_text())
+    forgery(content)
+    path.write_text(json.dumps(content))
+    assert not Tube.load(path).proven
+
+
+def test_a_local_gain_is_between_that_flown_and_that_of_the_extreme_linear_loops(upright):
+    # x'' = (slope - 3) x - 2 x' + w, slope = sin(x)/x within [.997, 1] on the tube
+    energy, peak = (gain.gamma for gain in upright.gains)
+    # no resonance above d = 1/sqrt 2: the static gain 1/2; peak^2 = 1/(2 2 omega^2), X of Lyapunov
+    assert 0.5 <= energy < 0.5 * 1.02
+    assert 8**-0.5 <= peak < 8**-0.5 * 1.05
+
+
+def test_a_gain_of_a_state_that_there_is_none_is_refused(upright):
+    for outputs in ("x0", [], ["x0", "speed"]):
+        with pytest.raises(InputError, match="outputs"):
+            upright.with_gain(outputs)
+
+
+def test_equations_are_the_same_when_read_again():
+    x = casadi.SX.sym("x", 2)
+    f = casadi.Function(
+        "f", [x], [casadi.fabs(x[0]) / x[1] - casadi.if_else(x[0] > 0.1, casadi.sin(x[1]), 2.5)]
+    )
+    again = equations.read(json.loads(json.dumps(equations.written(f))))
+    for at in ([0.3, 2.0], [-0.2, 0.7]):
+        assert float(again(at)) == float(f(at))
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda c: c["operations"].append(["add", 0, 10**6]),
+        lambda c: c["operations"].append(["unknown", 0]),
+        lambda c: c["operations"].__setitem__(0, ["input", 3, 0]),
+        lambda c: c["outputs"].append([10**6]),
+    ],
+)
+def test_equations_that_are_none_are_refused(damage):
+    x = casadi.SX.sym("x", 2)
+    content = equations.written(casadi.Function("f", [x], [x[0] * x[1]]))
+    damage(content)
+    with pytest.raises(InputError):
+        equations.read(content)
+
+
+def test_motions_that_do_not_fit_are_refused():
+    model, about = _pendulum()
+    with pytest.raises(InputError, match="sizes"):
+        tube(model, about, gust=0.1)
+    with pytest.raises(InputError, match="Motions"):
+        tube(model, 3.0, gust=0.1, sizes=(1, 1))
+    with pytest.raises(InputError, match="helicopter"):
+        tube(model, about, gust=0.1, sizes=(1, 1), acceleration=1.0)
+    with pytest.raises(InputError, match="must take"):
+        tube(casadi.Function("f", [], []), about, gust=0.1, sizes=(1, 1))
+    for wrong in (
+        {"gain": (1.0, 2.0, 3.0)},
+        {"others": [[0.0, 1.0]]},
+        {"schedule": [1.0, 0.0]},
+        {"rate": (0.0, 1.0)},
+        {"pieces": (0,)},
+        {"states": ("x",)},
+    ):
+        with pytest.raises(InputError):
+            _pendulum(**wrong)
+
+
+def test_a_reference_that_misses_the_equations_moves_the_tube():
+    c = casadi.SX.sym("c", 0)
+    drifting = casadi.Function(
+        "off", [c], [casadi.SX([0.02, 0]), casadi.SX(0.0), casadi.SX([0, 0])]
+    )
+    model, about = _pendulum(drifting)
+    found = tube(model, about, gust=0.2, sizes=(0.2, 0.3))
+    _, exact = _pendulum()
+    assert found.proven
+    # .02 of an acceleration are a tenth of the gust
+    assert (
+        found.half_widths[0] > 1.05 * tube(model, exact, gust=0.2, sizes=(0.2, 0.3)).half_widths[0]
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", [c for c in VTOL if not c.bank], ids=lambda c: c.motions)
+def test_the_planar_vtol_stays_within_less_than_the_published_tube(case):
+    found = vtol_tube(case)
+    assert found.proven, found.why
+    position, control = sizes(found)
+    assert position < 0.5713518919661784  # compute_tubes.m, lambda 1.2
+    assert control < 0.5687971228165479
+    assert vtol_from_its_border(found, 500, 40) < 1 + 1e-6  # that of the integration
+
+
+@pytest.mark.slow
+def test_the_cells_of_a_schedule_are_enclosed_with_all_others():
+    case = next(c for c in VTOL if c.bank)
+    loop = Deviations(over_ground(), motions(case), case.gust)
+    cell = Cell(1, (0.0, 1.0), loop.reference.ranges[0], loop.reference.ranges[1:])
+    factor = np.diag([0.1, 0.1, 0.15, 0.3, 0.3, 1.0])
+    (over,) = loop.enclosed([cell], factor[None], loop.drifts([cell]))
+    rng, data = np.random.default_rng(0), loop.reference.data[1]
+    for _ in range(300):
+        z, w = rng.standard_normal(6), rng.uniform(-1, 1)
+        e = factor @ z / np.linalg.norm(z)
+        c = [rng.uniform(low, high) for low, high in cell.ranges]
+        moved = np.asarray(loop.rate(e, w, c, data))[:, 0]
+        x = rng.standard_normal(6)
+        # x'F (e, w, 1) is at most that at a corner, plus what symbols and terms add
+        v = np.concatenate([e, [w, 1.0]])
+        bound = max(x @ F @ v for F in over.corners.reshape(-1, 6, 8))
+        bound += np.linalg.norm([x @ H @ v for H in over.tube])
+        bound += np.linalg.norm([x @ H @ v for H in over.gust])
+        for row, W in zip(over.left, over.weights, strict=True):
+            bound += abs(x @ row) * np.sqrt(v @ W @ v)
+        assert x @ moved <= bound * (1 + 1e-9) + 1e-12  # roundings of this sum
+
+
+@pytest.mark.slow
+def test_the_published_metric_is_refuted_at_its_own_tube():
+    metric = Metric.stored("position")
+    found = refuted(metric, metric.tube)
+    assert found is not None
+    assert found[1] < 0
+    assert refuted(metric, 2 * metric.tube) is None
+
+
+@pytest.mark.slow
+def test_positions_of_the_published_metric_are_bounded_between_the_points():
+    metric = Metric.stored("position")
+    assert proven_positive(metric.position(0.6785))  # the largest on a grid is .67650
+    assert not proven_positive(metric.position(0.676))
