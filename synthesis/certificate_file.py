@@ -95,7 +95,7 @@ def written(cert: Certificate, path: str | os.PathLike[str]) -> Path:
     content = {
         "schema": SCHEMA,
         "version": VERSION,
-        **_encoded({**statement, "status": cert.status.name}),
+        **encoded({**statement, "status": cert.status.name}),
         "proof": None if cert.proof is None else _encoded_proof(cert.proof),
     }
     return write_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
@@ -148,7 +148,7 @@ def _certificate(content: Mapping[str, Any]) -> Certificate:
             f"expected the fields of a certificate; missing: {', '.join(sorted(missing)) or 'none'}"
             f"; unknown: {', '.join(sorted(foreign)) or 'none'}"
         )
-    statement = {name: _decoded(content[name]) for name in names if name != "proof"}
+    statement = {name: decoded(content[name]) for name in names if name != "proof"}
     if statement["status"] not in Status.__members__:
         raise InputError(f"expected the name of a status, got {statement['status']!r:.60}")
     statement["status"] = Status[statement["status"]]
@@ -194,14 +194,14 @@ def _encoded_proof(proof: Proof) -> dict[str, Any]:
     }
     if isinstance(evidence, box.Evidence):
         own["source"] = evidence.model.source
-    return {"route": route, **_encoded(own), "lyapunov": _encoded(proof.lyapunov)}
+    return {"route": route, **encoded(own), "lyapunov": encoded(proof.lyapunov)}
 
 
 def _decoded_proof(content: Any) -> Proof:
     if not isinstance(content, dict) or content.get("route") not in ROUTES:
         raise InputError(f"expected a proof by one of the routes {', '.join(ROUTES)}")
     route = content["route"]
-    own = {name: _decoded(v) for name, v in content.items() if name not in ("route", "lyapunov")}
+    own = {name: decoded(v) for name, v in content.items() if name not in ("route", "lyapunov")}
     if route == "one parameter":
         own["pieces"] = model_pieces(_a(LPVStateSpace, own["lpv"]))
     elif route == "box":
@@ -217,7 +217,7 @@ def _decoded_proof(content: Any) -> Proof:
             _a(kind, own[name])
     if own.get("block") is not None:
         _a(NormBounded, own["block"])
-    return Proof(ROUTES[route](**own), _decoded(content["lyapunov"]))
+    return Proof(ROUTES[route](**own), decoded(content["lyapunov"]))
 
 
 def _a(kind: Any, value: Any) -> Any:
@@ -226,7 +226,7 @@ def _a(kind: Any, value: Any) -> Any:
     return value
 
 
-def _encoded(value: Any) -> Any:
+def encoded(value: Any) -> Any:
     if isinstance(value, Signal):
         return {"signal": str(value), "unit": value.unit}
     if value is None or isinstance(value, str | bool | int):
@@ -236,10 +236,10 @@ def _encoded(value: Any) -> Any:
     if isinstance(value, np.integer):
         return int(value)
     if isinstance(value, np.ndarray):
-        numbers = [_encoded(v) for v in value.ravel().tolist()]
+        numbers = [encoded(v) for v in value.ravel().tolist()]
         return {"shape": list(value.shape), "array": numbers}
     if isinstance(value, dict):
-        return {name: _encoded(v) for name, v in value.items()}
+        return {name: encoded(v) for name, v in value.items()}
     if type(value) in WORDS:
         left_out = LEFT_OUT.get(type(value), ())
         names = (
@@ -247,19 +247,19 @@ def _encoded(value: Any) -> Any:
             if is_dataclass(value)
             else list(value._fields)
         )
-        own = {name: _encoded(getattr(value, name)) for name in names if name not in left_out}
+        own = {name: encoded(getattr(value, name)) for name in names if name not in left_out}
         return {"type": WORDS[type(value)], **own}
     if isinstance(value, tuple | list):
-        return [_encoded(v) for v in value]
+        return [encoded(v) for v in value]
     raise InputError(
         f"a {type(value).__name__} cannot be written to a file; fit the model to a polynomial or"
         " spline basis first, or keep the certificate in memory"
     )
 
 
-def _decoded(value: Any) -> Any:
+def decoded(value: Any) -> Any:
     if isinstance(value, list):
-        return tuple(map(_decoded, value))
+        return tuple(map(decoded, value))
     if not isinstance(value, dict):
         return value
     if value.keys() == {"float"}:
@@ -270,14 +270,14 @@ def _decoded(value: Any) -> Any:
     if value.keys() == {"signal", "unit"}:
         return Signal(_a(str, value["signal"]), _a(str, value["unit"]))
     if value.keys() == {"shape", "array"}:
-        numbers = [_decoded(v) for v in _a(list, value["array"])]
+        numbers = [decoded(v) for v in _a(list, value["array"])]
         if not all(isinstance(v, float | int) and not isinstance(v, bool) for v in numbers):
             raise InputError("expected an array of numbers")
         return np.array(numbers, dtype=float).reshape(_a(list, value["shape"]))
     kind = TYPES.get(value.get("type", ""))
     if kind is None:
         raise InputError(f"unknown kind of value {value.get('type')!r:.60}")
-    return kind(**{name: _decoded(v) for name, v in value.items() if name != "type"})
+    return kind(**{name: decoded(v) for name, v in value.items() if name != "type"})
 
 
 def _refused(constant: str) -> None:
