@@ -103,24 +103,7 @@ def written(cert: Certificate, path: str | os.PathLike[str]) -> Path:
 
 def read(path: str | os.PathLike[str]) -> Certificate:
     """Read a certificate; see `Certificate.load`."""
-    try:
-        content = json.loads(Path(path).read_text(encoding="utf-8"), parse_constant=_refused)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
-    except (ValueError, RecursionError) as error:
-        raise InputError(
-            f"{path}: expected a certificate as JSON, got another or a damaged file ({error});"
-            " write it again with Certificate.save"
-        ) from None
-    if not isinstance(content, dict) or content.get("schema") != SCHEMA:
-        raise InputError(
-            f"{path}: expected the schema {SCHEMA!r}; this file was not written by Certificate.save"
-        )
-    if content.get("version") != VERSION or isinstance(content.get("version"), bool):
-        raise InputError(
-            f"{path}: expected version {VERSION} of the schema, got {content.get('version')!r:.60};"
-            " read it with the version of symheli that wrote it"
-        )
+    content = content_of(path, SCHEMA, VERSION, "a certificate", "Certificate.save")
     try:
         with np.errstate(all="ignore"):
             cert = _certificate(content)
@@ -128,15 +111,46 @@ def read(path: str | os.PathLike[str]) -> Certificate:
         raise CertificateError(f"{path}: {error}") from None
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    except (
-        *(TypeError, ValueError, AttributeError, LookupError),
-        *(ArithmeticError, RecursionError, np.linalg.LinAlgError),
-    ) as error:
+    except DAMAGED as error:
         raise InputError(f"{path}: damaged, a value is invalid ({error})") from None
     if cert.verified and not cert.verify():
         why = cert.fault or "the inequalities do not hold with this bound"
         raise CertificateError(f"{path}: the proof does not establish the certified bound: {why}")
     return cert
+
+
+DAMAGED = (
+    *(TypeError, ValueError, AttributeError, LookupError),
+    *(ArithmeticError, RecursionError, np.linalg.LinAlgError),
+)
+"""What values of a damaged file raise."""
+
+
+def content_of(
+    path: str | os.PathLike[str], schema: str, version: int, what: str, writer: str
+) -> dict[str, Any]:
+    """Read a JSON file of this schema and version, which `writer` writes; raise `InputError` for
+    any other.
+    """
+    try:
+        content = json.loads(Path(path).read_text(encoding="utf-8"), parse_constant=_refused)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
+    except (ValueError, RecursionError) as error:
+        raise InputError(
+            f"{path}: expected {what} as JSON, got another or a damaged file ({error});"
+            f" write it again with {writer}"
+        ) from None
+    if not isinstance(content, dict) or content.get("schema") != schema:
+        raise InputError(
+            f"{path}: expected the schema {schema!r}; this file was not written by {writer}"
+        )
+    if content.get("version") != version or isinstance(content.get("version"), bool):
+        raise InputError(
+            f"{path}: expected version {version} of the schema, got {content.get('version')!r:.60};"
+            " read it with the version of symheli that wrote it"
+        )
+    return content
 
 
 def _certificate(content: Mapping[str, Any]) -> Certificate:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -24,7 +24,7 @@ from synthesis.lpv.bases import dependence
 from synthesis.program.cone_program import Solver, general_solver
 from synthesis.sets.proof import holds
 from synthesis.sets.search import SPARE, Found, Search
-from synthesis.sets.statement import Statement, feedback_of
+from synthesis.sets.statement import Limit, Statement, feedback_of
 from synthesis.worst.rates import Rate, limits
 
 if TYPE_CHECKING:
@@ -38,9 +38,14 @@ is changed, coarse and fine.
 """
 MOST_STEPS = 8
 """Changes of alpha in either direction."""
+HUGE = 1e6
+"""Size over that of the limits beyond which a set that has not settled counts as unbounded."""
+ROUNDS, SETTLED = 6, 0.1
+"""Most changes of coordinates, and the change of the volume's logarithm at which they end."""
 MORE_SPARE = 10.0
-"""Factor on the spare of the inequalities where the exact check fails, and how often."""
+"""Factor on the spare of the inequalities where the exact check fails."""
 TRIES = 5
+"""Candidates that are checked."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,17 +130,15 @@ class InvariantSet:
 
     def used(self, *p: float) -> dict[str, float]:
         """Part of each limit that the set at p reaches, at most 1; the largest one binds."""
-        Q, K, at = self.gramian(*p), self.gain(*p), self.statement.model.at(*p)
-        out = {}
-        for limit in self.statement.limits:
-            row = self._row(limit.where, limit.index, K, at)
-            out[str(limit.signal)] = float(np.sqrt(row @ Q @ row)) / limit.bound
-        return out
+        Q = self.gramian(*p)
+        rows = ((limit, self.row(limit, *p)) for limit in self.statement.limits)
+        return {str(at.signal): float(np.sqrt(row @ Q @ row)) / at.bound for at, row in rows}
 
-    def _row(self, where: int, index: int, K: Array, at: LinearModel) -> Array:
-        """The row c + d K of a limit, (n,)."""
+    def row(self, limit: Limit, *p: float) -> Array:
+        """The signal of a limit over the states at p, (n,)."""
+        K, at = self.gain(*p), self.statement.model.at(*p)
         seen = (np.eye(len(at.A)), at.C + at.D[:, self.statement.moved] @ K, K)
-        return seen[where][index]
+        return seen[limit.where][limit.index]
 
     def cut(self, first: str, second: str, *p: float, ax: Axes | None = None) -> Axes:
         """Draw the set at p where all other states are 0, over two of the states, and the limits
@@ -167,6 +170,10 @@ class InvariantSet:
         with `rigorous` False in floating point.
         """
         return holds(self.statement, self.shape, self.alpha, self.shares, rigorous=rigorous)
+
+    def established(self) -> InvariantSet:
+        """The same set, `proven` where the exact check passes."""
+        return replace(self, proven=True, why="") if self.verify() else self
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the set as JSON, sufficient to prove it again: `symheli verify FILE`."""
@@ -279,100 +286,108 @@ def _directions(given: Sequence[Mapping[str, float]], model: LPVStateSpace) -> A
     return out
 
 
+NO_SET = "the solver finds no set within the limits"
+UNBOUNDED = "the set grows without a bound: limit more states"
+
+
 class _Climb:
     """The search over alpha, and the coordinates of the programs: those of the last set found."""
 
     def __init__(self, search: Search, alpha: float | None):
         self.search, self.alpha = search, alpha
         own = search.statement
-        sizes = [own.state_bounds.get(x, 1.0) for x in own.model.states]
-        self.T = np.diag(sizes)
+        if not own.disturbance:
+            self.alpha = 0.0
+        self.T = np.diag([own.state_bounds.get(x, 1.0) for x in own.model.states])
+        self.why = NO_SET
 
     def best(self) -> InvariantSet:
         """The largest set found, with its proof."""
-        own = self.search.statement
-        if self.alpha is None and len(own.disturbance):
-            alpha = self._best_alpha()
-        else:
-            alpha = 0.0 if not len(own.disturbance) else self.alpha
-        if alpha is None:
-            return self._none("the solver has no set within the limits, or none that is bounded")
-        spare = SPARE
+        alpha, spare = self._best_alpha() if self.alpha is None else self.alpha, SPARE
         for _ in range(TRIES):
-            found = self._settled(alpha, spare)
+            found = None if alpha is None else self._settled(alpha, spare)
             if found is None:
-                break
-            made = self._made(found, alpha)
-            if made.verify():
-                return replace(made, proven=True, why="")
+                return self._none(self.why)
+            made = self._made(found, alpha).established()
+            if made.proven:
+                return made
             spare *= MORE_SPARE
-        else:
-            return self._none("no candidate passes the exact check")
-        return self._none("the solver has no set within the limits, or none that is bounded")
+        return self._none("no candidate passes the exact check")
 
     def _settled(self, alpha: float, spare: float) -> Found | None:
-        """The candidate in coordinates in which it is nearly the unit ball."""
-        found = self.search.largest(alpha, self.T, spare)
-        if found is None:
-            return None
-        self._take(found)
-        return self.search.largest(alpha, self.T, spare) or found
+        """The candidate in coordinates in which it is nearly the unit ball; None: there is none,
+        and `why` says why.
+        """
+        before = None
+        for _ in range(ROUNDS):
+            found = self.search.largest(alpha, self.T, spare)
+            if found is None and before is not None and before.size > HUGE:
+                break
+            if found is None:
+                return before
+            log = 0.5 * np.linalg.slogdet(self._middle(found))[1]
+            if before is not None and abs(log - self._log) < SETTLED:
+                return found
+            before, self._log = found, log
+            self.T = np.linalg.cholesky(self._middle(found))
+        self.why = UNBOUNDED
+        return None
 
-    def _take(self, found: Found) -> None:
-        """Make the set found the unit ball of the coordinates."""
+    def _middle(self, found: Found) -> Array:
+        """Q in the middle of the box."""
         search = self.search
-        middle = search.basis(np.mean(search.points, axis=0)[None].squeeze())
-        Q = np.tensordot(middle, found.Q, axes=1)
-        try:
-            self.T = np.linalg.cholesky(0.5 * (Q + Q.T))
-        except np.linalg.LinAlgError:
-            return
+        at = [0.5 * (a + b) for a, b in search.motion.box]
+        functions = search.basis(np.array(at if len(at) > 1 else at[0]))
+        return np.tensordot(functions, found.Q, axes=1)
 
     def _best_alpha(self) -> float | None:
         """The alpha of the largest set, by steps of a factor up and down and then of a finer
-        one.
+        one; None: there is none.
         """
         sizes: dict[float, float] = {}
-        first = FIRST_DECAY / self.search.unit
 
         def size(alpha: float) -> float:
             if alpha not in sizes:
                 tried = self.search.largest(alpha, self.T)
                 sizes[alpha] = -math.inf if tried is None else tried.size
-                progress.step(f"alpha {alpha:.3g} 1/s: size {sizes[alpha]:.4g}")
+                progress.step(f"alpha {alpha:.3g}: size {sizes[alpha]:.4g}")
             return sizes[alpha]
 
+        best = FIRST_DECAY / self.search.unit
         with task("invariant set", 2 * MOST_STEPS) as progress:
-            alpha = first
             for factor in (STEP, FINER):
                 for direction in (factor, 1 / factor):
-                    for _ in range(MOST_STEPS):
-                        ahead = alpha * direction
-                        if self.search.sampled and ahead >= 1:
-                            break
-                        if size(ahead) <= size(alpha) and math.isfinite(size(alpha)):
-                            break
-                        alpha = ahead
-                if not math.isfinite(size(alpha)):
+                    best = self._climbed(best, direction, size)
+                if size(best) == -math.inf:
                     return None
-        return alpha
+        return best
+
+    def _climbed(self, alpha: float, factor: float, size: Callable[[float], float]) -> float:
+        """alpha after steps of this factor, as long as the set grows, or while none was found."""
+        start = alpha
+        for _ in range(MOST_STEPS):
+            ahead = alpha * factor
+            if self.search.sampled and ahead >= 1:
+                break
+            if size(ahead) <= size(alpha) and size(alpha) > -math.inf:
+                break
+            alpha = ahead
+        return alpha if size(alpha) > -math.inf else start
 
     def _made(self, found: Found, alpha: float) -> InvariantSet:
-        model = self.search.statement.model
-        n, k = len(model.states), len(found.Q)
-        names = tuple(model.inputs[i] for i in self.search.statement.moved)
-        names = names if self.search.statement.feedback is None else ()
+        own = self.search.statement
+        model, k, rows = own.model, len(found.Q), found.Y.shape[1]
+        names = tuple(model.inputs[i] for i in own.moved)[:rows]
+        n = len(model.states)
         shape = LPVStateSpace(
-            self.search.basis, found.Q, np.zeros((k, n, 0)), found.Y, np.zeros((k, len(names), 0)),
+            self.search.basis, found.Q, np.zeros((k, n, 0)), found.Y, np.zeros((k, rows, 0)),
             model.parameters, model.states, (), names, model.dt,
         )  # fmt: skip
-        return InvariantSet(
-            self.search.statement, shape, alpha, found.shares, False, "not verified"
-        )
+        why = "the inequalities do not hold in exact arithmetic"
+        return InvariantSet(own, shape, alpha, found.shares, False, why)
 
     def _none(self, why: str) -> InvariantSet:
-        n, nu = len(self.T), len(self.search.statement.controls)
-        k = self.search.basis.size
-        nu = nu if self.search.statement.feedback is None else 0
-        nothing = Found(np.zeros((k, n, n)), np.zeros((k, nu, n)), np.zeros(0), 0.0)
+        own, k, n = self.search.statement, self.search.basis.size, len(self.T)
+        rows = len(own.controls) if own.feedback is None else 0
+        nothing = Found(np.zeros((k, n, n)), np.zeros((k, rows, n)), np.zeros(0), 0.0)
         return replace(self._made(nothing, 0.0), why=why)
