@@ -96,6 +96,8 @@ from synthesis.polynomial.matrix import PolynomialMatrix as PolynomialMatrix
 from synthesis.program.cone_program import Solver as Solver
 from synthesis.program.cone_program import installed_solvers as installed_solvers
 from synthesis.robust.structure import DynamicBlock as DynamicBlock
+from synthesis.sets.governor import Governor as Governor
+from synthesis.sets.governor import governor as governor
 from synthesis.sets.invariant_set import InvariantSet as InvariantSet
 from synthesis.sets.invariant_set import invariant_set as invariant_set
 from synthesis.sheet.evaluation import SpecificationTable as SpecificationTable

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 POINTS = 361
 """Of the border."""
+CLOSE = 0.99
+"""Part of the largest share of a limit from which on a limit counts as binding too."""
 ROOM = 1.3
 """Size of the picture over that of the cut."""
 
@@ -46,10 +48,11 @@ def plot_cut(
         for limit in found.statement.limits
     }
     reached = {name: np.abs(row @ border).max() / bound for name, (bound, row) in seen.items()}
-    binding = max(reached, key=reached.__getitem__)
+    binding = [name for name, part in reached.items() if part > CLOSE * max(reached.values())]
     for name, (bound, row) in seen.items():
-        _line(ax, row, bound, size, RED if name == binding else GREY)
-    ax.set_title(f"closest: {binding}, {reached[binding]:.0%} of its limit here", fontsize="medium")
+        _line(ax, row, bound, size, RED if name in binding else GREY)
+    most = max(reached.values())
+    ax.set_title(f"binds: {', '.join(binding)} ({most:.0%} of the limit)", fontsize="medium")
     ax.set_xlabel(label(found.shape.states[i]))
     ax.set_ylabel(label(found.shape.states[j]))
     return plain(ax)

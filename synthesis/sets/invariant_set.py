@@ -14,6 +14,7 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv import LinearModel, LPVStateSpace
+from symheli.lpv.scheduling import UNSCHEDULED
 from symheli.progress import task
 from symheli.threads import with_one_thread
 from symheli.values.arrays import Array, frozen
@@ -80,7 +81,7 @@ class InvariantSet:
     >>> import numpy as np
     >>> plant = symheli.lpv.LinearModel([[1.0]], [[2.0]], [[1.0]], [[0.0]], ["x"], ["u"], ["x_m"])
     >>> found = synthesis.invariant_set(plant, input_bounds={"u": 1.0})
-    >>> found.proven, bool(1.999 < found.half_widths(0.0)[0] < 2)  # b / a
+    >>> found.proven, bool(1.999 < found.half_widths()[0] < 2)  # b / a
     (True, True)
     """
 
@@ -95,14 +96,26 @@ class InvariantSet:
 
     def gramian(self, *p: float) -> Array:
         """Q (n, n) at p, one value a parameter; x' Q^-1 x <= 1 is the set there."""
-        Q = self.shape.at(*p).A
+        Q = self.shape.at(*self._point(p)).A
         return 0.5 * (Q + Q.T)
 
     def gain(self, *p: float) -> Array:
         """K (nu, n) at p, u = K x."""
+        p = self._point(p)
         if self.statement.feedback is not None:
             return self.statement.feedback.at(*p).D
         return np.linalg.solve(self.gramian(*p), self.shape.at(*p).C.T).T
+
+    def _point(self, p: tuple[float, ...]) -> tuple[float, ...]:
+        """p, which may be left out of a model without scheduling."""
+        without = not p and self.shape.parameters == (UNSCHEDULED,)
+        return (UNSCHEDULED.middle,) if without else p
+
+    def levels(self, x: Array, p: Any) -> Array:
+        """x' Q^-1 x of states (..., n), each at its own p (...), or (..., m)."""
+        Q = self.shape.matrices(p).A
+        z = np.linalg.solve(np.linalg.cholesky(0.5 * (Q + np.swapaxes(Q, -1, -2))), x[..., None])
+        return (z[..., 0] ** 2).sum(axis=-1)
 
     def level(self, x: Any, *p: float) -> Array:
         """x' Q^-1 x of states (..., n) at p: at most 1 in the set."""
@@ -111,8 +124,7 @@ class InvariantSet:
         if x.shape[-1:] != (n,):
             raise InputError(f"x: expected {n} states along the last axis, got shape {x.shape}")
         root = np.linalg.cholesky(self.gramian(*p))
-        z = np.linalg.solve(root, x.reshape(-1, n).T)
-        return (z**2).sum(axis=0).reshape(x.shape[:-1])
+        return (np.linalg.solve(root, x.reshape(-1, n).T) ** 2).sum(axis=0).reshape(x.shape[:-1])
 
     def contains(self, x: Any, *p: float) -> bool:
         """Whether the state (n,) lies in the set at p; of states (..., n), whether all do."""
@@ -136,13 +148,13 @@ class InvariantSet:
 
     def row(self, limit: Limit, *p: float) -> Array:
         """The signal of a limit over the states at p, (n,)."""
-        K, at = self.gain(*p), self.statement.model.at(*p)
+        K, at = self.gain(*p), self.statement.model.at(*self._point(p))
         seen = (np.eye(len(at.A)), at.C + at.D[:, self.statement.moved] @ K, K)
         return seen[limit.where][limit.index]
 
     def cut(self, first: str, second: str, *p: float, ax: Axes | None = None) -> Axes:
         """Draw the set at p where all other states are 0, over two of the states, and the limits
-        there; the one that the set comes closest to is drawn strong.
+        there; those that the cut comes closest to are red.
         """
         from synthesis.sets.cut import plot_cut
 

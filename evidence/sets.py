@@ -1,0 +1,113 @@
+"""`python -m evidence.sets`: nonlinear flights of helicopters whose commanded airspeed jumps, with
+and without the reference governor of a proven set.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass
+from typing import Any
+
+import casadi
+import numpy as np
+
+import symheli
+from evidence.tables import DOCS, keep, markdown
+from symheli import Helicopter
+from synthesis import Governor, InvariantSet, governor, invariant_set
+
+Array = np.ndarray
+
+VEHICLES = ("xcell60", "xcell_kahn_hudson")
+AIRSPEEDS = (3.0, 13.0)
+"""m/s."""
+GUST = 0.25
+"""Largest gust along each body axis, m/s."""
+STATE_BOUNDS = {
+    **{"u": 2.0, "v": 2.0, "w": 2.0, "p": 0.8, "q": 0.8, "r": 0.8, "phi": 0.25, "theta": 0.25},
+    **{"a1": 0.1, "b1": 0.1},
+}
+"""Largest deviations from steady flight: m/s, rad/s, rad."""
+INPUT_BOUNDS = {"d_lon": 0.1, "d_lat": 0.1, "d_col": 0.1, "d_ped": 0.2}
+"""Of the controls, rad."""
+FLIGHTS, SECONDS = 500, 20.0
+SAMPLE, STEP = 0.02, 0.01
+"""Of the governor, and of Runge and Kutta's method, s."""
+
+
+def proven_set(heli: Helicopter) -> InvariantSet:
+    """The set at every held airspeed, of the models along it."""
+    inputs = (*INPUT_BOUNDS, "u_w", "v_w", "w_w")
+    speeds = np.linspace(*AIRSPEEDS, 11).tolist()
+    model = symheli.sweep(heli, speeds, inputs=inputs).interpolate("polynomial", 4, rate=0.0)
+    return invariant_set(
+        model,
+        state_bounds=STATE_BOUNDS,
+        input_bounds=INPUT_BOUNDS,
+        disturbance=dict.fromkeys(inputs[4:], GUST),
+        degree=2,
+    )
+
+
+@dataclass(frozen=True)
+class Flown:
+    """Of each flight: the largest sqrt(V) reached, the largest part of a limit of state or control
+    used, and when the airspeed command was reached, s (infinite: never).
+    """
+
+    size: Array
+    used: Array
+    arrived: Array
+
+
+def flown(heli: Helicopter, found: InvariantSet, start: Array, wanted: Array, governed: bool) -> Flown:
+    """Nonlinear flights (N,) from steady flight at one commanded airspeed to another, in gusts
+    that change at random.
+    """
+    by, trim, count = governor(found), found.statement.model.trim, len(start)
+    x, u, w = (casadi.SX.sym(name, size) for name, size in (("x", 10), ("u", 4), ("w", 3)))
+    rhs = casadi.Function("rhs", [x, u, w], [heli.rhs(x, u, w)]).map(count)
+    rng = np.random.default_rng(0)
+    hold = rng.integers(1, 100, count)
+    bounds = np.array([*STATE_BOUNDS.values()]), np.array([*INPUT_BOUNDS.values()])
+    at, v, gust = trim.state(start), start.copy(), np.zeros((count, 3))
+    size, used, arrived = np.zeros(count), np.zeros(count), np.full(count, np.inf)
+    gusts = np.random.default_rng(1)
+    for k in range(round(SECONDS / SAMPLE)):
+        v = by.next(at, wanted, v) if governed else wanted
+        arrived = np.where((v == wanted) & np.isinf(arrived), k * SAMPLE, arrived)
+        new = GUST * gusts.choice([-1.0, 1.0], (count, 3))
+        gust = np.where((k % hold == 0)[:, None], new, gust)
+        K = gains(found, v)
+        x_r, u_r = trim.state(v), trim.input(v)[:, :4]
+
+        def control(at: Array) -> Array:
+            return u_r + np.einsum("kij,kj->ki", K, at - x_r)
+
+        def rate(at: Array) -> Array:
+            return np.asarray(rhs(at.T, control(at).T, gust.T)).T
+
+        for _ in range(round(SAMPLE / STEP)):
+            a = rate(at)
+            b = rate(at + STEP / 2 * a)
+            c = rate(at + STEP / 2 * b)
+            at = at + STEP / 6 * (a + 2 * b + 2 * c + rate(at + STEP * c))
+        at = np.nan_to_num(np.clip(at, -1e3, 1e3), nan=1e3)
+        size = np.maximum(size, np.sqrt(by.level(at, v)))
+        e, moved = np.abs(at - x_r) / bounds[0], np.abs(control(at) - u_r) / bounds[1]
+        used = np.maximum(used, np.maximum(e.max(axis=1), moved.max(axis=1)))
+    return Flown(size, used, arrived)
+
+
+def gains(found: InvariantSet, v: Array) -> Array:
+    """K (N, nu, n) at airspeeds (N,)."""
+    at = found.shape.matrices(v)
+    return np.swapaxes(np.linalg.solve(at.A, np.swapaxes(at.C, -1, -2)), -1, -2)
+
+
+def commands(by: Governor, count: int) -> tuple[Array, Array]:
+    """Steps of the commanded airspeed (N,) from and to, each of which leaves the set at once."""
+    rng = np.random.default_rng(0)
+    start, wanted = rng.uniform(*AIRSPEEDS, (2, 40 * count))
+    leaves = by.level(by.steady(start), wanted) > 1
+    return start[leaves][:count], wanted[leaves][:count]
