@@ -33,6 +33,8 @@ INPUT_BOUNDS = {"d_lon": 0.1, "d_lat": 0.1, "d_col": 0.1, "d_ped": 0.2}
 FLIGHTS, SECONDS = 500, 10.0
 SAMPLE, STEP = 0.02, 0.01
 """Of the governor, and of Runge and Kutta's method, s."""
+LOST = 1e3
+"""Size at which a state of a flight that diverges is held, SI."""
 
 
 def proven_set(heli: Helicopter) -> InvariantSet:
@@ -60,13 +62,14 @@ class Flown:
     arrived: Array
 
 
-def flown(heli: Helicopter, found: InvariantSet, start: Array, wanted: Array, governed: bool) -> Flown:
+def flown(
+    heli: Helicopter, found: InvariantSet, start: Array, wanted: Array, governed: bool
+) -> Flown:
     """Nonlinear flights (N,) from steady flight at one commanded airspeed to another, in gusts
     that change at random.
     """
     by, trim, count = governor(found), found.statement.model.trim, len(start)
-    x, u, w = (casadi.SX.sym(name, size) for name, size in (("x", 10), ("u", 4), ("w", 3)))
-    rhs = casadi.Function("rhs", [x, u, w], [heli.rhs(x, u, w)]).map(count)
+    rate = _closed(heli).map(count)
     rng = np.random.default_rng(1)
     hold = rng.integers(1, 100, count)
     bounds = np.array([*STATE_BOUNDS.values()]), np.array([*INPUT_BOUNDS.values()])
@@ -77,25 +80,34 @@ def flown(heli: Helicopter, found: InvariantSet, start: Array, wanted: Array, go
         arrived = np.where((v == wanted) & np.isinf(arrived), k * SAMPLE, arrived)
         new = GUST * rng.choice([-1.0, 1.0], (count, 3))
         gust = np.where((k % hold == 0)[:, None], new, gust)
-        K = gains(found, v)
-        x_r, u_r = trim.state(v), trim.input(v)[:, :4]
-
-        def control(at: Array) -> Array:
-            return u_r + np.einsum("kij,kj->ki", K, at - x_r)
-
-        def rate(at: Array) -> Array:
-            return np.asarray(rhs(at.T, control(at).T, gust.T)).T
-
+        K, x_r = gains(found, v), trim.state(v)
+        u_r = trim.input(v)[:, : len(INPUT_BOUNDS)]
+        given = (x_r.T, u_r.T, np.hstack(np.swapaxes(K, 1, 2)).reshape(10, -1), gust.T)
         for _ in range(round(SAMPLE / STEP)):
-            a = rate(at)
-            b = rate(at + STEP / 2 * a)
-            c = rate(at + STEP / 2 * b)
-            at = at + STEP / 6 * (a + 2 * b + 2 * c + rate(at + STEP * c))
-        at = np.nan_to_num(np.clip(at, -1e3, 1e3), nan=1e3)
+            a = _rates(rate, at, given)
+            b = _rates(rate, at + STEP / 2 * a, given)
+            c = _rates(rate, at + STEP / 2 * b, given)
+            d = _rates(rate, at + STEP * c, given)
+            at = at + STEP / 6 * (a + 2 * b + 2 * c + d)
+        at = np.nan_to_num(np.clip(at, -LOST, LOST), nan=LOST)
         size = np.maximum(size, np.sqrt(by.level(at, v)))
-        e, moved = np.abs(at - x_r) / bounds[0], np.abs(control(at) - u_r) / bounds[1]
-        used = np.maximum(used, np.maximum(e.max(axis=1), moved.max(axis=1)))
+        e = at - x_r
+        u = np.einsum("kij,kj->ki", K, e)
+        parts = [np.abs(own / bound).max(axis=1) for own, bound in zip((e, u), bounds, strict=True)]
+        used = np.maximum.reduce([used, *parts])
     return Flown(size, used, arrived)
+
+
+def _closed(heli: Helicopter) -> casadi.Function:
+    """dx/dt of x, the steady state and controls, K and the gust."""
+    x, x_r = casadi.SX.sym("x", 10), casadi.SX.sym("x_r", 10)
+    u_r, K, w = casadi.SX.sym("u_r", 4), casadi.SX.sym("K", 10, 4), casadi.SX.sym("w", 3)
+    rates = heli.rhs(x, u_r + K.T @ (x - x_r), w)
+    return casadi.Function("closed", [x, x_r, u_r, K, w], [rates])
+
+
+def _rates(rate: casadi.Function, at: Array, given: tuple[Array, ...]) -> Array:
+    return np.asarray(rate(at.T, *given)).T
 
 
 def gains(found: InvariantSet, v: Array) -> Array:

@@ -241,6 +241,7 @@ def _a(kind: Any, value: Any) -> Any:
 
 
 def encoded(value: Any) -> Any:
+    """Return a value as JSON holds it; raise `InputError` for a type that is not in `TYPES`."""
     if isinstance(value, Signal):
         return {"signal": str(value), "unit": value.unit}
     if value is None or isinstance(value, str | bool | int):
@@ -272,6 +273,7 @@ def encoded(value: Any) -> Any:
 
 
 def decoded(value: Any) -> Any:
+    """Return the value that `encoded` wrote; raise `InputError` for anything else."""
     if isinstance(value, list):
         return tuple(map(decoded, value))
     if not isinstance(value, dict):

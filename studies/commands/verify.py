@@ -17,7 +17,8 @@ HELP = "prove saved certificates again, exactly, from their files alone"
 ARGUMENTS = (
     positional(
         "files",
-        "written by Certificate.save, Tube.save, InvariantSet.save, symheli certify --save or a study (DIR/proofs)",
+        "written by Certificate.save, Tube.save, InvariantSet.save, symheli certify --save or a"
+        " study (DIR/proofs)",
         nargs="+",
         metavar="file",
     ),

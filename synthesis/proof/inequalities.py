@@ -119,7 +119,9 @@ def decrease(
         growth = number(growth_of(demand.shift, model.dt))
         yield from dissipation(system, here, demand.kind, after=there * growth)
         return
-    drifts = [slope_along(here, drift, demand.time, number) for drift in demand.motion.drifts(moving)]
+    drifts = [
+        slope_along(here, drift, demand.time, number) for drift in demand.motion.drifts(moving)
+    ]
     if demand.shift:
         rising = here * (2 * number(demand.shift))
         drifts = [rising if drift is None else rising + drift for drift in drifts]

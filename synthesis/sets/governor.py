@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -56,32 +57,38 @@ class Governor:
         """
         v = frozen(reference, "reference")
         e = frozen(x, "x") - self.steady(v)
-        p = v if self.parameters is None else np.broadcast_to(self.parameters, (*v.shape, 1))
-        p = p if self.parameters is None or p.shape[-1] > 1 else p[..., 0]
-        return self.set.levels(e, p)
+        if self.parameters is None:
+            return self.set.levels(e, v)
+        return ((e @ self._whitening) ** 2).sum(axis=-1)
+
+    @cached_property
+    def _whitening(self) -> Array:
+        """S (n, n) with V = |e S|^2 at the parameters."""
+        assert self.parameters is not None  # noqa: S101 - asked by the caller
+        return np.linalg.inv(np.linalg.cholesky(self.set.gramian(*self.parameters))).T
 
     def next(self, x: Any, wanted: Any, now: Any) -> Array:
         """The governed reference: as far from `now` towards `wanted` as the state stays inside the
         set around it, by bisection; `now` where nothing further does.
 
-        A reference that is the scheduling parameter stays in its range. The state is (..., n), both references (...), with the reference held until the next call.
-        A state that starts inside never leaves, whatever is wanted: the set is invariant while the
-        reference is held, and a step that the governor makes ends inside.
+        A reference that is the scheduling parameter stays in its range. The state is (..., n), both
+        references (...), and the reference is held until the next call. A state that starts inside
+        never leaves, whatever is wanted: the set is invariant while the reference is held, and
+        where the governor steps the state is inside again.
         """
         now, wanted = np.broadcast_arrays(frozen(now, "now"), frozen(wanted, "wanted"))
         if self.parameters is None:
             (s,) = self.set.shape.parameters
             wanted = np.clip(wanted, s.low, s.high)
-        inside = np.zeros(now.shape)
-        ahead = np.ones(now.shape)
-        for k in range(HALVINGS):
-            stays = self.level(x, now + ahead * (wanted - now)) <= 1
-            if k == 0 and np.all(stays):
-                return now + (wanted - now)
-            outside = np.where(stays, np.inf, ahead) if k == 0 else np.where(stays, outside, ahead)
-            inside = np.where(stays, ahead, inside)
-            ahead = np.where(np.isinf(outside), 1.0, 0.5 * (inside + outside))
-        return now + inside * (wanted - now)
+        arrives = self.level(x, wanted) <= 1
+        if np.all(arrives):
+            return wanted
+        low, high = np.zeros(now.shape), np.ones(now.shape)
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            stays = self.level(x, now + middle * (wanted - now)) <= 1
+            low, high = np.where(stays, middle, low), np.where(stays, high, middle)
+        return np.where(arrives, wanted, now + low * (wanted - now))
 
 
 def governor(
@@ -127,20 +134,20 @@ def governor(
     if not isinstance(found, InvariantSet) or not found.proven:
         raise InputError("found: expected an InvariantSet with a proof (found.proven)")
     n, m = len(found.shape.states), len(found.shape.parameters)
+    trim = found.statement.model.trim
+    if steady is None and trim is None:
+        raise InputError("steady: the model of the set has no trim; give the steady state")
     if steady is None:
-        trim = found.statement.model.trim
-        if trim is None:
-            raise InputError("steady: the model of the set has no trim; give the steady state")
-        steady = trim.state
+        steady = getattr(trim, "state", None)
     elif not callable(steady):
-        direction = frozen(steady, "steady", (n,))
-
-        def steady(v: Array) -> Array:
-            return v[..., None] * direction
-
+        steady = partial(_along, frozen(steady, "steady", (n,)))
     if at is None and found.shape.parameters == (UNSCHEDULED,):
         at = [UNSCHEDULED.middle]
     own = None if at is None else frozen(at, "at", (m,))
     if own is None and m > 1:
         raise InputError(f"at: the set has {m} parameters; give the values where it is taken")
     return Governor(found, steady, own)
+
+
+def _along(direction: Array, v: Array) -> Array:
+    return v[..., None] * direction

@@ -237,7 +237,8 @@ def invariant_set(
     rate : float, sequence or mapping, optional
         Largest |dp/dt|, as for `l2_gain`; by default the model's own.
     degree : int or tuple of int, optional
-        Of Q and Y in every parameter, or one each; by default 1 in those that may not jump. In discrete time Q depends only on constant parameters.
+        Of Q and Y in every parameter, or one each; by default 1 in those that may not jump. In
+        discrete time Q depends only on constant parameters.
     alpha : float, optional
         See `InvariantSet`; by default several are tried, and the best taken.
     solver : Solver or str
@@ -316,8 +317,10 @@ class _Climb:
     def best(self) -> InvariantSet:
         """The largest set found, with its proof."""
         alpha, spare = self._best_alpha() if self.alpha is None else self.alpha, SPARE
+        if alpha is None:
+            return self._none(self.why)
         for _ in range(TRIES):
-            found = None if alpha is None else self._settled(alpha, spare)
+            found = self._settled(alpha, spare)
             if found is None:
                 return self._none(self.why)
             made = self._made(found, alpha).established()

@@ -53,7 +53,10 @@ class Search:
         self.directions = directions
         model = statement.model
         self.motion = Motion.of(model.parameters)
-        self.parts = [pieces(model), *([] if statement.feedback is None else [pieces(statement.feedback)])]
+        self.parts = [
+            pieces(model),
+            *([] if statement.feedback is None else [pieces(statement.feedback)]),
+        ]
         self.cells = self._cells()
         self.points = self._volume_points()
         self.unit = self._time_unit()
@@ -75,7 +78,9 @@ class Search:
         constant = polynomials([0] * len(own.model.parameters), own.model.box)
         unit = np.eye(nw)
         tau = program.variable(unit[:, :, None] * unit, constant) if nw else None
-        lower = np.array([np.outer(np.eye(n)[i], np.eye(n)[j]) for i in range(n) for j in range(i + 1)])
+        lower = np.array(
+            [np.outer(np.eye(n)[i], np.eye(n)[j]) for i in range(n) for j in range(i + 1)]
+        )
         roots = [program.variable(lower, constant) for _ in self.points]
         one = np.ones((1, 1, 1))
         leaves = n * len(self.points)
@@ -135,9 +140,7 @@ class Search:
         law = np.zeros((self.basis.size, nu if designed else 0, n))
         if Y is not None:
             law = Y.coefficients(x) @ T.T
-        shares = (
-            np.zeros(0) if tau is None else np.maximum(np.diag(tau.coefficients(x)[0]), 0.0)
-        )
+        shares = np.zeros(0) if tau is None else np.maximum(np.diag(tau.coefficients(x)[0]), 0.0)
         size = -float(cost @ x)
         return Found(0.5 * (found + np.swapaxes(found, 1, 2)), law, shares / self.unit, size)
 

@@ -80,13 +80,14 @@ class Statement:
         passed = [
             y
             for y in self.state_bounds
-            if y in self.model.outputs and y not in self.model.states
+            if y in self.model.outputs
+            and y not in self.model.states
             and np.any(self.model.D[:, self.model.outputs.index(y)][:, self.disturbed])
         ]
         if passed:
             raise InputError(
-                f"state_bounds: disturbances reach {passed[0]} directly, and no set of states bounds"
-                " it; bound a state or another output"
+                f"state_bounds: disturbances reach {passed[0]} directly, and no set of states"
+                " bounds it; bound a state or another output"
             )
 
     @cached_property
@@ -121,10 +122,14 @@ class Statement:
     def hypotheses(self) -> tuple[str, ...]:
         """What the statement rests on, in sentences."""
         law = "u = K(p) x with all states known" if self.controls else "the loop as it is given"
+        time = "continuous" if self.model.dt is None else "discrete"
         told = [f"|{w}| <= {a:g}" for w, a in self.disturbance.items()]
         return (
-            f"the LPV model, in {'continuous' if self.model.dt is None else 'discrete'} time; {law}",
-            *(motion(s, s.rate if isinstance(s.rate, str) else s.limit) for s in self.model.parameters),
+            f"the LPV model, in {time} time; {law}",
+            *(
+                motion(s, 0.0 if isinstance(s.rate, str) else s.limit)
+                for s in self.model.parameters
+            ),
             f"disturbances with any history: {', '.join(told)}" if told else "no disturbances",
         )
 

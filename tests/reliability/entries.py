@@ -79,6 +79,8 @@ EXEMPT: dict[str, str] = {
                 "SpecificationTable",
                 "StructuredController",
                 "Tube",
+                "InvariantSet",
+                "Governor",
             ),
             *(),
             *(),
@@ -115,6 +117,8 @@ SLOW = {
         "synthesis.robust_margin",
         "synthesis.worst_case_gain",
         "synthesis.loop_shaping",
+        "synthesis.invariant_set",
+        "synthesis.governor",
     ),
 }
 """Entries that fly, sweep or solve: `FEW` inputs each."""

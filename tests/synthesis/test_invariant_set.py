@@ -11,7 +11,6 @@ import pytest
 from scipy.linalg import expm
 
 import symheli
-import synthesis
 from studies.cli import main
 from symheli.errors import InputError
 from symheli.lpv import LinearModel, LPVStateSpace, Scheduling
@@ -53,9 +52,7 @@ def test_of_a_sampled_lag_with_a_disturbance_it_is_the_closed_form():
 
 @pytest.mark.parametrize("u_max", [0.3, 1.0])
 def test_a_double_integrator_has_the_set_of_an_independent_program(u_max):
-    found = invariant_set(
-        CART, state_bounds={"x": 2.0, "v": 1.0}, input_bounds={"u": u_max}
-    )
+    found = invariant_set(CART, state_bounds={"x": 2.0, "v": 1.0}, input_bounds={"u": u_max})
     Q, Y = cvxpy.Variable((2, 2), symmetric=True), cvxpy.Variable((1, 2))
     A, B = CART.A, CART.B
     motion = A @ Q + B @ Y
@@ -121,8 +118,12 @@ def furthest(found, count, steps, dt, seed=0):
         way = np.where(rng.random(count) < 0.02, -way, way)
         # continuous: of V now; sampled: of V after the step
         ahead = x if own.model.dt is None else A @ x
-        push = own.amplitudes[:, None] * np.sign(np.swapaxes(W, 1, 2) @ np.linalg.solve(at.A, ahead))
-        used = max(used, np.abs((K @ x)[..., 0] / [4.0, 4.0]).max(), np.abs(x[..., 0] / [1, 2, 3]).max())
+        push = own.amplitudes[:, None] * np.sign(
+            np.swapaxes(W, 1, 2) @ np.linalg.solve(at.A, ahead)
+        )
+        used = max(
+            used, np.abs((K @ x)[..., 0] / [4.0, 4.0]).max(), np.abs(x[..., 0] / [1, 2, 3]).max()
+        )
         if own.model.dt is None:
             wide[:, :n, :n], wide[:, :n, n:] = A, W @ push
             x = (expm(wide * dt) @ np.pad(x, ((0, 0), (0, 1), (0, 0)), constant_values=1.0))[:, :n]
@@ -292,13 +293,13 @@ def test_the_governor_takes_the_largest_step_of_the_closed_form():
 
 def test_no_command_drives_a_governed_model_out_of_its_set():
     found = invariant_set(CART, state_bounds={"x": 1.0, "v": 1.0}, input_bounds={"u": 0.3})
-    made, rng, dt = governor(found, [1.0, 0.0]), np.random.default_rng(0), 0.05
+    made, rng, dt = governor(found, [1.0, 0.0]), np.random.default_rng(0), 0.1
     A = CART.A + CART.B @ found.gain()
     step = expm(A * dt)
     wanted = rng.uniform(-20, 20, 500)
     for governed in (True, False):
         x, v, most = np.zeros((500, 2)), np.zeros(500), np.zeros(500)
-        for _ in range(200):
+        for _ in range(100):
             v = made.next(x, wanted, v) if governed else wanted
             x_r = v[:, None] * np.array([1.0, 0.0])
             x = x_r + (x - x_r) @ step.T
