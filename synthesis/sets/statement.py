@@ -15,7 +15,8 @@ from symheli.lpv import LinearModel, LPVStateSpace
 from symheli.values.arrays import Array
 from symheli.values.signal import Signal, indices
 from symheli.values.summary import summarized
-from synthesis.analysis.hypotheses import motion
+from synthesis.analysis.hypotheses import drifting, motion
+from synthesis.lpv.bases import moves
 from synthesis.plant.as_controller import as_controller
 
 
@@ -131,6 +132,7 @@ class Statement:
                 for s in self.model.parameters
             ),
             f"disturbances with any history: {', '.join(told)}" if told else "no disturbances",
+            *(drifting(self.model) if moves(self.model.parameters) else ()),
         )
 
 
