@@ -111,10 +111,10 @@ def _tube(file: str) -> tuple[None, str, dict[str, Any]]:
 
 def _set(file: str) -> tuple[None, str, dict[str, Any]]:
     """The verdict on the invariant set in a file, in words and for a program."""
-    from synthesis import InvariantSet
+    from synthesis.sets.set_file import read
 
     progress(f"verifying {file} in rational arithmetic")
-    found = InvariantSet.load(file)
+    found = read(file)
     verdict = f"proven in exact arithmetic: {found}" if found.proven else f"not proven: {found.why}"
     own = found.statement
     return (

@@ -25,8 +25,8 @@ from synthesis.lpv.bases import dependence
 from synthesis.program.cone_program import Solver, general_solver
 from synthesis.sets.proof import holds
 from synthesis.sets.search import SPARE, Found, Search
-from synthesis.sets.statement import Limit, Statement, feedback_of
-from synthesis.worst.rates import Rate, limits
+from synthesis.sets.statement import Limit, Statement, stated
+from synthesis.worst.rates import Rate
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -191,14 +191,15 @@ class InvariantSet:
         """Write the set as JSON, sufficient to prove it again: `symheli verify FILE`."""
         from synthesis.sets.set_file import written
 
-        return written(self, path)
+        own = {"shape": self.shape, "alpha": self.alpha, "shares": self.shares}
+        return written(self, path, own)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> InvariantSet:
         """Read a set and prove it again; `proven` says whether that succeeded."""
         from synthesis.sets.set_file import read
 
-        return read(path)
+        return read(path, cls)
 
 
 @with_one_thread
@@ -268,20 +269,9 @@ def invariant_set(
     (True, True, 'x')
     """
     solver = general_solver(solver)
-    if isinstance(model, LinearModel):
-        model = LPVStateSpace.constant(model)
-    if not isinstance(model, LPVStateSpace):
-        raise InputError(
-            f"model: expected an LPVStateSpace or a LinearModel, got {type(model).__name__}"
-        )
-    own = limits(model.parameters, rate)
-    model = replace(model, parameters=own, residuals=None)
-    outside = dict(disturbance or {})
-    controls = tuple(u for u in model.inputs if u not in outside)
-    feedback = None if controller is None else feedback_of(controller, model, controls)
-    statement = Statement(
-        model, outside, controls, state_bounds or {}, input_bounds or {}, feedback
-    )
+    statement = stated(model, controller, state_bounds, input_bounds, disturbance, rate)
+    model = statement.model
+    own = model.parameters
     matters = [True] * len(own)
     basis = dependence(degree, own, "Q", matters, DEGREE, still=model.dt is not None)
     search = Search(statement, basis, _directions(directions, model), solver)

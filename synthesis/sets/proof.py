@@ -52,14 +52,77 @@ def holds(
     )
 
 
-class _Parts:
-    """Model, Q and feedback as polynomials on regions, in the arithmetic of `number`."""
+class _Loop:
+    """Model and given feedback as polynomials on regions, in the arithmetic of `number`."""
 
-    def __init__(self, statement: Statement, shape: LPVStateSpace, number: Number):
+    def __init__(self, statement: Statement, number: Number):
         self.statement, self.number = statement, number
-        self.model, self.shape = pieces(statement.model), pieces(shape)
+        self.model = pieces(statement.model)
         self.feedback = None if statement.feedback is None else pieces(statement.feedback)
         self.motion = Motion.of(statement.model.parameters)
+
+    def regions(self) -> list[Region]:
+        """All boxes of p on which everything is polynomial."""
+        box = [(s.low, s.high) for s in self.statement.model.parameters]
+        breaks = box if self.feedback is None else self.feedback.breaks
+        still = [False] * len(box)  # no inequality has Q at another p
+        return list(regions(self.model, [np.array(b) for b in breaks], self.motion, still))
+
+    def matrices(self, region: Region) -> tuple[PolynomialMatrix, ...]:
+        """A, B of the controls, W of disturbances of size 1, C, D of the controls."""
+        own, number = self.statement, self.number
+        A, B, C, D = model_on(self.model, region, number)
+        Bu, W, Du = (
+            PolynomialMatrix(M.box, M.coefficients[..., which])
+            for M, which in ((B, own.moved), (B, own.disturbed), (D, own.moved))
+        )
+        W = PolynomialMatrix(W.box, W.coefficients * exact(own.amplitudes, number))
+        return A, Bu, W, C, Du
+
+    def gains(self, region: Region) -> PolynomialMatrix:
+        """The given K; none where nothing is controlled."""
+        if self.feedback is None:
+            nothing = exact(np.zeros((0, self.model.sizes[0])), self.number)
+            box = tuple((self.number(a), self.number(b)) for a, b in region.box)
+            return PolynomialMatrix.constant(nothing, box)
+        return self.on(self.feedback.models[region.segment][3], region.box)
+
+    def on(self, M: PolynomialMatrix, box: Sequence[tuple[float, float]]) -> PolynomialMatrix:
+        """A polynomial matrix on a box."""
+        own = tuple((self.number(a), self.number(b)) for a, b in box)
+        return convert(M, self.number).restrict(own)
+
+
+def closed_pieces(
+    statement: Statement, number: Number
+) -> Iterator[tuple[PolynomialMatrix, PolynomialMatrix, PolynomialMatrix]]:
+    """A and W (of disturbances of size 1) of the loop with the given feedback, and the rows of all
+    limits over their bounds, on boxes that cover all p.
+    """
+    loop = _Loop(statement, number)
+    for region in loop.regions():
+        A, B, W, C, D = loop.matrices(region)
+        K = loop.gains(region)
+        eye = PolynomialMatrix.constant(exact(np.eye(A.shape[0]), number), A.box)
+        seen = (eye, C + D @ K, K)
+        one = number(1.0)
+        rows = [
+            _row(seen[limit.where], limit.index) * (one / number(limit.bound))
+            for limit in statement.limits
+        ]
+        yield A + B @ K, W, block([[row] for row in rows])
+
+
+def _row(M: PolynomialMatrix, index: int) -> PolynomialMatrix:
+    return PolynomialMatrix(M.box, M.coefficients[..., index : index + 1, :])
+
+
+class _Parts(_Loop):
+    """The loop with Q and, where it was designed, Y."""
+
+    def __init__(self, statement: Statement, shape: LPVStateSpace, number: Number):
+        super().__init__(statement, number)
+        self.shape = pieces(shape)
         self.law = next(iter(self.shape.models.values()))
 
     @property
@@ -84,29 +147,15 @@ class _Parts:
                 return False
         return True
 
-    def regions(self) -> list[Region]:
-        """All boxes of p on which everything is polynomial."""
-        breaks = (self.shape if self.feedback is None else self.feedback).breaks
-        still = [False] * len(breaks)  # no inequality has Q at another p
-        return list(regions(self.model, [np.array(b) for b in breaks], self.motion, still))
-
     def inequalities(
         self, region: Region, alpha: float, shares: Array
     ) -> Iterator[PolynomialMatrix]:
         """Every matrix that must be positive definite on the region."""
         own, number, box = self.statement, self.number, region.box
-        A, B, C, D = model_on(self.model, region, number)
-        Q = self._on(self.law[0], box)
+        A, Bu, W, C, Du = self.matrices(region)
+        Q = self.on(self.law[0], box)
         Q = (Q + Q.T) * number(0.5)
-        if self.feedback is None:
-            Y = self._on(self.law[2], box)
-        else:
-            Y = self._on(self._gains(region), box) @ Q
-        Bu, W, Du = (
-            PolynomialMatrix(M.box, M.coefficients[..., which])
-            for M, which in ((B, own.moved), (B, own.disturbed), (D, own.moved))
-        )
-        W = PolynomialMatrix(W.box, W.coefficients * exact(own.amplitudes, number))
+        Y = self.on(self.law[2], box) if self.feedback is None else self.gains(region) @ Q
         tau = PolynomialMatrix.constant(exact(np.diag(shares), number), W.box)
         motion = A @ Q + Bu @ Y
         if self.model.dt is not None:
@@ -119,19 +168,9 @@ class _Parts:
                 yield _whole(decrease(motion, Q, slope, W.T, tau, number(alpha)), number)
         seen = (Q, C @ Q + Du @ Y, Y)
         for limit in own.limits:
-            F, i = seen[limit.where], limit.index
-            row = PolynomialMatrix(F.box, F.coefficients[..., i : i + 1, :])
+            row = _row(seen[limit.where], limit.index)
             bound = exact([[limit.bound]], number)
-            yield _whole(within(row, Q, PolynomialMatrix.constant(bound @ bound, F.box)), number)
-
-    def _gains(self, region: Region) -> PolynomialMatrix:
-        """K on the piece of the given feedback that holds the region."""
-        assert self.feedback is not None  # noqa: S101 - asked by the caller
-        return self.feedback.models[region.segment][3]
-
-    def _on(self, M: PolynomialMatrix, box: Sequence[tuple[float, float]]) -> PolynomialMatrix:
-        own = tuple((self.number(a), self.number(b)) for a, b in box)
-        return convert(M, self.number).restrict(own)
+            yield _whole(within(row, Q, PolynomialMatrix.constant(bound @ bound, row.box)), number)
 
 
 def _whole(rows: Lower, number: Number) -> PolynomialMatrix:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -18,6 +18,7 @@ from symheli.values.summary import summarized
 from synthesis.analysis.hypotheses import drifting, motion
 from synthesis.lpv.bases import moves
 from synthesis.plant.as_controller import as_controller
+from synthesis.worst.rates import Rate, limits
 
 
 class Limit(NamedTuple):
@@ -174,3 +175,29 @@ def feedback_of(given: Any, model: LPVStateSpace, controls: tuple[str, ...]) -> 
         K.basis, nothing, np.zeros((len(D), 0, D.shape[2])), np.zeros((len(D), D.shape[1], 0)), D,
         model.parameters, (), model.states, names, model.dt,
     )  # fmt: skip
+
+
+def stated(
+    model: Any,
+    controller: Any,
+    state_bounds: Mapping[str, float] | None,
+    input_bounds: Mapping[str, float] | None,
+    disturbance: Mapping[str, float] | None,
+    rate: Rate = None,
+) -> Statement:
+    """The statement of the arguments of `invariant_set`; raises `InputError` where they do not
+    fit.
+    """
+    if isinstance(model, LinearModel):
+        model = LPVStateSpace.constant(model)
+    if not isinstance(model, LPVStateSpace):
+        raise InputError(
+            f"model: expected an LPVStateSpace or a LinearModel, got {type(model).__name__}"
+        )
+    model = replace(model, parameters=limits(model.parameters, rate), residuals=None)
+    outside = {} if disturbance is None else disturbance
+    controls = tuple(u for u in model.inputs if u not in outside)
+    feedback = None if controller is None else feedback_of(controller, model, controls)
+    states = {} if state_bounds is None else state_bounds
+    inputs = {} if input_bounds is None else input_bounds
+    return Statement(model, outside, controls, states, inputs, feedback)

@@ -80,6 +80,7 @@ EXEMPT: dict[str, str] = {
                 "StructuredController",
                 "Tube",
                 "InvariantSet",
+                "LowComplexitySet",
                 "Governor",
             ),
             *(),
@@ -118,6 +119,7 @@ SLOW = {
         "synthesis.worst_case_gain",
         "synthesis.loop_shaping",
         "synthesis.invariant_set",
+        "synthesis.low_complexity_set",
         "synthesis.governor",
     ),
 }
