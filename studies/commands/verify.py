@@ -127,7 +127,7 @@ def _set(file: str) -> tuple[None, str, dict[str, Any]]:
             "state_bounds": own.state_bounds,
             "input_bounds": own.input_bounds,
             "exact": found.proven,
-            "hypotheses": found.hypotheses,
+            "hypotheses": own.hypotheses,
         },
     )
 

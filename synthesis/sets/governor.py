@@ -35,7 +35,8 @@ class Governor:
     Examples
     --------
     >>> import numpy as np
-    >>> cart = symheli.lpv.LinearModel(
+    >>> from symheli.lpv import LinearModel
+    >>> cart = LinearModel(
     ...     [[0, 1.0], [0, 0]], [[0], [1.0]], np.eye(2), np.zeros((2, 1)),
     ...     ["x", "v"], ["u"], ["x_m", "v_m"])
     >>> found = synthesis.invariant_set(
@@ -125,8 +126,8 @@ def governor(
 
     Examples
     --------
-    >>> import numpy as np
-    >>> plant = symheli.lpv.LinearModel([[1.0]], [[2.0]], [[1.0]], [[0.0]], ["x"], ["u"], ["x_m"])
+    >>> from symheli.lpv import LinearModel
+    >>> plant = LinearModel([[1.0]], [[2.0]], [[1.0]], [[0.0]], ["x"], ["u"], ["x_m"])
     >>> found = synthesis.invariant_set(plant, input_bounds={"u": 1.0})  # |x| <= 2
     >>> print(synthesis.governor(found, [1.0]).next([0.5], 9.0, 0.0).round(4))
     2.5

@@ -6,7 +6,6 @@ import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -78,8 +77,8 @@ class InvariantSet:
 
     Examples
     --------
-    >>> import numpy as np
-    >>> plant = symheli.lpv.LinearModel([[1.0]], [[2.0]], [[1.0]], [[0.0]], ["x"], ["u"], ["x_m"])
+    >>> from symheli.lpv import LinearModel
+    >>> plant = LinearModel([[1.0]], [[2.0]], [[1.0]], [[0.0]], ["x"], ["u"], ["x_m"])
     >>> found = synthesis.invariant_set(plant, input_bounds={"u": 1.0})
     >>> found.proven, bool(1.999 < found.half_widths()[0] < 2)  # b / a
     (True, True)
@@ -160,22 +159,10 @@ class InvariantSet:
 
         return plot_cut(self, first, second, p, ax)
 
-    @cached_property
-    def hypotheses(self) -> tuple[str, ...]:
-        """What the statement rests on, in sentences."""
-        return (*self.statement.hypotheses, "the state lies in the set at the start")
-
     def __str__(self) -> str:
         if not self.proven:
             return f"no invariant set: {self.why}"
-        limited = ", ".join(f"|{s}| <= {b:g}" for s, b, *_ in self.statement.limits)
-        return "\n".join(
-            [
-                "invariant ellipsoid, proven for every p",
-                f"within {limited}",
-                *(f"- {line}" for line in self.hypotheses),
-            ]
-        )
+        return self.statement.told("invariant ellipsoid")
 
     def verify(self, rigorous: bool = True) -> bool:
         """Check every inequality again: in rational arithmetic between the scheduling points, or

@@ -67,7 +67,8 @@ class LowComplexitySet:
     Examples
     --------
     >>> import numpy as np
-    >>> model = symheli.lpv.LinearModel(
+    >>> from symheli.lpv import LinearModel
+    >>> model = LinearModel(
     ...     [[0.5, 0.2], [0.0, 0.7]], np.zeros((2, 0)), np.eye(2), np.zeros((2, 0)), ["x", "y"], [],
     ...     ["x_m", "y_m"], dt=0.1)
     >>> found = synthesis.low_complexity_set(model, state_bounds={"x": 1.0, "y": 2.0})
@@ -138,8 +139,7 @@ class LowComplexitySet:
     def __str__(self) -> str:
         if not self.proven:
             return f"no invariant set: {self.why}"
-        lines = ["invariant parallelepiped, proven for every p", *self.statement.hypotheses]
-        return "\n- ".join([*lines, "the state lies in the set at the start"])
+        return self.statement.told("invariant parallelepiped")
 
 
 class _Matrices:
@@ -214,8 +214,8 @@ def low_complexity_set(
 
     Examples
     --------
-    >>> import numpy as np
-    >>> sampled = symheli.lpv.LinearModel(
+    >>> from symheli.lpv import LinearModel
+    >>> sampled = LinearModel(
     ...     [[1.2]], [[1.0, 0.1]], [[1.0]], [[0.0, 0.0]], ["x"], ["u", "w"], ["x_m"], dt=0.1)
     >>> found = synthesis.low_complexity_set(
     ...     sampled, controller=[[-0.7]], input_bounds={"u": 0.7}, disturbance={"w": 1.0})

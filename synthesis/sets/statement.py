@@ -120,6 +120,12 @@ class Statement:
             out.append(Limit(model.inputs[i], bound, 2, self.controls.index(name)))
         return tuple(out)
 
+    def told(self, what: str) -> str:
+        """What is proven, with the limits and hypotheses, in lines."""
+        limited = ", ".join(f"|{limit.signal}| <= {limit.bound:g}" for limit in self.limits)
+        lines = (f"- {line}" for line in self.hypotheses)
+        return "\n".join([f"{what}, proven for every p", f"within {limited}", *lines])
+
     @property
     def hypotheses(self) -> tuple[str, ...]:
         """What the statement rests on, in sentences."""
@@ -134,6 +140,7 @@ class Statement:
             ),
             f"disturbances with any history: {', '.join(told)}" if told else "no disturbances",
             *(drifting(self.model) if moves(self.model.parameters) else ()),
+            "the state lies in the set at the start",
         )
 
 

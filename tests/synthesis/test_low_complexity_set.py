@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from studies.cli import main
 from symheli.errors import InputError
 from symheli.lpv import LinearModel, LPVStateSpace, Scheduling
-from studies.cli import main
 from synthesis import InvariantSet, LowComplexitySet, low_complexity_set
 
 
