@@ -102,6 +102,7 @@ from synthesis.sets.invariant_set import InvariantSet as InvariantSet
 from synthesis.sets.invariant_set import invariant_set as invariant_set
 from synthesis.sets.low_complexity import LowComplexitySet as LowComplexitySet
 from synthesis.sets.low_complexity import low_complexity_set as low_complexity_set
+from synthesis.sets.switch import SwitchInside as SwitchInside
 from synthesis.sheet.evaluation import SpecificationTable as SpecificationTable
 from synthesis.sheet.evaluation import specifications as specifications
 from synthesis.sheet.sheet import Sheet as Sheet

@@ -120,6 +120,7 @@ SLOW = {
         "synthesis.loop_shaping",
         "synthesis.invariant_set",
         "synthesis.low_complexity_set",
+        "synthesis.SwitchInside",
         "synthesis.governor",
     ),
 }

@@ -14,7 +14,7 @@ import symheli
 from studies.cli import main
 from symheli.errors import InputError
 from symheli.lpv import LinearModel, LPVStateSpace, Scheduling
-from synthesis import InvariantSet, governor, invariant_set
+from synthesis import InvariantSet, SwitchInside, governor, invariant_set
 
 matplotlib.use("agg")
 
@@ -310,6 +310,27 @@ def test_no_command_drives_a_governed_model_out_of_its_set():
             assert np.abs(v).max() > 2  # and it moves
         else:
             assert np.sum(most > 1) > 450
+
+
+def test_laws_that_switch_inside_their_sets_keep_every_limit():
+    bounds = {"state_bounds": {"x": 2.0, "v": 1.0}, "input_bounds": {"u": 0.5}}
+    gains = ([[-0.1, -0.5]], [[-4.0, -4.0]])
+    sets = [invariant_set(CART, controller=K, **bounds) for K in gains]
+    law, dt, rng = SwitchInside(sets), 0.02, np.random.default_rng(0)
+    steps = [expm((CART.A + CART.B @ np.array(K)) * dt) for K in gains]
+    most, arrived, careless = 0.0, 0, 0.0
+    for _ in range(20):
+        z = rng.standard_normal(2)
+        x, active = np.linalg.cholesky(sets[0].gramian()) @ z / np.linalg.norm(z), 0
+        careless = max(careless, np.abs(np.array(gains[1]) @ x).item())
+        for _ in range(1000):
+            active = law.next(x, 1, active)
+            most = max(most, np.abs(law.control(x, active)).max() / 0.5, abs(x[0]) / 2, abs(x[1]))
+            x = steps[active] @ x
+        arrived += active
+    assert most < 1 + 1e-9
+    assert arrived == 20  # all have come to the fast law
+    assert careless > 1.0  # which would have exceeded its limit at once
 
 
 @pytest.mark.slow
