@@ -69,6 +69,7 @@ def flown(
     that change at random.
     """
     by, trim, count = governor(found), found.statement.model.trim, len(start)
+    assert trim is not None  # noqa: S101 - models of a family have theirs
     rate = _closed(heli).map(count)
     rng = np.random.default_rng(1)
     hold = rng.integers(1, 100, count)
@@ -82,7 +83,7 @@ def flown(
         gust = np.where((k % hold == 0)[:, None], new, gust)
         K, x_r = gains(found, v), trim.state(v)
         u_r = trim.input(v)[:, : len(INPUT_BOUNDS)]
-        given = (x_r.T, u_r.T, np.hstack(np.swapaxes(K, 1, 2)).reshape(10, -1), gust.T)
+        given = (x_r.T, u_r.T, np.concatenate([*np.swapaxes(K, 1, 2)], axis=1), gust.T)
         for _ in range(round(SAMPLE / STEP)):
             a = _rates(rate, at, given)
             b = _rates(rate, at + STEP / 2 * a, given)

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from symheli.errors import InputError
+from symheli.lpv import TrimSchedule
 from symheli.lpv.scheduling import UNSCHEDULED
 from symheli.values.arrays import Array, frozen
 from symheli.values.summary import summarized
@@ -57,7 +58,13 @@ class Governor:
         inside.
         """
         v = frozen(reference, "reference")
-        e = frozen(x, "x") - self.steady(v)
+        x, n = frozen(x, "x"), len(self.set.shape.states)
+        if x.ndim == 0 or x.shape[-1] != n or x.shape[:-1] not in ((), v.shape):
+            raise InputError(
+                f"x: expected {n} states along the last axis, for one reference or one each of"
+                f" {v.shape}, got shape {x.shape}"
+            )
+        e = x - self.steady(v)
         if self.parameters is None:
             return self.set.levels(e, v)
         return ((e @ self._whitening) ** 2).sum(axis=-1)
@@ -135,20 +142,27 @@ def governor(
     if not isinstance(found, InvariantSet) or not found.proven:
         raise InputError("found: expected an InvariantSet with a proof (found.proven)")
     n, m = len(found.shape.states), len(found.shape.parameters)
+    moved: Callable[[Array], Array]
     trim = found.statement.model.trim
-    if steady is None and trim is None:
+    if callable(steady):
+        moved = cast("Callable[[Array], Array]", steady)
+    elif steady is not None:
+        moved = partial(_along, frozen(steady, "steady", (n,)))
+    elif trim is not None:
+        moved = partial(_trimmed, trim)
+    else:
         raise InputError("steady: the model of the set has no trim; give the steady state")
-    if steady is None:
-        steady = getattr(trim, "state", None)
-    elif not callable(steady):
-        steady = partial(_along, frozen(steady, "steady", (n,)))
     if at is None and found.shape.parameters == (UNSCHEDULED,):
         at = [UNSCHEDULED.middle]
     own = None if at is None else frozen(at, "at", (m,))
     if own is None and m > 1:
         raise InputError(f"at: the set has {m} parameters; give the values where it is taken")
-    return Governor(found, steady, own)
+    return Governor(found, moved, own)
 
 
 def _along(direction: Array, v: Array) -> Array:
     return v[..., None] * direction
+
+
+def _trimmed(trim: TrimSchedule, v: Array) -> Array:
+    return trim.state(v)

@@ -229,6 +229,8 @@ def low_complexity_set(
         raise InputError(f"controller: expected gains for {', '.join(statement.controls)}")
     matrices = _Matrices.of(statement, float)
     none = np.zeros_like(matrices.A[0])
+    if not np.any(matrices.limits):
+        return LowComplexitySet(statement, none, False, "the limits see no state: limit a state")
     found = [V for start in _starts(matrices) if (V := _grown(matrices, start)) is not None]
     if not found:
         return LowComplexitySet(statement, none, False, "the search finds no set")
@@ -271,13 +273,13 @@ def _grown(own: _Matrices, V: Array) -> Array | None:
         motion = _sums(own, V)[0]
         Z = _step(own, V, trust, None if motion > most else most)
         ahead = None if Z is None else V @ (np.eye(len(V)) + Z)
-        better = False
+        better, closer = False, V
         if ahead is not None and np.linalg.matrix_rank(ahead) == len(V):
-            ahead = ahead * (most / max(_sums(own, ahead)[1], most))
-            after = _sums(own, ahead)[0]
-            larger = abs(np.linalg.det(ahead)) > (1 + SPARE) * abs(np.linalg.det(V))
+            closer = ahead * (most / max(_sums(own, ahead)[1], most))
+            after = _sums(own, closer)[0]
+            larger = abs(np.linalg.det(closer)) > (1 + SPARE) * abs(np.linalg.det(V))
             better = after < motion if motion > most else after <= most and larger
-        V, trust = (ahead, trust) if better else (V, trust / 2)
+        V, trust = (closer, trust) if better else (V, trust / 2)
         if trust < LEAST_TRUST:
             break
     return V if _sums(own, V)[0] <= 1 else None

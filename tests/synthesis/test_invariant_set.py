@@ -373,3 +373,15 @@ def test_a_set_without_a_bound_says_so():
         found.save("never.json")
     with pytest.raises(InputError, match="proof"):
         governor(found, [1.0, 0.0])
+    with pytest.raises(InputError, match="proof"):
+        SwitchInside([found])
+
+
+def test_a_governor_refuses_states_of_another_size():
+    found = invariant_set(CART, state_bounds={"x": 1.0, "v": 1.0}, input_bounds={"u": 1.0})
+    made = governor(found, [1.0, 0.0])
+    for x in ([], [0.0], [0.0, 0.0, 0.0], [[0.0, 0.0]] * 3):
+        with pytest.raises(InputError, match="2 states along the last axis"):
+            made.next(x, [1.0, 2.0], 0.0)
+    with pytest.raises(InputError, match="steady"):
+        governor(found)

@@ -123,6 +123,16 @@ def test_the_sums_are_those_of_linear_programs(scheduled):
     assert math.isclose(scheduled.level(scheduled.V[:, 0]), 1.0, rel_tol=1e-12)
 
 
+def test_limits_that_see_no_state_say_so():
+    found = low_complexity_set(
+        LinearModel([[0.5]], [[1.0]], [[1.0]], [[0.0]], ["x"], ["u"], ["y"], dt=0.1),
+        controller=[[0.0]],
+        input_bounds={"u": 1.0},
+    )
+    assert not found.proven
+    assert "limit a state" in found.why
+
+
 @pytest.mark.parametrize(
     ("model", "options", "told"),
     [
