@@ -69,7 +69,7 @@ def flown(
     that change at random.
     """
     by, trim, count = governor(found), found.statement.model.trim, len(start)
-    assert trim is not None  # noqa: S101 - models of a family have theirs
+    assert trim is not None
     rate = _closed(heli).map(count)
     rng = np.random.default_rng(1)
     hold = rng.integers(1, 100, count)
