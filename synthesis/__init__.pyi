@@ -100,6 +100,13 @@ from synthesis.program.cone_program import installed_solvers as installed_solver
 from synthesis.robust.slope import SlopeMargin as SlopeMargin
 from synthesis.robust.slope import slope_margin as slope_margin
 from synthesis.robust.structure import DynamicBlock as DynamicBlock
+from synthesis.sets.governor import Governor as Governor
+from synthesis.sets.governor import governor as governor
+from synthesis.sets.invariant_set import InvariantSet as InvariantSet
+from synthesis.sets.invariant_set import invariant_set as invariant_set
+from synthesis.sets.low_complexity import LowComplexitySet as LowComplexitySet
+from synthesis.sets.low_complexity import low_complexity_set as low_complexity_set
+from synthesis.sets.switch import SwitchInside as SwitchInside
 from synthesis.sheet.evaluation import SpecificationTable as SpecificationTable
 from synthesis.sheet.evaluation import specifications as specifications
 from synthesis.sheet.sheet import Sheet as Sheet

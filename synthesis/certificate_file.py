@@ -95,7 +95,7 @@ def written(cert: Certificate, path: str | os.PathLike[str]) -> Path:
     content = {
         "schema": SCHEMA,
         "version": VERSION,
-        **_encoded({**statement, "status": cert.status.name}),
+        **encoded({**statement, "status": cert.status.name}),
         "proof": None if cert.proof is None else _encoded_proof(cert.proof),
     }
     return write_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
@@ -103,24 +103,7 @@ def written(cert: Certificate, path: str | os.PathLike[str]) -> Path:
 
 def read(path: str | os.PathLike[str]) -> Certificate:
     """Read a certificate; see `Certificate.load`."""
-    try:
-        content = json.loads(Path(path).read_text(encoding="utf-8"), parse_constant=_refused)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
-    except (ValueError, RecursionError) as error:
-        raise InputError(
-            f"{path}: expected a certificate as JSON, got another or a damaged file ({error});"
-            " write it again with Certificate.save"
-        ) from None
-    if not isinstance(content, dict) or content.get("schema") != SCHEMA:
-        raise InputError(
-            f"{path}: expected the schema {SCHEMA!r}; this file was not written by Certificate.save"
-        )
-    if content.get("version") != VERSION or isinstance(content.get("version"), bool):
-        raise InputError(
-            f"{path}: expected version {VERSION} of the schema, got {content.get('version')!r:.60};"
-            " read it with the version of symheli that wrote it"
-        )
+    content = content_of(path, SCHEMA, VERSION, "a certificate", "Certificate.save")
     try:
         with np.errstate(all="ignore"):
             cert = _certificate(content)
@@ -128,15 +111,46 @@ def read(path: str | os.PathLike[str]) -> Certificate:
         raise CertificateError(f"{path}: {error}") from None
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    except (
-        *(TypeError, ValueError, AttributeError, LookupError),
-        *(ArithmeticError, RecursionError, np.linalg.LinAlgError),
-    ) as error:
+    except DAMAGED as error:
         raise InputError(f"{path}: damaged, a value is invalid ({error})") from None
     if cert.verified and not cert.verify():
         why = cert.fault or "the inequalities do not hold with this bound"
         raise CertificateError(f"{path}: the proof does not establish the certified bound: {why}")
     return cert
+
+
+DAMAGED = (
+    *(TypeError, ValueError, AttributeError, LookupError),
+    *(ArithmeticError, RecursionError, np.linalg.LinAlgError),
+)
+"""What values of a damaged file raise."""
+
+
+def content_of(
+    path: str | os.PathLike[str], schema: str, version: int, what: str, writer: str
+) -> dict[str, Any]:
+    """Read a JSON file of this schema and version, which `writer` writes; raise `InputError` for
+    any other.
+    """
+    try:
+        content = json.loads(Path(path).read_text(encoding="utf-8"), parse_constant=_refused)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
+    except (ValueError, RecursionError) as error:
+        raise InputError(
+            f"{path}: expected {what} as JSON, got another or a damaged file ({error});"
+            f" write it again with {writer}"
+        ) from None
+    if not isinstance(content, dict) or content.get("schema") != schema:
+        raise InputError(
+            f"{path}: expected the schema {schema!r}; this file was not written by {writer}"
+        )
+    if content.get("version") != version or isinstance(content.get("version"), bool):
+        raise InputError(
+            f"{path}: expected version {version} of the schema, got {content.get('version')!r:.60};"
+            " read it with the version of symheli that wrote it"
+        )
+    return content
 
 
 def _certificate(content: Mapping[str, Any]) -> Certificate:
@@ -148,7 +162,7 @@ def _certificate(content: Mapping[str, Any]) -> Certificate:
             f"expected the fields of a certificate; missing: {', '.join(sorted(missing)) or 'none'}"
             f"; unknown: {', '.join(sorted(foreign)) or 'none'}"
         )
-    statement = {name: _decoded(content[name]) for name in names if name != "proof"}
+    statement = {name: decoded(content[name]) for name in names if name != "proof"}
     if statement["status"] not in Status.__members__:
         raise InputError(f"expected the name of a status, got {statement['status']!r:.60}")
     statement["status"] = Status[statement["status"]]
@@ -194,14 +208,14 @@ def _encoded_proof(proof: Proof) -> dict[str, Any]:
     }
     if isinstance(evidence, box.Evidence):
         own["source"] = evidence.model.source
-    return {"route": route, **_encoded(own), "lyapunov": _encoded(proof.lyapunov)}
+    return {"route": route, **encoded(own), "lyapunov": encoded(proof.lyapunov)}
 
 
 def _decoded_proof(content: Any) -> Proof:
     if not isinstance(content, dict) or content.get("route") not in ROUTES:
         raise InputError(f"expected a proof by one of the routes {', '.join(ROUTES)}")
     route = content["route"]
-    own = {name: _decoded(v) for name, v in content.items() if name not in ("route", "lyapunov")}
+    own = {name: decoded(v) for name, v in content.items() if name not in ("route", "lyapunov")}
     if route == "one parameter":
         own["pieces"] = model_pieces(_a(LPVStateSpace, own["lpv"]))
     elif route == "box":
@@ -217,7 +231,7 @@ def _decoded_proof(content: Any) -> Proof:
             _a(kind, own[name])
     if own.get("block") is not None:
         _a(NormBounded, own["block"])
-    return Proof(ROUTES[route](**own), _decoded(content["lyapunov"]))
+    return Proof(ROUTES[route](**own), decoded(content["lyapunov"]))
 
 
 def _a(kind: Any, value: Any) -> Any:
@@ -226,7 +240,8 @@ def _a(kind: Any, value: Any) -> Any:
     return value
 
 
-def _encoded(value: Any) -> Any:
+def encoded(value: Any) -> Any:
+    """Return a value as JSON holds it; raise `InputError` for a type that is not in `TYPES`."""
     if isinstance(value, Signal):
         return {"signal": str(value), "unit": value.unit}
     if value is None or isinstance(value, str | bool | int):
@@ -236,10 +251,10 @@ def _encoded(value: Any) -> Any:
     if isinstance(value, np.integer):
         return int(value)
     if isinstance(value, np.ndarray):
-        numbers = [_encoded(v) for v in value.ravel().tolist()]
+        numbers = [encoded(v) for v in value.ravel().tolist()]
         return {"shape": list(value.shape), "array": numbers}
     if isinstance(value, dict):
-        return {name: _encoded(v) for name, v in value.items()}
+        return {name: encoded(v) for name, v in value.items()}
     if type(value) in WORDS:
         left_out = LEFT_OUT.get(type(value), ())
         names = (
@@ -247,19 +262,20 @@ def _encoded(value: Any) -> Any:
             if is_dataclass(value)
             else list(value._fields)
         )
-        own = {name: _encoded(getattr(value, name)) for name in names if name not in left_out}
+        own = {name: encoded(getattr(value, name)) for name in names if name not in left_out}
         return {"type": WORDS[type(value)], **own}
     if isinstance(value, tuple | list):
-        return [_encoded(v) for v in value]
+        return [encoded(v) for v in value]
     raise InputError(
         f"a {type(value).__name__} cannot be written to a file; fit the model to a polynomial or"
         " spline basis first, or keep the certificate in memory"
     )
 
 
-def _decoded(value: Any) -> Any:
+def decoded(value: Any) -> Any:
+    """Return the value that `encoded` wrote; raise `InputError` for anything else."""
     if isinstance(value, list):
-        return tuple(map(_decoded, value))
+        return tuple(map(decoded, value))
     if not isinstance(value, dict):
         return value
     if value.keys() == {"float"}:
@@ -270,14 +286,14 @@ def _decoded(value: Any) -> Any:
     if value.keys() == {"signal", "unit"}:
         return Signal(_a(str, value["signal"]), _a(str, value["unit"]))
     if value.keys() == {"shape", "array"}:
-        numbers = [_decoded(v) for v in _a(list, value["array"])]
+        numbers = [decoded(v) for v in _a(list, value["array"])]
         if not all(isinstance(v, float | int) and not isinstance(v, bool) for v in numbers):
             raise InputError("expected an array of numbers")
         return np.array(numbers, dtype=float).reshape(_a(list, value["shape"]))
     kind = TYPES.get(value.get("type", ""))
     if kind is None:
         raise InputError(f"unknown kind of value {value.get('type')!r:.60}")
-    return kind(**{name: _decoded(v) for name, v in value.items() if name != "type"})
+    return kind(**{name: decoded(v) for name, v in value.items() if name != "type"})
 
 
 def _refused(constant: str) -> None:

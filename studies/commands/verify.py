@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from studies.commands.arguments import positional
@@ -16,7 +17,8 @@ HELP = "prove saved certificates again, exactly, from their files alone"
 ARGUMENTS = (
     positional(
         "files",
-        "written by Certificate.save, Tube.save, symheli certify --save or a study (DIR/proofs)",
+        "written by Certificate.save, Tube.save, InvariantSet.save, symheli certify --save or a"
+        " study (DIR/proofs)",
         nargs="+",
         metavar="file",
     ),
@@ -25,12 +27,12 @@ ARGUMENTS = (
 
 def run(arguments: argparse.Namespace) -> Output:
     """Load, verify in rational arithmetic; exit status 1 where a proof fails."""
-    if len(arguments.files) == 1 and not _holds_a_tube(arguments.files[0]):
+    if len(arguments.files) == 1 and _reader(arguments.files[0]) is _verified:
         cert, verdict, data = _verified(arguments.files[0])
         return Output(f"{cert.details}\n{verdict}", data, status=0 if data["exact"] else 1)
     lines, proofs = [], []
     for file in arguments.files:
-        _, verdict, data = _tube(file) if _holds_a_tube(file) else _verified(file)
+        _, verdict, data = _reader(file)(file)
         lines.append(f"{file}: {verdict}")
         proofs.append(data)
     exact = all(proof["exact"] for proof in proofs)
@@ -72,13 +74,17 @@ def _verified(file: str) -> tuple[Certificate, str, dict[str, Any]]:
     )
 
 
-def _holds_a_tube(file: str) -> bool:
-    """Whether a file begins like one written by Tube.save."""
+def _reader(file: str) -> Callable[[str], tuple[Certificate | None, str, dict[str, Any]]]:
+    """What proves this file again: by the schema at its beginning a tube, a set or, of every other,
+    a certificate.
+    """
     try:
         with open(file, encoding="utf-8") as text:
-            return '"schema": "symheli tube"' in text.read(200)
+            start = text.read(200)
     except (OSError, ValueError):
-        return False
+        return _verified
+    own = {"symheli tube": _tube, "symheli set": _set}
+    return next((by for name, by in own.items() if f'"schema": "{name}"' in start), _verified)
 
 
 def _tube(file: str) -> tuple[None, str, dict[str, Any]]:
@@ -99,6 +105,29 @@ def _tube(file: str) -> tuple[None, str, dict[str, Any]]:
             "half_widths": found.half_widths.tolist(),
             "exact": found.proven,
             "hypotheses": found.hypotheses,
+        },
+    )
+
+
+def _set(file: str) -> tuple[None, str, dict[str, Any]]:
+    """The verdict on the invariant set in a file, in words and for a program."""
+    from synthesis.sets.set_file import read
+
+    progress(f"verifying {file} in rational arithmetic")
+    found = read(file)
+    verdict = f"proven in exact arithmetic: {found}" if found.proven else f"not proven: {found.why}"
+    own = found.statement
+    return (
+        None,
+        verdict,
+        {
+            "file": file,
+            "kind": "invariant set",
+            "disturbance": own.disturbance,
+            "state_bounds": own.state_bounds,
+            "input_bounds": own.input_bounds,
+            "exact": found.proven,
+            "hypotheses": own.hypotheses,
         },
     )
 

@@ -119,7 +119,9 @@ def decrease(
         growth = number(growth_of(demand.shift, model.dt))
         yield from dissipation(system, here, demand.kind, after=there * growth)
         return
-    drifts = [_slope(here, drift, demand.time, number) for drift in demand.motion.drifts(moving)]
+    drifts = [
+        slope_along(here, drift, demand.time, number) for drift in demand.motion.drifts(moving)
+    ]
     if demand.shift:
         rising = here * (2 * number(demand.shift))
         drifts = [rising if drift is None else rising + drift for drift in drifts]
@@ -359,7 +361,7 @@ def _scaled(f: PolynomialMatrix, F: PolynomialMatrix) -> PolynomialMatrix:
     return PolynomialMatrix(f.box, f.coefficients * np.eye(F.shape[0], dtype=int)) @ F
 
 
-def _slope(
+def slope_along(
     here: PolynomialMatrix, drift: Drift, time: float, number: Number
 ) -> PolynomialMatrix | None:
     """Return dP/dt for this motion of p; None where P does not change."""

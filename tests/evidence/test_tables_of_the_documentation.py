@@ -18,6 +18,7 @@ from evidence import (
     gain_table,
     logs,
     responses,
+    sets,
     specs,
     structured,
     tube_gains,
@@ -186,6 +187,18 @@ def gains_on_a_narrow_range():
     found = list(gains(lateral_loop(_xcell()), 5.5, 7.5).values())
     for shown, value in zip(KEPT["lft.md", "reach"].cells("[5.5, 7.5] m/s"), found, strict=True):
         assert same(shown, value, rel=2e-4)
+
+
+def governed_flights():
+    # 20 other commands: none leaves with the governor, nearly all without
+    name = "xcell_kahn_hudson"
+    _, governed, without, *_ = KEPT["sets.md", "jumps"].cells(name)
+    heli = Helicopter.load(name, governor="ideal")
+    _, _, *today = sets.row(name, sets.proven_set(heli), 20)
+    assert governed == today[0] == "0, 0"
+    shown, found = ([int(n) for n in each.split(",")] for each in (without, today[1]))
+    assert 18 <= found[0] <= shown[0]
+    assert 18 <= found[1] <= shown[1]
 
 
 def tube_in_hover():
@@ -403,6 +416,7 @@ ROWS = {
     ("lft.md", "reach"): gains_on_a_narrow_range,
     ("structured.md", "static output feedback"): static_output_feedback_of_one_helicopter,
     ("structured.md", "gain table"): scheduled_lqr_beside_the_gain_table,
+    ("sets.md", "jumps"): governed_flights,
     ("tubes.md", "amplitudes"): tube_in_hover,
     ("tubes.md", "transitions"): tube_along_a_transition,
     ("tubes.md", "remainders"): remainder_of_one_cell,

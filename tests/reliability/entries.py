@@ -63,7 +63,6 @@ EXEMPT: dict[str, str] = {
                 "RigidBodyOnline",
                 "Scores",
             ),
-            *(),
         )
     },
     **{
@@ -84,9 +83,10 @@ EXEMPT: dict[str, str] = {
                 "StructuredController",
                 "Tube",
                 "LocalGain",
+                "InvariantSet",
+                "LowComplexitySet",
+                "Governor",
             ),
-            *(),
-            *(),
         )
     },
     "synthesis.DynamicBlock": BY_ITS_USERS,
@@ -122,6 +122,10 @@ SLOW = {
         "synthesis.worst_case_gain",
         "synthesis.mu_synthesis",
         "synthesis.loop_shaping",
+        "synthesis.invariant_set",
+        "synthesis.low_complexity_set",
+        "synthesis.SwitchInside",
+        "synthesis.governor",
     ),
 }
 """Entries that fly, sweep or solve: `FEW` inputs each."""
