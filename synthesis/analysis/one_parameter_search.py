@@ -269,8 +269,8 @@ class OneParameter(Ladder):
             if unrounded * (1 + CLOSE_TO_LOWER) < least:
                 P, least, conditioning = kept, unrounded, condition
         gamma, proof = inflated(least, units.channel, self.sampling_error), Proof(evidence, P)
-        exactly = P.coordinates is not None and math.isfinite(least)
-        believed = proof.exact(gamma) if exactly else self.believed(proof, gamma)
-        if math.isinf(least) or not evidence.floating(P, gamma) or not believed:
+        if math.isinf(least) or not evidence.floating(P, gamma):
+            return Found(math.inf, None, answer)
+        if not (self.believed(proof, gamma) if P.coordinates is None else proof.exact(gamma)):
             return Found(math.inf, None, answer)
         return Found(gamma, proof, answer, conditioning)
