@@ -32,9 +32,7 @@ GUSTS = (0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.75, 1.0, 1.25, 1.5)
 TRANSITIONS = (
     ("xcell60", 3.0, 6.0, 0.25, 1.0, 1.0, 1.0),
     ("xcell60", 6.0, 7.0, 0.15, 1.0, 1.0, 1.0),
-    ("xcell60", 7.0, 8.0, 0.1, 1.0, 1.0, 1.0),
     ("xcell_kahn_hudson", 3.0, 4.0, 0.25, 1.0, 1.0, 1.0),
-    ("xcell_kahn_hudson", 4.0, 6.0, 0.25, 1.0, 1.0, 1.0),
     ("xcell60", 9.0, 10.0, 0.25, 0.5, 0.5, 0.5),
 )
 """Helicopter, range, m/s; gusts, m/s; largest acceleration, jerk and snap, m/s^2, m/s^3, m/s^4."""
