@@ -64,6 +64,9 @@ class PredictionError(Method):
         whole(self.evaluations, "evaluations", 1)
         if not 0 < self.tolerance < 1:
             raise InputError(f"tolerance: expected a number in (0, 1), got {self.tolerance}")
+        ar, ma, _ = self.noise
+        whole(ar, "ar")
+        whole(ma, "ma")
 
     @property
     @abstractmethod
@@ -169,11 +172,6 @@ class BoxJenkins(OutputError):
     ma: int = field(default=0, kw_only=True)
     shorthand: ClassVar[str] = "bj"
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        whole(self.ar, "ar")
-        whole(self.ma, "ma")
-
     @property
     def noise(self) -> tuple[int, int, Literal["output", "equation"]]:
         """(C/D) e, at the outputs."""
@@ -211,11 +209,6 @@ class ARMAX(PredictionError):
     ma: int = field(default=1, kw_only=True)
     ar: int = field(default=0, kw_only=True)
     shorthand: ClassVar[str] = "armax"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        whole(self.ar, "ar")
-        whole(self.ma, "ma")
 
     @property
     def noise(self) -> tuple[int, int, Literal["output", "equation"]]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass, replace
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -98,7 +99,9 @@ def certify(problem: Problem) -> Certificate:
         return cert
     other = None if best.bound <= FAR_ABOVE * frozen.value else backwards(problem)
     if other is not None:
-        cert = _lower(cert, _of_adjoint(other, beaten))
+        both = cert, _of_adjoint(other, beaten)
+        tried = tuple(attempt for each in both for attempt in each.attempts)
+        cert = replace(min(both, key=attrgetter("gamma")), attempts=tried)
     return cert.resting_on(search_hypothesis(search and search.seconds, beaten.seconds))
 
 
@@ -106,12 +109,6 @@ def _of_adjoint(problem: Problem, beaten: Beaten) -> Certificate:
     """Search a proof of the adjoint of a loop, whose lower bound is known."""
     ladder = route(problem)
     return Report(problem).found(ladder.search(beaten.frozen), beaten, ladder).resting_on([ADJOINT])
-
-
-def _lower(first: Certificate, second: Certificate) -> Certificate:
-    """Return the certificate with the lower proven gain, with the programs tried for both."""
-    better = second if second.verified and not first.proven <= second.proven else first
-    return replace(better, attempts=(*first.attempts, *second.attempts))
 
 
 class _Member(NamedTuple):

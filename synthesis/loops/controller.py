@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
@@ -50,11 +51,6 @@ RICHER_SEARCH = {
 """Search used where the usual P proves far more than was promised. A coarse tolerance and a larger
 margin leave such a P enough digits for its verification.
 """
-
-
-def _proven(found: Certificate) -> float:
-    """Return the proven gain; infinity without a proof."""
-    return found.gamma if found.verified else math.inf
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -206,7 +202,7 @@ class Controller:
         for k, other in enumerate(others):
             if found.gamma <= (GAIN_TOLERANCE if k else AS_PROMISED) * enough:
                 break
-            found = min(found, other(), key=_proven)
+            found = min(found, other(), key=attrgetter("gamma"))
         return found
 
     def discretize(self, dt: float) -> Controller:
