@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -23,6 +21,7 @@ from symheli.values.summary import summarized
 from synthesis.lpv.bases import dependence
 from synthesis.program.cone_program import Solver, general_solver
 from synthesis.sets.proof import holds
+from synthesis.sets.proven_set import ProvenSet
 from synthesis.sets.search import SPARE, Found, Search
 from synthesis.sets.statement import Limit, Statement, stated
 from synthesis.worst.rates import Rate
@@ -49,7 +48,7 @@ TRIES = 5
 
 
 @dataclass(frozen=True, eq=False)
-class InvariantSet:
+class InvariantSet(ProvenSet):
     """The states x' Q(p)^-1 x <= 1 that no motion of an LPV model leaves, within its limits.
 
     Made by `invariant_set`; `verify` proves it again from these fields alone.
@@ -90,8 +89,14 @@ class InvariantSet:
     shares: Array
     proven: bool
     why: str = ""
+    form: ClassVar[str] = "invariant ellipsoid"
 
     __repr__ = summarized
+
+    @property
+    def stored(self) -> Mapping[str, Any]:
+        """What a file holds of the set beside its statement."""
+        return {"shape": self.shape, "alpha": self.alpha, "shares": self.shares}
 
     def gramian(self, *p: float) -> Array:
         """Q (n, n) at p, one value a parameter; x' Q^-1 x <= 1 is the set there."""
@@ -125,10 +130,6 @@ class InvariantSet:
         root = np.linalg.cholesky(self.gramian(*p))
         return (np.linalg.solve(root, x.reshape(-1, n).T) ** 2).sum(axis=0).reshape(x.shape[:-1])
 
-    def contains(self, x: Any, *p: float) -> bool:
-        """Whether the state (n,) lies in the set at p; of states (..., n), whether all do."""
-        return bool(np.all(self.level(x, *p) <= 1))
-
     def volume(self, *p: float) -> float:
         """Volume of the set at p, in the product of the states' units."""
         n = len(self.shape.states)
@@ -159,34 +160,11 @@ class InvariantSet:
 
         return plot_cut(self, first, second, p, ax)
 
-    def __str__(self) -> str:
-        if not self.proven:
-            return f"no invariant set: {self.why}"
-        return self.statement.told("invariant ellipsoid")
-
     def verify(self, rigorous: bool = True) -> bool:
         """Check every inequality again: in rational arithmetic between the scheduling points, or
         with `rigorous` False in floating point.
         """
         return holds(self.statement, self.shape, self.alpha, self.shares, rigorous=rigorous)
-
-    def established(self) -> InvariantSet:
-        """The same set, `proven` where the exact check passes."""
-        return replace(self, proven=True, why="") if self.verify() else self
-
-    def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write the set as JSON, sufficient to prove it again: `symheli verify FILE`."""
-        from synthesis.sets.set_file import written
-
-        own = {"shape": self.shape, "alpha": self.alpha, "shares": self.shares}
-        return written(self, path, own)
-
-    @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> InvariantSet:
-        """Read a set and prove it again; `proven` says whether that succeeded."""
-        from synthesis.sets.set_file import read
-
-        return read(path, cls)
 
 
 @with_one_thread

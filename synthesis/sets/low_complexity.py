@@ -13,12 +13,10 @@ Control 47 (1988); Blanchini and Miani, "Set-Theoretic Methods in Control" (2008
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from scipy.linalg import solve_discrete_lyapunov
@@ -30,6 +28,7 @@ from symheli.values.arrays import Array, frozen
 from symheli.values.summary import summarized
 from synthesis.polynomial.exact import Number, exact, rational
 from synthesis.sets.proof import closed_pieces
+from synthesis.sets.proven_set import ProvenSet
 from synthesis.sets.statement import Statement, stated
 
 STEPS = 60
@@ -43,7 +42,7 @@ SPARE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class LowComplexitySet:
+class LowComplexitySet(ProvenSet):
     """The states x = V z, |z_i| <= 1, that no motion of a sampled LPV model leaves, within limits.
 
     Made by `low_complexity_set`.
@@ -80,8 +79,14 @@ class LowComplexitySet:
     V: Array
     proven: bool
     why: str = ""
+    form: ClassVar[str] = "invariant parallelepiped"
 
     __repr__ = summarized
+
+    @property
+    def stored(self) -> Mapping[str, Any]:
+        """What a file holds of the set beside its statement."""
+        return {"V": self.V}
 
     @cached_property
     def half_widths(self) -> Array:
@@ -101,10 +106,6 @@ class LowComplexitySet:
         z = np.linalg.solve(self.V, x.reshape(-1, len(self.V)).T)
         return np.abs(z).max(axis=0).reshape(x.shape[:-1])
 
-    def contains(self, x: Any) -> bool:
-        """Whether the state (n,) lies in the set; of states (..., n), whether all do."""
-        return bool(np.all(self.level(x) <= 1))
-
     def verify(self) -> bool:
         """Check every sum again, in rational arithmetic."""
         number = rational()
@@ -118,28 +119,6 @@ class LowComplexitySet:
             for A, E in zip(own.A, own.E, strict=True)
         )
         return moved and all(max(abs(c @ V).sum(axis=1)) <= one for c in own.limits)
-
-    def established(self) -> LowComplexitySet:
-        """The same set, `proven` where the exact check passes."""
-        return replace(self, proven=True, why="") if self.verify() else self
-
-    def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write the set as JSON, sufficient to prove it again: `symheli verify FILE`."""
-        from synthesis.sets.set_file import written
-
-        return written(self, path, {"V": self.V})
-
-    @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> LowComplexitySet:
-        """Read a set and prove it again; `proven` says whether that succeeded."""
-        from synthesis.sets.set_file import read
-
-        return read(path, cls)
-
-    def __str__(self) -> str:
-        if not self.proven:
-            return f"no invariant set: {self.why}"
-        return self.statement.told("invariant parallelepiped")
 
 
 class _Matrices:

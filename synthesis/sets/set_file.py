@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,21 +14,16 @@ from symheli.lpv import LPVStateSpace
 from symheli.values.arrays import frozen
 from symheli.values.whole_files import write_text
 from synthesis.certificate_file import DAMAGED, content_of, decoded, encoded
+from synthesis.sets.proven_set import ProvenSet
 from synthesis.sets.statement import Statement
-
-if TYPE_CHECKING:
-    from synthesis.sets.invariant_set import InvariantSet
-    from synthesis.sets.low_complexity import LowComplexitySet
-
-    AnySet = InvariantSet | LowComplexitySet
 
 SCHEMA, VERSION = "symheli set", 1
 SIZES = ("disturbance", "state_bounds", "input_bounds")
 """Fields of a statement that are names and numbers; stored as pairs."""
 
 
-def written(found: AnySet, path: str | os.PathLike[str], proof: Mapping[str, Any]) -> Path:
-    """Write the set with the fields of its `proof`; see `InvariantSet.save`."""
+def written(found: ProvenSet, path: str | os.PathLike[str]) -> Path:
+    """Write the set; see `InvariantSet.save`."""
     if not found.proven:
         raise InputError(f"only a proven set is saved; here {found.why}")
     own = found.statement
@@ -41,7 +35,7 @@ def written(found: AnySet, path: str | os.PathLike[str], proof: Mapping[str, Any
         "controls": list(own.controls),
         "model": encoded(own.model),
         "feedback": encoded(own.feedback),
-        **encoded(dict(proof)),
+        **encoded(dict(found.stored)),
     }
     return write_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
 
@@ -61,7 +55,7 @@ def read(path: str | os.PathLike[str], kind: type[Any] | None = None) -> Any:
         raise InputError(f"{path}: damaged, a value is invalid or missing ({error})") from None
 
 
-def _read(content: dict[str, Any]) -> AnySet:
+def _read(content: dict[str, Any]) -> ProvenSet:
     from synthesis.sets.invariant_set import InvariantSet
     from synthesis.sets.low_complexity import LowComplexitySet
 

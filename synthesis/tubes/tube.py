@@ -21,6 +21,7 @@ from symheli.errors import InputError
 from symheli.progress import Task, task, tracked
 from symheli.values.summary import summarized
 from symheli.values.whole_files import write_text
+from synthesis.certificate_file import DAMAGED, content_of
 from synthesis.program.cone_program import Solver
 from synthesis.tubes.deviations import Cell, Deviations
 from synthesis.tubes.files import (
@@ -273,21 +274,12 @@ class Tube:
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Tube:
         """Read a tube and prove it again; `proven` says whether that succeeded."""
+        content = content_of(path, SCHEMA, VERSION, "a tube", "Tube.save")
         try:
-            content = json.loads(Path(path).read_text(encoding="utf-8"))
-            if not isinstance(content, dict) or content.get("schema") != SCHEMA:
-                raise InputError(f"{path}: expected the schema {SCHEMA!r}, written by Tube.save")
-            if content["version"] != VERSION:
-                raise InputError(
-                    f"{path}: expected version {VERSION} of the schema, got"
-                    f" {content['version']!r:.60}; read it with the version that wrote it"
-                )
             found = _read(content)
-        except OSError as error:
-            raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
-        except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
-            if isinstance(error, InputError):
-                raise
+        except InputError:
+            raise
+        except DAMAGED as error:
             raise InputError(f"{path}: damaged, a value is invalid or missing ({error})") from None
         proven = found.verify()
         why = "" if proven else "the inequality does not hold in exact arithmetic"

@@ -1,0 +1,67 @@
+"""What sets of states with a proof have in common: membership, their files and their words."""
+
+from __future__ import annotations
+
+import os
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from symheli.values.arrays import Array
+from synthesis.sets.statement import Statement
+
+
+class ProvenSet(ABC):
+    """The states at which `level` is at most 1, with the `statement` that no motion leaves them.
+
+    `proven` is false, and `why` says why, where the exact check has not passed.
+    """
+
+    statement: Statement
+    proven: bool
+    why: str
+    form: ClassVar[str]
+    """The set in words."""
+
+    @property
+    @abstractmethod
+    def stored(self) -> Mapping[str, Any]:
+        """What a file holds of the set beside its statement."""
+
+    @abstractmethod
+    def level(self, x: Any, *p: float) -> Array:
+        """Size of states (..., n) at p in terms of the set: at most 1 in it."""
+
+    @abstractmethod
+    def verify(self) -> bool:
+        """Check every inequality again, in rational arithmetic."""
+
+    def contains(self, x: Any, *p: float) -> bool:
+        """Whether the state (n,) lies in the set at p; of states (..., n), whether all do."""
+        return bool(np.all(self.level(x, *p) <= 1))
+
+    def established(self) -> Self:
+        """The same set, `proven` where the exact check passes."""
+        return replace(self, proven=True, why="") if self.verify() else self  # type: ignore[type-var]
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the set as JSON, sufficient to prove it again: `symheli verify FILE`."""
+        from synthesis.sets.set_file import written
+
+        return written(self, path)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Self:
+        """Read a set and prove it again; `proven` says whether that succeeded."""
+        from synthesis.sets.set_file import read
+
+        return read(path, cls)
+
+    def __str__(self) -> str:
+        if not self.proven:
+            return f"no invariant set: {self.why}"
+        return self.statement.told(self.form)
