@@ -233,11 +233,6 @@ class PolynomialMatrix:
         """Return (lowest, highest) coefficient: bounds of every entry on the whole box."""
         return self.coefficients.min(), self.coefficients.max()
 
-    def corners(self) -> Array:
-        """Return the values (2^m or fewer, rows, columns) at the corners of the box."""
-        ends = tuple(slice(None, None, max(d, 1)) for d in self.degrees)
-        return self.coefficients[ends].reshape(-1, *self.shape)
-
     def extend(self, box: Box) -> PolynomialMatrix:
         """Return the same matrix with further parameters, those of `box`, on which it does not
         depend.
