@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from symheli.codegen import Program, evaluate
+from symheli.codegen import ScalarProgram, evaluate
 from symheli.codegen.branches import Side, branches
 
 SELECTIONS = ("select", "min", "max")
@@ -18,7 +18,7 @@ SELECTIONS = ("select", "min", "max")
 class Waiting:
     """A program at N points; `inputs[i][j]` (N,) is entry j of input i."""
 
-    def __init__(self, program: Program, *inputs: np.ndarray):
+    def __init__(self, program: ScalarProgram, *inputs: np.ndarray):
         self.program, self.points = program, inputs[0].shape[1]
         self._taken = self._first_taken(inputs)
 
@@ -27,7 +27,7 @@ class Waiting:
         operations = self.program.operations
         chosen = {k: o.arguments for k, o in enumerate(operations) if o.name in SELECTIONS}
         wanted = tuple(a for arguments in chosen.values() for a in arguments)
-        asked = Program(self.program.name, self.program.sizes, operations, (wanted,))
+        asked = ScalarProgram(self.program.name, self.program.sizes, operations, (wanted,))
         values, out = iter(evaluate(asked, *inputs)[0]), {}
         for k, arguments in chosen.items():
             a = [np.broadcast_to(next(values), self.points) for _ in arguments]

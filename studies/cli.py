@@ -67,7 +67,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(arguments: argparse.Namespace) -> int:
     with warnings.catch_warnings():
-        warnings.showwarning = _Notes()
+        warnings.showwarning = _PrintedOnce()
         try:
             with displayed():
                 output: Output = arguments.run(arguments)
@@ -156,7 +156,7 @@ def _fail(error: Exception, asks_json: bool, sentence: str = "", status: int = 1
     return status
 
 
-class _Notes:
+class _PrintedOnce:
     """Warnings, each printed once, however many steps of the work repeat it."""
 
     def __init__(self) -> None:

@@ -10,9 +10,9 @@ from functools import cached_property
 from types import SimpleNamespace
 from typing import Any, Literal, NamedTuple
 
-from symheli.airframe.part import Part
+from symheli.airframe.part import InstalledPart
 from symheli.codegen.symbolic import SX, Function, column, dense, jacobian, replaced
-from symheli.components import Flow, Motion, unnamed
+from symheli.components import AirMotion, Flow, unnamed
 from symheli.errors import InputError
 from symheli.physics import inflow
 from symheli.physics.drivetrain import Drive, ideal_governor, pi_governor
@@ -63,7 +63,7 @@ class Dynamics:
     `Helicopter`.
     """
 
-    parts: Mapping[str, Part]
+    parts: Mapping[str, InstalledPart]
     entries: Mapping[str, Mapping[str, str]]
     parameters: tuple[Signal, ...]
     governor: Governor
@@ -87,10 +87,10 @@ class Dynamics:
         return (*VELOCITY, *QUATERNION, *POSITION, *self.own_states)
 
     @cached_property
-    def order(self) -> tuple[Part, ...]:
+    def order(self) -> tuple[InstalledPart, ...]:
         """The parts ordered by the flow they need."""
         waiting = dict(self.parts)
-        order: list[Part] = []
+        order: list[InstalledPart] = []
         made: set[str] = set()
         while waiting:
             ready = [name for name, part in waiting.items() if set(part.needs) <= made]
@@ -254,7 +254,7 @@ class Dynamics:
         solver: Callable[..., Any],
     ) -> Sum:
         drivetrain = parameters["drivetrain"]
-        motion = Motion(
+        motion = AirMotion(
             *air,
             *rates,
             Om=own["Om"] if self.governor == "pi" else drivetrain.nominal_speed,

@@ -60,7 +60,7 @@ TYPES: dict[str, Any] = {
         *(Attempt, Seconds, Scheduling, Block, LFT, LPVStateSpace),
         *(PolynomialMatrix, Motion, Scaling, Demand, Coordinates, NormBounded),
         *(SplineLyapunov, MemoryLyapunov, LagRegion, BoxLyapunov),
-        *(Multiplier, lft_proof.Quadratic),
+        Multiplier,
         *(
             bases.Polynomial,
             bases.BSpline,
@@ -69,7 +69,12 @@ TYPES: dict[str, Any] = {
             bases.Patches,
         ),
     )
-} | {"Spline": bases.CubicSpline, "Trajectory": SchedulingTrajectory, "Units": _former_units}
+} | {
+    "Quadratic": lft_proof.QuadraticStorage,
+    "Spline": bases.CubicSpline,
+    "Trajectory": SchedulingTrajectory,
+    "Units": _former_units,
+}
 """Types that a file may contain, by their name in the file, which does not change with the name of
 the class.
 """
@@ -82,9 +87,9 @@ LATER = ("perturbation",)
 """Fields that files of this version may lack: they were written before the field existed."""
 
 ROUTES = {
-    "one parameter": one_parameter.Evidence,
-    "box": box.Evidence,
-    "lft": lft_proof.Evidence,
+    "one parameter": one_parameter.IntervalEvidence,
+    "box": box.BoxEvidence,
+    "lft": lft_proof.LFTEvidence,
 }
 DERIVED = {"pieces", "model"}
 
@@ -206,7 +211,7 @@ def _encoded_proof(proof: Proof) -> dict[str, Any]:
         for name, value in evidence._asdict().items()  # type: ignore[attr-defined]
         if name not in DERIVED
     }
-    if isinstance(evidence, box.Evidence):
+    if isinstance(evidence, box.BoxEvidence):
         own["source"] = evidence.model.source
     return {"route": route, **encoded(own), "lyapunov": encoded(proof.lyapunov)}
 

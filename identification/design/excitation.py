@@ -10,7 +10,7 @@ import numpy as np
 from identification.design.determined import determined_columns
 from identification.design.never_determined import never_determined
 from identification.design.tall_factors import triangular
-from identification.structure.lpvarx import LPVARX, Group
+from identification.structure.lpvarx import LPVARX, EquationGroup
 from identification.structure.regressors import Regression, as_records, stacked
 from symheli.errors import ExcitationError
 from symheli.records import FlightRecord
@@ -176,7 +176,7 @@ def excitation_of(arx: LPVARX, data: Regression) -> ExcitationReport:
     return max(reports, key=lambda report: (not report.sufficient, report.condition))
 
 
-def _report(arx: LPVARX, data: Regression, group: Group) -> ExcitationReport:
+def _report(arx: LPVARX, data: Regression, group: EquationGroup) -> ExcitationReport:
     regressors = arx.regressors(group)
     names, n = tuple(arx.regressor_names[i] for i in regressors), len(regressors)
     values, directions = spectrum(data.phi[:, regressors])

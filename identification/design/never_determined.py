@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.structure.lpvarx import LPVARX, Group
+from identification.structure.lpvarx import LPVARX, EquationGroup
 from identification.structure.regressors import regression
 from symheli.records import FlightRecord
 from symheli.values import signals
@@ -18,7 +18,7 @@ STRUCTURAL_ZERO = 1e-9
 """Singular values of random regressors below this fraction of the largest are structurally zero."""
 
 
-def never_determined(arx: LPVARX, group: Group) -> str:
+def never_determined(arx: LPVARX, group: EquationGroup) -> str:
     """Return why no record determines the coefficients of a group, in a sentence; empty where a
     rich record does.
     """
@@ -40,7 +40,7 @@ def never_determined(arx: LPVARX, group: Group) -> str:
     )
 
 
-def _repeated(arx: LPVARX, group: Group) -> int:
+def _repeated(arx: LPVARX, group: EquationGroup) -> int:
     """Return the number of regressors of a group that are combinations of others for all signals.
 
     Every signal is replaced by independent random numbers, one draw a name, so that a signal that

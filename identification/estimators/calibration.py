@@ -333,7 +333,7 @@ def calibrate(
     outputs = _outputs(heli, flights, actuators)
     if not 0.0 <= gust < np.inf:
         raise InputError(f"gust: expected a standard deviation >= 0 in m/s, got {gust!r}")
-    search = _Search(heli, free, outputs, float(step), float(gust), actuators)
+    search = _GaussNewton(heli, free, outputs, float(step), float(gust), actuators)
     found, cost = None, np.inf
     for stages in STAGES:
         lengths = [*(s for s in stages if s < window), window]
@@ -452,7 +452,7 @@ class _Linearized:
         return solve_triangular(self.root, self.own - self.coupling @ move)
 
 
-class _Search:
+class _GaussNewton:
     """Gauss-Newton steps in the logarithms of the parameters, in units of their prior deviations,
     and in the unknowns of every window.
     """

@@ -194,7 +194,9 @@ class FilterError(Method):
         flights = []
         for record, R in zip(records, self._variances(records), strict=True):
             noise = Noise.of(R, left, *air)
-            flights += [(Stretch.of(arx, record, part), noise) for part in unbroken(arx, record)]
+            flights += [
+                (SmoothedStretch.of(arx, record, part), noise) for part in unbroken(arx, record)
+            ]
         weights = [len(s.y) for s, _ in flights]
         R = np.average([noise.R for _, noise in flights], axis=0, weights=weights)
         count, settled, n = 0, False, arx.n_regressors
@@ -405,7 +407,7 @@ class Signals(NamedTuple):
 
 
 @dataclass(eq=False)
-class Stretch:
+class SmoothedStretch:
     """Measured samples y (n, 8) without a gap, and the states `x` (n, 8) and the gust (n, 3)
     smoothed so far; the other signals `now`, and to both `sides` of each unknown of actuators and
     wind.
@@ -422,7 +424,7 @@ class Stretch:
     sides: list[tuple[Signals, Signals]]
 
     @classmethod
-    def of(cls, arx: Aerodynamics, record: FlightRecord, part: slice) -> Stretch:
+    def of(cls, arx: Aerodynamics, record: FlightRecord, part: slice) -> SmoothedStretch:
         """The samples of `part` of a record."""
         y = record.columns(STATES)[part]
         now = Signals.of(arx, record, part)

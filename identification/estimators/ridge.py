@@ -15,7 +15,7 @@ from scipy.optimize import minimize_scalar
 from identification.design.excitation import column_scale
 from identification.design.tall_factors import orthonormal
 from identification.estimators.method import Estimate, Method
-from identification.structure.lpvarx import LPVARX, Group
+from identification.structure.lpvarx import LPVARX, EquationGroup
 from identification.structure.regressors import Regression
 from symheli.errors import ExcitationError, InputError
 from symheli.lpv import FunctionSpace
@@ -92,7 +92,7 @@ def ridge(arx: LPVARX, data: Regression, options: Ridge) -> tuple[Array, Array]:
     theta, weights = np.zeros((arx.n_regressors, arx.ny)), np.zeros(arx.ny)
     for group in arx.groups:
         regressors, outputs = arx.regressors(group), np.array(group.outputs)
-        problem = _Problem.of(arx, data, group, options)
+        problem = _RidgeProblem.of(arx, data, group, options)
         for y in tracked("ridge", outputs):
             weights[y] = problem.cross_validated(y) if options.weight is None else options.weight
             theta[regressors, y] = problem.solve(float(weights[y]), y)
@@ -100,7 +100,7 @@ def ridge(arx: LPVARX, data: Regression, options: Ridge) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Problem:
+class _RidgeProblem:
     """|Z - R b|^2 + m weight |L b|^2 in scaled columns, R'R = X'X; `rest` what no b explains, m
     samples.
     """
@@ -113,7 +113,9 @@ class _Problem:
     scale: Array
 
     @classmethod
-    def of(cls, arx: LPVARX, data: Regression, group: Group, options: Ridge) -> _Problem:
+    def of(
+        cls, arx: LPVARX, data: Regression, group: EquationGroup, options: Ridge
+    ) -> _RidgeProblem:
         X = data.phi[:, arx.regressors(group)]
         scale = column_scale(X) / np.sqrt(max(len(X), 1))
         (root, whitened), size = _penalty_roots(arx.basis, options.towards), arx.basis.size

@@ -14,7 +14,7 @@ import numpy as np
 from identification.export.checked import model_cases, number_type
 from identification.model.lpvarx_model import LPVARXModel
 from identification.recursive.forgetting import Constant
-from identification.recursive.kernel.configuration import KINDS, Configuration
+from identification.recursive.kernel.configuration import KINDS, KernelConfiguration
 from symheli.errors import InputError
 from symheli.export.c_program import CProgram
 from symheli.export.c_text import blocks, define, index_macros, literals, rows, table
@@ -74,7 +74,7 @@ def write_model(
     ['roll.h', 'roll.c', 'roll_check.c']
     >>> folder.cleanup()
     """
-    c = Configuration(model.structure, Constant(1.0), number_type(precision))
+    c = KernelConfiguration(model.structure, Constant(1.0), number_type(precision))
     if not c.factors:
         raise InputError(
             "user-supplied functions cannot be written in C; identify with a polynomial or spline"
@@ -90,7 +90,7 @@ def write_model(
     ).write(folder)
 
 
-def _header(model: LPVARXModel, c: Configuration, name: str) -> dict[str, object]:
+def _header(model: LPVARXModel, c: KernelConfiguration, name: str) -> dict[str, object]:
     """Sizes, the index of every signal with its unit, and what the model is in words."""
     arx, up = model.structure, f"{name.upper()}_"
     ranges = [f"{low:g} to {high:g}" for low, high in arx.basis.ranges]
@@ -116,7 +116,7 @@ def _header(model: LPVARXModel, c: Configuration, name: str) -> dict[str, object
     }
 
 
-def _tables(model: LPVARXModel, c: Configuration, up: str) -> str:
+def _tables(model: LPVARXModel, c: KernelConfiguration, up: str) -> str:
     """The coefficients and the functions of p."""
     factors = [f.arguments for f in c.factors]
     starts = np.cumsum([[0, 0], *([f[4].size, f[5].size] for f in factors[:-1])], axis=0)

@@ -246,7 +246,7 @@ def _bands(
 
 
 def response_of(
-    found: Windows, outputs: tuple[Signal, ...], inputs: tuple[Signal, ...], window: float
+    found: WindowTransforms, outputs: tuple[Signal, ...], inputs: tuple[Signal, ...], window: float
 ) -> FrequencyResponse:
     """From windows (s) of the signals (inputs, outputs, references); without references the inputs
     are their own.
@@ -312,7 +312,7 @@ def independent(windows: int) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Windows:
+class WindowTransforms:
     """Fourier transforms (K, n, m) of m signals in K windows at `omega` (n,; rad/s), scaled so that
     their squares are one-sided densities; means (K, others) of further signals; and how much of
     its data each window shares with each other, `overlap` (K, K), 1 on the diagonal.
@@ -335,7 +335,7 @@ def windows(
     window: float,
     band: tuple[float, float] | None,
     also: tuple[str, ...] = (),
-) -> Windows:
+) -> WindowTransforms:
     """Return every unbroken window (s) of the records, half overlapping, with the means of the
     signals `also`.
 
@@ -385,4 +385,4 @@ def windows(
     number, start = np.array(places).T
     apart = np.where(number[:, None] == number, np.minimum(np.abs(start[:, None] - start), n), n)
     shared = np.array([taper[d:] @ taper[: n - d] for d in range(n)] + [0.0]) / (taper @ taper)
-    return Windows(omega[keep], np.array(transforms), np.array(means), shared[apart])
+    return WindowTransforms(omega[keep], np.array(transforms), np.array(means), shared[apart])

@@ -21,7 +21,7 @@ from symheli.values.summary import summarized
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Trial:
+class ScannedOrder:
     """One structure of a scan: fits in percent by output, mean over validation records.
 
     Parameters
@@ -83,12 +83,12 @@ class OrderScan:
     (1, 1)
     """
 
-    trials: tuple[Trial, ...]
+    trials: tuple[ScannedOrder, ...]
     horizon: int
 
     __repr__ = summarized
 
-    def best(self, by: str = "ahead") -> Trial:
+    def best(self, by: str = "ahead") -> ScannedOrder:
         """The trial of the largest median fit over the outputs "one_step", "ahead" or in
         "free_run"; or of the least "bic".
         """
@@ -204,12 +204,12 @@ def _judge(
     test: Sequence[FlightRecord],
     horizon: int,
     hold_p: bool,
-) -> Trial:
+) -> ScannedOrder:
     nothing = np.full(structure.ny, np.nan)
     try:
         model = fit(structure, train)
     except ExcitationError as error:
-        return Trial(
+        return ScannedOrder(
             structure=structure,
             bic=np.nan,
             one_step=nothing,
@@ -232,6 +232,6 @@ def _judge(
         )
         for n in (1, horizon, None)
     )
-    return Trial(
+    return ScannedOrder(
         structure=structure, bic=float(bic), one_step=one_step, ahead=ahead, free_run=free_run
     )

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.estimators.filter_error import Noise, Stretch, noise_of_flight, unbroken
+from identification.estimators.filter_error import Noise, SmoothedStretch, noise_of_flight, unbroken
 from identification.model.kinematic_model import KinematicModel
 from identification.structure.kinematic_arx import STATES
 from symheli.errors import InputError
@@ -119,7 +119,7 @@ def unseen_flight(model: KinematicModel, record: FlightRecord) -> UnseenFlight:
     louder = np.zeros(len(R))  # how much less is left where one sensor is louder by its error
     errors = np.where(told, found.errors, 0.0)
     for part in unbroken(aero, prepared):
-        s = Stretch.of(aero, prepared, part)
+        s = SmoothedStretch.of(aero, prepared, part)
         white = s.whitened(model.theta, noise)
         power += float(np.sum(white**2))
         known = s.normal(model.theta, noise)[0] @ C  # what errors of the coefficients add

@@ -27,7 +27,7 @@ MAX_DEGREE = 16
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
+class BoundedCoefficients:
     """Coefficients (n, m) known to left D right, |D|_2 bounded: of the lagged signals `kept` and
     the equations `rows`, as coefficients of `functions` of the parameters that move.
     """
@@ -186,13 +186,13 @@ class Realization:
         inputs: Sequence[str] | None,
         held: Mapping[str, float],
         degree: int | None,
-        block: Block | None = None,
+        block: BoundedCoefficients | None = None,
     ) -> LPVStateSpace:
         """Polynomials through the matrices, of a degree or of that at which they are exact; with
         `block` its inputs d and outputs v after the others.
         """
         x, u, y = (np.array(i) for i in self.kept(outputs, inputs))
-        line = Line.of(self.kin, parameters, held)
+        line = MovingParameters.of(self.kin, parameters, held)
 
         def part(p: Array) -> Matrices:
             whole = line.whole(p)
@@ -237,12 +237,12 @@ class Realization:
         covariance: Array,
         probability: float,
         draws: int,
-    ) -> tuple[Block, MatrixEllipsoid]:
+    ) -> tuple[BoundedCoefficients, MatrixEllipsoid]:
         """The ellipsoid of the coefficients that stay where only some signals do, on the line of
         parameters that move: offsets are no dynamics, and what is left out is left out.
         """
         _, u, y = self.kept(outputs, inputs)
-        line = Line.of(self.kin, parameters, held)
+        line = MovingParameters.of(self.kin, parameters, held)
         nz, f = len(MOVING), self.kin.basis
         signals = {i for i in y if i < nz} | {nz + i for i in u}
         entries = [e for e in self.kin.aerodynamics.entries if e.kind == "input"]
@@ -260,7 +260,7 @@ class Realization:
         part = 0.5 * (part + part.transpose(2, 3, 0, 1))
         found = matrix_ellipsoid(part, probability, draws)
         equations = [RIGID_BODY[i] for i in rows]
-        block = Block(
+        block = BoundedCoefficients(
             tuple(kept),
             tuple(int(i) for i in rows),
             own,
@@ -272,7 +272,13 @@ class Realization:
         return block, found
 
     def _block(
-        self, block: Block, whole: Array, p: Array, line: Line, x: Array, u: Array
+        self,
+        block: BoundedCoefficients,
+        whole: Array,
+        p: Array,
+        line: MovingParameters,
+        x: Array,
+        u: Array,
     ) -> tuple[Array, Array, Array]:
         """E (K, nx, m), G (K, n, nx), H (K, n, nu): what an error of the coefficients does, and
         what shows it.
@@ -301,7 +307,7 @@ class Realization:
         return out
 
 
-class Line(NamedTuple):
+class MovingParameters(NamedTuple):
     """The parameters that move, their ranges and degrees, where the others are `held` (NaN for
     those that move).
     """
@@ -314,7 +320,7 @@ class Line(NamedTuple):
     @classmethod
     def of(
         cls, kin: KinematicARX, parameters: tuple[Signal, ...], held: Mapping[str, float]
-    ) -> Line:
+    ) -> MovingParameters:
         """Raises `UnknownNameError` for another parameter, `InputError` where none moves, or where
         the basis has no polynomials.
         """
@@ -344,7 +350,7 @@ class Line(NamedTuple):
 
 
 def interpolated(
-    part: Callable[[Array], Matrices], line: Line, degree: int | None
+    part: Callable[[Array], Matrices], line: MovingParameters, degree: int | None
 ) -> tuple[FunctionSpace, Matrices, Array]:
     """Return basis, coefficients and check points of polynomials through matrices at any p, of
     `degree` in each parameter, or raised until the error is below `INTERPOLATION_TOLERANCE`.

@@ -287,6 +287,6 @@ class LPVARXModel:
                 " s; resample it"
             )
 
-    def _along(self, record: FlightRecord) -> prediction.Recursion:
+    def _along(self, record: FlightRecord) -> prediction.OutputRecursion:
         self.require_same_kind(record)
-        return prediction.Recursion.along(self.structure, self.theta, record)
+        return prediction.OutputRecursion.along(self.structure, self.theta, record)

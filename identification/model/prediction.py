@@ -21,7 +21,7 @@ DIVERGED = 1e100
 
 
 @dataclass(frozen=True, eq=False)
-class Recursion:
+class OutputRecursion:
     """y(k) = -sum_i A[k, i-1] y(k-i) + known[k] along a record: A (n, na, ny, ny), known (n, ny),
     NaN without a full past.
     """
@@ -33,7 +33,7 @@ class Recursion:
     memory: int
 
     @classmethod
-    def along(cls, arx: LPVARX, theta: Array, record: FlightRecord) -> Recursion:
+    def along(cls, arx: LPVARX, theta: Array, record: FlightRecord) -> OutputRecursion:
         """Return the coefficients at every sample of `record`, and the contribution of inputs and
         scheduling.
         """
@@ -71,7 +71,7 @@ class Recursion:
         return self.A.shape[1]
 
 
-def predict(run: Recursion, horizon: int, noise: NoiseModel | None = None) -> Array:
+def predict(run: OutputRecursion, horizon: int, noise: NoiseModel | None = None) -> Array:
     """Predictions (n, ny) of y(t) from outputs up to t - horizon, inputs and p up to t; NaN where
     not available.
 
@@ -171,7 +171,7 @@ def require_horizon(horizon: object) -> None:
         )
 
 
-def simulate(run: Recursion) -> Array:
+def simulate(run: OutputRecursion) -> Array:
     """Free response (n, ny): each segment starts from its first measured outputs, then only inputs
     and p are used.
 
@@ -186,7 +186,7 @@ def simulate(run: Recursion) -> Array:
     return _flagged(out)
 
 
-def _free_run(run: Recursion, part: slice, out: Array) -> None:
+def _free_run(run: OutputRecursion, part: slice, out: Array) -> None:
     na, ny = run.na, run.y.shape[1]
     A = run.A.transpose(0, 2, 1, 3).reshape(len(run.y), ny, na * ny)
     past, alive = np.zeros(na * ny), False

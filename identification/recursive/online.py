@@ -8,7 +8,7 @@ import numpy as np
 
 from identification.recursive.kernel import configuration as at
 from identification.recursive.kernel import twin
-from identification.recursive.kernel.configuration import Configuration
+from identification.recursive.kernel.configuration import KernelConfiguration
 from identification.recursive.kernel.twin import DETERMINED, LEARNT, REFUSED, SATURATED
 from identification.recursive.rls_state import RLSState
 from symheli.errors import InputError
@@ -32,7 +32,7 @@ class Online:
     (True, True, (4, 1))
     """
 
-    def __init__(self, configuration: Configuration, kernel: Any, state: RLSState):
+    def __init__(self, configuration: KernelConfiguration, kernel: Any, state: RLSState):
         self._configuration, self._kernel, self._start = configuration, kernel, state
         self._state, self._work = (
             aligned(size, configuration.dtype) for size in configuration.sizes
@@ -174,7 +174,7 @@ def aligned(size: int, dtype: type[np.floating]) -> Array:
     return raw[start : start + size * np.dtype(dtype).itemsize].view(dtype)
 
 
-def _coefficients(configuration: Configuration, memory: Array) -> Array:
+def _coefficients(configuration: KernelConfiguration, memory: Array) -> Array:
     layout = configuration.groups[0]
     return memory[layout.in_state["theta"]].reshape(layout.m, -1)[:, : layout.n].T
 
@@ -190,7 +190,7 @@ def vector(value: object, size: int, name: str) -> Array:
     return np.ascontiguousarray(array)
 
 
-def functions(configuration: Configuration, p: Array) -> Array:
+def functions(configuration: KernelConfiguration, p: Array) -> Array:
     """The basis (k, size) at p (k, parameters), NaN where p is not finite: for functions the kernel
     cannot evaluate.
     """
@@ -200,7 +200,7 @@ def functions(configuration: Configuration, p: Array) -> Array:
     return out
 
 
-def complain(configuration: Configuration, y: object, u: object, p: object) -> None:
+def complain(configuration: KernelConfiguration, y: object, u: object, p: object) -> None:
     """Raises the `InputError` for a sample the kernel refused."""
     arx = configuration.structure
     largest = twin.Limits.of(

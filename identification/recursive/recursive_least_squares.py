@@ -15,7 +15,7 @@ from identification.model.kinematic_fit import mean_trim
 from identification.recursive import kernel, saved_state
 from identification.recursive.forgetting import Forgetting, forgetting_of
 from identification.recursive.history import History
-from identification.recursive.kernel.configuration import Configuration
+from identification.recursive.kernel.configuration import KernelConfiguration
 from identification.recursive.online import Online, vector
 from identification.recursive.rigid_body_online import RigidBodyOnline
 from identification.recursive.rls_state import RLSInfo, RLSState
@@ -105,12 +105,12 @@ class RecursiveLeastSquares:
         return structure.aerodynamics if isinstance(structure, KinematicARX) else structure
 
     @cached_property
-    def configuration(self) -> Configuration:
+    def configuration(self) -> KernelConfiguration:
         """Configuration of the kernel; its `sizes` are the numbers of memory the estimator
         takes.
         """
         forgetting = forgetting_of(self.forgetting, self.floor)
-        return Configuration(self.regression, forgetting, PRECISIONS[self.precision])
+        return KernelConfiguration(self.regression, forgetting, PRECISIONS[self.precision])
 
     def init(self) -> RLSState:
         """Return the initial state, without information."""

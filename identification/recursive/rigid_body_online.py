@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.recursive.kernel.configuration import Configuration
+from identification.recursive.kernel.configuration import KernelConfiguration
 from identification.recursive.online import Online, vector
 from identification.recursive.rls_state import RLSState
 from identification.structure.kinematic_arx import MOVING, STATES, increments
@@ -43,7 +43,7 @@ class RigidBodyOnline(Online):
     [False, False, True, True]
     """
 
-    def __init__(self, configuration: Configuration, kernel: Any, state: RLSState, dt: float):
+    def __init__(self, configuration: KernelConfiguration, kernel: Any, state: RLSState, dt: float):
         super().__init__(configuration, kernel, state)
         self._half, self._controls = 0.5 * dt, configuration.structure.nu - FAST
         self._y, self._u = np.zeros(FAST), np.zeros(FAST + self._controls)

@@ -11,7 +11,7 @@ from scipy.linalg import solve_triangular
 from identification.recursive.forgetting import Constant
 from identification.recursive.kernel import configuration as at
 from identification.recursive.kernel import twin
-from identification.recursive.kernel.configuration import Configuration, GroupLayout
+from identification.recursive.kernel.configuration import GroupLayout, KernelConfiguration
 from symheli.errors import InputError
 from symheli.values.arrays import Array
 from symheli.values.summary import summarized
@@ -40,7 +40,7 @@ class RLSState:
     (799, True, (4, 1))
     """
 
-    configuration: Configuration
+    configuration: KernelConfiguration
     memory: Array
     _learnt: dict[str, Array] = field(default_factory=dict, repr=False)
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.recursive.kernel.configuration import Configuration
+from identification.recursive.kernel.configuration import KernelConfiguration
 from identification.recursive.rls_state import RLSState
 from symheli.errors import InputError
 from symheli.values.whole_files import write_text
@@ -35,7 +35,7 @@ def save(state: RLSState, path: str | os.PathLike[str]) -> None:
     write_text(path, json.dumps(content, indent=1) + "\n")
 
 
-def load(configuration: Configuration, path: str | os.PathLike[str]) -> RLSState:
+def load(configuration: KernelConfiguration, path: str | os.PathLike[str]) -> RLSState:
     """Load the state in `path`; raise `InputError` unless it is whole and belongs to an estimator
     of this configuration.
     """
@@ -64,7 +64,7 @@ def load(configuration: Configuration, path: str | os.PathLike[str]) -> RLSState
     return RLSState(configuration, memory)
 
 
-def description(configuration: Configuration) -> dict[str, Any]:
+def description(configuration: KernelConfiguration) -> dict[str, Any]:
     """Return the configuration of a state: every field of structure and forgetting, and the
     precision.
     """

@@ -41,7 +41,7 @@ class Term(NamedTuple):
     signals: tuple[int, ...]
 
 
-class Entry(NamedTuple):
+class TermSignal(NamedTuple):
     """One signal of a term; it takes one regressor for each function of the basis.
 
     Parameters
@@ -65,7 +65,7 @@ class Entry(NamedTuple):
     p_lag: int
 
 
-class Group(NamedTuple):
+class EquationGroup(NamedTuple):
     """Outputs whose equations have the same regressors.
 
     Parameters
@@ -313,12 +313,12 @@ class LPVARX:
         return True
 
     @cached_property
-    def entries(self) -> tuple[Entry, ...]:
+    def entries(self) -> tuple[TermSignal, ...]:
         """Every signal of every term, in the order of the regressors."""
-        return tuple(Entry(t.kind, s, t.lag, t.p_lag) for t in self.terms for s in t.signals)
+        return tuple(TermSignal(t.kind, s, t.lag, t.p_lag) for t in self.terms for s in t.signals)
 
     @cached_property
-    def groups(self) -> tuple[Group, ...]:
+    def groups(self) -> tuple[EquationGroup, ...]:
         """Groups of outputs with the same regressors: all of them, unless orders or delays differ
         between equations.
         """
@@ -328,9 +328,9 @@ class LPVARX:
                 i for i, e in enumerate(self.entries) if self._has(e.kind, e.lag, e.channel, y)
             )
             members.setdefault(used, []).append(y)
-        return tuple(Group(tuple(outputs), entries) for entries, outputs in members.items())
+        return tuple(EquationGroup(tuple(outputs), entries) for entries, outputs in members.items())
 
-    def regressors(self, group: Group) -> Array:
+    def regressors(self, group: EquationGroup) -> Array:
         """Positions (n,) of the regressors of a group among all of them."""
         size = self.basis.size
         return (np.array(group.entries, dtype=int)[:, None] * size + np.arange(size)).reshape(-1)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from studies.campaigns.campaign import Campaign, Case
-from studies.campaigns.trial import LONGEST_REASON, Outcome, Value
+from studies.campaigns.trial import LONGEST_REASON, TrialOutcome, Value
 from symheli.errors import InputError, UnknownNameError
 from symheli.extras import extra
 from symheli.values.arrays import Array
@@ -90,7 +90,7 @@ class CampaignDataset:
         dataset._describe()
         return dataset
 
-    def write(self, row: int, outcome: Outcome) -> None:
+    def write(self, row: int, outcome: TrialOutcome) -> None:
         """The case in that row, in one file; why it failed before."""
         reason = self.path / "reason" / str(row)
         if outcome.reason:

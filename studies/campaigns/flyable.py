@@ -249,7 +249,7 @@ def _data(one: Experiment) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class Flown:
+class FlownPlan:
     """What was flown against what was planned: the ratio of the standard errors (n,) for residuals
     of one size, by regressor that the plan determines, and the range of airspeed (m/s) that was
     covered and planned.
@@ -300,7 +300,7 @@ class Flown:
         return "\n".join(["this is not enough", *lines])
 
 
-def flown(plan: Path, records: Sequence[FlightRecord], *, sweeps: bool = False) -> Flown:
+def flown(plan: Path, records: Sequence[FlightRecord], *, sweeps: bool = False) -> FlownPlan:
     """Hold records against a plan.json, its flights or its sweeps.
 
     Records have its signals at its step; the commanded airspeed may be missing where the measured
@@ -331,7 +331,7 @@ def flown(plan: Path, records: Sequence[FlightRecord], *, sweeps: bool = False) 
     planned = Plan(flights, ()).bounds
     speed = np.concatenate([held_one[SCHEDULING] for held_one in held.values()])
     excited = np.isfinite(planned)
-    return Flown(
+    return FlownPlan(
         Plan(compared, ()).bounds[excited] / planned[excited],
         tuple(n for n, wanted in zip(structure.regressor_names, excited, strict=True) if wanted),
         sum(one.duration for one in compared),

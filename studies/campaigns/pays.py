@@ -30,7 +30,7 @@ CONDITIONS = {
 
 
 @dataclass(frozen=True)
-class Line:
+class OutputFits:
     """One output of one axis in one condition: fits in percent by horizon (seeds,), LPV and LTI; on
     how many seeds scheduling pays.
     """
@@ -55,7 +55,7 @@ def where_scheduling_pays(
     *,
     on: Runner,
     path: Path | None = None,
-) -> Iterator[Line]:
+) -> Iterator[OutputFits]:
     """In each condition fly with the default seed and `seeds` others, fit, and judge on another
     transition; a case is the flights of a seed, kept in the dataset at `path` where one is given.
     """
@@ -74,12 +74,14 @@ def where_scheduling_pays(
         )
 
 
-def _line(condition: str, axis: Axis, output: str, found: Mapping[str, np.ndarray]) -> Line:
+def _line(condition: str, axis: Axis, output: str, found: Mapping[str, np.ndarray]) -> OutputFits:
     lpv, lti = ({h: found[fit_of(axis, output, h, model)] for h in HORIZONS} for model in MODELS)
-    return Line(condition, axis.name, output, lpv, lti, int(found[paying(axis, output)].sum()))
+    return OutputFits(
+        condition, axis.name, output, lpv, lti, int(found[paying(axis, output)].sum())
+    )
 
 
-def table(lines: Sequence[Line]) -> str:
+def table(lines: Sequence[OutputFits]) -> str:
     """Medians over the seeds, LPV / LTI; then the worst of them, each model on the flight it does
     worst on.
     """
@@ -105,7 +107,7 @@ def table(lines: Sequence[Line]) -> str:
 
 
 def _rows(
-    lines: Sequence[Line], over: Callable[[np.ndarray], Any], end: Callable[[Line], str]
+    lines: Sequence[OutputFits], over: Callable[[np.ndarray], Any], end: Callable[[OutputFits], str]
 ) -> Iterator[str]:
     group = ("", "")
     for line in lines:
@@ -121,7 +123,7 @@ def _rows(
         yield f"  {line.output:8s}{cells}{end(line)}"
 
 
-def data(lines: Sequence[Line]) -> list[dict[str, Any]]:
+def data(lines: Sequence[OutputFits]) -> list[dict[str, Any]]:
     """Every fit of every seed."""
     return [
         {

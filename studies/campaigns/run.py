@@ -19,7 +19,7 @@ import numpy as np
 from studies.campaigns.campaign import Campaign
 from studies.campaigns.dataset import CampaignDataset
 from studies.campaigns.runners import Runner, answers
-from studies.campaigns.trial import Outcome, Trial, Value, reason_of
+from studies.campaigns.trial import Trial, TrialOutcome, Value, reason_of
 from studies.output import progress
 from studies.transition.stored_stages import code_digest
 from symheli.errors import DataWarning, SymheliError
@@ -132,7 +132,7 @@ def columns_of(campaign: Campaign, on: Runner, path: Path | None = None) -> dict
 
 def outcomes(
     trial: Trial, cases: Sequence[Mapping[str, Value]], on: Runner
-) -> Iterator[tuple[int, Outcome]]:
+) -> Iterator[tuple[int, TrialOutcome]]:
     """Yield number and outcome of each case as they are done. A case fails if its processes end as
     often as the runner tries.
 
@@ -153,11 +153,11 @@ def outcomes(
                     lost.append(i)
                 else:
                     nothing = (math.nan,) * len(trial.units)
-                    yield i, Outcome(nothing, reason_of(error))
+                    yield i, TrialOutcome(nothing, reason_of(error))
         todo = lost
 
 
-def _error(future: Future[Outcome]) -> BaseException | None:
+def _error(future: Future[TrialOutcome]) -> BaseException | None:
     try:
         return future.exception()
     except CancelledError as error:
@@ -184,7 +184,7 @@ class _ProgressLines:
         self._begin = self._last = time.monotonic()
         self._print(f"{there} are there" if there else "")
 
-    def of(self, outcome: Outcome) -> None:
+    def of(self, outcome: TrialOutcome) -> None:
         """One more."""
         self._done += 1
         self._failed += bool(outcome.reason)

@@ -93,7 +93,7 @@ class Trial:
             )
         return value
 
-    def call(self, parameters: Mapping[str, Value]) -> Callable[[], Outcome]:
+    def call(self, parameters: Mapping[str, Value]) -> Callable[[], TrialOutcome]:
         """Return the call for a worker."""
         return partial(outcome, self.run, tuple(self.quantities), dict(parameters))
 
@@ -103,7 +103,7 @@ class Trial:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class TrialOutcome:
     """Outcome of one case: its quantities in order, the time last; or the reason of its failure."""
 
     values: tuple[float, ...]
@@ -114,7 +114,7 @@ def outcome(
     run: Callable[..., Mapping[str, float]],
     quantities: tuple[str, ...],
     parameters: Mapping[str, Value],
-) -> Outcome:
+) -> TrialOutcome:
     """Run one case; what goes wrong is its reason."""
     begin = time.perf_counter()
     try:
@@ -126,7 +126,7 @@ def outcome(
         reason = ""
     except Exception as error:
         values, reason = (math.nan,) * len(quantities), reason_of(error)
-    return Outcome((*values, time.perf_counter() - begin), reason)
+    return TrialOutcome((*values, time.perf_counter() - begin), reason)
 
 
 def reason_of(error: BaseException) -> str:

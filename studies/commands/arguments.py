@@ -19,7 +19,7 @@ class Argument:
 
 
 @dataclass(frozen=True)
-class Group:
+class ArgumentGroup:
     """Arguments under a `title` in the help; without one, those of which one may be given."""
 
     arguments: tuple[Argument, ...]
@@ -60,17 +60,17 @@ def positional(name: str, help: str, **settings: Any) -> Argument:
     return Argument(name, {"help": help, **settings})
 
 
-def one_of(*arguments: Argument) -> Group:
+def one_of(*arguments: Argument) -> ArgumentGroup:
     """Options of which one may be given."""
-    return Group(arguments)
+    return ArgumentGroup(arguments)
 
 
-def group(title: str, about: str | None, *arguments: Argument) -> Group:
+def group(title: str, about: str | None, *arguments: Argument) -> ArgumentGroup:
     """Arguments that belong together in the help."""
-    return Group(arguments, title, about)
+    return ArgumentGroup(arguments, title, about)
 
 
-def add(parser: ArgumentParser, table: Iterable[Argument | Group]) -> None:
+def add(parser: ArgumentParser, table: Iterable[Argument | ArgumentGroup]) -> None:
     """Put the arguments of a table into a parser."""
     for entry in table:
         if isinstance(entry, Argument):

@@ -53,7 +53,7 @@ SEEDS, FEW_SEEDS = 20, 4
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Flown:
+class TurbulentFlights:
     """One controller in turbulence of one size: `gust` is the standard deviation of its level
     components, m/s; one of `flights` a seed.
     """
@@ -83,26 +83,26 @@ class Flown:
 class FlownControllers:
     """Simulated flights, by controller and within that by size."""
 
-    flown: tuple[Flown, ...]
+    flown: tuple[TurbulentFlights, ...]
     seeds: int
     duration: float
 
-    def of(self, name: str) -> list[Flown]:
+    def of(self, name: str) -> list[TurbulentFlights]:
         """Return the flights of one controller, by size."""
         return [one for one in self.flown if one.name == name]
 
-    def at(self, wind: float) -> list[Flown]:
+    def at(self, wind: float) -> list[TurbulentFlights]:
         """Return the flights of all controllers, in turbulence of one size."""
         return [one for one in self.flown if one.wind == wind]
 
-    def exceeded(self, name: str, gain: float) -> Flown | None:
+    def exceeded(self, name: str, gain: float) -> TurbulentFlights | None:
         """The flights in the least turbulence in which one of them has an energy ratio above a
         gain.
         """
         above = (f for f in self.of(name) if f.of(lambda flight: flight.ratio)[1] > gain)
         return min(above, key=lambda f: f.wind, default=None)
 
-    def ranked(self, wind: float) -> list[Flown]:
+    def ranked(self, wind: float) -> list[TurbulentFlights]:
         """Return the controllers that lost no flight, the least median energy ratio first."""
         return sorted((f for f in self.at(wind) if not f.lost), key=lambda f: f.ratio)
 
@@ -146,7 +146,7 @@ def fly_controllers(vehicle: str, designs: Designs, seeds: Sequence[int]) -> Flo
     n = len(seeds)
     return FlownControllers(
         flown=tuple(
-            Flown(
+            TurbulentFlights(
                 name=name,
                 wind=wind,
                 gust=float(Dryden(wind, ALTITUDE).intensities[0]),

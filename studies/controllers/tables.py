@@ -15,7 +15,7 @@ from studies.transition.tables import Table, gain
 if TYPE_CHECKING:
     from studies.controllers.certified import CertifiedControllers
     from studies.controllers.designs import Designs
-    from studies.controllers.flown import Flown, FlownControllers
+    from studies.controllers.flown import FlownControllers, TurbulentFlights
     from studies.controllers.measures import Measures
     from studies.transition.outcome import Outcome
 
@@ -199,12 +199,12 @@ def _won(found: FlownControllers, wind: float) -> str:
     return f"{won}.{simple}{fell}"
 
 
-def _better(one: Flown, other: Flown) -> int:
+def _better(one: TurbulentFlights, other: TurbulentFlights) -> int:
     pairs = zip(one.flights, other.flights, strict=True)
     return sum(a.ratio < b.ratio for a, b in pairs)
 
 
-def _worst(one: Flown) -> float:
+def _worst(one: TurbulentFlights) -> float:
     return one.of(lambda flight: flight.ratio)[1]
 
 
@@ -226,5 +226,5 @@ def hypotheses(found: FlownControllers) -> str:
     )
 
 
-def _broke(one: Flown) -> bool:
+def _broke(one: TurbulentFlights) -> bool:
     return any(flight.outside > 0 or flight.faster > 0 for flight in one.flights)

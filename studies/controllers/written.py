@@ -11,7 +11,7 @@ from studies.transition.saved_proofs import proof_file
 
 if TYPE_CHECKING:
     from studies.controllers.designs import Design
-    from studies.controllers.flown import Flown
+    from studies.controllers.flown import TurbulentFlights
     from studies.transition.outcome import Outcome
 
 
@@ -39,7 +39,7 @@ def _design(design: Design) -> dict[str, Any]:
     }
 
 
-def _flown(one: Flown) -> dict[str, Any]:
+def _flown(one: TurbulentFlights) -> dict[str, Any]:
     each = one.flights
     return {
         "controller": one.name,

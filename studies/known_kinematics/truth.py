@@ -23,7 +23,7 @@ SPEEDS = np.linspace(0.0, TOP, 27)
 
 
 @dataclass(frozen=True)
-class Axis:
+class TruthAxis:
     """Outputs, inputs, and the states of the truth that belong to them (None: all)."""
 
     outputs: tuple[str, ...]
@@ -31,12 +31,12 @@ class Axis:
     states: tuple[str, ...] | None
 
 
-AXES: Mapping[str, Axis] = {
-    "lateral": Axis(("v", "p", "r", "phi"), ("d_lat", "d_ped"), ("v", "p", "r", "phi", "b1")),
-    "longitudinal": Axis(
+AXES: Mapping[str, TruthAxis] = {
+    "lateral": TruthAxis(("v", "p", "r", "phi"), ("d_lat", "d_ped"), ("v", "p", "r", "phi", "b1")),
+    "longitudinal": TruthAxis(
         ("u", "w", "q", "theta"), ("d_lon", "d_col"), ("u", "w", "q", "theta", "a1")
     ),
-    "all axes": Axis(("u", "v", "w", "p", "q", "r", "phi", "theta"), INPUTS, None),
+    "all axes": TruthAxis(("u", "v", "w", "p", "q", "r", "phi", "theta"), INPUTS, None),
 }
 
 
@@ -54,7 +54,7 @@ class Truth:
     def of(
         cls,
         heli: Helicopter,
-        axes: Mapping[str, Axis] = AXES,
+        axes: Mapping[str, TruthAxis] = AXES,
         *,
         period: float = PERIOD,
         servos: Mapping[str, Servo] | None = None,
@@ -95,7 +95,7 @@ class Truth:
 
 def sampled(
     model: LinearModel,
-    axis: Axis,
+    axis: TruthAxis,
     period: float = PERIOD,
     servos: Mapping[str, Servo] | None = None,
     late: int = 0,
@@ -132,7 +132,7 @@ def frozen_axes(model: KinematicModel, truth: Truth) -> FrozenAxes:
     }
 
 
-def frozen(model: KinematicModel, axis: Axis, airspeed: float) -> LinearModel:
+def frozen(model: KinematicModel, axis: TruthAxis, airspeed: float) -> LinearModel:
     """Return an identified model of an axis in level flight, with the names of the exact model."""
     p = (airspeed, 0.0) if len(model.parameters) == 2 else (airspeed,)
     commands = {u.removesuffix("_command"): u for u in map(str, model.inputs)}

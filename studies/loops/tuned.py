@@ -31,7 +31,7 @@ DEVIATIONS = 3.0
 """Half width of a band in standard deviations of the drawn helicopters."""
 
 
-class Quantity(NamedTuple):
+class QuantityBand(NamedTuple):
     """Unit of a quantity, and the smallest half width of its band: what rounding, trims and a
     period of the loops leave.
     """
@@ -41,15 +41,15 @@ class Quantity(NamedTuple):
 
 
 QUANTITIES = {
-    "gain": Quantity("dB", 0.1),
-    "phase": Quantity("deg", 0.5),
-    "bandwidth": Quantity("rad/s", 0.02),
-    "peak": Quantity("dB", 0.1),
-    "rejection": Quantity("rad/s", 0.02),
-    "rejection_peak": Quantity("dB", 0.1),
-    "overshoot": Quantity("%", 1.0),
-    "rise": Quantity("s", 0.02),
-    "settling": Quantity("s", 0.02),
+    "gain": QuantityBand("dB", 0.1),
+    "phase": QuantityBand("deg", 0.5),
+    "bandwidth": QuantityBand("rad/s", 0.02),
+    "peak": QuantityBand("dB", 0.1),
+    "rejection": QuantityBand("rad/s", 0.02),
+    "rejection_peak": QuantityBand("dB", 0.1),
+    "overshoot": QuantityBand("%", 1.0),
+    "rise": QuantityBand("s", 0.02),
+    "settling": QuantityBand("s", 0.02),
 }
 """What has a band: two margins, then `Responses`."""
 

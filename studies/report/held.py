@@ -45,7 +45,7 @@ rotor answers more slowly than its two lags last.
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Axis:
+class AxisModels:
     """The models of one axis at `SPEEDS`, all sampled at the same period."""
 
     name: str
@@ -79,7 +79,7 @@ def held_to_dict(study: Outcome) -> dict[str, Any] | None:
     return made
 
 
-def axes(study: Outcome) -> list[Axis]:
+def axes(study: Outcome) -> list[AxisModels]:
     """Longitudinal, then lateral."""
     assert study.baseline is not None  # noqa: S101
     nodes, cubic = study.baseline.nodes, study.baseline.lpv["polynomial 3"]
@@ -96,7 +96,7 @@ def axes(study: Outcome) -> list[Axis]:
         if study.known_kinematics is not None:
             known = study.known_kinematics.model
             models[KNOWN] = [frozen(known, part, float(v)) for v in SPEEDS]
-        out.append(Axis(name=name, channel=CHANNELS[axis.name], models=models))
+        out.append(AxisModels(name=name, channel=CHANNELS[axis.name], models=models))
     return out
 
 
@@ -151,7 +151,7 @@ def _entry(model: LinearModel, to: str, of: str) -> float:
     return float(M[states.index(to), j])
 
 
-def _axis(axis: Axis) -> dict[str, Any]:
+def _axis(axis: AxisModels) -> dict[str, Any]:
     period = axis.models[EXACT][0].dt
     assert period is not None  # noqa: S101
     source, output = axis.channel

@@ -41,7 +41,7 @@ KINDS = {
 """Kinds of negative results, as they are counted."""
 
 
-class Row(NamedTuple):
+class Finding(NamedTuple):
     """A finding, its reason, its path in results.json, and its kind among `KINDS`; `failed` where
     the computation broke off without a result.
     """
@@ -53,7 +53,7 @@ class Row(NamedTuple):
     failed: bool = False
 
 
-def shortfalls(study: Outcome) -> list[Row]:
+def shortfalls(study: Outcome) -> list[Finding]:
     """Return all negative results, and all failures."""
     return [
         *_models(study),
@@ -91,15 +91,15 @@ def counted(study: Outcome) -> list[str]:
     return out
 
 
-def _table(title: str, rows: Sequence[Row], name: str) -> Table:
+def _table(title: str, rows: Sequence[Finding], name: str) -> Table:
     columns = ["what", "why", "results.json"]
     return Table(title, columns, [[row.what, row.why, row.path] for row in rows], name=name)
 
 
-def _models(study: Outcome) -> Iterator[Row]:
+def _models(study: Outcome) -> Iterator[Finding]:
     if study.baseline is not None and (unfit := study.baseline.unfit):
         names = ", ".join(e.name for e in unfit[:4])
-        yield Row(
+        yield Finding(
             f"No polynomial up to degree 6 fits {len(unfit)} entries of A(p), B(p) within 10 % of"
             f" their range, worst {names}.",
             "They jump where the model has a corner (a limit of the tail, the edge of the wake);"
@@ -111,7 +111,7 @@ def _models(study: Outcome) -> Iterator[Row]:
     for run in study.paper_experiment.runs if study.paper_experiment else ():
         refused.setdefault(run.cubic_refused, []).append(run.loop)
     for why, which in refused.items():
-        yield Row(
+        yield Finding(
             f"A cubic basis is refused in the published experiment, {' and '.join(which)} loop.",
             f"{why[:1].upper()}{why[1:]}.",
             "paper_experiment",
@@ -119,7 +119,7 @@ def _models(study: Outcome) -> Iterator[Row]:
         )
 
 
-def _marks(study: Outcome) -> Iterator[Row]:
+def _marks(study: Outcome) -> Iterator[Finding]:
     if (found := study.identification) is None:
         return
     for axis in AXES:
@@ -131,7 +131,7 @@ def _marks(study: Outcome) -> Iterator[Row]:
                 if not one.scores.ahead[y] >= mark[k]
             ]
             if missed:
-                yield Row(
+                yield Finding(
                     f"Targets missed 1 s ahead, {axis.name}, {noise}: {', '.join(missed)}.",
                     "One flight, one seed; symheli campaign gives the median of many.",
                     "identification.models",
@@ -139,7 +139,7 @@ def _marks(study: Outcome) -> Iterator[Row]:
                 )
         worst = max(found.of(axis, NOISES[0]).mode_miss.values())
         if not worst <= MODE_MARK:
-            yield Row(
+            yield Finding(
                 f"The frozen rotor mode, {axis.name}, is missed by {worst:.1f} %, wanted"
                 f" {MODE_MARK:g}.",
                 "Noise-free: the structure has too few lags for it.",
@@ -148,7 +148,7 @@ def _marks(study: Outcome) -> Iterator[Row]:
             )
 
 
-def _predictions(study: Outcome) -> Iterator[Row]:
+def _predictions(study: Outcome) -> Iterator[Finding]:
     for one in study.comparison.predictions if study.comparison else ():
         lost: dict[str, list[str]] = {}
         for p in one.found.predictions:
@@ -157,7 +157,7 @@ def _predictions(study: Outcome) -> Iterator[Row]:
                     lost.setdefault(p.name, []).append(y)
         if lost:
             each = "; ".join(f"{name}: {', '.join(ys)}" for name, ys in lost.items())
-            yield Row(
+            yield Finding(
                 f"In free run worse than the mean of the flight, {one.axis.name}, {one.noise}:"
                 f" {each}.",
                 "Slow modes with hardly any damping turn a small error of a pole into a drift.",
@@ -197,14 +197,14 @@ def without_certificate(study: Outcome) -> list[str]:
     return [f"No certificate found for {', '.join(m)}: {w}" for w, m in models.items()]
 
 
-def _proofs(study: Outcome) -> Iterator[Row]:
+def _proofs(study: Outcome) -> Iterator[Finding]:
     for one in _unproven(study):
         what = "The proof of a gain failed" if one.failed else "No certificate of a gain"
         heading = f"{what}, {one.channel} channel, {one.model}: {', '.join(one.tests)}."
-        yield Row(heading, _capital(one.why), one.path, "certificate", one.failed)
+        yield Finding(heading, _capital(one.why), one.path, "certificate", one.failed)
     for sentence in not_about_the_helicopter(study.bounds):
         why = "The model differs from the helicopter by more than this loop's margin."
-        yield Row(sentence, why, "guarantees.bounds", "certificate")
+        yield Finding(sentence, why, "guarantees.bounds", "certificate")
 
 
 def _why(b: Bound, bounds: Sequence[Bound]) -> tuple[str, bool]:
@@ -224,11 +224,11 @@ def _why(b: Bound, bounds: Sequence[Bound]) -> tuple[str, bool]:
     return f"{c.status.value}.", False
 
 
-def _controllers(study: Outcome) -> Iterator[Row]:
+def _controllers(study: Outcome) -> Iterator[Finding]:
     for design in study.controllers.designs if study.controllers else ():
         if design.controller is None:
             what = "The design failed" if design.failed else "No controller"
-            yield Row(
+            yield Finding(
                 f"{what}: {design.name}.",
                 f"{design.reason.removesuffix('.')}.",
                 "controllers.designs",
@@ -240,7 +240,7 @@ def _controllers(study: Outcome) -> Iterator[Row]:
     for wind in WINDS:
         for one in found.at(wind):
             if one.lost:
-                yield Row(
+                yield Finding(
                     f"{one.name} lost {one.lost} of {found.seeds} flights in gusts of"
                     f" {one.gust:.1f} m/s.",
                     "The gusts took it outside what its model and its travel allow.",

@@ -34,7 +34,7 @@ from symheli.values.arrays import Array
 from symheli.values.kinematics import GRAVITY
 from symheli.values.named_vector import NamedVector
 from synthesis.sheet.measures import rate_over_change
-from synthesis.sheet.sheet import Axis, Sheet
+from synthesis.sheet.sheet import ControlAxis, Sheet
 
 ACCELERATIONS = (1.0, 3.0)
 """Of the transitions, gentle and aggressive, m/s^2."""
@@ -219,7 +219,7 @@ class Handover:
         return u, (k + 1, u, inner)
 
 
-def quickness(heli: Helicopter, K: LPVStateSpace, axis: Axis) -> float:
+def quickness(heli: Helicopter, K: LPVStateSpace, axis: ControlAxis) -> float:
     """Return peak rate over peak change of an attitude, 1/s, after a step of its command in still
     air: the least over `HELD_AT` and both signs; NaN where a flight is lost.
 

@@ -21,7 +21,7 @@ from studies.transition.axes import (
     rotor_mode,
 )
 from studies.transition.baseline import Baseline
-from studies.transition.flights import NOISES, Flights
+from studies.transition.flights import NOISES, StudyRecords
 from studies.transition.identified import Identification
 from symheli import Helicopter, LPVStateSpace
 
@@ -75,7 +75,7 @@ class FrozenAxis:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Comparison:
+class Comparisons:
     """All comparisons."""
 
     predictions: tuple[ComparedAxis, ...]
@@ -83,8 +83,8 @@ class Comparison:
 
 
 def compare(
-    heli: Helicopter, baseline: Baseline, flights: Flights, identification: Identification
-) -> Comparison:
+    heli: Helicopter, baseline: Baseline, flights: StudyRecords, identification: Identification
+) -> Comparisons:
     """Every axis, with and without noise; frozen without."""
     cubic, spline = baseline.lpv["polynomial 3"], baseline.lpv["spline"]
     baselines = {
@@ -120,7 +120,7 @@ def compare(
         )
         for axis in AXES
     ]
-    return Comparison(predictions=tuple(predictions), frozen=tuple(frozen))
+    return Comparisons(predictions=tuple(predictions), frozen=tuple(frozen))
 
 
 def along_the_command(lpv: LPVStateSpace, heli: Helicopter, *, drift: bool = True) -> BaselineModel:

@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 
     from identification import FrozenModels
     from studies.transition.comparison import ComparedAxis
-    from studies.transition.flights import Flights
+    from studies.transition.flights import StudyRecords
     from studies.transition.known_kinematics import KnownKinematics
     from studies.transition.outcome import Outcome
-    from studies.transition.paper_experiment import Experiment
+    from studies.transition.paper_experiment import PaperExperiment
     from synthesis import GainCurve
 
 DEGREES = 180 / math.pi
@@ -203,7 +203,7 @@ def entries(study: Outcome) -> Figure:
     return figure
 
 
-def convergence(e: Experiment) -> Figure:
+def convergence(e: PaperExperiment) -> Figure:
     """Parameters over time, one panel an output."""
     figure, axes = _subplots(1, 3, 11, 2.8, sharex=True)
     for ax, c in zip(axes[0], e.channels, strict=True):
@@ -229,7 +229,7 @@ def convergence(e: Experiment) -> Figure:
     return figure
 
 
-def outputs(e: Experiment) -> Figure:
+def outputs(e: PaperExperiment) -> Figure:
     """System and one-step prediction over the fresh record, with the error below."""
     figure, axes = _subplots(2, 3, 11, 3.8, sharex=True, height_ratios=(2, 1))
     for column, c in enumerate(e.channels):
@@ -254,7 +254,7 @@ def outputs(e: Experiment) -> Figure:
     return figure
 
 
-def flights(flown: Flights) -> Figure:
+def flights(flown: StudyRecords) -> Figure:
     """Airspeed, attitude and inputs of training and test."""
     figure, axes = _subplots(3, 2, 11, 4.6, sharex="col", width_ratios=(2.2, 1))
     shown = {"training": flown.training[NOISES[0]], "test": flown.test[NOISES[0]]}

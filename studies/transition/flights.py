@@ -97,7 +97,7 @@ class TransitionPlan:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Flights:
+class StudyRecords:
     """Records for identification and for validation, each {noise: record}, and the gentle
     flight.
     """
@@ -116,7 +116,7 @@ class Flights:
         return each | {"gentle": self.gentle}
 
 
-def fly_transitions(heli: Helicopter, seed: int, ramps: int, gentle_ramps: int) -> Flights:
+def fly_transitions(heli: Helicopter, seed: int, ramps: int, gentle_ramps: int) -> StudyRecords:
     """Simulate training and test flights without and with noise, and the gentle flight."""
     autopilot = autopilot_for(heli)
     clean = TransitionPlan(seed, ramps=ramps)
@@ -125,7 +125,9 @@ def fly_transitions(heli: Helicopter, seed: int, ramps: int, gentle_ramps: int) 
     for noise, plan in plans.items():
         training[noise] = plan.training(heli, autopilot)
         test[noise] = plan.test(heli, autopilot)
-    return Flights(training=training, test=test, gentle=clean.gentle(heli, autopilot, gentle_ramps))
+    return StudyRecords(
+        training=training, test=test, gentle=clean.gentle(heli, autopilot, gentle_ramps)
+    )
 
 
 def autopilot_for(heli: Helicopter, dt: float = 0.02) -> Autopilot:

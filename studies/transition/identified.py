@@ -18,7 +18,7 @@ from studies.transition.axes import (
     mode_misses,
     update_time,
 )
-from studies.transition.flights import NOISES, Flights
+from studies.transition.flights import NOISES, StudyRecords
 from symheli import Helicopter
 
 CLEAN, NOISY = NOISES
@@ -64,7 +64,7 @@ class Identification:
         return next(one for one in self.axes if (one.axis, one.noise) == (axis, noise))
 
 
-def identify_axes(heli: Helicopter, flights: Flights) -> Identification:
+def identify_axes(heli: Helicopter, flights: StudyRecords) -> Identification:
     """Fit every axis with and without noise; once more by instruments, which noise needs."""
     found = []
     for noise in NOISES:

@@ -9,9 +9,9 @@ from studies.controllers.certified import CertifiedControllers
 from studies.controllers.designs import Designs
 from studies.controllers.flown import FlownControllers
 from studies.transition.baseline import Baseline
-from studies.transition.comparison import Comparison
+from studies.transition.comparison import Comparisons
 from studies.transition.effort import Effort
-from studies.transition.flights import Flights
+from studies.transition.flights import StudyRecords
 from studies.transition.guarantees import Bound
 from studies.transition.identified import Identification
 from studies.transition.known_kinematics import KnownKinematics
@@ -36,9 +36,9 @@ class Outcome:
     baseline: Baseline | None = None
     paper_experiment: PaperExperiments | None = None
     exact_recovery: Recoveries | None = None
-    flights: Flights | None = None
+    flights: StudyRecords | None = None
     identification: Identification | None = None
-    comparison: Comparison | None = None
+    comparison: Comparisons | None = None
     known_kinematics: KnownKinematics | None = None
     gust: GustProofs | None = None
     longitudinal: LongitudinalProofs | None = None

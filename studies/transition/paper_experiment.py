@@ -29,7 +29,7 @@ UNITS = {
 
 
 @dataclass(frozen=True)
-class Channel:
+class OutputResult:
     """One output of the experiment: how its 12 parameters converged and how the model follows the
     system.
     """
@@ -56,7 +56,7 @@ class Channel:
 
 
 @dataclass(frozen=True)
-class Experiment:
+class PaperExperiment:
     """Open or closed loop, with the record it was judged on and the reason why a cubic basis is
     refused.
     """
@@ -64,7 +64,7 @@ class Experiment:
     loop: str
     training: FlightRecord
     test: FlightRecord
-    channels: tuple[Channel, ...]
+    channels: tuple[OutputResult, ...]
     cubic_refused: str
     excitation: str
 
@@ -73,7 +73,7 @@ class Experiment:
 class PaperExperiments:
     """The experiment in open loop, as in the paper, and in closed loop."""
 
-    runs: tuple[Experiment, ...]
+    runs: tuple[PaperExperiment, ...]
 
 
 def run_experiments(family: LinearFamily, seed: int = 0) -> PaperExperiments:
@@ -140,7 +140,7 @@ def structure(output: str, degree: int = 2) -> LPVARX:
     )
 
 
-def run_experiment(family: LinearFamily, closed: bool, seed: int = 0) -> Experiment:
+def run_experiment(family: LinearFamily, closed: bool, seed: int = 0) -> PaperExperiment:
     """Identify on one record, judge on a fresh one with another input."""
     plant = discretized_baseline(family)
     training, test = fly_baseline(plant, closed, seed), fly_baseline(plant, closed, seed + 500)
@@ -150,7 +150,7 @@ def run_experiment(family: LinearFamily, closed: bool, seed: int = 0) -> Experim
         refused = ""
     except ExcitationError as error:
         refused = str(error)
-    return Experiment(
+    return PaperExperiment(
         "closed" if closed else "open",
         training,
         test,
@@ -160,7 +160,7 @@ def run_experiment(family: LinearFamily, closed: bool, seed: int = 0) -> Experim
     )
 
 
-def _channel(output: str, training: FlightRecord, test: FlightRecord) -> Channel:
+def _channel(output: str, training: FlightRecord, test: FlightRecord) -> OutputResult:
     arx = structure(output)
     history = RecursiveLeastSquares(arx).run(training)
     model = history.model
@@ -184,7 +184,7 @@ def _channel(output: str, training: FlightRecord, test: FlightRecord) -> Channel
     k = int(largest[0])
     push = float(np.abs(test["d_lon"][max(k - 2, 0) : k]).max() / test["d_lon"].std())
     settled = _settling(history.time, theta)
-    return Channel(
+    return OutputResult(
         output,
         model,
         history.time,

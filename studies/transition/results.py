@@ -27,13 +27,13 @@ from studies.transition.saved_proofs import proof_file
 if TYPE_CHECKING:
     from identification import FrozenModels, Scores
     from studies.transition.baseline import Baseline
-    from studies.transition.comparison import Comparison
+    from studies.transition.comparison import Comparisons
     from studies.transition.first_look import FirstLook
-    from studies.transition.flights import Flights
+    from studies.transition.flights import StudyRecords
     from studies.transition.identified import Identification
     from studies.transition.known_kinematics import KnownKinematics
     from studies.transition.outcome import Outcome
-    from studies.transition.paper_experiment import Channel, Experiment
+    from studies.transition.paper_experiment import OutputResult, PaperExperiment
     from studies.transition.recovery import Recovery
     from symheli import Signal
 
@@ -154,7 +154,7 @@ def _trim(b: Baseline, name: Signal) -> dict[str, Any]:
     return values((t.x[name] if name in t.x else t.u[name] for t in b.nodes.trims), name.unit)
 
 
-def _experiment(e: Experiment) -> dict[str, Any]:
+def _experiment(e: PaperExperiment) -> dict[str, Any]:
     return {
         "loop": e.loop,
         "period": value(PERIOD, "s"),
@@ -163,7 +163,7 @@ def _experiment(e: Experiment) -> dict[str, Any]:
     }
 
 
-def _channel(c: Channel) -> dict[str, Any]:
+def _channel(c: OutputResult) -> dict[str, Any]:
     one, ahead, free = c.fits.values()
     return {
         "output": c.output,
@@ -193,7 +193,7 @@ def _recovery(r: Recovery) -> dict[str, Any]:
     }
 
 
-def _flights(flights: Flights) -> list[dict[str, Any]]:
+def _flights(flights: StudyRecords) -> list[dict[str, Any]]:
     return [
         {
             "name": name,
@@ -232,7 +232,7 @@ def _identification(found: Identification) -> dict[str, Any]:
     }
 
 
-def _comparison(found: Comparison) -> dict[str, Any]:
+def _comparison(found: Comparisons) -> dict[str, Any]:
     return {
         "predictions": [
             {

@@ -51,7 +51,7 @@ def read(content: bytes) -> Any:
             for k in range(len(archive.namelist()) - 1):
                 with archive.open(f"{k}.npy") as member:
                     arrays.append(np.lib.format.read_array(member, allow_pickle=False))
-        return _Reader(tree["objects"], arrays).value(tree["root"])
+        return _TreeReader(tree["objects"], arrays).value(tree["root"])
     except (
         *(zipfile.BadZipFile, KeyError, IndexError, TypeError, ValueError, AttributeError),
         *(ImportError, OSError, EOFError, RecursionError),
@@ -112,7 +112,7 @@ class _Writer:
         return out | {"text": str.__str__(value)} if isinstance(value, str) else out
 
 
-class _Reader:
+class _TreeReader:
     """The value of a tree, each object of it made once."""
 
     def __init__(self, objects: list[Any], arrays: list[np.ndarray]):

@@ -8,12 +8,12 @@ from types import SimpleNamespace
 from typing import Any
 
 from symheli.airframe.sections import PLACE
-from symheli.components import Component, Effect, Entry, Flow, Motion
+from symheli.components import AirMotion, Component, Effect, Entry, Flow
 from symheli.values.signal import Signal
 
 
 @dataclass(frozen=True)
-class Part:
+class InstalledPart:
     """One section of a vehicle file.
 
     suffix: added to the names of its states, flow and switches; empty for the first of a kind, "_"
@@ -62,7 +62,7 @@ class Part:
     def evaluate(
         self,
         par: SimpleNamespace,
-        motion: Motion,
+        motion: AirMotion,
         controls: Mapping[str, Any],
         own: Mapping[str, Any],
         flow: Flow,
@@ -98,7 +98,7 @@ class Part:
         )
 
 
-def _moved(motion: Motion, par: SimpleNamespace) -> Motion:
+def _moved(motion: AirMotion, par: SimpleNamespace) -> AirMotion:
     """The motion of the reference point: V + omega x r."""
     return motion._replace(
         u_a=motion.u_a + motion.q * par.z - motion.r * par.y,

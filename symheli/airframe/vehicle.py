@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 
-from symheli.airframe.part import Part
+from symheli.airframe.part import InstalledPart
 from symheli.airframe.plausibility import implausibilities, impossibilities
 from symheli.airframe.quantity import Quantity
 from symheli.airframe.vehicle_file import LINEAR, VehicleFile, entries_of
@@ -30,7 +30,7 @@ class Vehicle:
     title: str
     source: str
     sections: Mapping[str, Mapping[str, Quantity]]
-    components: Mapping[str, Part]
+    components: Mapping[str, InstalledPart]
 
     __repr__ = summarized
 

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from symheli.airframe.part import Part
+from symheli.airframe.part import InstalledPart
 from symheli.airframe.plausibility import implausibilities, impossibilities
 from symheli.airframe.quantity import Quantity, read_quantity
 from symheli.airframe.readable import (
@@ -46,7 +46,7 @@ class VehicleFile:
         self._asked: Mapping[str, Mapping[str, Entry]] = {}
         self.problems: list[Problem] = broken_lines(unread)
 
-    def read(self) -> tuple[dict[str, Part], dict[str, dict[str, Quantity]]]:
+    def read(self) -> tuple[dict[str, InstalledPart], dict[str, dict[str, Quantity]]]:
         """The parts in the order of the file, and every number of every section.
 
         Raises one `InputError` with everything that is wrong, in the order of the file.
@@ -63,9 +63,9 @@ class VehicleFile:
         refuse(self.path, self.problems)
         return parts, quantities
 
-    def _parts(self, tables: Mapping[str, dict[str, Any]]) -> dict[str, Part]:
+    def _parts(self, tables: Mapping[str, dict[str, Any]]) -> dict[str, InstalledPart]:
         """Every section that is not fixed, as a part; one that cannot be is noted and left out."""
-        parts: dict[str, Part] = {}
+        parts: dict[str, InstalledPart] = {}
         taken: set[str] = set()
         whole = True
         for section, table in tables.items():
@@ -88,7 +88,7 @@ class VehicleFile:
             suffix = f"_{section}" if names & taken else ""
             taken |= {f"{name}{suffix}" for name in names}
             optional = (name for name, entry in component.entries.items() if entry.optional)
-            parts[section] = Part(
+            parts[section] = InstalledPart(
                 section,
                 component,
                 suffix,
@@ -102,7 +102,7 @@ class VehicleFile:
             self._flow_is_made(parts)
         return parts
 
-    def _flow_is_made(self, parts: Mapping[str, Part]) -> None:
+    def _flow_is_made(self, parts: Mapping[str, InstalledPart]) -> None:
         """Note every flow that a part needs and no part makes, with the part that would."""
         made = {name for part in parts.values() for name in part.makes}
         for section, part in parts.items():
@@ -120,7 +120,7 @@ class VehicleFile:
     def _quantities(
         self,
         tables: Mapping[str, dict[str, Any]],
-        parts: Mapping[str, Part],
+        parts: Mapping[str, InstalledPart],
         entries: Mapping[str, Mapping[str, Entry]],
     ) -> dict[str, dict[str, Quantity]]:
         """Every number that can be read; what cannot, and what is missing or unknown, is noted."""
@@ -311,7 +311,7 @@ class _AlreadySaidError(Exception):
 
 
 def entries_of(
-    sections: Iterable[str], parts: Mapping[str, Part]
+    sections: Iterable[str], parts: Mapping[str, InstalledPart]
 ) -> dict[str, Mapping[str, Entry]]:
     """Return the entries of each section; sections that are neither fixed nor a part are
     left out.

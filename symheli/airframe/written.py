@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping
 
-from symheli.airframe.part import Part
+from symheli.airframe.part import InstalledPart
 from symheli.airframe.plausibility import RANGES
 from symheli.airframe.quantity import Quantity
 from symheli.airframe.sections import FIXED, PLACE
@@ -97,7 +97,7 @@ def _about(component: Component | None, mark: str = "# ") -> list[str]:
     return [f"{mark}{first}"] if first else []
 
 
-def _wiring(part: Part) -> Iterator[str]:
+def _wiring(part: InstalledPart) -> Iterator[str]:
     if part.kind != part.section:
         yield f"component = {_text(part.kind)}"
     if part.controls:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from symheli.codegen.c_source import Layout, c_function
 from symheli.codegen.evaluate import as_casadi, evaluate
-from symheli.codegen.program import Operation, Program
+from symheli.codegen.program import Operation, ScalarProgram
 from symheli.codegen.translation import program
 
-__all__ = ["Layout", "Operation", "Program", "as_casadi", "c_function", "evaluate", "program"]
+__all__ = ["Layout", "Operation", "ScalarProgram", "as_casadi", "c_function", "evaluate", "program"]

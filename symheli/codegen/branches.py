@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 
-from symheli.codegen.program import Program
+from symheli.codegen.program import ScalarProgram
 
 Side = tuple[int, bool] | None
 """A side of a selection: its position, and whether it is the one taken where the condition holds.
@@ -19,7 +19,7 @@ mispredicted branch.
 """
 
 
-def branches(program: Program) -> list[Side]:
+def branches(program: ScalarProgram) -> list[Side]:
     """Return for each operation the innermost side of a selection that all its users are on; sides
     that are not worth a branch are left out.
     """
@@ -43,7 +43,7 @@ def branches(program: Program) -> list[Side]:
     return [kept(home) for home in homes]
 
 
-def _homes(program: Program) -> list[Side]:
+def _homes(program: ScalarProgram) -> list[Side]:
     """The innermost side that all users of each operation are on, from the last operation to the
     first.
     """

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from importlib import resources
 
 from symheli.codegen.branches import Side, branches
-from symheli.codegen.program import COMPARISONS, ELEMENTARY, Operation, Program
+from symheli.codegen.program import COMPARISONS, ELEMENTARY, Operation, ScalarProgram
 
 _INFIX = {
     "add": "+",
@@ -67,7 +67,7 @@ typedef double lane[LANES];
 """
 
 
-def c_function(program: Program, layout: Layout, name: str) -> str:
+def c_function(program: ScalarProgram, layout: Layout, name: str) -> str:
     """`static void name(const lane *in0, ..., lane *out0, ...)`: a plain loop over lanes that the
     compiler turns into vector code.
 
@@ -94,7 +94,7 @@ def c_function(program: Program, layout: Layout, name: str) -> str:
     return "\n".join([*lines, "  }", "}", ""])
 
 
-def _in_line(program: Program, layout: Layout) -> list[str]:
+def _in_line(program: ScalarProgram, layout: Layout) -> list[str]:
     """Every operation in order, both sides of every selection: what vector registers can do."""
     return [
         _definition(program, k, g, layout.width)
@@ -104,7 +104,7 @@ def _in_line(program: Program, layout: Layout) -> list[str]:
     ]
 
 
-def _in_branches(program: Program) -> list[str]:
+def _in_branches(program: ScalarProgram) -> list[str]:
     """Write code for one point only: operations that only one side of a selection needs are
     computed only where it is taken.
     """
@@ -134,7 +134,7 @@ def _in_branches(program: Program) -> list[str]:
     return written(None)
 
 
-def _definition(program: Program, position: int, group: int, width: int) -> str:
+def _definition(program: ScalarProgram, position: int, group: int, width: int) -> str:
     operation = program.operations[position]
     kind = "_Bool" if operation.name in COMPARISONS else "double"
     return (
@@ -147,12 +147,12 @@ def _name(position: int, group: int) -> str:
     return f"{'abcdefgh'[group]}{position}"
 
 
-def _operand(program: Program, position: int, group: int) -> str:
+def _operand(program: ScalarProgram, position: int, group: int) -> str:
     o = program.operations[position]
     return f"({o.value!r})" if o.name == "constant" else _name(position, group)
 
 
-def _expression(program: Program, o: Operation, group: int, width: int) -> str:
+def _expression(program: ScalarProgram, o: Operation, group: int, width: int) -> str:
     a = [_operand(program, k, group) for k in o.arguments]
     if o.name in _INFIX:
         return f"{a[0]} {_INFIX[o.name]} {a[1]}"

@@ -11,7 +11,7 @@ from typing import Any
 import casadi
 import numpy as np
 
-from symheli.codegen.program import Operation, Program
+from symheli.codegen.program import Operation, ScalarProgram
 from symheli.codegen.symbolic import (
     absolute,
     arcsin,
@@ -47,7 +47,7 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
 }
 
 
-def evaluate(program: Program, *inputs: Any) -> list[list[Any]]:
+def evaluate(program: ScalarProgram, *inputs: Any) -> list[list[Any]]:
     """The elements of each output; `inputs[i][j]` is entry j of input i: a float, an (N,) array or
     a CasADi symbol.
 
@@ -77,7 +77,7 @@ def _value(o: Operation, values: Sequence[Any], inputs: Sequence[Any]) -> Any:
     )
 
 
-def as_casadi(program: Program) -> casadi.Function:
+def as_casadi(program: ScalarProgram) -> casadi.Function:
     """The program as a CasADi function for its virtual machine: the same bits as `evaluate` on
     arrays, but for the sign of a zero, as long as it needs no sin, cos, ...
     """

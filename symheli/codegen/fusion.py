@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from symheli.codegen.program import Builder, Program, rewritten
+from symheli.codegen.program import Builder, ScalarProgram, rewritten
 
 LATENCY = {"add": 3, "sub": 3, "mul": 4, "fma": 4, "div": 13, "sqrt": 20}
 """Latency of an operation in cycles, on current processors; 1 for operations not listed."""
 
 
-def fused(given: Program, varying: Sequence[int]) -> Program:
+def fused(given: ScalarProgram, varying: Sequence[int]) -> ScalarProgram:
     """The program with a sum or difference of a product as a fused multiply-add, where all users
     of the product are sums: fewer operations, and a shorter way through them.
 
@@ -38,7 +38,7 @@ def fused(given: Program, varying: Sequence[int]) -> Program:
     return rewritten(given, rule)
 
 
-def _ready(given: Program) -> list[int]:
+def _ready(given: ScalarProgram) -> list[int]:
     """Return when each operation is done if only its arguments delay it, cycles."""
     out: list[int] = []
     for o in given.operations:
@@ -46,7 +46,7 @@ def _ready(given: Program) -> list[int]:
     return out
 
 
-def _used_in_sums_alone(given: Program) -> list[bool]:
+def _used_in_sums_alone(given: ScalarProgram) -> list[bool]:
     """Whether each operation is a product that only sums and differences use."""
     out = [o.name == "mul" for o in given.operations]
     for o in given.operations:

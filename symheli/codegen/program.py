@@ -45,7 +45,7 @@ class Operation:
 
 
 @dataclass(frozen=True)
-class Program:
+class ScalarProgram:
     """A function of vectors as a list of scalar operations, none repeated, none unused.
 
     `sizes`: length of each input. `outputs`: for each output the positions of its entries. Whoever
@@ -73,7 +73,7 @@ class Program:
             )
         return out
 
-    def hoist(self, varying: Sequence[int]) -> tuple[Program, Program]:
+    def hoist(self, varying: Sequence[int]) -> tuple[ScalarProgram, ScalarProgram]:
         """(held, rest): what does not depend on the `varying` inputs, and the rest given it, so
         that held work is done once.
 
@@ -161,8 +161,8 @@ class Builder:
 
 
 def rewritten(
-    given: Program, rule: Callable[[Builder, int, tuple[int, ...]], int | None]
-) -> Program:
+    given: ScalarProgram, rule: Callable[[Builder, int, tuple[int, ...]], int | None]
+) -> ScalarProgram:
     """The program with operations replaced: rule(builder, position in the given program, new
     positions of its arguments) -> new position, or None to keep it.
     """
@@ -175,7 +175,7 @@ def rewritten(
     return replace(given, operations=tuple(builder.operations), outputs=outputs)
 
 
-def without_unused(given: Program) -> Program:
+def without_unused(given: ScalarProgram) -> ScalarProgram:
     """The program without the operations that no output needs."""
     used = {a for output in given.outputs for a in output}
     for position in reversed(range(len(given.operations))):

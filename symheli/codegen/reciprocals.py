@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-from symheli.codegen.program import Builder, Program, rewritten
+from symheli.codegen.program import Builder, ScalarProgram, rewritten
 
 
-def reciprocals(given: Program, varying: Sequence[int]) -> Program:
+def reciprocals(given: ScalarProgram, varying: Sequence[int]) -> ScalarProgram:
     """Return the program with divisors that are constant, used more than once, or independent of
     the `varying` inputs inverted once.
     """

@@ -13,7 +13,7 @@ from symheli.codegen.program import (
     ELEMENTARY,
     Builder,
     Operation,
-    Program,
+    ScalarProgram,
     without_unused,
 )
 from symheli.codegen.reciprocals import reciprocals
@@ -26,7 +26,7 @@ _NAMES = {
 }
 
 
-def program(function: casadi.Function, varying: Sequence[int] | None = None) -> Program:
+def program(function: casadi.Function, varying: Sequence[int] | None = None) -> ScalarProgram:
     """The operations of an SX function of dense column vectors that needs no more than + - * / sqrt
     | |, fmin, fmax, sin, cos, tan, asin, atan2, exp, comparisons and branches.
 
@@ -39,7 +39,7 @@ def program(function: casadi.Function, varying: Sequence[int] | None = None) -> 
     return without_unused(fused(without_unused(reciprocals(operations(function), varies)), varies))
 
 
-def operations(function: casadi.Function) -> Program:
+def operations(function: casadi.Function) -> ScalarProgram:
     """The operations of such a function as they stand: nothing inverted, nothing fused."""
     builder = _Translator()
     registers: dict[int, int] = {}
@@ -64,7 +64,9 @@ def operations(function: casadi.Function) -> Program:
                 f" with + - * / sqrt fabs, comparisons, if_else, tan, {', '.join(ELEMENTARY)}"
             )
     sizes = tuple(function.size1_in(i) for i in range(function.n_in()))
-    read = Program(function.name(), sizes, tuple(builder.operations), tuple(map(tuple, outputs)))
+    read = ScalarProgram(
+        function.name(), sizes, tuple(builder.operations), tuple(map(tuple, outputs))
+    )
     return without_unused(read)
 
 

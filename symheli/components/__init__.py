@@ -13,11 +13,11 @@ import importlib.util
 import pkgutil
 from pathlib import Path
 
-from symheli.components.component import Component, Effect, Flow, Motion, unnamed
+from symheli.components.component import AirMotion, Component, Effect, Flow, unnamed
 from symheli.components.entry import Entry
 from symheli.errors import InputError, UnknownNameError
 
-__all__ = ["Component", "Effect", "Entry", "Flow", "Motion", "find", "packaged", "unnamed"]
+__all__ = ["AirMotion", "Component", "Effect", "Entry", "Flow", "find", "packaged", "unnamed"]
 
 
 def find(name: str, folder: Path | None = None) -> Component:

@@ -12,7 +12,7 @@ from symheli.errors import InputError
 from symheli.values.signal import Signal
 
 
-class Motion(NamedTuple):
+class AirMotion(NamedTuple):
     """Motion of the body through the air: velocity of the c.g. relative to the air u_a v_a w_a
     (m/s), body rates p q r (rad/s), rotor speed Om relative to the body (rad/s), air density rho
     (kg/m^3).
@@ -81,7 +81,7 @@ class Component:
     """
 
     evaluate: Callable[
-        [SimpleNamespace, Motion, Mapping[str, Any], Mapping[str, Any], Flow], Effect
+        [SimpleNamespace, AirMotion, Mapping[str, Any], Mapping[str, Any], Flow], Effect
     ]
     parameters: Mapping[str, Entry | str]
     states: tuple[Signal, ...] = ()

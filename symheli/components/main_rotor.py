@@ -7,7 +7,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from symheli.codegen.symbolic import absolute, sqrt
-from symheli.components.component import Component, Effect, Flow, Motion
+from symheli.components.component import AirMotion, Component, Effect, Flow
 from symheli.components.entry import Entry
 from symheli.components.rotor import disc, load
 from symheli.values.signal import Signal
@@ -39,7 +39,7 @@ def flapping_slopes(
 
 def evaluate(
     par: SimpleNamespace,
-    motion: Motion,
+    motion: AirMotion,
     controls: Mapping[str, Any],
     own: Mapping[str, Any],
     flow: Flow,

@@ -7,7 +7,7 @@ from math import pi
 from types import SimpleNamespace
 from typing import Any
 
-from symheli.components.component import Component, Effect, Flow, Motion
+from symheli.components.component import AirMotion, Component, Effect, Flow
 from symheli.components.entry import Entry
 from symheli.components.rotor import Load, disc, linear_load, load
 from symheli.errors import InputError
@@ -15,7 +15,7 @@ from symheli.errors import InputError
 
 def evaluate(
     par: SimpleNamespace,
-    motion: Motion,
+    motion: AirMotion,
     controls: Mapping[str, Any],
     own: Mapping[str, Any],
     flow: Flow,

@@ -7,13 +7,13 @@ from types import SimpleNamespace
 from typing import Any
 
 from symheli.codegen.symbolic import clip, maximum, where
-from symheli.components.component import Component, Effect, Flow, Motion
+from symheli.components.component import AirMotion, Component, Effect, Flow
 from symheli.components.entry import Entry
 
 
 def evaluate(
     par: SimpleNamespace,
-    motion: Motion,
+    motion: AirMotion,
     controls: Mapping[str, Any],
     own: Mapping[str, Any],
     flow: Flow,

@@ -9,7 +9,7 @@ from typing import Any
 import casadi
 import numpy as np
 
-from symheli.codegen.program import Operation, Program
+from symheli.codegen.program import Operation, ScalarProgram
 from symheli.codegen.translation import operations
 from symheli.enclosure.domain import Domain
 from symheli.enclosure.form import EPS, MARGIN, AffineForm, hull, pick
@@ -485,7 +485,7 @@ class _Over:
     each operation that may have a kink.
     """
 
-    program: Program
+    program: ScalarProgram
     kinks: Mapping[int, int]
     continuous: bool
     seeds: int
@@ -657,7 +657,7 @@ def _compared(name: str, a: AffineForm, b: AffineForm) -> Array:
     return np.where(yes, 1, np.where(no, 0, -1))
 
 
-def _extreme(program: Program, selection: Operation) -> str:
+def _extreme(program: ScalarProgram, selection: Operation) -> str:
     """ "min" or "max" where a selection takes the smaller or larger of the numbers compared."""
     condition, *sides = selection.arguments
     o = program.operations[condition]
@@ -668,7 +668,9 @@ def _extreme(program: Program, selection: Operation) -> str:
     return {o.arguments: "min", o.arguments[::-1]: "max"}.get(tuple(sides), "")
 
 
-def _square_root(program: Program, o: Operation, values: list[Value], argument: _Dual) -> _Dual:
+def _square_root(
+    program: ScalarProgram, o: Operation, values: list[Value], argument: _Dual
+) -> _Dual:
     """A square root. Of a sum of squares, sqrt(x^2 + y^2 + c), the derivatives x/sqrt and y/sqrt
     are at most 1 in size, also where the root passes 0.
     """
@@ -692,7 +694,7 @@ def _square_root(program: Program, o: Operation, values: list[Value], argument: 
     return _Dual(value, slope)
 
 
-def _squares(program: Program, position: int) -> list[int] | None:
+def _squares(program: ScalarProgram, position: int) -> list[int] | None:
     """Positions of the numbers whose squares are summed there, None where that is no such sum."""
     o = program.operations[position]
     if o.name == "constant" and o.value >= 0:

@@ -7,7 +7,7 @@ from typing import Any
 import casadi
 
 from symheli.codegen.evaluate import as_casadi
-from symheli.codegen.program import Operation, Program
+from symheli.codegen.program import Operation, ScalarProgram
 from symheli.codegen.translation import operations
 from symheli.errors import InputError
 
@@ -60,6 +60,6 @@ def read(content: dict[str, Any]) -> casadi.Function:
     if not all(0 <= k < len(rows) for output in outputs for k in output):
         raise InputError("an output that is no operation")
     try:
-        return as_casadi(Program(str(content["name"]), sizes, tuple(rows), outputs))
+        return as_casadi(ScalarProgram(str(content["name"]), sizes, tuple(rows), outputs))
     except (KeyError, TypeError, RuntimeError) as error:
         raise InputError(f"no function of these operations: {error!r:.60}") from None

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import sympy
 
 from symheli.airframe.sections import FIXED
-from symheli.components import Component, Effect, Flow, Motion
+from symheli.components import AirMotion, Component, Effect, Flow
 from symheli.equations.notation import dot, printed, real, symbol_of, upright
 from symheli.physics import inflow, rigid_body
 
@@ -79,7 +79,7 @@ def listing(heli: Helicopter) -> tuple[Section, ...]:
     drivetrain, attitude and position in flight.
     """
     s = _symbols(heli)
-    motion = Motion(*[vars(s)[name] for name in Motion._fields])
+    motion = AirMotion(*[vars(s)[name] for name in AirMotion._fields])
     controls, own = (
         {str(name): vars(s)[str(name)] for name in names} for names in (heli.inputs, heli.states)
     )
@@ -115,7 +115,7 @@ def _symbols(heli: Helicopter) -> SimpleNamespace:
         *heli.states,
         *heli.inputs,
         *heli.wind,
-        *Motion._fields,
+        *AirMotion._fields,
         "psi",
         "Om",
         "q0",

@@ -62,7 +62,7 @@ def deviations(given: object) -> LPVStateSpace:
     )
 
 
-class Pieces(NamedTuple):
+class PolynomialPieces(NamedTuple):
     """Matrices as polynomials of p - break: breaks (pieces + 1,), coefficients (pieces, degree + 1,
     rows, columns) from the highest power.
     """
@@ -170,7 +170,7 @@ class ScheduledController:
         return out
 
     @cached_property
-    def pieces(self) -> Pieces | None:
+    def pieces(self) -> PolynomialPieces | None:
         """The same as polynomials between breaks; None with several parameters or functions that
         are no polynomials there.
         """
@@ -181,7 +181,7 @@ class ScheduledController:
         except InputError:
             return None
         powers = np.stack([_powers(part.bernstein, part.high - part.low) for part in parts])
-        return Pieces(
+        return PolynomialPieces(
             np.array([parts[0].low, *(part.high for part in parts)]),
             np.einsum("kdj,jrc->kdrc", powers, self.coefficients),
         )

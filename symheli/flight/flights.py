@@ -16,7 +16,7 @@ from symheli.flight.course import Clock, Course
 from symheli.flight.disturbance import Disturbances
 from symheli.flight.equipment import Equipment
 from symheli.flight.flight_data import FlightData
-from symheli.flight.loops import Flown, Loops
+from symheli.flight.loops import LoopResults, Loops
 from symheli.flight.plan import READ, FlightPlan
 from symheli.helicopter import Helicopter
 from symheli.values.arrays import Array
@@ -113,7 +113,7 @@ class Flights:
         for loops in list(self._under_way):
             loops.stop()
 
-    def _run(self, loops: Loops, layout: Layout) -> Flown:
+    def _run(self, loops: Loops, layout: Layout) -> LoopResults:
         self._under_way.add(loops)
         try:
             if self._stopped:
@@ -138,7 +138,11 @@ class Flights:
         return found
 
     def _data(
-        self, plans: Sequence[FlightPlan], courses: Sequence[Course], clock: Clock, flown: Flown
+        self,
+        plans: Sequence[FlightPlan],
+        courses: Sequence[Course],
+        clock: Clock,
+        flown: LoopResults,
     ) -> list[FlightData]:
         return [
             FlightData(self.heli, plan, clock, course, out, int(lost))

@@ -16,7 +16,7 @@ from symheli.physics.rigid_body import body_to_earth
 from symheli.values.arrays import Array
 
 if TYPE_CHECKING:
-    from symheli.flight.loops import Flown, Loops
+    from symheli.flight.loops import LoopResults, Loops
 
 MAX_BANK = 1.4
 """Bank or pitch angle (rad) beyond which a flight is lost."""
@@ -25,7 +25,7 @@ MAX_BANK = 1.4
 class InNumpy:
     """A flight that waits for its command at every sample."""
 
-    def __init__(self, loops: Loops, i: int, found: Flown):
+    def __init__(self, loops: Loops, i: int, found: LoopResults):
         self._loops, self._i, self._found = loops, i, found
         self._made: Equations = equations(loops.heli)
         self._course, d = loops.courses[loops.chosen[i]], loops.disturbances

@@ -30,7 +30,7 @@ READINGS = (*signals(READ), *ROTOR)
 
 
 @dataclass(frozen=True, eq=False)
-class Flown:
+class LoopResults:
     """Results of N flights: `out` (N, kept, nx + 9) with the states as measured, inputs, commands
     and airspeed at the record's samples, undefined after the end of a flight; `lost` (N,) the
     control sample at which a flight was lost, or -1.
@@ -66,7 +66,7 @@ class Loops:
         """Stop every running flight at its next sample."""
         self._stop[0] = 1
 
-    def fly(self, layout: Layout) -> Flown:
+    def fly(self, layout: Layout) -> LoopResults:
         """Fly them all; the bits are the same in every layout. Raises `KeyboardInterrupt` where it
         was stopped.
         """
@@ -85,16 +85,16 @@ class Loops:
             raise KeyboardInterrupt
         return found
 
-    def _empty(self) -> Flown:
+    def _empty(self) -> LoopResults:
         kept = -(-int(self.samples.max()) // self.clock.every)
         count = len(self.chosen)
-        return Flown(
+        return LoopResults(
             np.empty((count, kept, len(self.heli.states) + 9)), np.full(count, -1, np.int_)
         )
 
     # --- machine code ----------------------------------------------------------------------------
 
-    def _arguments(self, found: Flown) -> ctypes.Structure:
+    def _arguments(self, found: LoopResults) -> ctypes.Structure:
         longest = int(self.samples.max())
         d, e, controller = self.disturbances, self.equipment, self.equipment.controller
         scheduled = controller if isinstance(controller, ScheduledController) else None
@@ -158,7 +158,7 @@ class Loops:
 
     # --- a controller in Python, or no machine code ----------------------------------------------
 
-    def _one_by_one(self, code: ctypes.CDLL | None) -> Flown:
+    def _one_by_one(self, code: ctypes.CDLL | None) -> LoopResults:
         found = self._empty()
         arguments = self._arguments(found) if code is not None else None
         for i in range(len(self.chosen)):

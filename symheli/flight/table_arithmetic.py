@@ -41,7 +41,7 @@ class Status(IntFlag):
     HELD = 8
 
 
-class Entry(IntEnum):
+class InitialCommand(IntEnum):
     """Initial value of a command: its trim, the command in force, or none as it is under way."""
 
     GROUND = 0
@@ -92,7 +92,7 @@ class TableState:
     command, offset : array (ny,)
         The commands in force, rad, and what is left of what they began with beside their own.
     entry : array (ny,)
-        Of `Entry`: how each command begins.
+        Of `InitialCommand`: how each command begins.
     started : bool
         Whether the parameter was followed before.
     reading, target, filtered, parameter_used : float32
@@ -142,7 +142,7 @@ class TableState:
 
     def entering(self, command: Array) -> TableState:
         """The same, to begin at the command in force (ny,)."""
-        return replace(self, command=command, entry=np.full(len(command), Entry.IN_FORCE))
+        return replace(self, command=command, entry=np.full(len(command), InitialCommand.IN_FORCE))
 
 
 def follow_parameter(n: Numbers, s: TableState, reading: np.float32, valid: bool) -> TableState:
@@ -208,11 +208,11 @@ def commands(n: Numbers, s: TableState, error: Array, trim: Array, others: Array
     flown = s.flown
     M, order, own = matrices_at(n, s.parameter_used), n.order, n.order + len(error)
     answer = _times(M[:, :own], np.concatenate([s.x, error]))
-    before = np.where((s.entry == Entry.GROUND) & np.isfinite(trim), trim, s.command)
+    before = np.where((s.entry == InitialCommand.GROUND) & np.isfinite(trim), trim, s.command)
     plain = np.where(n.integrates, before, trim) + answer[order:]
     wanted = plain + s.offset
     applied = _clip(wanted, n.low, n.high)
-    entering = flown & (s.entry == Entry.IN_FORCE)
+    entering = flown & (s.entry == InitialCommand.IN_FORCE)
     applied = np.where(entering, _clip(before, n.low, n.high), applied)
     applied = np.where(flown, applied, np.where(np.isfinite(others), others, before))
     wanted = np.where(entering, applied, wanted)
@@ -224,7 +224,7 @@ def commands(n: Numbers, s: TableState, error: Array, trim: Array, others: Array
         return replace(
             s,
             command=np.where(flown, before, applied),
-            entry=np.where(flown, s.entry, Entry.IN_FORCE),
+            entry=np.where(flown, s.entry, InitialCommand.IN_FORCE),
             status=s.status | Status.HELD,
         )
     kept = np.where(entering, applied - plain, s.offset)
@@ -233,7 +233,7 @@ def commands(n: Numbers, s: TableState, error: Array, trim: Array, others: Array
         x=x,
         command=applied,
         offset=n.fade * np.where(flown & ~n.integrates, kept, np.float32(0)),
-        entry=np.where(flown, Entry.UNDER_WAY, Entry.IN_FORCE),
+        entry=np.where(flown, InitialCommand.UNDER_WAY, InitialCommand.IN_FORCE),
         status=s.status | (Status.SATURATED if (flown & (excess != 0)).any() else Status.FINE),
     )
 

@@ -34,7 +34,7 @@ from symheli.flight.single_precision import (
 )
 from symheli.flight.table_arithmetic import (
     MAX_COUNT,
-    Entry,
+    InitialCommand,
     Numbers,
     TableState,
     commands,
@@ -403,7 +403,7 @@ class TableController:
         parameter = self._provided(measured if self.follow == "reading" else p)
         u = np.array([reference[s] for s in INPUTS])
         trim, state, read = u[self._rows], self._own(state), self.own_commands
-        before = np.where(state.entry == Entry.GROUND, trim, state.command)
+        before = np.where(state.entry == InitialCommand.GROUND, trim, state.command)
         in_force = dict(zip(map(str, self.outputs), before, strict=True))
         u[self._rows], state = self.update(
             state,

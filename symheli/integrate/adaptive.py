@@ -16,7 +16,7 @@ from symheli.errors import InputError, SymheliError
 from symheli.integrate.equations import Equations
 from symheli.integrate.kernel import structure
 from symheli.integrate.problem import Problem
-from symheli.integrate.tableau import CASH_KARP, DORMAND_PRINCE, Pair
+from symheli.integrate.tableau import CASH_KARP, DORMAND_PRINCE, EmbeddedTableau
 from symheli.values.arrays import Array
 
 SCALE = {"m/s": 1.0, "rad/s": 1.0, "1": 0.1, "m": 1.0, "rad": 0.1}
@@ -38,7 +38,7 @@ class Adaptive:
     largest: float = math.inf
     most: int = 1_000_000
 
-    tableau: ClassVar[Pair]
+    tableau: ClassVar[EmbeddedTableau]
 
     def __post_init__(self) -> None:
         for name in ("relative", "absolute", "largest", "most"):
@@ -181,7 +181,7 @@ def _gave_up(sample: int, dt: float, method: Adaptive) -> SymheliError:
 
 
 @functools.cache
-def _head(pair: Pair, switches: int) -> str:
+def _head(pair: EmbeddedTableau, switches: int) -> str:
     """The tableau as C, and the number of switching functions."""
 
     def values(row: Array) -> str:

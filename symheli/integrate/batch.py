@@ -14,7 +14,7 @@ from symheli.helicopter import Helicopter
 from symheli.integrate.equations import equations
 from symheli.integrate.feedback import Feedback
 from symheli.integrate.problem import many_flights
-from symheli.integrate.rk4 import Flights, RungeKutta4
+from symheli.integrate.rk4 import IntegratedFlights, RungeKutta4
 from symheli.integrate.side_by_side import SIDE_BY_SIDE, over_the_cores, workers_of
 from symheli.integrate.validity import warn_of_flights
 from symheli.values.arrays import Array
@@ -157,7 +157,7 @@ def simulate_batch(
     if feedback is not None:
         feedback.check(heli, problem.samples)
     every = problem.samples if keep == "final" else keep
-    flights = Flights(
+    flights = IntegratedFlights(
         equations(heli),
         problem,
         method or RungeKutta4(),

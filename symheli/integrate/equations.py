@@ -10,7 +10,7 @@ from functools import cached_property
 from importlib import resources
 from typing import Any, Literal
 
-from symheli.codegen import Layout, Program, as_casadi, c_function, program
+from symheli.codegen import Layout, ScalarProgram, as_casadi, c_function, program
 from symheli.codegen.compile import library, loaded
 from symheli.codegen.numeric import Numeric
 from symheli.codegen.symbolic import SX, Function, adjoint_product, column, tangent_product
@@ -39,17 +39,17 @@ class Equations:
         self.states = dynamics.flight_states
         self.parameters = dynamics.parameters
         self._functions = _functions(dynamics)
-        self._programs: dict[str, Program] = {}
-        self._hoisted: dict[str, tuple[Program, Program]] = {}
+        self._programs: dict[str, ScalarProgram] = {}
+        self._hoisted: dict[str, tuple[ScalarProgram, ScalarProgram]] = {}
         self._libraries: dict[tuple[str | tuple[str, ...] | Layout, ...], ctypes.CDLL | None] = {}
 
-    def hoisted(self, which: Which) -> tuple[Program, Program]:
+    def hoisted(self, which: Which) -> tuple[ScalarProgram, ScalarProgram]:
         """(held, rest) of one of the functions; see `Program.hoist`."""
         if which not in self._hoisted:
             self._hoisted[which] = self._program(which).hoist(VARYING[which])
         return self._hoisted[which]
 
-    def _program(self, which: Which) -> Program:
+    def _program(self, which: Which) -> ScalarProgram:
         if which not in self._programs:
             self._programs[which] = program(self._functions[which], VARYING[which])
         return self._programs[which]

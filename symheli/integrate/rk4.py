@@ -59,7 +59,7 @@ class RungeKutta4:
         return CLASSICAL
 
 
-class Flights:
+class IntegratedFlights:
     """Flights of a problem, run in any order: states (N, kept, nx) and, under feedback, the inputs
     used (N, kept, 4).
 

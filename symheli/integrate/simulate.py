@@ -13,7 +13,7 @@ from symheli.integrate.equations import Equations, equations
 from symheli.integrate.feedback import Feedback
 from symheli.integrate.problem import Problem, one_flight
 from symheli.integrate.radau import Radau
-from symheli.integrate.rk4 import Flights, RungeKutta4
+from symheli.integrate.rk4 import IntegratedFlights, RungeKutta4
 from symheli.integrate.trajectory import Trajectory
 from symheli.integrate.validity import warn_of_flights
 from symheli.values.arrays import Array
@@ -139,7 +139,7 @@ def _flown(
     steps, per_sample = np.full(n * substeps, step), np.full(n, substeps)
     if isinstance(method, Radau):
         return radau.fly(made, problem, method), u, steps, per_sample, None
-    flights = Flights(made, problem, method, feedback, 1, False, Layout())
+    flights = IntegratedFlights(made, problem, method, feedback, 1, False, Layout())
     flights.run(0, 1)
     return (
         flights.states[0],

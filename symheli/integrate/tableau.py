@@ -32,7 +32,7 @@ def _tableau(rows: list[list[float]], b: list[float]) -> Tableau:
 
 
 @dataclass(frozen=True, eq=False)
-class Pair(Tableau):
+class EmbeddedTableau(Tableau):
     """A method of order 5 that is followed, and weights `lower` (stages,) of one of order 4 with
     the same stages; stage `at_end` lies at the end of the step.
     """
@@ -46,9 +46,11 @@ class Pair(Tableau):
         return self.b - self.lower
 
 
-def _pair(rows: list[list[float]], b: list[float], lower: list[float], at_end: int) -> Pair:
+def _pair(
+    rows: list[list[float]], b: list[float], lower: list[float], at_end: int
+) -> EmbeddedTableau:
     plain = _tableau(rows, b)
-    return Pair(plain.a, plain.b, np.array(lower), at_end)
+    return EmbeddedTableau(plain.a, plain.b, np.array(lower), at_end)
 
 
 CLASSICAL = _tableau([[1 / 2], [0, 1 / 2], [0, 0, 1]], [1 / 6, 1 / 3, 1 / 3, 1 / 6])

@@ -63,10 +63,10 @@ def check_mat5(file: Path) -> None:
     mark = bytes(data[126:HEADER])
     if mark not in (b"IM", b"MI"):
         raise ValueError("the header does not say the order of bytes")
-    _Reader("little" if mark == b"IM" else "big").whole(data[HEADER:])
+    _MatReader("little" if mark == b"IM" else "big").whole(data[HEADER:])
 
 
-class _Reader:
+class _MatReader:
     def __init__(self, order: Literal["little", "big"]):
         self.order: Literal["little", "big"] = order
 

@@ -27,7 +27,7 @@ WINDOW = 25
 
 
 @dataclass(frozen=True)
-class Clock:
+class LogClock:
     """The time of a log: the column that counts it ("" where the columns have clocks of their own)
     in `unit`; median step, gaps, the longest step and the duration, all in s.
     """
@@ -42,7 +42,7 @@ class Clock:
 
 
 @dataclass(frozen=True)
-class Motion:
+class ColumnSummary:
     """Motion of a column: samples and those missing, range, mean and standard deviation in its
     guessed or declared unit, its own median step (s).
     """
@@ -66,9 +66,9 @@ class Survey:
 
     log: Path
     format: str
-    clock: Clock | None
+    clock: LogClock | None
     step: float | None
-    motions: Mapping[str, Motion]
+    motions: Mapping[str, ColumnSummary]
     units: Mapping[str, str | None]
     guesses: Mapping[str, Guess]
     segments: tuple[Segment, ...] = ()
@@ -145,12 +145,12 @@ def _time_of(held: Mapping[str, Column]) -> tuple[str | None, str]:
     return None, "s"
 
 
-def _clock(name: str, unit: str, stamps: np.ndarray) -> Clock:
+def _clock(name: str, unit: str, stamps: np.ndarray) -> LogClock:
     stamps = stamps[forward(stamps)]
     steps = np.diff(stamps)
     step = float(np.median(steps))
     inside = steps[steps <= GAP * step]
-    return Clock(
+    return LogClock(
         name,
         unit,
         step,
@@ -161,14 +161,14 @@ def _clock(name: str, unit: str, stamps: np.ndarray) -> Clock:
     )
 
 
-def _motion(column: Column) -> Motion:
+def _motion(column: Column) -> ColumnSummary:
     known = column.values[np.isfinite(column.values)]
     step = None
     if column.time is not None and np.sum(forward(column.time)) > 1:
         time = column.time[forward(column.time)]
         step = float(np.median(np.diff(time)))
     shown = known if len(known) else np.array([np.nan])
-    return Motion(
+    return ColumnSummary(
         samples=len(column.values),
         missing=len(column.values) - len(known),
         low=float(shown.min()),

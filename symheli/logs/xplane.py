@@ -56,7 +56,7 @@ SOURCES = {
 
 
 @dataclass(frozen=True, eq=False)
-class Segment:
+class RawTable:
     """Rows under one header: raw columns by "name,unit" without padding, a repeated name with #2,
     #3 ...
     """
@@ -118,7 +118,7 @@ def xplane_columns(path: str | os.PathLike[str]) -> tuple[dict[str, Column], flo
     return {n: Column(time if clock else None, v, units[n]) for n, v in values.items()}, step
 
 
-def _segments(path: str | os.PathLike[str]) -> list[Segment]:
+def _segments(path: str | os.PathLike[str]) -> list[RawTable]:
     """Header by header; raises `InputError` with the line where a row does not fit its header."""
     numbered = enumerate(text(path).splitlines(), start=1)
     lines = [(i, line) for i, line in numbered if line.strip(" \t,|")]  # spreadsheets leave commas
@@ -137,7 +137,7 @@ def _segments(path: str | os.PathLike[str]) -> list[Segment]:
         table = np.array([_row(fields, len(names), i, path) for i, fields in rows]).reshape(
             len(rows), len(names)
         )
-        out.append(Segment(dict(zip(names, table.T, strict=True))))
+        out.append(RawTable(dict(zip(names, table.T, strict=True))))
     return out
 
 
@@ -213,7 +213,9 @@ def body_velocity(
     return u, np.cos(phi) * right + np.sin(phi) * below, -np.sin(phi) * right + np.cos(phi) * below
 
 
-def _clock(segment: Segment, dt: float | None, path: object, segments: list[Segment]) -> np.ndarray:
+def _clock(
+    segment: RawTable, dt: float | None, path: object, segments: list[RawTable]
+) -> np.ndarray:
     if dt is not None:
         return positive(dt) * np.arange(len(segment))
     for name in CLOCKS:
@@ -228,7 +230,7 @@ def _clock(segment: Segment, dt: float | None, path: object, segments: list[Segm
     raise InputError(f"{path}: the log has no time column; give the sample period dt in s{hint}")
 
 
-def estimated_period(segments: list[Segment]) -> float | None:
+def estimated_period(segments: list[RawTable]) -> float | None:
     """The step (s) that best explains the changes of X, Y, Z by vX, vY, vZ; None where the log
     lacks them or nothing moved.
     """

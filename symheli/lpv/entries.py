@@ -59,14 +59,14 @@ class Names(Protocol):
         ...
 
 
-class Entry(NamedTuple):
+class MatrixEntry(NamedTuple):
     """One entry of A, B, C or D along the scheduling: its name, A[q, u], with unit, and values."""
 
     name: Signal
     values: Array
 
 
-def entries(names: Names, matrices: Stacked) -> Iterator[Entry]:
+def entries(names: Names, matrices: Stacked) -> Iterator[MatrixEntry]:
     """Every entry, matrix by matrix and row by row."""
     outputs = [y.unit for y in names.outputs]
     for matrix, rows, units, columns in (
@@ -79,7 +79,7 @@ def entries(names: Names, matrices: Stacked) -> Iterator[Entry]:
         for i, (row, unit) in enumerate(zip(rows, units, strict=True)):
             for j, column in enumerate(columns):
                 name = Signal(f"{matrix}[{row}, {column}]", per(unit, column.unit))
-                yield Entry(name, values[..., i, j])
+                yield MatrixEntry(name, values[..., i, j])
 
 
 def rates(names: Names) -> list[str]:
@@ -101,7 +101,7 @@ def entry_called(models: Any, name: str) -> Array:
     return chosen(list(entries(models, models)), [name])[0].values
 
 
-def chosen(every: Sequence[Entry], wanted: Sequence[str]) -> list[Entry]:
+def chosen(every: Sequence[MatrixEntry], wanted: Sequence[str]) -> list[MatrixEntry]:
     """Those of these names; raises `UnknownNameError`."""
     by_name = {str(e.name): e for e in every}
     for name in wanted:

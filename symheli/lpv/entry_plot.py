@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from symheli.lpv.entries import Entry, Names, Stacked, chosen, entries
+from symheli.lpv.entries import MatrixEntry, Names, Stacked, chosen, entries
 from symheli.lpv.linear_family import AIRSPEED
 from symheli.values.arrays import Array
 from symheli.values.drawing import GREY, axes_of, label, legend_beside, plain
@@ -45,7 +45,7 @@ def plot_family(ax: Axes | None, family: LinearFamily, wanted: Sequence[str] | N
     along = family.axes.index(AIRSPEED) if AIRSPEED in family.axes else 0
     values = family.values[along]
     drawn = [
-        Entry(e.name, np.moveaxis(e.values, along, 0).reshape(len(values), -1))
+        MatrixEntry(e.name, np.moveaxis(e.values, along, 0).reshape(len(values), -1))
         for e in _selected(family, family, wanted)
     ]
     ax = draw_scaled(axes_of(ax), family.axes[along], values, drawn)
@@ -59,13 +59,13 @@ def plot_family(ax: Axes | None, family: LinearFamily, wanted: Sequence[str] | N
     return ax
 
 
-def _selected(names: Names, matrices: Stacked, wanted: Sequence[str] | None) -> list[Entry]:
+def _selected(names: Names, matrices: Stacked, wanted: Sequence[str] | None) -> list[MatrixEntry]:
     every = list(entries(names, matrices))
     return chosen(every, [f"A[{s}, {s}]" for s in names.states] if wanted is None else wanted)
 
 
 def draw_scaled(
-    ax: Axes, over: Signal, values: Array, drawn: Sequence[Entry], marker: str = "."
+    ax: Axes, over: Signal, values: Array, drawn: Sequence[MatrixEntry], marker: str = "."
 ) -> Axes:
     """Quantities of different units on one axis: each divided by its largest magnitude, which the
     legend gives with its unit. Of several curves (K, m) of one quantity the last has the label, the

@@ -44,7 +44,7 @@ MIN_ALPHA = 0.25
 
 
 @dataclass(frozen=True)
-class FrozenModel:
+class NamedModel:
     """A model at one value of its parameters, and how a legend writes that."""
 
     p: tuple[float, ...]
@@ -52,7 +52,7 @@ class FrozenModel:
     model: LinearModel
 
 
-def frozen_at(model: Model, p: object = None) -> list[FrozenModel]:
+def frozen_at(model: Model, p: object = None) -> list[NamedModel]:
     """The model frozen at each of the values; raises `InputError` for another type and for a linear
     model with values.
     """
@@ -60,7 +60,7 @@ def frozen_at(model: Model, p: object = None) -> list[FrozenModel]:
         case LinearModel():
             if p is not None:
                 raise InputError("a LinearModel has no scheduling parameter: leave p out")
-            return [FrozenModel((), "", model)]
+            return [NamedModel((), "", model)]
         case LinearFamily():
             grid = np.stack([m.ravel() for m in np.meshgrid(*model.values, indexing="ij")], -1)
             names = model.axes
@@ -69,7 +69,7 @@ def frozen_at(model: Model, p: object = None) -> list[FrozenModel]:
             grid = np.tile([s.middle for s in model.parameters], (VALUES, 1))
             first = model.parameters[0] if model.parameters else None
             if first is None:
-                return [FrozenModel((), "", model.at())]
+                return [NamedModel((), "", model.at())]
             grid[:, 0] = np.linspace(first.low, first.high, VALUES)
         case _:
             raise InputError(
@@ -80,7 +80,7 @@ def frozen_at(model: Model, p: object = None) -> list[FrozenModel]:
         grid = frozen(np.atleast_1d(np.asarray(p, float)), "p")
         grid = grid[:, None] if grid.ndim == 1 and len(names) == 1 else np.atleast_2d(grid)
         grid = frozen(grid, "p", (None, len(names)))
-    return [FrozenModel(tuple(row), _words(names, row), model.at(*row)) for row in grid.tolist()]
+    return [NamedModel(tuple(row), _words(names, row), model.at(*row)) for row in grid.tolist()]
 
 
 def _words(names: Sequence[Signal], values: Sequence[float]) -> str:
@@ -434,7 +434,7 @@ def step(
     return plain(ax)
 
 
-def _settled(models: Sequence[FrozenModel]) -> float:
+def _settled(models: Sequence[NamedModel]) -> float:
     """Five time constants of the slowest decaying pole, s; 10 where none decays."""
     poles, dt = np.concatenate([one.model.poles() for one in models]), models[0].model.dt
     decay = -(np.real(poles) if dt is None else np.log(np.abs(poles[poles != 0])) / dt)
@@ -442,12 +442,12 @@ def _settled(models: Sequence[FrozenModel]) -> float:
     return 5.0 / slowest if np.isfinite(slowest) else 10.0
 
 
-def _paler(models: Sequence[FrozenModel]) -> list[tuple[FrozenModel, float]]:
+def _paler(models: Sequence[NamedModel]) -> list[tuple[NamedModel, float]]:
     strengths = np.linspace(MIN_ALPHA, 1.0, len(models)) if len(models) > 1 else [1.0]
     return [(one, float(s)) for one, s in zip(models, strengths, strict=True)]
 
 
-def _frequencies(models: Sequence[FrozenModel], omega: object) -> Array:
+def _frequencies(models: Sequence[NamedModel], omega: object) -> Array:
     if omega is not None:
         return frozen(omega, "omega", (None,))
     dt = models[0].model.dt
@@ -469,7 +469,7 @@ def _channel(model: LinearModel, input: str, output: str, w: Array) -> Array:
     return model.frequency_response(w)[:, i, j]
 
 
-def _signals(models: Sequence[FrozenModel], input: str, output: str) -> tuple[Signal, Signal]:
+def _signals(models: Sequence[NamedModel], input: str, output: str) -> tuple[Signal, Signal]:
     i, j = _places(models[0].model, input, output)
     return models[0].model.outputs[i], models[0].model.inputs[j]
 

@@ -11,7 +11,7 @@ from symheli.lpv.bases.function_space import FunctionSpace, tensor_grid
 from symheli.lpv.bases.polynomial import Polynomial
 from symheli.lpv.bases.polynomials import factors_of
 from symheli.lpv.bases.product import Product
-from symheli.lpv.lpv_state_space import LPVStateSpace, Residuals
+from symheli.lpv.lpv_state_space import FitResiduals, LPVStateSpace
 from symheli.lpv.scheduling import Scheduling, parameters
 
 
@@ -65,8 +65,8 @@ def _over(
 
 
 def _everywhere(
-    residuals: Residuals, own: Sequence[Scheduling], given: Sequence[Scheduling]
-) -> Residuals:
+    residuals: FitResiduals, own: Sequence[Scheduling], given: Sequence[Scheduling]
+) -> FitResiduals:
     """Return the same misfit at both ends of every new range."""
     nodes = residuals.nodes.reshape(len(residuals.nodes), -1)
     known = {s.name: column for s, column in zip(own, nodes.T, strict=True)}
@@ -76,4 +76,4 @@ def _everywhere(
     columns = {name: np.repeat(column, count) for name, column in known.items()}
     columns |= {s.name: np.tile(end, len(nodes)) for s, end in zip(new, ends.T, strict=True)}
     repeated = (np.repeat(M, count, axis=0) for M in residuals.matrices)
-    return Residuals(np.column_stack([columns[s.name] for s in given]), *repeated)
+    return FitResiduals(np.column_stack([columns[s.name] for s in given]), *repeated)

@@ -12,7 +12,7 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.lpv.bases.described import basis_of, described_basis
 from symheli.lpv.bases.function_space import FunctionSpace
-from symheli.lpv.lpv_state_space import LPVStateSpace, Residuals
+from symheli.lpv.lpv_state_space import FitResiduals, LPVStateSpace
 from symheli.lpv.scheduling import Scheduling
 from symheli.lpv.trim_schedule import TrimSchedule
 from symheli.values import Signal, plain_file
@@ -72,7 +72,7 @@ def load(path: str | os.PathLike[str], basis: FunctionSpace | None) -> LPVStateS
                 _read(trim["u"]),
                 *(None if (M := trim.get(name)) is None else _read(M) for name in ("xdot", "y")),
             ),
-            residuals=None if residuals is None else Residuals(*map(_read, residuals)),
+            residuals=None if residuals is None else FitResiduals(*map(_read, residuals)),
         )
     except InputError:
         raise

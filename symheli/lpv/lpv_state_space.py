@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
     from symheli.lpv.balanced_truncation import Balance, BalancedTruncation
     from symheli.lpv.lft import LFT
-    from symheli.lpv.prediction import Prediction
+    from symheli.lpv.prediction import SteppedFlight
 
 
 class Matrices(NamedTuple):
@@ -55,7 +55,7 @@ class Matrices(NamedTuple):
     __repr__ = summarized
 
 
-class Residuals(NamedTuple):
+class FitResiduals(NamedTuple):
     """Fit minus exact data at `nodes` (K,), (K, d) with d parameters: A (K, nx, nx), B (K, nx, nu),
     C (K, ny, nx), D (K, ny, nu).
     """
@@ -71,13 +71,13 @@ class Residuals(NamedTuple):
         """The four arrays without the nodes."""
         return Matrices(*self[1:])
 
-    def within(self, box: Sequence[Scheduling]) -> Residuals | None:
+    def within(self, box: Sequence[Scheduling]) -> FitResiduals | None:
         """Return the residuals at the nodes in these ranges; None where there are none."""
         columns = self.nodes.reshape(len(self.nodes), -1).T
         inside = np.all(
             [(s.low <= at) & (at <= s.high) for s, at in zip(box, columns, strict=False)], axis=0
         )
-        return Residuals(*(each[inside] for each in self)) if np.any(inside) else None
+        return FitResiduals(*(each[inside] for each in self)) if np.any(inside) else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +133,7 @@ class LPVStateSpace:
     outputs: tuple[Signal, ...]
     dt: float | None = None
     trim: TrimSchedule | None = None
-    residuals: Residuals | None = None
+    residuals: FitResiduals | None = None
 
     __repr__ = summarized
     _repr_html_ = as_table
@@ -397,7 +397,7 @@ class LPVStateSpace:
             outputs=tuple(self.outputs[i] for i in iy),
             trim=self.trim and self.trim.select(ix, iu, iy),
             residuals=self.residuals
-            and Residuals(self.residuals.nodes, *keep(*self.residuals.matrices)),
+            and FitResiduals(self.residuals.nodes, *keep(*self.residuals.matrices)),
         )
 
     def feedback(self, gains: Mapping[tuple[str, str], float]) -> LPVStateSpace:
@@ -538,7 +538,7 @@ class LPVStateSpace:
         return model.with_residuals(p, exact)
 
     @property
-    def fitted_to(self) -> Residuals | None:
+    def fitted_to(self) -> FitResiduals | None:
         """Data of the fit at its nodes: fit minus residuals; None for a model that is not a fit."""
         if self.residuals is None:
             return None
@@ -548,12 +548,12 @@ class LPVStateSpace:
                 self.matrices(self.residuals.nodes), self.residuals.matrices, strict=True
             )
         )
-        return Residuals(self.residuals.nodes, *exact)
+        return FitResiduals(self.residuals.nodes, *exact)
 
     def with_residuals(self, nodes: Array, exact: Matrices) -> LPVStateSpace:
         """Return the same model as a fit of `exact` (K, ...) at `nodes` (K,), or (K, d)."""
         off = (M - E for M, E in zip(self.matrices(nodes), exact, strict=True))
-        return replace(self, residuals=Residuals(nodes, *off))
+        return replace(self, residuals=FitResiduals(nodes, *off))
 
     def _sampled(self, matrices: Matrices, dt: float) -> Matrices:
         frozen = [
@@ -630,7 +630,7 @@ class LPVStateSpace:
         *,
         dt: float | None = None,
         rate: object | None = None,
-    ) -> Prediction:
+    ) -> SteppedFlight:
         """Predict a flight: any number of samples ahead, or in free run; see
         `symheli.lpv.predict`.
         """

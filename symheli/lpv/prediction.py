@@ -17,7 +17,7 @@ from symheli.values.numbers import whole
 from symheli.values.sample_period import same_period
 
 
-class Prediction(NamedTuple):
+class SteppedFlight(NamedTuple):
     """A flight as an LPV model steps through it: x(k+1) - x0(k+1) = A(k) (x(k) - x0(k)) + push(k).
 
     A (n, nx, nx), push (n, nx), and the measured states x and the trim x0, (n, nx).
@@ -63,7 +63,7 @@ def predict(
     *,
     dt: float | None = None,
     rate: object | None = None,
-) -> Prediction:
+) -> SteppedFlight:
     """The flight with scheduling p (n,) or (n, d), inputs u (n, nu) and measured states x (n, nx).
 
     All are total values, about the trim of the model where it has one. What its motion adds,
@@ -79,15 +79,15 @@ def predict(
         raise InputError(f"the model is sampled every {lpv.dt} s, the flight every {dt} s")
     A, B, E = steps(lpv, p, dt)
     if lpv.trim is None:
-        return Prediction(A, np.einsum("kij,kj->ki", B, u), x, np.zeros((n, nx)))
+        return SteppedFlight(A, np.einsum("kij,kj->ki", B, u), x, np.zeros((n, nx)))
     period = lpv.dt if dt is None else dt
     x0, u0 = lpv.trim.state(p), lpv.trim.input(p)
     speed = np.gradient(p, period, axis=0) if rate is None else np.broadcast_to(rate, p.shape)  # type: ignore[arg-type]
     push = np.einsum("kij,kj->ki", B, u - u0)
     if lpv.dt is None:
-        return Prediction(A, push + np.einsum("kij,kj->ki", E, lpv.trim.drift(p, speed)), x, x0)
+        return SteppedFlight(A, push + np.einsum("kij,kj->ki", E, lpv.trim.drift(p, speed)), x, x0)
     # the trim of a sampled model moves by what it is at the next sample
     moved = lpv.dt * lpv.trim.drift(p, speed if rate is not None else np.zeros(p.shape))
     if rate is None:
         moved -= np.diff(x0, axis=0, append=x0[-1:])
-    return Prediction(A, push + moved, x, x0)
+    return SteppedFlight(A, push + moved, x, x0)

@@ -23,8 +23,8 @@ from symheli.records.sensor_faults import (
     RATE_BIAS,
     SCALE,
     TILT,
-    Estimate,
     Faults,
+    ScalarEstimate,
     sensor_faults,
 )
 from symheli.records.shifted import shifted
@@ -62,9 +62,9 @@ class SensorCheck:
     """
 
     signal: Signal
-    bias: Estimate | None
-    scale: Estimate | None
-    delay: Estimate | None
+    bias: ScalarEstimate | None
+    scale: ScalarEstimate | None
+    delay: ScalarEstimate | None
     verdict: str
 
 
@@ -278,7 +278,7 @@ def _bias(signal: Signal, found: Faults, limit: float) -> list[str]:
     return [f"it reads {bias.value:.3g} {signal.unit} too much: subtract it"]
 
 
-def _delay(signal: Signal, delay: Estimate | None, limit: float, step: float) -> list[str]:
+def _delay(signal: Signal, delay: ScalarEstimate | None, limit: float, step: float) -> list[str]:
     if delay is None or abs(delay.value) <= max(step, limit * delay.standard_error):
         return []
     drivers = "the rates" if signal in ANGLES else "the specific forces"
@@ -298,7 +298,7 @@ def _reason(signal: Signal, found: Faults, names: Sequence[str]) -> str:
     return "the flight does not show it"
 
 
-def _cell(estimate: Estimate | None) -> str:
+def _cell(estimate: ScalarEstimate | None) -> str:
     if estimate is None:
         return "-"
     if estimate.standard_error == inf:

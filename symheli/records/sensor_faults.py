@@ -67,7 +67,7 @@ SURELY = 4.0
 """Standard errors by which a misfit is larger, or a scale negative, for good."""
 
 
-class Estimate(NamedTuple):
+class ScalarEstimate(NamedTuple):
     """A number and its standard error (infinite: not known)."""
 
     value: float
@@ -90,9 +90,9 @@ class Faults:
     """
 
     windows: int
-    bias: dict[str, Estimate] = field(default_factory=dict)
-    scale: dict[str, Estimate] = field(default_factory=dict)
-    delay: dict[str, Estimate] = field(default_factory=dict)
+    bias: dict[str, ScalarEstimate] = field(default_factory=dict)
+    scale: dict[str, ScalarEstimate] = field(default_factory=dict)
+    delay: dict[str, ScalarEstimate] = field(default_factory=dict)
     explained: dict[str, float] = field(default_factory=dict)
     moves: dict[str, float] = field(default_factory=dict)
 
@@ -129,10 +129,10 @@ def sensor_faults(record: FlightRecord) -> Faults:
     faults = Faults(len(windows))
     fit.report(faults)
     for i, angle in enumerate(angles):
-        faults.scale[angle] = Estimate(reads[angle], 0.0)
+        faults.scale[angle] = ScalarEstimate(reads[angle], 0.0)
         if i < 2:
             tilt = fit.estimate(6 + i)
-            faults.bias[angle] = Estimate(
+            faults.bias[angle] = ScalarEstimate(
                 reads[angle] * tilt.value, abs(reads[angle]) * tilt.standard_error
             )
     if all(name in signals for name in (*VELOCITIES, *FORCES)):
@@ -183,31 +183,31 @@ class _Fit:
     factors: Array
     free: Array
 
-    def estimate(self, i: int) -> Estimate:
+    def estimate(self, i: int) -> ScalarEstimate:
         """Parameter `i` as it is."""
         error = self.found.errors[i] if self.free[i] else inf
-        return Estimate(float(self.found.theta[i]), float(error))
+        return ScalarEstimate(float(self.found.theta[i]), float(error))
 
     def report(self, faults: Faults) -> None:
         """Enter drivers and channels."""
         theta, errors = self.found.theta, self.found.errors
         for i, (name, f) in enumerate(zip(self.drivers, self.factors, strict=True)):
             inverse, offset = theta[i], theta[3 + i]
-            faults.scale[name] = Estimate(
+            faults.scale[name] = ScalarEstimate(
                 float(1 / (f * inverse)),
                 float(errors[i] / abs(f * inverse**2)) if self.free[i] else inf,
             )
             both = np.flatnonzero(self.free[[i, 3 + i]]) * 3 + i
             slopes = np.array([-offset / inverse**2, 1 / inverse])[(both - i) // 3] / f
             variance = slopes @ self.found.covariance[both][:, both] @ slopes
-            faults.bias[name] = Estimate(
+            faults.bias[name] = ScalarEstimate(
                 float(offset / (f * inverse)), float(np.sqrt(variance)) if self.free[3 + i] else inf
             )
         for i, name in enumerate(self.found.names):
             faults.explained[name] = float(self.found.explained[i])
             faults.moves[name] = float(np.sqrt(self.found.moves[i]))
             error = errors[len(theta) + i] if faults.explained[name] >= MIN_EXPLAINED else inf
-            faults.delay[name] = Estimate(float(self.found.delays[i]), float(error))
+            faults.delay[name] = ScalarEstimate(float(self.found.delays[i]), float(error))
 
 
 def _fit(

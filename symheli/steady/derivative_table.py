@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv.entries import Entry
+from symheli.lpv.entries import MatrixEntry
 from symheli.lpv.linear_family import AIRSPEED, LinearFamily
 from symheli.values.arrays import Array, frozen
 from symheli.values.comma_separated import comma_separated
@@ -106,7 +106,7 @@ class DerivativeTable:
         """
         from symheli.lpv.entry_plot import draw_scaled
 
-        drawn = [Entry(next(s for s in self.names if s == n), self[n]) for n in names]
+        drawn = [MatrixEntry(next(s for s in self.names if s == n), self[n]) for n in names]
         ax = draw_scaled(axes_of(ax), AIRSPEED, self.airspeeds, drawn)
         ax.set_ylabel("derivative by its largest magnitude")
         return ax

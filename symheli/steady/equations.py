@@ -12,7 +12,7 @@ from typing import Any, Literal, NamedTuple
 
 import casadi
 
-from symheli.codegen import Layout, Program, c_function, program
+from symheli.codegen import Layout, ScalarProgram, c_function, program
 from symheli.codegen.compile import library, loaded
 from symheli.codegen.numeric import Numeric
 from symheli.codegen.symbolic import SX, Function, column, cos, dense, jacobian, sin
@@ -157,7 +157,7 @@ class SteadyEquations:
         path = library("\n".join(parts), f"steady-{layout.lanes}")
         return None if path is None else loaded(path)
 
-    def _program(self, name: Name) -> Program:
+    def _program(self, name: Name) -> ScalarProgram:
         return program(self.function(name))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from synthesis.analysis.problem import Problem, pose
+from synthesis.analysis.problem import BoundProblem, pose
 from synthesis.forms import Spline
 from synthesis.program.cone_program import LYAPUNOV
 
@@ -23,7 +23,7 @@ def adjoint_options(parameters: int) -> dict[str, Any]:
     )
 
 
-def backwards(problem: Problem) -> Problem | None:
+def backwards(problem: BoundProblem) -> BoundProblem | None:
     """Return the problem of the adjoint; None where it proves the same or nothing: for options that
     the user chose, other bounds than a gain, P that cannot move, a set of models, and where the
     rate of a parameter is another one.

@@ -20,7 +20,7 @@ from synthesis.analysis.general_search import General
 from synthesis.analysis.hypotheses import VERIFIED, hypotheses
 from synthesis.analysis.ladder import Found, Ladder
 from synthesis.analysis.one_parameter_search import OneParameter
-from synthesis.analysis.problem import Problem
+from synthesis.analysis.problem import BoundProblem
 from synthesis.certificate import Certificate, Seconds, Status
 from synthesis.impose import Grid
 from synthesis.polynomial.pieces import Pieces, pieces
@@ -54,7 +54,7 @@ class Beaten(NamedTuple):
     perturbation: Array | None = None
 
 
-def certify(problem: Problem) -> Certificate:
+def certify(problem: BoundProblem) -> Certificate:
     """Search a lower bound and a proof, and write the certificate."""
     demand, search = problem.demand, problem.search
     sign = 1.0 if problem.gains else -1.0
@@ -105,13 +105,13 @@ def certify(problem: Problem) -> Certificate:
     return cert.resting_on(search_hypothesis(search and search.seconds, beaten.seconds))
 
 
-def _of_adjoint(problem: Problem, beaten: Beaten) -> Certificate:
+def _of_adjoint(problem: BoundProblem, beaten: Beaten) -> Certificate:
     """Search a proof of the adjoint of a loop, whose lower bound is known."""
     ladder = route(problem)
     return Report(problem).found(ladder.search(beaten.frozen), beaten, ladder).resting_on([ADJOINT])
 
 
-class _Member(NamedTuple):
+class _LoopAndWorst(NamedTuple):
     """The `model` whose trajectories give the lower bound, and its worst `frozen` model.
 
     Of a set the one with `perturbation`; where no basis holds it the nominal one, beside the frozen
@@ -124,22 +124,22 @@ class _Member(NamedTuple):
     unstable: tuple[float, ...] | None = None
 
 
-def _worst_member(problem: Problem) -> _Member:
+def _worst_member(problem: BoundProblem) -> _LoopAndWorst:
     unc, size = problem.uncertain, measure(problem.demand, problem.model.dt)
     if unc is None:
-        return _Member(problem.model, worst_frozen(problem.model, size))
+        return _LoopAndWorst(problem.model, worst_frozen(problem.model, size))
     found = worst_perturbation(unc, gains=problem.gains)
     try:
         model = pieces(unc.perturbed(found.delta))
     except InputError:
         at = (found.p,)
-        return _Member(
+        return _LoopAndWorst(
             problem.model, Worst(found.value, at), found.delta, at if found.unstable else None
         )
-    return _Member(model, worst_frozen(model, size), found.delta)
+    return _LoopAndWorst(model, worst_frozen(model, size), found.delta)
 
 
-def route(problem: Problem) -> Ladder:
+def route(problem: BoundProblem) -> Ladder:
     """Return the search for a proof that suits the problem."""
     return (OneParameter if problem.one_parameter else General)(problem)
 
@@ -148,7 +148,7 @@ def route(problem: Problem) -> Ladder:
 class Report:
     """Writer of the certificate of a problem."""
 
-    problem: Problem
+    problem: BoundProblem
 
     @property
     def parameters(self) -> tuple[Scheduling, ...]:

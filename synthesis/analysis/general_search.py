@@ -13,7 +13,7 @@ import numpy as np
 from symheli.lpv import LinearModel, Matrices
 from synthesis.analysis.frozen_storage import central_dissipation
 from synthesis.analysis.ladder import CLOSE_TO_LOWER, NO_MARGIN, Found, Ladder
-from synthesis.analysis.problem import Problem
+from synthesis.analysis.problem import BoundProblem
 from synthesis.assemble.box import Shape, affine_inequalities, assemble
 from synthesis.assemble.points import at_points, points_of
 from synthesis.certificate import Attempt, Kind, Proof
@@ -26,11 +26,11 @@ from synthesis.polynomial.pieces import Pieces
 from synthesis.polynomial.regions import model_on, regions
 from synthesis.polynomial.symmetric import extended, length, smat
 from synthesis.program import interior_point
-from synthesis.program.cone_program import LYAPUNOV, Answer, Candidate, general_solver, solve
+from synthesis.program.cone_program import LYAPUNOV, Answer, SolverPoint, general_solver, solve
 from synthesis.program.interior_point import Minimum
 from synthesis.program.lyapunov_program import LyapunovBlocks, LyapunovProgram, Sizes
 from synthesis.program.scaling import Scaling, dissipative, gramian_units, model_scaling
-from synthesis.proof.box import Evidence
+from synthesis.proof.box import BoxEvidence
 from synthesis.worst.frozen import norm
 
 Array = np.ndarray
@@ -95,7 +95,7 @@ class _AtPoints(NamedTuple):
 class General(Ladder):
     """Splines P(p) over a box, in the scaled units of the `evidence`."""
 
-    def __init__(self, problem: Problem):
+    def __init__(self, problem: BoundProblem):
         if problem.solver.name == LYAPUNOV and not problem.by_points:  # of stability, for a gain
             problem = problem._replace(solver=general_solver("CLARABEL"))
         super().__init__(problem)
@@ -132,7 +132,7 @@ class General(Ladder):
         return self._in_units(self.choices[best])
 
     def _in_units(self, units: Scaling) -> float:
-        self.evidence = Evidence(self.problem.model, units, self.problem.demand)
+        self.evidence = BoxEvidence(self.problem.model, units, self.problem.demand)
         searched = self.evidence._replace(model=self.problem.model.rounded)
         self.scaled, self.scaled_demand = searched.scaled
         return 1.0 / self.evidence.in_units(1.0)
@@ -232,7 +232,7 @@ class General(Ladder):
         self.attempts.append(Attempt(name, margin, f"{message}, {words}", found.bound))
         return found
 
-    def _solve(self, shape: Shape, margin: float) -> Candidate:
+    def _solve(self, shape: Shape, margin: float) -> SolverPoint:
         """Solve the program of all inequalities."""
         problem, start = self.problem, time.perf_counter()
         if problem.by_points:
@@ -357,13 +357,13 @@ class General(Ladder):
         tensor = np.tensordot(free, values, axes=1).reshape(*shape.counts, n, n)
         return BoxLyapunov(shape.knots, shape.degrees, self.evidence.to_physical(tensor))
 
-    def _verified(self, candidate: Candidate, shape: Shape) -> Found:
+    def _verified(self, candidate: SolverPoint, shape: Shape) -> Found:
         start = time.perf_counter()
         found = self._judged(candidate, shape)
         self.spent[2] += time.perf_counter() - start
         return found
 
-    def _judged(self, candidate: Candidate, shape: Shape) -> Found:
+    def _judged(self, candidate: SolverPoint, shape: Shape) -> Found:
         """Compute the bound that P itself admits, whatever status the solver reported."""
         if candidate.x is None:
             return Found(math.inf, None, candidate.answer)

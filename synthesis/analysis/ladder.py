@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symheli.progress import task
-from synthesis.analysis.problem import Problem
+from synthesis.analysis.problem import BoundProblem
 from synthesis.certificate import Attempt, Proof
 from synthesis.program.cone_program import Answer
 from synthesis.program.scaling import in_its_own_scale
@@ -70,7 +70,7 @@ class Ladder(ABC):
     solve and verify them (`spent`).
     """
 
-    def __init__(self, problem: Problem):
+    def __init__(self, problem: BoundProblem):
         self.problem = problem
         self.attempts: list[Attempt] = []
         self.spent = np.zeros(3)

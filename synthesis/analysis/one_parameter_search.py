@@ -26,7 +26,7 @@ from synthesis.forms import Spline
 from synthesis.impose import Bernstein
 from synthesis.lyapunov.spline import Lyapunov, SplineLyapunov
 from synthesis.program import interior_point
-from synthesis.program.cone_program import LYAPUNOV, Answer, Candidate, solve
+from synthesis.program.cone_program import LYAPUNOV, Answer, SolverPoint, solve
 from synthesis.program.lyapunov_program import MANY_STATES, LyapunovProgram
 from synthesis.program.scaling import dissipative
 from synthesis.worst.frozen import norm
@@ -106,12 +106,12 @@ class OneParameter(Ladder):
         self.attempts.append(Attempt(program, margin, words, found.bound))
         return found
 
-    def _solve(self, shape: Unknown, margin: float) -> Candidate:
+    def _solve(self, shape: Unknown, margin: float) -> SolverPoint:
         if self.problem.solver.name == LYAPUNOV:
             return self._solve_by_products(shape, margin)
         return self._solve_by_rounds(shape, margin)
 
-    def _solve_by_products(self, form: Unknown, margin: float) -> Candidate:
+    def _solve_by_products(self, form: Unknown, margin: float) -> SolverPoint:
         """Solve with all blocks, kept as products with P."""
         assert isinstance(form, Quadratic)  # noqa: S101 - see `Problem`
         blocks = form.products(self.scaled, self.elevation)
@@ -119,7 +119,7 @@ class OneParameter(Ladder):
         program = LyapunovProgram(blocks, sizes, margin, floor)
         return interior_point.minimise(program, self.problem.solver)
 
-    def _solve_by_rounds(self, form: Unknown, margin: float) -> Candidate:
+    def _solve_by_rounds(self, form: Unknown, margin: float) -> SolverPoint:
         """Solve with the blocks likely to be active, add the violated ones, and repeat: this needs
         far fewer blocks.
         """
@@ -237,7 +237,7 @@ class OneParameter(Ladder):
         self.scaled = whole
         return found.bound
 
-    def _judged(self, candidate: Candidate, shape: Unknown) -> Found:
+    def _judged(self, candidate: SolverPoint, shape: Unknown) -> Found:
         """Compute the gain that P itself admits, whatever status the solver reported."""
         answer = candidate.answer
         if candidate.x is None:

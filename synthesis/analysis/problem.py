@@ -21,7 +21,7 @@ from synthesis.worst.rates import Rate, limits
 Model = LPVStateSpace | LFT | UncertainStateSpace
 
 
-class Problem(NamedTuple):
+class BoundProblem(NamedTuple):
     """A model in polynomial pieces, the kind of bound and the options; `uncertain`: the set of
     models for which the bound must hold, with `model` as its nominal one; `usual`: whether form,
     impose and solver were left out.
@@ -83,7 +83,7 @@ def pose(
     impose: Imposed | None,
     solver: Solver | str | None,
     search: Search | None,
-) -> Problem:
+) -> BoundProblem:
     """Check the options against one another and against the model, and return the problem.
 
     Raises `InputError` for an option that has no meaning for the problem.
@@ -110,7 +110,7 @@ def pose(
     if uncertain is not None:
         uncertain = uncertain.with_scheduling(model.parameters)
     demand = Demand(kind, motion)
-    problem = Problem(pieces(model), demand, form, impose, Solver("CLARABEL"), search)
+    problem = BoundProblem(pieces(model), demand, form, impose, Solver("CLARABEL"), search)
     problem = problem._replace(uncertain=uncertain, usual=usual)
     _check_channels(problem)
     _check_options(problem)
@@ -118,7 +118,7 @@ def pose(
     return problem._replace(solver=_solver(problem, solver))
 
 
-def _solver(problem: Problem, solver: Solver | str | None) -> Solver:
+def _solver(problem: BoundProblem, solver: Solver | str | None) -> Solver:
     by_products = (
         problem.one_parameter and isinstance(problem.form, Spline)
     ) or problem.points_serve
@@ -161,7 +161,7 @@ def _check_rest(motion: Motion, moving: Sequence[Scheduling]) -> None:
             )
 
 
-def _check_channels(problem: Problem) -> None:
+def _check_channels(problem: BoundProblem) -> None:
     nx, nu, ny = problem.model.sizes
     if nx == 0:
         raise InputError("the model has no states; its gain is the largest norm of D(p)")
@@ -176,7 +176,7 @@ def _check_channels(problem: Problem) -> None:
         )
 
 
-def _check_block(problem: Problem) -> None:
+def _check_block(problem: BoundProblem) -> None:
     if problem.uncertain is None:
         return
     if not problem.one_parameter or not isinstance(problem.form, Spline):
@@ -187,7 +187,7 @@ def _check_block(problem: Problem) -> None:
         )
 
 
-def _check_options(problem: Problem) -> None:
+def _check_options(problem: BoundProblem) -> None:
     form, kind, dt = problem.form, problem.demand.kind, problem.model.dt
     if not isinstance(form, Spline):
         name = type(form).__name__

@@ -16,7 +16,7 @@ from symheli.threads import with_one_thread
 from symheli.values.summary import summarized
 from synthesis.analysis.questions import stability
 from synthesis.robust.lower_bound import ACCURACY, ROUGH, best_reals, worst_closing
-from synthesis.robust.structure import DynamicBlock, Loop, loop_at, loop_of
+from synthesis.robust.structure import BlockLoop, DynamicBlock, loop_at, loop_of
 from synthesis.robust.upper_bound import proven_level
 from synthesis.worst.frozen import frozen_gain
 from synthesis.worst.over_box import worst_over
@@ -251,7 +251,7 @@ def _of_blocks(
     )
 
 
-def _lost(loop: Loop, d: np.ndarray, largest: float, refine: bool = False) -> float:
+def _lost(loop: BlockLoop, d: np.ndarray, largest: float, refine: bool = False) -> float:
     """Return the factor at which the loop is lost with its real parameters along d, roughly or
     refined; no more than the largest.
     """

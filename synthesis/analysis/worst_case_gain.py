@@ -13,7 +13,7 @@ from symheli.lpv import LFT, LPVStateSpace
 from symheli.threads import with_one_thread
 from symheli.values.summary import summarized
 from synthesis.robust.lower_bound import ACCURACY, ROUGH, best_reals, worst_closing
-from synthesis.robust.structure import DynamicBlock, Loop, loop_of
+from synthesis.robust.structure import BlockLoop, DynamicBlock, loop_of
 from synthesis.robust.upper_bound import proven_level
 from synthesis.worst.frozen import norm
 
@@ -102,7 +102,7 @@ def worst_case_gain(
     return WorstCaseGain(lower, proven.level, loop.physical(d), loop.frequency(omega), inner)
 
 
-def _gain(closed: Loop, refine: bool = False) -> tuple[float, float, np.ndarray | None]:
+def _gain(closed: BlockLoop, refine: bool = False) -> tuple[float, float, np.ndarray | None]:
     """Return the largest gain found of a loop of full blocks, its last part the performance, the
     frequency, and the blocks; inf where the loop may be unstable.
     """
@@ -115,7 +115,7 @@ def _gain(closed: Loop, refine: bool = False) -> tuple[float, float, np.ndarray 
     if len(closed.parts) == 1:
         return own[0], own[1], None
 
-    def at(gamma: float) -> Loop:
+    def at(gamma: float) -> BlockLoop:
         rows = np.ones(len(closed.C))
         rows[part.rows] /= gamma
         return closed._replace(C=rows[:, None] * closed.C, D=rows[:, None] * closed.D)

@@ -94,7 +94,7 @@ class Supply(NamedTuple):
     linear: Array
 
 
-class Multiplier(NamedTuple):
+class BlockMultipliers(NamedTuple):
     """The multiplier lambda of each part of a `block`: a spline of `degree` on the knots of P, one
     number where the part is dynamic.
     """
@@ -114,7 +114,7 @@ def continuous_blocks(
     degree: int,
     rate: float,
     extra: int,
-    multiplier: Multiplier | None = None,
+    multiplier: BlockMultipliers | None = None,
 ) -> Iterator[Blocks]:
     """The blocks of every cell for both signs of the rate; `extra` raises the degree of the
     Bernstein form.
@@ -139,7 +139,7 @@ def discrete_blocks(
     knots: Array,
     degree: int,
     extra: int,
-    multiplier: Multiplier | None = None,
+    multiplier: BlockMultipliers | None = None,
 ) -> Iterator[Blocks]:
     """Yield the blocks of every strip."""
     for form in over_strips(strips, knots, degree, extra, multiplier):
@@ -259,7 +259,7 @@ class OverCell(NamedTuple):
 
 
 def over_cell(
-    cell: Cell, knots: Array, degree: int, extra: int, multiplier: Multiplier | None = None
+    cell: Cell, knots: Array, degree: int, extra: int, multiplier: BlockMultipliers | None = None
 ) -> OverCell:
     """Compute the weights of one cell; `extra` raises the degree of the Bernstein form."""
     A, B, dM = common_degree(cell.piece.A, cell.piece.B, cell)
@@ -304,7 +304,7 @@ def over_strips(
     knots: Array,
     degree: int,
     extra: int,
-    multiplier: Multiplier | None = None,
+    multiplier: BlockMultipliers | None = None,
 ) -> Iterator[OverStrip]:
     """Compute the weights of every strip. Likely to be active: the border lines of the widest cell
     of each segment and piece.
@@ -380,7 +380,7 @@ def bordered(top: Array, side: Array) -> Array:
     )
 
 
-def output_terms(cell: Cell, multiplier: Multiplier | None = None) -> Array:
+def output_terms(cell: Cell, multiplier: BlockMultipliers | None = None) -> Array:
     """Bernstein coefficients of [C D]'[C D] over the cell, of the outputs y alone where there is a
     block.
     """
@@ -394,7 +394,7 @@ class SupplyTerms(NamedTuple):
     """
 
     squares: Array
-    by: Multiplier | None
+    by: BlockMultipliers | None
 
     @property
     def degree(self) -> int:
@@ -422,7 +422,7 @@ class SupplyTerms(NamedTuple):
         return Supply(np.concatenate(columns).astype(int), np.concatenate(linear, axis=1))
 
 
-def supply_terms(cell: Cell, multiplier: Multiplier | None) -> SupplyTerms:
+def supply_terms(cell: Cell, multiplier: BlockMultipliers | None) -> SupplyTerms:
     """bound^2 [G J H]'[G J H] - diag(0, I, 0) over the cell, of each part."""
     if multiplier is None:
         return SupplyTerms(np.zeros((0, 0, 0, 0)), None)

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from synthesis.assemble.bounded_real import Multiplier, Supply, over_cell, over_strips
+from synthesis.assemble.bounded_real import BlockMultipliers, Supply, over_cell, over_strips
 from synthesis.polynomial.bernstein import product_weights
 from synthesis.polynomial.cells import Cell, Strip
 from synthesis.polynomial.symmetric import smat
@@ -23,7 +23,7 @@ def continuous_products(
     degree: int,
     rate: float,
     extra: int,
-    multiplier: Multiplier | None = None,
+    multiplier: BlockMultipliers | None = None,
 ) -> Iterator[LyapunovBlocks]:
     """The blocks of every cell, both signs of the rate together: [I 0]' P [A B] and its transpose,
     and half of the drift with each.
@@ -59,7 +59,7 @@ def discrete_products(
     knots: Array,
     degree: int,
     extra: int,
-    multiplier: Multiplier | None = None,
+    multiplier: BlockMultipliers | None = None,
 ) -> Iterator[LyapunovBlocks]:
     """The blocks of every strip: M_i' P+ times what the coefficients M = [A B] beside it add up to,
     and P itself.

@@ -16,8 +16,8 @@ import numpy as np
 
 from symheli.lpv import LPVStateSpace, UncertainStateSpace
 from synthesis.assemble.bounded_real import (
+    BlockMultipliers,
     Blocks,
-    Multiplier,
     continuous_blocks,
     discrete_blocks,
 )
@@ -33,7 +33,7 @@ from synthesis.polynomial.symmetric import extended, length, smat, svec
 from synthesis.polynomial.symmetric_power import generator, monomials, null_matrix, null_size
 from synthesis.program.lyapunov_program import MANY_STATES, LyapunovBlocks, Sizes
 from synthesis.program.scaling import Scaling, block_scaling, scaling
-from synthesis.proof.one_parameter import Evidence
+from synthesis.proof.one_parameter import IntervalEvidence
 
 Array = np.ndarray
 
@@ -56,9 +56,9 @@ class ScaledProblem(NamedTuple):
         """Largest change of p per scaled unit of time."""
         return self.rate * self.units.time
 
-    def evidence(self, elevation: int) -> Evidence:
+    def evidence(self, elevation: int) -> IntervalEvidence:
         """The checks that verify a P for this problem."""
-        return Evidence(self.lpv, self.pieces, self.units, self.rate, elevation, self.block)
+        return IntervalEvidence(self.lpv, self.pieces, self.units, self.rate, elevation, self.block)
 
     def sizes(self, form: Unknown) -> Sizes:
         """Return the sizes of the program for a V of this form."""
@@ -144,7 +144,7 @@ class Quadratic(Unknown):
     knots: Array
     degree: int
     size: int
-    by: Multiplier | None = None
+    by: BlockMultipliers | None = None
 
     @property
     def unknowns(self) -> int:
@@ -318,11 +318,11 @@ def unknowns(problem: ScaledProblem, form: LyapunovForm) -> Iterator[Unknown]:
             yield Quadratic(knots, degree, n, _multiplier(problem, degree))
 
 
-def _multiplier(problem: ScaledProblem, degree: int) -> Multiplier | None:
+def _multiplier(problem: ScaledProblem, degree: int) -> BlockMultipliers | None:
     """Return the multipliers, of the degree of P, which sets the degree of the LMIs, and at least
     1, because a constant P does not show where the block matters most.
     """
-    return None if problem.block is None else Multiplier(problem.block, max(degree, 1))
+    return None if problem.block is None else BlockMultipliers(problem.block, max(degree, 1))
 
 
 def constant(problem: ScaledProblem, form: LyapunovForm) -> Unknown:

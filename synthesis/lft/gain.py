@@ -25,7 +25,7 @@ from synthesis.lft.program import (
     unpack,
     with_state_channels,
 )
-from synthesis.lft.proof import Evidence, Quadratic
+from synthesis.lft.proof import LFTEvidence, QuadraticStorage
 from synthesis.polynomial.motion import Motion
 from synthesis.program.cone_program import Answer, Solver, general_solver, solve
 from synthesis.proof.inequalities import Demand
@@ -234,7 +234,7 @@ class MultiplierSearch(Ladder):
         """Set the coordinates for this expected gain; return the unit of gains."""
         lft, scaling, *_ = self.problem
         # a small gain means one thing only in the coordinates the LFT has, up to a number
-        self.evidence = Evidence(lft, coordinates(lft, bound, one=scaling == "small gain"))
+        self.evidence = LFTEvidence(lft, coordinates(lft, bound, one=scaling == "small gain"))
         self.multipliers = multiplier_class(scaling, lft.sizes)
         loop = scaled(lft, self.evidence.coordinates)
         if not self.problem.gains:
@@ -300,7 +300,9 @@ class MultiplierSearch(Ladder):
         lft, (units, left, _) = self.problem.lft, self.evidence.coordinates
         P, Q, S, R = unpack(x, self.multipliers, len(lft.states))
         multiplier = Multiplier(self.problem.scaling, lft.sizes, Q, S, R)
-        proof = Quadratic(units.to_physical(P), multiplier.transformed(left, units.channel**2))
+        proof = QuadraticStorage(
+            units.to_physical(P), multiplier.transformed(left, units.channel**2)
+        )
         least, conditioning = self.evidence.least_gain(proof)
         gamma = inflated(least, units.channel)
         if math.isinf(gamma) or not self.evidence.floating(proof, gamma):

@@ -30,7 +30,7 @@ box.
 """
 
 
-class Quadratic(NamedTuple):
+class QuadraticStorage(NamedTuple):
     """V = x'P x and a multiplier, in physical units and in the copies of the parameters the LFT
     has.
     """
@@ -44,7 +44,7 @@ class Quadratic(NamedTuple):
         return f"V = x'Px, multiplier of the class {self.multiplier.scaling!r}"
 
 
-class Evidence(NamedTuple):
+class LFTEvidence(NamedTuple):
     """An LFT, and the coordinates in which its numbers are of order one."""
 
     lft: LFT
@@ -55,11 +55,11 @@ class Evidence(NamedTuple):
         """The parameters of the LFT."""
         return self.lft.parameters
 
-    def fault(self, proof: Quadratic, kind: str, rates: tuple[float, ...]) -> str | None:
+    def fault(self, proof: QuadraticStorage, kind: str, rates: tuple[float, ...]) -> str | None:
         """Return why the proof does not belong to this LFT and statement, before any inequality is
         checked; None where it does.
         """
-        if not isinstance(proof, Quadratic) or not isinstance(proof.multiplier, Multiplier):
+        if not isinstance(proof, QuadraticStorage) or not isinstance(proof.multiplier, Multiplier):
             return "expected P and a Multiplier"
         if kind != ("l2 gain" if self.lft.inputs else "stability"):
             return f"the LFT of the proof is not one of the kind {kind!r}"
@@ -79,7 +79,7 @@ class Evidence(NamedTuple):
             units.fault(x),
         )
 
-    def least_gain(self, proof: Quadratic) -> tuple[float, float]:
+    def least_gain(self, proof: QuadraticStorage) -> tuple[float, float]:
         """Return (gain that the proof admits, condition number of P); inf where it proves nothing,
         NaN without channels.
         """
@@ -102,12 +102,12 @@ class Evidence(NamedTuple):
         g = max(float(np.linalg.eigvalsh(level).max()), 0.0)
         return units.channel * math.sqrt(g), float(values[-1] / values[0])
 
-    def floating(self, proof: Quadratic, gamma: float) -> bool:
+    def floating(self, proof: QuadraticStorage, gamma: float) -> bool:
         """Check by eigenvalues, with a margin for rounding."""
         least = self.least_gain(proof)[0]
         return math.isnan(least) if math.isnan(gamma) else least < gamma
 
-    def exact(self, proof: Quadratic, gamma: float) -> bool:
+    def exact(self, proof: QuadraticStorage, gamma: float) -> bool:
         """Check by LDL' in rationals; the doubles of the LFT, of the proof and of gamma are taken
         as exact rationals.
         """
@@ -126,7 +126,7 @@ class Evidence(NamedTuple):
         )
         return exactly and self.checked_independently(proof, gamma, number)
 
-    def checked_independently(self, proof: Quadratic, gamma: float, number: Number) -> bool:
+    def checked_independently(self, proof: QuadraticStorage, gamma: float, number: Number) -> bool:
         """Check the inequality of V = x'Px at the corners of the box and inside it, through the
         closed model's own matrices.
         """
@@ -144,7 +144,7 @@ class Evidence(NamedTuple):
                 return False
         return True
 
-    def _conditions_hold(self, proof: Quadratic) -> bool:
+    def _conditions_hold(self, proof: QuadraticStorage) -> bool:
         units, right = self.coordinates.units, self.coordinates.right
         if not _structure_holds(proof.multiplier, self.lft):
             return False
@@ -157,7 +157,7 @@ class Evidence(NamedTuple):
         return all(_negative(-(T.T @ M @ T)) for M, T in zip(scaled, transforms, strict=True))
 
 
-def _left_side(lft: LFT, proof: Quadratic, number: Number) -> Array:
+def _left_side(lft: LFT, proof: QuadraticStorage, number: Number) -> Array:
     """The quadratic form on (w, x, u) with gamma = 0: rows of the LFT are (z, dx/dt or x(k+1),
     y).
     """

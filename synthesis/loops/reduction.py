@@ -43,7 +43,7 @@ def reduced(controller: Controller, order: int) -> Controller:
     """
     if isinstance(order, bool) or not isinstance(order, int | np.integer) or order < 0:
         raise InputError(f"order: expected an integer >= 0, got {order!r}")
-    return controller if order >= controller.order else _Whole(controller).kept(order)
+    return controller if order >= controller.order else _FullController(controller).kept(order)
 
 
 def within(controller: Controller, loss: float) -> Controller:
@@ -72,7 +72,7 @@ def fewest(
     """Return the reduced controller of the first of the `orders` (None: every one, from 0 on) with
     gain at most `limit`; the controller itself where there is none.
     """
-    whole = _Whole(controller)
+    whole = _FullController(controller)
     for order in range(controller.order) if orders is None else orders:
         try:
             fewer = whole.kept(order)
@@ -83,7 +83,7 @@ def fewest(
     return controller
 
 
-class _Whole:
+class _FullController:
     """The controller of full order, with the Gramians and gain that all reductions use."""
 
     def __init__(self, controller: Controller) -> None:

@@ -24,7 +24,7 @@ from synthesis.lpv.unknown import UnknownFunction
 from synthesis.polynomial.bernstein import blossom
 from synthesis.polynomial.symmetric import basis as symmetric_basis
 from synthesis.polynomial.symmetric import svec, symmetrized
-from synthesis.program.cone_program import Candidate, ConeProgram, Solver, solve
+from synthesis.program.cone_program import ConeProgram, Solver, SolverPoint, solve
 
 Array = np.ndarray
 
@@ -60,7 +60,7 @@ def cells(breaks: Sequence[Sequence[float]], degrees: Sequence[int]) -> list[Ber
 
 
 @dataclass(frozen=True, eq=False)
-class Variable:
+class MatrixVariable:
     """A matrix that is an unknown function of p.
 
     Its value at p is a sum of `entries` (e, a, b), whose factors are the functions of `unknown`;
@@ -89,28 +89,28 @@ class AffineProgram:
     """
 
     def __init__(self) -> None:
-        self.variables: list[Variable] = []
+        self.variables: list[MatrixVariable] = []
         self.count, self.values = 0, 1
         self._zero: list[tuple[sparse.csr_matrix, Array]] = []
         self._positive: list[tuple[sparse.csr_matrix, Array]] = []
         self._sizes: list[int] = []
 
-    def variable(self, entries: Array, basis: FunctionSpace) -> Variable:
+    def variable(self, entries: Array, basis: FunctionSpace) -> MatrixVariable:
         """Add a matrix that is a sum of `entries` (e, a, b), each times functions of this basis."""
         e = len(entries)
         columns = self.count + np.arange(basis.size * e).reshape(basis.size, e)
         here = slice(self.values, self.values + e)
         along = slice(here.stop, here.stop + (e if basis.size > 1 else 0))
-        made = Variable(UnknownFunction(basis, 0), entries, columns, here, along)
+        made = MatrixVariable(UnknownFunction(basis, 0), entries, columns, here, along)
         self.count, self.values = self.count + columns.size, along.stop
         self.variables.append(made)
         return made
 
-    def symmetric(self, n: int, basis: FunctionSpace) -> Variable:
+    def symmetric(self, n: int, basis: FunctionSpace) -> MatrixVariable:
         """Add a symmetric matrix (n, n)."""
         return self.variable(symmetric_basis(n), basis)
 
-    def full(self, rows: int, columns: int, basis: FunctionSpace) -> Variable:
+    def full(self, rows: int, columns: int, basis: FunctionSpace) -> MatrixVariable:
         """Add a matrix (rows, columns) without structure."""
         return self.variable(np.eye(rows * columns).reshape(-1, rows, columns), basis)
 
@@ -121,11 +121,11 @@ class AffineProgram:
         out[0] = M
         return out
 
-    def value(self, variable: Variable) -> Array:
+    def value(self, variable: MatrixVariable) -> Array:
         """Return the variable at p."""
         return self._placed(variable.entries, variable.here)
 
-    def slope(self, variable: Variable) -> Array:
+    def slope(self, variable: MatrixVariable) -> Array:
         """Return its derivative along the motion of p for which the inequality is imposed."""
         moving = variable.along.stop - variable.along.start
         return self._placed(variable.entries[:moving], variable.along)
@@ -192,7 +192,7 @@ class AffineProgram:
         """Numbers of rows of the matrices that are positive semidefinite."""
         return tuple(self._sizes)
 
-    def minimise(self, cost: Array, solver: Solver) -> Candidate:
+    def minimise(self, cost: Array, solver: Solver) -> SolverPoint:
         """Return the solver's candidate for the least cost' x."""
         rows = [*self._zero, *self._positive]
         A = sparse.csc_matrix(sparse.vstack([-A for A, _ in rows]))

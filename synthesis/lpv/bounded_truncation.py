@@ -117,7 +117,7 @@ def bounded_truncation(
     inside = model.scaled(
         dict(zip(model.inputs, su, strict=True)), dict(zip(model.outputs, sy, strict=True))
     )
-    whole = _Whole.of(projected(inside, left, right), balance)
+    whole = _FullModel.of(projected(inside, left, right), balance)
     first, second = whole.least(values), whole.dual.least(values)
     if balance == "factors":
         found = left @ np.linalg.inv(first) @ left.T, right @ np.linalg.inv(second) @ right.T
@@ -127,7 +127,7 @@ def bounded_truncation(
 
 
 @dataclass(frozen=True, eq=False)
-class _Whole:
+class _FullModel:
     """A, B, C, D (K, ., .) at p (K, m), whose inequality is linear in the unknown Gramian: that of
     reachability, or Z; `dual` has the other.
     """
@@ -138,7 +138,7 @@ class _Whole:
     balance: Balance
 
     @classmethod
-    def of(cls, model: LPVStateSpace, balance: Balance) -> _Whole:
+    def of(cls, model: LPVStateSpace, balance: Balance) -> _FullModel:
         """Time in units in which A is of order one."""
         one = len(model.parameters) == 1
         size = float(np.abs(model.A).max())
@@ -158,7 +158,7 @@ class _Whole:
         return cls(matrices, breaks_of(model), list(model.box), balance)
 
     @property
-    def dual(self) -> _Whole:
+    def dual(self) -> _FullModel:
         """Of the transposed model."""
 
         def turned(p: Array) -> Sequence[Array]:

@@ -24,7 +24,7 @@ DECAY_FRACTION = 0.5
 """Fraction of the decay rate of the slowest mode for which the Lyapunov equation is solved."""
 
 
-class FrozenStability(NamedTuple):
+class FrozenVerdict(NamedTuple):
     """Whether a loop is `stable` frozen at every p, None if undecided; `p` (m,) is then, or for an
     unstable loop, the place.
     """
@@ -33,7 +33,7 @@ class FrozenStability(NamedTuple):
     p: Array | None = None
 
 
-def frozen_stability(loop: LPVStateSpace) -> FrozenStability:
+def frozen_stability(loop: LPVStateSpace) -> FrozenVerdict:
     """Decide stability of the loop frozen at each p of its range.
 
     For every cell P solves a Lyapunov equation of its middle; where P does not serve the whole
@@ -43,15 +43,15 @@ def frozen_stability(loop: LPVStateSpace) -> FrozenStability:
     waiting = [models[0] for models in pieces(loop).models.values()]
     for _ in range(MAX_CELLS):
         if not waiting:
-            return FrozenStability(True)
+            return FrozenVerdict(True)
         A = waiting.pop()
         middle = np.mean(np.array(A.box, dtype=float), axis=1)
         root = _lyapunov(A(middle), loop.dt)
         if root is None:
-            return FrozenStability(False, middle)
+            return FrozenVerdict(False, middle)
         if not negative_definite(_decrease(A, root, loop.dt), cells=MAX_BOXES):
             waiting += A.split(int(np.argmax(_variation(A))))
-    return FrozenStability(None, middle)
+    return FrozenVerdict(None, middle)
 
 
 def _lyapunov(A: Array, dt: float | None) -> Array | None:

@@ -19,7 +19,13 @@ from symheli.threads import with_one_thread
 from symheli.values.signal import indices
 from synthesis.certificate import Attempt
 from synthesis.loops.controller import Controller
-from synthesis.lpv.affine_program import AffineProgram, BernsteinCell, Variable, cells, from_lower
+from synthesis.lpv.affine_program import (
+    AffineProgram,
+    BernsteinCell,
+    MatrixVariable,
+    cells,
+    from_lower,
+)
 from synthesis.lpv.bases import Dependence, functions, limited, used
 from synthesis.lpv.fitted import fitted, in_plant_units
 from synthesis.lpv.objectives import H2, L2, EnergyToPeak, Objective, PoleRegion
@@ -160,7 +166,7 @@ def multiobjective(
     return replace(made, optimum=least, attempts=tuple(attempts))
 
 
-class _Loop(NamedTuple):
+class _LoopInNewVariables(NamedTuple):
     """The closed loop in the new variables, as arrays of an `AffineProgram`."""
 
     A: Array
@@ -175,10 +181,10 @@ class _Unknowns(NamedTuple):
     given, the separation of X Y from I.
     """
 
-    X: Variable
-    Y: Variable
-    K: tuple[Variable, ...]
-    scalars: tuple[Variable, ...]
+    X: MatrixVariable
+    Y: MatrixVariable
+    K: tuple[MatrixVariable, ...]
+    scalars: tuple[MatrixVariable, ...]
 
 
 class _Problem:
@@ -348,7 +354,7 @@ class _Problem:
         program: AffineProgram,
         cell: BernsteinCell,
         o: Objective,
-        loop: _Loop,
+        loop: _LoopInNewVariables,
         unknowns: _Unknowns,
         top: Array,
     ) -> None:
@@ -373,13 +379,15 @@ class _Problem:
             if not sampled:
                 program.zero(cell, loop.D)
 
-    def _loop(self, program: AffineProgram, plant: Generalized, unknowns: _Unknowns) -> _Loop:
+    def _loop(
+        self, program: AffineProgram, plant: Generalized, unknowns: _Unknowns
+    ) -> _LoopInNewVariables:
         _, B1, B2, C1, C2, D11, D12, D21, _ = plant
         X, Y = program.value(unknowns.X), program.value(unknowns.Y)
         At, Bt, Ct, D = (program.value(v) for v in unknowns.K)
         A = program.known(plant.A)
         corner = program.known(np.eye(plant.A.shape[-1]))
-        return _Loop(
+        return _LoopInNewVariables(
             blocks([[plant.A @ Y + B2 @ Ct, A + B2 @ D @ C2], [At, X @ plant.A + Bt @ C2]]),
             from_lower([[Y], [corner, X]]),
             blocks([[program.known(B1) + B2 @ D @ D21], [X @ B1 + Bt @ D21]]),
@@ -388,7 +396,7 @@ class _Problem:
         )
 
 
-def _region(region: PoleRegion, loop: _Loop) -> Iterator[Array]:
+def _region(region: PoleRegion, loop: _LoopInNewVariables) -> Iterator[Array]:
     """Yield the inequalities of a pole region (Chilali and Gahinet 1996)."""
     A, P = loop.A, loop.P
     if region.decay > 0:

@@ -30,7 +30,7 @@ from synthesis.lpv.search import (
     CLOSE_TO_OPTIMUM,
     FAR_ABOVE,
     MIN_IMPROVEMENT,
-    Design,
+    ScaledDesign,
     Start,
     best,
     least,
@@ -336,7 +336,7 @@ def _designs(
     other: Start | None,
     factors: Sequence[float],
     attempts: list[Attempt],
-) -> Iterator[tuple[Start, Design]]:
+) -> Iterator[tuple[Start, ScaledDesign]]:
     """Yield designs of `other` first, where X and Y both depend on p and dp/dt is not measured,
     which suits slow parameters; only with back-offs whose gamma is still lower.
     """

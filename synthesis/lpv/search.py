@@ -93,7 +93,7 @@ class Start(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Design:
+class ScaledDesign:
     """X and Y with the gamma they hold for, in these coordinates; `fit` are the gains (K, ..) at p
     (K, m), scaled, as functions of p.
     """
@@ -196,7 +196,7 @@ def settled(
     attempts: list[Attempt],
     loop: Loop | None = None,
     neglecting: bool = False,
-) -> Iterator[Design]:
+) -> Iterator[ScaledDesign]:
     """Yield designs at these multiples of the least gamma, whose frozen `loop` keeps the level with
     the gains as functions of p; `neglecting`: the gains do not depend on dp/dt, which may raise
     gamma by `MAX_RATE_LOSS` at most.
@@ -211,7 +211,7 @@ def settled(
         gamma = factor * lowest.gamma * scaled.channel
         attempts.append(Attempt(f"back-off {factor:g}", 0.0, f"{message}, {outcome}", gamma))
 
-    def by_splines() -> Iterator[Design]:
+    def by_splines() -> Iterator[ScaledDesign]:
         while sharp:
             factor = max(sharp)
             found, gains = sharp.pop(factor)
@@ -248,7 +248,7 @@ def _tried(
     loop: Loop,
     neglecting: bool,
     fit_of: Callable[[ScaledPlant, Gains, Loop, Array, float], Fitted | None],
-) -> tuple[Design | None, str]:
+) -> tuple[ScaledDesign | None, str]:
     """Return the design of these gains, None where their loop does not keep gamma; and the outcome
     in words.
     """
@@ -270,7 +270,7 @@ def _tried(
     if fit is None:
         return None, SHARP
     outcome = f"frozen loops keep it, functions of p within {fit.misfit:.1e}"
-    return Design(scaled, existence, found._replace(gamma=reached), fit), outcome
+    return ScaledDesign(scaled, existence, found._replace(gamma=reached), fit), outcome
 
 
 def simplest(

@@ -178,7 +178,7 @@ class _Search:
     plant: Plant
     scaled: ScaledPlant
     points: Array
-    worst: _Frozen
+    worst: _FrozenBounds
     attempts: list[Attempt]
 
     @property
@@ -291,7 +291,7 @@ def _gains(plant: Generalized, P: Array) -> Array:
     return -np.linalg.solve(_t(plant.D12) @ plant.D12, _t(plant.B2) @ P + _t(plant.D12) @ plant.C1)
 
 
-class _Frozen(NamedTuple):
+class _FrozenBounds(NamedTuple):
     """Largest least variance of the models frozen at some p, scaled, with that p (m,); and the
     largest least g of the program of Y at any.
     """
@@ -301,7 +301,7 @@ class _Frozen(NamedTuple):
     control: float
 
 
-def _worst_frozen(scaled: ScaledPlant, points: Array) -> _Frozen | None:
+def _worst_frozen(scaled: ScaledPlant, points: Array) -> _FrozenBounds | None:
     """Return the worst over these p (K, m); None where one model has no controller."""
     parts = []
     for each in zip(*scaled.at(points), strict=True):
@@ -313,7 +313,7 @@ def _worst_frozen(scaled: ScaledPlant, points: Array) -> _Frozen | None:
         parts.append((np.sum((control.X @ driven) * driven), np.trace(seen)))
     known, total = np.array(parts)[:, 0], np.sum(parts, axis=1)
     k = int(np.argmax(total))
-    return _Frozen(max(float(total[k]), 0.0), points[k], float(known.max()))
+    return _FrozenBounds(max(float(total[k]), 0.0), points[k], float(known.max()))
 
 
 def _innovations(plant: Generalized) -> Array:

@@ -30,7 +30,7 @@ class Obstacle(Enum):
     COUPLING = "control and estimation can each reach it alone, but not together"
 
 
-class Trial(NamedTuple):
+class RiccatiTrial(NamedTuple):
     """Result of the Riccati equations at a level: `obstacle` is None where a controller exists.
 
     `slack`: gamma^2 over the spectral radius of XY, less one, -1 where a solution does not exist.
@@ -86,21 +86,21 @@ class Normalised(NamedTuple):
         parts = D[: len(D) - nu], D[:, : D.shape[1] - ny]
         return max((float(np.linalg.norm(part, 2)) for part in parts if part.size), default=0.0)
 
-    def trial(self, gamma: float) -> Trial:
+    def trial(self, gamma: float) -> RiccatiTrial:
         """Decide whether a controller with a norm below `gamma` exists."""
         if gamma <= self.least():
-            return Trial(gamma, Obstacle.DIRECT, -1.0)
+            return RiccatiTrial(gamma, Obstacle.DIRECT, -1.0)
         X, F = _half(self.plant, gamma)
         if X is None:
-            return Trial(gamma, Obstacle.CONTROL, -1.0)
+            return RiccatiTrial(gamma, Obstacle.CONTROL, -1.0)
         Y, L = _half(self.plant.dual, gamma)
         if Y is None:
-            return Trial(gamma, Obstacle.ESTIMATION, -1.0)
+            return RiccatiTrial(gamma, Obstacle.ESTIMATION, -1.0)
         radius = float(np.abs(np.linalg.eigvals(X @ Y)).max(initial=0.0))
         slack = gamma**2 / radius - 1 if radius > 0 else math.inf
-        return Trial(gamma, None if slack > 0 else Obstacle.COUPLING, slack, X, F, Y, L)
+        return RiccatiTrial(gamma, None if slack > 0 else Obstacle.COUPLING, slack, X, F, Y, L)
 
-    def controller(self, trial: Trial) -> tuple[Array, Array, Array, Array]:
+    def controller(self, trial: RiccatiTrial) -> tuple[Array, Array, Array, Array]:
         """Return the central controller u = K y of the original plant; its state estimates the
         plant's, in the same coordinates.
         """

@@ -15,7 +15,7 @@ from scipy import linalg, optimize
 
 from symheli.errors import InputError
 from symheli.lpv import LinearModel
-from synthesis.lti.central import Normalised, Obstacle, Trial
+from synthesis.lti.central import Normalised, Obstacle, RiccatiTrial
 from synthesis.lti.linear_quadratic import Matrices, lqg
 from synthesis.lti.point_design import (
     DesignStatus,
@@ -159,7 +159,7 @@ class _Levels(NamedTuple):
         P = P._replace(A=A, B1=into * P.B1, B2=into * P.B2, C1=P.C1 * out, C2=P.C2 * out)
         return cls(Normalised.of(P), units, dt)
 
-    def controller(self, trial: Trial) -> Matrices | None:
+    def controller(self, trial: RiccatiTrial) -> Matrices | None:
         """Return the central controller for the original plant; None where it would not be
         causal.
         """

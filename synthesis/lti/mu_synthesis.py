@@ -25,7 +25,7 @@ from synthesis.lti.hinf import hinf
 from synthesis.lti.point_design import PointDesign, as_model, named_loop
 from synthesis.plant.generalized import Channels, Generalized, sampled_controller
 from synthesis.robust.covers import rational
-from synthesis.robust.structure import DynamicBlock, Loop, Part, behind, channels_of, loop_of
+from synthesis.robust.structure import BlockLoop, DynamicBlock, Part, behind, channels_of, loop_of
 from synthesis.robust.upper_bound import proven_level
 
 Array = np.ndarray
@@ -192,7 +192,7 @@ def mu_synthesis(
 class _Plant(NamedTuple):
     """The plant of all parts, continuous, from (w, u) to (z, y)."""
 
-    loop: Loop
+    loop: BlockLoop
     parts: tuple[Part, ...]
     controls: tuple[Signal, ...]
     measurements: tuple[Signal, ...]
@@ -258,7 +258,7 @@ class _Plant(NamedTuple):
         inputs, outputs = (*names[1], *self.controls), (*names[2], *self.measurements)
         return LinearModel(A, B, C, D, tuple(names[0]), inputs, outputs)
 
-    def closed(self, K: LinearModel) -> Loop:
+    def closed(self, K: LinearModel) -> BlockLoop:
         """Return the loop of the parts behind a controller, continuous."""
         model = self._model(*self.loop[:4])
         names = Channels.of(model, self.controls, self.measurements, None, None)
@@ -348,12 +348,12 @@ class _Filter(NamedTuple):
         ).model()
 
 
-def _frequencies(loop: Loop) -> Array:
+def _frequencies(loop: BlockLoop) -> Array:
     paces = loop.paces
     return np.geomspace(paces[0] / 10, 10 * paces[-1], FREQUENCIES)
 
 
-def _scalings(loop: Loop, omega: Array) -> tuple[Array, Array]:
+def _scalings(loop: BlockLoop, omega: Array) -> tuple[Array, Array]:
     """Return (levels, x): the largest singular value (K,) of D M D^-1 at each frequency with the
     best D = exp(x) found, x (K, parts), 0 of the last part.
     """

@@ -238,7 +238,7 @@ class ConeProgram:
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
+class SolverPoint:
     """A solver's answer and point `x`, None without one; `seconds` of solving, `message` of the
     solver.
     """
@@ -249,7 +249,7 @@ class Candidate:
     message: str
 
 
-def solve(program: ConeProgram, solver: Solver) -> Candidate:
+def solve(program: ConeProgram, solver: Solver) -> SolverPoint:
     """Return the solver's candidate. Never raises for a failed solve: that is an answer."""
     method: Callable[[ConeProgram, Solver], tuple[Answer, Any, str]] = {
         "CLARABEL": _clarabel,
@@ -260,7 +260,7 @@ def solve(program: ConeProgram, solver: Solver) -> Candidate:
     x = None if x is None else np.asarray(x, dtype=float)
     if x is not None and (x.size != len(program.c) or not np.all(np.isfinite(x))):
         x = None
-    return Candidate(answer, x, time.perf_counter() - start, message)
+    return SolverPoint(answer, x, time.perf_counter() - start, message)
 
 
 SHORT_ITERATION = 3e8

@@ -34,7 +34,7 @@ import numpy as np
 from symheli.progress import Task, task
 from synthesis.polynomial.symmetric import indices, length, smat, svec, symmetrized
 from synthesis.program.block_cholesky import BlockCholesky
-from synthesis.program.cone_program import Answer, Candidate, Solver
+from synthesis.program.cone_program import Answer, Solver, SolverPoint
 from synthesis.program.lyapunov_program import LyapunovBlocks, Program, Sizes
 
 Array = np.ndarray
@@ -88,7 +88,7 @@ class Early(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Minimum(Candidate):
+class Minimum(SolverPoint):
     """Result: whether the requested gap is `reached`, at least nearly; with the point at which it
     first was below `EARLY_GAP`, None where it never was.
     """

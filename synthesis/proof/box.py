@@ -52,7 +52,7 @@ MIN_LEVEL = 1e-8
 """Least g in scaled units: no strict inequality proves zero."""
 
 
-class Evidence(NamedTuple):
+class BoxEvidence(NamedTuple):
     """A model with the required property, against which any P and bound can be checked;
     `demand.shift` is left to the bound.
     """

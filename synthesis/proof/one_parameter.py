@@ -113,7 +113,7 @@ def proven(statement: Statement, gamma: float) -> bool:
     return True
 
 
-class Evidence(NamedTuple):
+class IntervalEvidence(NamedTuple):
     """A model with a rate, against which any P(p) and gain can be checked.
 
     `pieces` of the model in physical units, `units` in which its numbers are of order one. Around a

@@ -143,7 +143,7 @@ def _at(coefficients: Array, local: Sequence[Any]) -> Array:
     return coefficients
 
 
-class Supplied(NamedTuple):
+class PointSupply(NamedTuple):
     """A norm-bounded block, |d| <= bound |v| of each part, with the multipliers (parts,) at one
     p.
     """
@@ -159,7 +159,7 @@ def dissipation(
     drift: Array | None,
     after: Array | None,
     g: Any,
-    block: Supplied | None = None,
+    block: PointSupply | None = None,
 ) -> Array:
     """Return the bounded real inequality at one p as a quadratic form in x, d and u: dV/dt + |y|^2
     - g |u|^2 + multiplier (bound^2 |v|^2 - |d|^2), the last term around each part of a `block` d =
@@ -281,7 +281,7 @@ def inequalities(
         (multipliers,), _ = spline(P.knots, P.multiplier_degree, values, p[0], number)
         for multiplier in multipliers:
             yield -np.array([[multiplier]])
-        supplied = Supplied(channel, number(channel.bound), multipliers)
+        supplied = PointSupply(channel, number(channel.bound), multipliers)
     decay, motion = demand.kind == "decay rate", demand.motion
     if dt is None:
         for pace in paces(p, demand.rates, motion.ties, degrees, number):

@@ -45,7 +45,7 @@ CELLS = 20000
 """Boxes of (frequency, bandwidth, damping) after which a weight counts as not shown."""
 
 
-class Range(NamedTuple):
+class PositiveRange(NamedTuple):
     """A number between `low` and `high`, both > 0, and that of the model, `nominal`."""
 
     low: float
@@ -53,7 +53,7 @@ class Range(NamedTuple):
     high: float
 
     @classmethod
-    def of(cls, given: object, nominal: object, name: str) -> Range:
+    def of(cls, given: object, nominal: object, name: str) -> PositiveRange:
         """Return the range; the middle is nominal where none is given. Raises `InputError`."""
         try:
             low, high = (float(v) for v in given)  # type: ignore[attr-defined]
@@ -84,7 +84,7 @@ def delay_weight(longest: object) -> LinearModel:
     return rational(numerator, denominator, 1 / T)
 
 
-def lag_weight(bandwidth: Range) -> LinearModel:
+def lag_weight(bandwidth: PositiveRange) -> LinearModel:
     """Return W of order 1 that covers b/(s + b) around that of the nominal bandwidth, rad/s.
 
     The error of b is h s/(s + b) with h = b/b0 - 1; of any b between, it is below that of an end.
@@ -97,7 +97,7 @@ def lag_weight(bandwidth: Range) -> LinearModel:
     return rational(np.array([h, 0.0]), np.array([1.0, h / k]), 1.0)
 
 
-def servo_weight(bandwidth: Range, damping: Range) -> LinearModel:
+def servo_weight(bandwidth: PositiveRange, damping: PositiveRange) -> LinearModel:
     """Return W of order 2 that covers w^2/(s^2 + 2 z w s + w^2) around the nominal w (rad/s), z.
 
     With s in units of the nominal w, k = w/w0 and t = -s^2 the squared error is t E(t, k, z)/F(t,

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import optimize
 
-from synthesis.robust.structure import Loop, Part
+from synthesis.robust.structure import BlockLoop, Part
 
 Array = np.ndarray
 
@@ -107,7 +107,7 @@ def _spread(v: Array, by: Array, parts: tuple[Part, ...], own: str, other: str) 
     return out
 
 
-def worst_closing(loop: Loop, refine: bool = False) -> Closing:
+def worst_closing(loop: BlockLoop, refine: bool = False) -> Closing:
     """Return the largest level of a stable loop of full blocks over all frequencies, of few of them
     or, to `refine`, of many and those about the best.
     """

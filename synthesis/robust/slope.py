@@ -144,11 +144,11 @@ def slope_margin(
         raise InputError("model: expected a stable continuous one; close its loops first")
     if model.D[j, i] != 0 and criterion != "circle":
         raise InputError(f"expected no feedthrough from {input} to {output}: put a filter between")
-    loop = _Loop(model.A, model.B[:, i], model.C[j], float(model.D[j, i]), criterion, odd)
+    loop = _ScalarLoop(model.A, model.B[:, i], model.C[j], float(model.D[j, i]), criterion, odd)
     return loop.margin()
 
 
-class _Loop(NamedTuple):
+class _ScalarLoop(NamedTuple):
     """G = c (s - A)^-1 b + d, and the class of multipliers."""
 
     A: Array

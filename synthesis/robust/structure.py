@@ -105,7 +105,7 @@ class DynamicBlock(NamedTuple):
         given = nominal if isinstance(nominal, Sequence) else (nominal, None)
         if len(given) != 2:
             raise InputError(f"nominal: expected (bandwidth, damping), got {nominal!r:.60}")
-        own = covers.Range.of(bandwidth, given[0], "bandwidth")
+        own = covers.PositiveRange.of(bandwidth, given[0], "bandwidth")
         if damping is None:
             weight = covers.lag_weight(own)
         else:
@@ -121,7 +121,7 @@ class Part(NamedTuple):
     real: bool
 
 
-class Loop(NamedTuple):
+class BlockLoop(NamedTuple):
     """x' = A x + B w, z = C x + D w, w = Delta z with one block of norm <= 1 a part; the last part
     may be the performance. Sampled models stand as continuous ones of the same norms. `sizes` (nz,)
     of the outputs of full blocks in units of the model, `weights` of the blocks; `middles` and
@@ -182,7 +182,7 @@ class Loop(NamedTuple):
         """Return the frequency of the model itself, rad/s."""
         return omega if self.dt is None else 2 * math.atan(omega) / self.dt
 
-    def closed(self, delta: Array) -> Loop:
+    def closed(self, delta: Array) -> BlockLoop:
         """Return the loop with its real parts at these values: those parts are gone."""
         real = [p for p in self.parts if p.real]
         n = real[-1].rows.stop if real else 0
@@ -197,7 +197,7 @@ class Loop(NamedTuple):
             for p in self.parts
             if not p.real
         )
-        return Loop(
+        return BlockLoop(
             self.A + B[:, :n] @ gain @ C[:n],
             B[:, n:] + B[:, :n] @ gain @ D[:n, n:],
             C[n:] + D[n:, :n] @ gain @ C[:n],
@@ -206,7 +206,7 @@ class Loop(NamedTuple):
             *self[5:],
         )
 
-    def in_units(self, level: float, performance: bool) -> Loop:
+    def in_units(self, level: float, performance: bool) -> BlockLoop:
         """Return the loop with z in units of the level, of the last part alone where that is the
         performance, balanced between its parts at the middle of its frequencies.
         """
@@ -240,7 +240,7 @@ class Loop(NamedTuple):
 
 def loop_of(
     model: LFT | LPVStateSpace, blocks: Sequence[DynamicBlock], performance: bool = False
-) -> Loop:
+) -> BlockLoop:
     """Return the loop of a model whose parameters are constant and whose channels are closed by
     these blocks; with the other channels as the last part where `performance` is asked.
 
@@ -289,10 +289,10 @@ def loop_of(
     middles = np.array([s.middle for s, _ in model.blocks])
     radii = np.array([s.radius * (size > 0) for s, size in model.blocks])
     whole = (*real, *full)
-    return Loop(A, B, C, D, whole, model.dt, units[:, 0], middles, radii, weights)
+    return BlockLoop(A, B, C, D, whole, model.dt, units[:, 0], middles, radii, weights)
 
 
-def loop_at(unc: UncertainStateSpace, p: float) -> Loop:
+def loop_at(unc: UncertainStateSpace, p: float) -> BlockLoop:
     """Return the loop of the parts of Delta around the model frozen at p."""
     block = unc.model.select(inputs=unc.perturbation_inputs, outputs=unc.perturbation_outputs)
     one = block.at(p)
@@ -300,7 +300,9 @@ def loop_at(unc: UncertainStateSpace, p: float) -> Loop:
     if unc.dt is not None:
         A, B, C, D = to_continuous(A, B, C, D)
     full = tuple(Part(rows, columns, False) for columns, rows in unc.places)
-    return Loop(A, B, C, D, full, unc.dt, np.full(len(C), unc.bound), np.array([p]), np.zeros(1))
+    return BlockLoop(
+        A, B, C, D, full, unc.dt, np.full(len(C), unc.bound), np.array([p]), np.zeros(1)
+    )
 
 
 def channels_of(

@@ -26,7 +26,7 @@ from scipy import sparse
 
 from synthesis.polynomial.symmetric import svec
 from synthesis.program.cone_program import Answer, ConeProgram, Solver, solve
-from synthesis.robust.structure import Loop
+from synthesis.robust.structure import BlockLoop
 
 Array = np.ndarray
 
@@ -64,7 +64,7 @@ class Upper(NamedTuple):
     covered: bool
 
 
-def proven_level(loop: Loop, start: float, *, performance: bool) -> Upper:
+def proven_level(loop: BlockLoop, start: float, *, performance: bool) -> Upper:
     """Return the least level, from `start` on in steps of `GROWTH`, that no block exceeds at any
     frequency: of all blocks, or of the performance alone beside blocks of norm 1.
     """
@@ -80,7 +80,7 @@ def proven_level(loop: Loop, start: float, *, performance: bool) -> Upper:
     return Upper(math.inf, decides, False)
 
 
-def level_at(loop: Loop, omega: float, low: float, performance: bool) -> float:
+def level_at(loop: BlockLoop, omega: float, low: float, performance: bool) -> float:
     """Return the least level above `low` at a frequency, from above; inf beyond `MAX_LEVEL`."""
     M = loop.response(omega)
     high = 1.01 * low
@@ -100,7 +100,7 @@ def level_at(loop: Loop, omega: float, low: float, performance: bool) -> float:
 
 
 def _uncovered(
-    loop: Loop, level: float, performance: bool, known: list[tuple[float, Scalings]]
+    loop: BlockLoop, level: float, performance: bool, known: list[tuple[float, Scalings]]
 ) -> float | None:
     """Return a frequency at which the level has no scalings; None where every one is covered."""
     paces = loop.paces
@@ -148,7 +148,7 @@ def _without(
 
 
 def _held(
-    loop: Loop, found: Scalings, omega: float, level: float, performance: bool
+    loop: BlockLoop, found: Scalings, omega: float, level: float, performance: bool
 ) -> tuple[float, float] | None:
     """Return the interval about omega in which the scalings hold; its upper end inf where they hold
     for all above. None where they do not hold at omega.
@@ -177,7 +177,7 @@ def _held(
     return low, float(above.min()) if len(above) else math.inf
 
 
-def _levelled(W: Array, loop: Loop, level: float, performance: bool) -> Array:
+def _levelled(W: Array, loop: BlockLoop, level: float, performance: bool) -> Array:
     out = W.copy()
     for k, part in enumerate(loop.parts):
         if not performance or k == len(loop.parts) - 1:
@@ -185,7 +185,7 @@ def _levelled(W: Array, loop: Loop, level: float, performance: bool) -> Array:
     return out
 
 
-def scalings_at(M: Array, loop: Loop, level: float, performance: bool) -> Scalings | None:
+def scalings_at(M: Array, loop: BlockLoop, level: float, performance: bool) -> Scalings | None:
     """Return scalings <= 1 that show the level at one frequency; None where there are none."""
     nz, nw = M.shape
     basis = _basis(loop, nz, nw)
@@ -218,7 +218,7 @@ def _left(M: Array, by: Scalings) -> Array:
     return by.W - M.conj().T @ by.Z @ M - 1j * (turned - turned.conj().T)
 
 
-def _basis(loop: Loop, nz: int, nw: int) -> list[tuple[Array, Array, Array]]:
+def _basis(loop: BlockLoop, nz: int, nw: int) -> list[tuple[Array, Array, Array]]:
     out = []
     for part in loop.parts:
         n = part.rows.stop - part.rows.start

@@ -22,8 +22,8 @@ from synthesis.lpv.bases import dependence
 from synthesis.program.cone_program import Solver, general_solver
 from synthesis.sets.proof import holds
 from synthesis.sets.proven_set import ProvenSet
-from synthesis.sets.search import SPARE, Found, Search
-from synthesis.sets.statement import Limit, Statement, stated
+from synthesis.sets.search import SPARE, SetSearch, SetSolution
+from synthesis.sets.statement import Limit, SetStatement, stated
 from synthesis.worst.rates import Rate
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ class InvariantSet(ProvenSet):
     (True, True)
     """
 
-    statement: Statement
+    statement: SetStatement
     shape: LPVStateSpace
     alpha: float
     shares: Array
@@ -239,7 +239,7 @@ def invariant_set(
     own = model.parameters
     matters = [True] * len(own)
     basis = dependence(degree, own, "Q", matters, DEGREE, still=model.dt is not None)
-    search = Search(statement, basis, _directions(directions, model), solver)
+    search = SetSearch(statement, basis, _directions(directions, model), solver)
     return _Climb(search, None if alpha is None else positive(alpha, "alpha")).best()
 
 
@@ -261,7 +261,7 @@ UNBOUNDED = "the set grows without a bound: limit more states"
 class _Climb:
     """The search over alpha, and the coordinates of the programs: those of the last set found."""
 
-    def __init__(self, search: Search, alpha: float | None):
+    def __init__(self, search: SetSearch, alpha: float | None):
         self.search, self.alpha = search, alpha
         own = search.statement
         if not own.disturbance:
@@ -284,7 +284,7 @@ class _Climb:
             spare *= MORE_SPARE
         return self._none("no candidate passes the exact check")
 
-    def _settled(self, alpha: float, spare: float) -> Found | None:
+    def _settled(self, alpha: float, spare: float) -> SetSolution | None:
         """The candidate in coordinates in which it is nearly the unit ball; None: there is none,
         and `why` says why.
         """
@@ -303,7 +303,7 @@ class _Climb:
         self.why = UNBOUNDED
         return None
 
-    def _middle(self, found: Found) -> Array:
+    def _middle(self, found: SetSolution) -> Array:
         """Q in the middle of the box."""
         search = self.search
         at = [0.5 * (a + b) for a, b in search.motion.box]
@@ -344,7 +344,7 @@ class _Climb:
             alpha = ahead
         return alpha if size(alpha) > -math.inf else start
 
-    def _made(self, found: Found, alpha: float) -> InvariantSet:
+    def _made(self, found: SetSolution, alpha: float) -> InvariantSet:
         own = self.search.statement
         model, k, rows = own.model, len(found.Q), found.Y.shape[1]
         names = tuple(model.inputs[i] for i in own.moved)[:rows]
@@ -359,5 +359,5 @@ class _Climb:
     def _none(self, why: str) -> InvariantSet:
         own, k, n = self.search.statement, self.search.basis.size, len(self.T)
         rows = len(own.controls) if own.feedback is None else 0
-        nothing = Found(np.zeros((k, n, n)), np.zeros((k, rows, n)), np.zeros(0), 0.0)
+        nothing = SetSolution(np.zeros((k, n, n)), np.zeros((k, rows, n)), np.zeros(0), 0.0)
         return replace(self._made(nothing, 0.0), why=why)

@@ -29,7 +29,7 @@ from symheli.values.summary import summarized
 from synthesis.polynomial.exact import Number, exact, rational
 from synthesis.sets.proof import closed_pieces
 from synthesis.sets.proven_set import ProvenSet
-from synthesis.sets.statement import Statement, stated
+from synthesis.sets.statement import SetStatement, stated
 
 STEPS = 60
 """Linear programs at most."""
@@ -75,7 +75,7 @@ class LowComplexitySet(ProvenSet):
     (True, [1.0, 2.0], True)
     """
 
-    statement: Statement
+    statement: SetStatement
     V: Array
     proven: bool
     why: str = ""
@@ -130,7 +130,7 @@ class _Matrices:
         self.A, self.E, self.limits = A, E, limits
 
     @classmethod
-    def of(cls, statement: Statement, number: Number) -> _Matrices:
+    def of(cls, statement: SetStatement, number: Number) -> _Matrices:
         """Those of all pieces of the model."""
         parts = [[], [], []]
         for closed in closed_pieces(statement, number):

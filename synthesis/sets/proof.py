@@ -20,11 +20,11 @@ from synthesis.polynomial.pieces import pieces
 from synthesis.polynomial.regions import Region, convert, model_on, regions
 from synthesis.proof.inequalities import slope_along
 from synthesis.sets.inequality import Lower, decrease, decrease_sampled, within
-from synthesis.sets.statement import Statement
+from synthesis.sets.statement import SetStatement
 
 
 def holds(
-    statement: Statement,
+    statement: SetStatement,
     shape: LPVStateSpace,
     alpha: float,
     shares: Array,
@@ -55,7 +55,7 @@ def holds(
 class _Loop:
     """Model and given feedback as polynomials on regions, in the arithmetic of `number`."""
 
-    def __init__(self, statement: Statement, number: Number):
+    def __init__(self, statement: SetStatement, number: Number):
         self.statement, self.number = statement, number
         self.model = pieces(statement.model)
         self.feedback = None if statement.feedback is None else pieces(statement.feedback)
@@ -94,7 +94,7 @@ class _Loop:
 
 
 def closed_pieces(
-    statement: Statement, number: Number
+    statement: SetStatement, number: Number
 ) -> Iterator[tuple[PolynomialMatrix, PolynomialMatrix, PolynomialMatrix]]:
     """A and W (of disturbances of size 1) of the loop with the given feedback, and the rows of all
     limits over their bounds, on boxes that cover all p.
@@ -120,7 +120,7 @@ def _row(M: PolynomialMatrix, index: int) -> PolynomialMatrix:
 class _Parts(_Loop):
     """The loop with Q and, where it was designed, Y."""
 
-    def __init__(self, statement: Statement, shape: LPVStateSpace, number: Number):
+    def __init__(self, statement: SetStatement, shape: LPVStateSpace, number: Number):
         super().__init__(statement, number)
         self.shape = pieces(shape)
         self.law = next(iter(self.shape.models.values()))

@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from symheli.values.arrays import Array
-from synthesis.sets.statement import Statement
+from synthesis.sets.statement import SetStatement
 
 
 class ProvenSet(ABC):
@@ -21,7 +21,7 @@ class ProvenSet(ABC):
     `proven` is false, and `why` says why, where the exact check has not passed.
     """
 
-    statement: Statement
+    statement: SetStatement
     proven: bool
     why: str
     form: ClassVar[str]

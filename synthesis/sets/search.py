@@ -14,7 +14,7 @@ from synthesis.polynomial.motion import Motion
 from synthesis.polynomial.pieces import pieces
 from synthesis.program.cone_program import Answer, Solver
 from synthesis.sets.inequality import decrease, decrease_sampled, within
-from synthesis.sets.statement import Statement
+from synthesis.sets.statement import SetStatement
 
 SPARE = 1e-7
 """Share of every inequality that a candidate leaves, in coordinates in which Q is of order one."""
@@ -24,7 +24,7 @@ VOLUME_POINTS = 3
 """Values of each parameter at which the volume counts, where Q moves with it."""
 
 
-class Found(NamedTuple):
+class SetSolution(NamedTuple):
     """Q (k, n, n) and Y (k, nu, n) in the functions of the search, tau (nw,), and the objective:
     the geometric mean of the squared semi-axes in the coordinates of the search, or the extent.
     """
@@ -35,7 +35,7 @@ class Found(NamedTuple):
     size: float
 
 
-class Search:
+class SetSearch:
     """The programs of one statement, with Q and Y in these functions of p.
 
     directions (k, n): make s largest with s times each of them in the set at all p; none: the
@@ -44,7 +44,7 @@ class Search:
 
     def __init__(
         self,
-        statement: Statement,
+        statement: SetStatement,
         basis: FunctionSpace,
         directions: Array,
         solver: Solver,
@@ -66,7 +66,7 @@ class Search:
         """Whether time is discrete."""
         return self.statement.model.dt is not None
 
-    def largest(self, alpha: float, T: Array, spare: float = SPARE) -> Found | None:
+    def largest(self, alpha: float, T: Array, spare: float = SPARE) -> SetSolution | None:
         """The largest set with this alpha, in the coordinates x = T z; None: the solver has
         none.
         """
@@ -142,7 +142,7 @@ class Search:
             law = Y.coefficients(x) @ T.T
         shares = np.zeros(0) if tau is None else np.maximum(np.diag(tau.coefficients(x)[0]), 0.0)
         size = -float(cost @ x)
-        return Found(0.5 * (found + np.swapaxes(found, 1, 2)), law, shares / self.unit, size)
+        return SetSolution(0.5 * (found + np.swapaxes(found, 1, 2)), law, shares / self.unit, size)
 
     def _decreases(
         self, program: AffineProgram, cell: BernsteinCell, parts: tuple[Array, ...], alpha: float,

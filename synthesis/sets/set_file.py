@@ -15,7 +15,7 @@ from symheli.values.arrays import frozen
 from symheli.values.whole_files import write_text
 from synthesis.certificate_file import DAMAGED, content_of, decoded, encoded
 from synthesis.sets.proven_set import ProvenSet
-from synthesis.sets.statement import Statement
+from synthesis.sets.statement import SetStatement
 
 SCHEMA, VERSION = "symheli set", 1
 SIZES = ("disturbance", "state_bounds", "input_bounds")
@@ -65,7 +65,7 @@ def _read(content: dict[str, Any]) -> ProvenSet:
         _a_model(feedback)
     sizes = {name: dict(content[name]) for name in SIZES}
     controls = tuple(map(str, content["controls"]))
-    statement = Statement(model=model, controls=controls, feedback=feedback, **sizes)
+    statement = SetStatement(model=model, controls=controls, feedback=feedback, **sizes)
     why = "the inequalities do not hold in exact arithmetic"
     if content["kind"] == "LowComplexitySet":
         n = len(model.states)

@@ -31,7 +31,7 @@ class Limit(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Statement:
+class SetStatement:
     """The loop and its limits.
 
     Attributes
@@ -191,7 +191,7 @@ def stated(
     input_bounds: Mapping[str, float] | None,
     disturbance: Mapping[str, float] | None,
     rate: Rate = None,
-) -> Statement:
+) -> SetStatement:
     """The statement of the arguments of `invariant_set`; raises `InputError` where they do not
     fit.
     """
@@ -207,4 +207,4 @@ def stated(
     feedback = None if controller is None else feedback_of(controller, model, controls)
     states = {} if state_bounds is None else state_bounds
     inputs = {} if input_bounds is None else input_bounds
-    return Statement(model, outside, controls, states, inputs, feedback)
+    return SetStatement(model, outside, controls, states, inputs, feedback)

@@ -20,7 +20,7 @@ from symheli.values.arrays import Array
 from symheli.values.signal import indices, signals
 from synthesis.loops.handling_qualities import Bandwidth, bandwidth
 from synthesis.loops.margins import Margins, loop, margins
-from synthesis.sheet.sheet import Axis, Specification
+from synthesis.sheet.sheet import ControlAxis, Specification
 from synthesis.worst.frozen import crossings, norm, to_continuous
 
 SHARE = 0.05
@@ -44,7 +44,7 @@ class AxisLoop:
 
     plant: LinearModel
     controller: LinearModel
-    axis: Axis
+    axis: ControlAxis
     travel: float = math.nan
     rate_limit: float = math.nan
 

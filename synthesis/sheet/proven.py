@@ -20,7 +20,7 @@ from synthesis.certificate import Certificate
 from synthesis.loops.margins import Margins
 from synthesis.plant.parts import DISTURBANCE
 from synthesis.plant.plant import Plant
-from synthesis.sheet.sheet import Axis, Sheet, Specification
+from synthesis.sheet.sheet import ControlAxis, Sheet, Specification
 
 PROVABLE = {
     "input_peak": ("control", 1.0),
@@ -71,7 +71,7 @@ def provable(sheet: Sheet) -> list[Specification]:
 def peak_loop(
     plant: LPVStateSpace,
     controller: LPVStateSpace | LinearModel,
-    axis: Axis,
+    axis: ControlAxis,
     measure: str,
     *,
     servos: Mapping[str, object] | None = None,
@@ -124,7 +124,7 @@ def prove(
     plant: LPVStateSpace,
     controller: LPVStateSpace | LinearModel,
     specification: Specification,
-    axis: Axis,
+    axis: ControlAxis,
     rate: float = 0.0,
     *,
     servos: Mapping[str, object] | None = None,

@@ -25,7 +25,7 @@ EXPONENTS = {"none": 0.0, "time": -0.5, "frequency": 0.5, "speed": -0.5, "length
 
 
 @dataclass(frozen=True, kw_only=True)
-class Axis:
+class ControlAxis:
     """What an axis is: its loop is broken at `control`, `response` follows its command.
 
     type "attitude": the response is the attitude; "rate": its integral is. `coupled`: the signal
@@ -137,7 +137,7 @@ class Sheet:
     """
 
     title: str
-    axes: Mapping[str, Axis]
+    axes: Mapping[str, ControlAxis]
     specifications: tuple[Specification, ...]
 
     __repr__ = summarized
@@ -157,7 +157,7 @@ class Sheet:
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise InputError(f"{file}: expected a specification sheet in TOML: {error}") from None
         try:
-            axes = {n: Axis(name=n, **own) for n, own in whole.get("axes", {}).items()}
+            axes = {n: ControlAxis(name=n, **own) for n, own in whole.get("axes", {}).items()}
             lengths = whole.get("lengths", {})
             each = [
                 _specification(axis, entry, lengths)

@@ -27,7 +27,7 @@ from synthesis.plant.diagnosis import modes_out_of_reach, unpriced
 from synthesis.plant.plant import Plant, require_plant
 from synthesis.plant.refusals import conditions, require_channels
 from synthesis.structures.descent import STANDSTILL, Point, Stationarity, bfgs, sampled_descent
-from synthesis.structures.peaks import Active, Loops, Value
+from synthesis.structures.peaks import Active, StructureLoops, Value
 from synthesis.structures.structure import Structure
 from synthesis.worst.frozen import norm
 
@@ -234,7 +234,7 @@ def structured(
     count = whole(starts, "starts", 1)
     if not 0 <= decay < math.inf:
         raise InputError(f"decay: expected a finite number >= 0, got {decay!r}")
-    search = _Search.of(plant, structure, specifications, start, units, decay, count)
+    search = _StructureSearch.of(plant, structure, specifications, start, units, decay, count)
     notes: list[str] = []
     rng = np.random.default_rng(whole(seed, "seed"))
     try:
@@ -248,7 +248,7 @@ def structured(
     return search.result(notes)
 
 
-class _Search:
+class _StructureSearch:
     """The state of a search, kept so that an interrupted one has a result."""
 
     def __init__(
@@ -292,7 +292,7 @@ class _Search:
         units: Mapping[str, float] | None,
         decay: float,
         starts: int,
-    ) -> _Search:
+    ) -> _StructureSearch:
         """Check what was given."""
         require_plant(plant)
         require_channels(plant)
@@ -338,10 +338,10 @@ class _Search:
         x = np.concatenate([*first.values()]) / unit
         return cls(plant, structure, given or (L2(),), x, unit, float(decay), starts)
 
-    def _loops(self, points: Array) -> Loops:
+    def _loops(self, points: Array) -> StructureLoops:
         ends = np.cumsum([self.structure.numbers_of(gain) for gain in self.structure.gains])
         units = self.units[ends - 1]
-        return Loops.of(
+        return StructureLoops.of(
             self.plant, self.structure, points, self.wanted, units, self.between, self.decay
         )
 

@@ -65,7 +65,7 @@ class _Closed(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Loops:
+class StructureLoops:
     """The plant at K conditions around the frame of a structure, whose gains close them.
 
     `open`: matrices with a leading axis; `shares` (K, n, g): of every free number in every gain;
@@ -94,7 +94,7 @@ class Loops:
         units: Array,
         bounded: Array,
         decay: float = 0.0,
-    ) -> Loops:
+    ) -> StructureLoops:
         """At `points` (K, m) of the parameters; bounds hold at those and at `bounded` (M, m)."""
         channels = [
             (

@@ -170,7 +170,7 @@ def dwell_time(
     parts = whole(parts, "parts", 1)
     if within is not None:
         within = positive(within, "within")
-    search = _Search(own, parts, solver)
+    search = _ModeSearch(own, parts, solver)
     if search.unstable:
         return _none(own, average, f"mode {search.unstable} is not stable")
     if average:
@@ -233,7 +233,7 @@ def _model(given: Any, dt: float | None) -> LPVStateSpace:
     return LPVStateSpace.constant(given)
 
 
-class _Search:
+class _ModeSearch:
     """Candidates by semidefinite programs in one P a mode, each verified before it is returned."""
 
     def __init__(self, modes: Modes, parts: int, solver: Solver) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy import sparse
 
 from symheli.lpv import Polynomial
-from synthesis.lpv.affine_program import AffineProgram, BernsteinCell, Variable, from_lower
+from synthesis.lpv.affine_program import AffineProgram, BernsteinCell, MatrixVariable, from_lower
 from synthesis.program.cone_program import Answer, ConeProgram, Solver, solve
 from synthesis.tubes.deviations import Cell
 from synthesis.tubes.inequality import (
@@ -194,7 +194,7 @@ class _Inequality:
         one = np.ones((1, 1, 1))
         common = [] if price is None else [program.variable(one, CONSTANT) for _ in range(2)]
         terms = np.eye(len(self.over.left))
-        self.variables: dict[str, Variable] = {
+        self.variables: dict[str, MatrixVariable] = {
             "tube": program.symmetric(n, CONSTANT),
             "gust": program.symmetric(n, CONSTANT),
             "terms": program.variable(terms[:, :, None] * terms, CONSTANT),

@@ -22,7 +22,7 @@ from synthesis.worst.budget import UNLIMITED, Budget
 from synthesis.worst.periodic import Sensitivity, gain, growth
 from synthesis.worst.scheduled import Scheduled
 from synthesis.worst.trajectory import SchedulingTrajectory
-from synthesis.worst.waves import Steps, steps
+from synthesis.worst.waves import TransitionMatrices, steps
 
 Array = np.ndarray
 
@@ -43,7 +43,7 @@ mean.
 class Objective(NamedTuple):
     """Objective along a cycle: a `measure`, divided by the period where `a_second`."""
 
-    measure: Callable[[Steps], Sensitivity]
+    measure: Callable[[TransitionMatrices], Sensitivity]
     a_second: bool
 
     def score(self, value: float, period: float) -> float:
@@ -153,7 +153,7 @@ def _gradient(
     return found, out / (period if objective.a_second else 1.0)
 
 
-def _along(lpv: Scheduled, cycle: SchedulingTrajectory) -> Steps:
+def _along(lpv: Scheduled, cycle: SchedulingTrajectory) -> TransitionMatrices:
     return steps(lpv, cycle.time, cycle.p, float(cycle.time[-1]))
 
 

@@ -20,7 +20,7 @@ from synthesis.worst.ascent import Objective
 from synthesis.worst.budget import UNLIMITED, Budget
 from synthesis.worst.scheduled import Scheduled
 from synthesis.worst.trajectory import SchedulingTrajectory
-from synthesis.worst.waves import Steps, steps
+from synthesis.worst.waves import TransitionMatrices, steps
 
 Array = np.ndarray
 
@@ -87,7 +87,7 @@ class _Path(NamedTuple):
         every = np.repeat(np.arange(len(self.counts)), self.counts)
         return every if math.isfinite(self.rate) else every[every % 2 == 0]
 
-    def steps(self, corners: Corners) -> Steps:
+    def steps(self, corners: Corners) -> TransitionMatrices:
         time, p = corners.cycle(self.rate)
         inner = [
             t0 + (t1 - t0) * np.arange(n) / n

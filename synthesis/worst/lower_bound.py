@@ -30,7 +30,7 @@ from synthesis.worst.rates import Rate, rates
 from synthesis.worst.scheduled import Scheduled
 from synthesis.worst.trajectory import SchedulingTrajectory
 from synthesis.worst.wave_family import WaveFamily
-from synthesis.worst.waves import Steps, samples, steps
+from synthesis.worst.waves import TransitionMatrices, samples, steps
 
 Array = np.ndarray
 
@@ -333,7 +333,9 @@ class _TrajectorySearch:
             else self.family.slowest_period
         )
 
-    def along(self, cycle: SchedulingTrajectory, finer: int = 1, split: int = 1) -> Steps:
+    def along(
+        self, cycle: SchedulingTrajectory, finer: int = 1, split: int = 1
+    ) -> TransitionMatrices:
         """Return the model along one cycle."""
         longest = max(self.family.longest, float(cycle.time[-1]) / self.search.steps) / finer
         return steps(self.lpv, *cycle, longest, split)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from synthesis.worst.waves import Steps
+from synthesis.worst.waves import TransitionMatrices
 
 Array = np.ndarray
 
@@ -51,7 +51,7 @@ class Lifted(NamedTuple):
     J: Array
 
     @classmethod
-    def of(cls, system: Steps) -> Lifted:
+    def of(cls, system: TransitionMatrices) -> Lifted:
         """Return the system over one cycle."""
         n, N = system.states, len(system.step)
         m, r = system.step.shape[2] - n, system.step.shape[1] - n
@@ -66,12 +66,12 @@ class Lifted(NamedTuple):
         return cls(F, G, H, J)
 
 
-def multiplier(system: Steps) -> float:
+def multiplier(system: TransitionMatrices) -> float:
     """Return the largest Floquet multiplier (modulus) of one cycle."""
     return float(np.abs(np.linalg.eigvals(system.transition)).max())
 
 
-def growth(system: Steps) -> Sensitivity:
+def growth(system: TransitionMatrices) -> Sensitivity:
     """Return the logarithm of the largest multiplier, by its left and right eigenvectors carried
     around the cycle.
     """
@@ -93,7 +93,9 @@ def growth(system: Steps) -> Sensitivity:
     return Sensitivity(math.log(abs(values[k])) if values[k] != 0 else -math.inf, left, right)
 
 
-def worst_input(system: Steps, lifted: Lifted | None = None) -> tuple[float, float, Array]:
+def worst_input(
+    system: TransitionMatrices, lifted: Lifted | None = None
+) -> tuple[float, float, Array]:
     """Return (gain, phase advance a cycle in rad, worst input (N, nu), complex) of the repeated
     cycle; gain inf where the state grows.
     """
@@ -127,7 +129,7 @@ def worst_input(system: Steps, lifted: Lifted | None = None) -> tuple[float, flo
     return value, angle, v.reshape(N, m)
 
 
-def gain(system: Steps) -> Sensitivity:
+def gain(system: TransitionMatrices) -> Sensitivity:
     """Return the logarithm of the gain, with the worst response and its adjoint; the phase advance
     a cycle is held.
     """

@@ -52,7 +52,7 @@ def worst_perturbation(unc: UncertainStateSpace, *, gains: bool) -> Perturbed:
     """Return the worst Delta found: of the largest gain of a frozen model (inf: unstable), or with
     `gains` False of the fastest growing mode.
     """
-    frozen = _Frozen.of(unc, gains)
+    frozen = _FrozenModels.of(unc, gains)
     grid = np.linspace(unc.scheduling.low, unc.scheduling.high, GRID)
     ends = [p for piece in unc.model.basis.pieces() for p in (piece.low, piece.high)]
     grid = np.unique([*grid, *(p for p in ends if grid[0] < p < grid[-1])])
@@ -79,7 +79,7 @@ def worst_perturbation(unc: UncertainStateSpace, *, gains: bool) -> Perturbed:
     return best._replace(unstable=surely_unstable(frozen.closed(best.delta, best.p).A, unc.dt))
 
 
-class _Frozen(NamedTuple):
+class _FrozenModels(NamedTuple):
     """The models frozen at each p, with the block open: inputs (u, d), outputs (y, v) in any
     order.
     """
@@ -92,7 +92,7 @@ class _Frozen(NamedTuple):
     gains: bool
 
     @classmethod
-    def of(cls, unc: UncertainStateSpace, gains: bool) -> _Frozen:
+    def of(cls, unc: UncertainStateSpace, gains: bool) -> _FrozenModels:
         into, out = unc.model.inputs, unc.model.outputs
         return cls(
             unc,

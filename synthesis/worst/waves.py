@@ -56,7 +56,7 @@ class Wave(NamedTuple):
         return np.concatenate([time + k * self.period for k in range(cycles)]), np.tile(p, cycles)
 
 
-class Steps(NamedTuple):
+class TransitionMatrices(NamedTuple):
     """Transition matrices: z_k = [x; v] -> [x(k+1); y_k] = step[k] z_k, scaled so that |v|^2 and
     |y|^2 are energies. step (N, nx + r, nx + nu).
 
@@ -86,7 +86,9 @@ def samples(trajectory: SchedulingTrajectory, dt: float) -> SchedulingTrajectory
     return SchedulingTrajectory(at, np.interp(at, time, p))
 
 
-def steps(lpv: Scheduled, time: Array, p: Array, longest: float, split: int = 1) -> Steps:
+def steps(
+    lpv: Scheduled, time: Array, p: Array, longest: float, split: int = 1
+) -> TransitionMatrices:
     """Return the model along straight lines between the corners (`time`, `p`), in steps of at most
     `longest` s, each cut in `split`.
 
@@ -98,7 +100,7 @@ def steps(lpv: Scheduled, time: Array, p: Array, longest: float, split: int = 1)
         sampled = samples(SchedulingTrajectory(time, p), lpv.dt)
         A, B, C, D = lpv.matrices(_clip(lpv, sampled.p))
         at = np.append(sampled.time, sampled.time[-1] + lpv.dt)
-        return Steps(
+        return TransitionMatrices(
             np.concatenate([np.concatenate([A, B], 2), np.concatenate([C, D], 2)], 1), at, n
         )
     starts, widths, p0, slope = [], [], [], []
@@ -126,7 +128,7 @@ def steps(lpv: Scheduled, time: Array, p: Array, longest: float, split: int = 1)
     root = np.sqrt(h)[:, None, None]
     step = np.concatenate([whole[:, :n], *(math.sqrt(0.5) * root * y for y in outputs)], 1)
     step[:, :, n:] /= root
-    return Steps(step, np.append(np.concatenate(starts), time[-1]), n)
+    return TransitionMatrices(step, np.append(np.concatenate(starts), time[-1]), n)
 
 
 def _clip(lpv: Scheduled, p: Array) -> Array:

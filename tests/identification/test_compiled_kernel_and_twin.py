@@ -9,7 +9,7 @@ from known_systems import Truth, moving, structure
 import identification as idn
 from identification.recursive import kernel
 from identification.recursive.kernel import twin
-from identification.recursive.kernel.configuration import Configuration
+from identification.recursive.kernel.configuration import KernelConfiguration
 from identification.recursive.online import Online
 from identification.structure.regressors import regression
 from symheli.lpv import CubicSpline
@@ -180,7 +180,7 @@ def test_other_bases_give_what_batch_least_squares_gives(name, precision):
 def test_basis_in_the_kernel_is_the_basis_of_the_structure():
     """Its Bernstein form against Legendre's recursion and SciPy's splines."""
     for basis in (idn.Polynomial(5, -3.0, 13.0), CubicSpline((0.0, 1.0, 4.0, 9.0, 13.0))):
-        (factor,) = Configuration(structure(basis=basis), idn.Constant(), np.float64).factors
+        (factor,) = KernelConfiguration(structure(basis=basis), idn.Constant(), np.float64).factors
         for p in np.linspace(basis.low, basis.high, 41):
             # Legendre's fifth has Bernstein coefficients of up to 330: a few roundings of those
             np.testing.assert_allclose(twin.evaluate(factor, p), basis(p), rtol=0, atol=1e-12)

@@ -10,7 +10,7 @@ import identification as idn
 from identification.estimators.block_banded import Whitening
 from identification.estimators.filter_error import (
     Noise,
-    Stretch,
+    SmoothedStretch,
     noise_variance,
 )
 from identification.structure.kinematic_arx import increments
@@ -47,7 +47,7 @@ def test_a_step_is_generalized_least_squares_with_the_dense_covariance(vehicle, 
     """
     record = vehicle.record(9, sensors=SENSORS)
     aero = vehicle.kin.aerodynamics
-    s = Stretch.of(aero, record, slice(0, 9))
+    s = SmoothedStretch.of(aero, record, slice(0, 9))
     R, Q = SENSORS**2, np.append(1e-3 * SENSORS[:6] ** 2, [1e-6, 1e-6])
     theta = vehicle.theta + 1e-3
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import symheli
-from symheli.components import Flow, Motion
+from symheli.components import AirMotion, Flow
 from symheli.components.main_rotor import evaluate
 from symheli.physics import inflow
 
@@ -27,7 +27,7 @@ def rotor(ideal):
         controls = {"d_col": d_col, "d_lon": cyclic[0], "d_lat": cyclic[1]}
         own = {"a1": flapping[0], "b1": flapping[1]}
         found = evaluate(
-            par, Motion(*velocity, *rates, 167.0, 1.225), controls, own, Flow(inflow.solve)
+            par, AirMotion(*velocity, *rates, 167.0, 1.225), controls, own, Flow(inflow.solve)
         )
         return (
             np.array(found.force, float),

@@ -72,7 +72,7 @@ OPTIONAL: tuple[Change, ...] = (
 )
 """In the place of a default None: what type belongs there is not known."""
 DEPTH = 3
-OPAQUE = ("RLSState", "Configuration", "Helicopter", "LinearModels", "OperatingPoints")
+OPAQUE = ("RLSState", "KernelConfiguration", "Helicopter", "LinearModels", "OperatingPoints")
 """Taken as they were made: by a reader that checks (fuzzed by itself), or by `init` of a recursion
 whose updates must be quick.
 """

@@ -20,7 +20,7 @@ import symheli
 import synthesis
 from studies.campaigns.campaign import Campaign
 from studies.campaigns.dataset import CampaignDataset
-from studies.campaigns.trial import Outcome, Trial
+from studies.campaigns.trial import Trial, TrialOutcome
 from studies.transition.stored_stages import Stored, StoredStages
 from symheli.logs.signal_map import SignalMap
 from symheli.lpv.linear_models import LinearModels
@@ -268,7 +268,11 @@ def folders(folder: Path) -> list[Reader]:
     path = folder / "campaign.zarr"
     dataset = CampaignDataset.open(path, campaign, {"version": "1"})
     for row, outcome in enumerate(
-        (Outcome((1.4, 0.1)), Outcome((2.0, 0.1)), Outcome((np.nan, 0.1), "ValueError: no length"))
+        (
+            TrialOutcome((1.4, 0.1)),
+            TrialOutcome((2.0, 0.1)),
+            TrialOutcome((np.nan, 0.1), "ValueError: no length"),
+        )
     ):
         dataset.write(row, outcome)
 

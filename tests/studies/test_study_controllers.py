@@ -36,8 +36,8 @@ from studies.controllers.designs import (
 )
 from studies.controllers.flown import (
     WINDS,
-    Flown,
     FlownControllers,
+    TurbulentFlights,
     fly_controllers,
     plans,
 )
@@ -305,7 +305,7 @@ def flight(ratio, lost=False, outside=0.0, beyond=0.0):
 
 
 def flights(name, wind, *each):
-    return Flown(name=name, wind=wind, gust=wind / 5, flights=each)
+    return TurbulentFlights(name=name, wind=wind, gust=wind / 5, flights=each)
 
 
 def test_the_table_says_how_many_flights_the_equations_do_not_promise():

@@ -48,7 +48,7 @@ def test_the_models_are_those_of_the_study_with_a_moving_trim(ideal):
 def test_the_table_gives_the_median_and_the_worst_of_the_seeds():
     fits = {h: np.array([90.0, -20.0, 70.0]) for h in HORIZONS}
     text = pays.table(
-        [pays.Line("still", "pitch", "q", fits, {h: v + 1 for h, v in fits.items()}, 2)]
+        [pays.OutputFits("still", "pitch", "q", fits, {h: v + 1 for h, v in fits.items()}, 2)]
     )
     median, worst = (line.split() for line in text.splitlines() if line.startswith("  q"))
     assert median == ["q", *["70.0", "/", "71.0"] * 3, "2/3"]

@@ -7,7 +7,7 @@ import pytest
 from models import lag, spring
 
 from symheli.lpv import LPVStateSpace
-from symheli.lpv.lpv_state_space import Residuals
+from symheli.lpv.lpv_state_space import FitResiduals
 from synthesis import Spline, SumOfSquares, decay_rate, l2_gain, lft_gain, stability
 
 COARSE = Spline(segments=2, degree=2)
@@ -24,7 +24,7 @@ def test_the_misfit_of_a_fitted_model_is_among_the_hypotheses(analysis, options)
     off = [np.zeros((3, *M.shape[1:])) for M in (lpv.A, lpv.B, lpv.C, lpv.D)]
     off[0][1, 0, 0] = 0.04
     text = analysis(
-        replace(lpv, residuals=Residuals(np.linspace(s.low, s.high, 3), *off)),
+        replace(lpv, residuals=FitResiduals(np.linspace(s.low, s.high, 3), *off)),
         **options,
         search=None,
     ).details

@@ -34,7 +34,7 @@ from synthesis import (
     stability,
 )
 from synthesis.analysis.problem import pose
-from synthesis.assemble.bounded_real import Multiplier
+from synthesis.assemble.bounded_real import BlockMultipliers
 from synthesis.assemble.unknowns import Quadratic, scaled_problem
 from synthesis.lyapunov.spline import graded_knots
 from synthesis.polynomial import exact
@@ -69,7 +69,7 @@ def problem(lpv, degree, rate=0.3, segments=3, with_gain=True):
     s = lpv.scheduling
     scaled = scaled_problem(lpv, rate, 1.0, with_gain=with_gain)
     knots = graded_knots(s.low, s.high, segments, 2.0)
-    own = None if scaled.block is None else Multiplier(scaled.block, 1)
+    own = None if scaled.block is None else BlockMultipliers(scaled.block, 1)
     return scaled, Quadratic(knots, degree, len(lpv.states), own)
 
 

@@ -162,7 +162,7 @@ def test_a_slope_in_the_last_places_of_an_entry_counts():
         (harmful, False),
         (nearly_cancelling([80 * last, last], PiecewiseLinear((0.0, 1.0))), True),
     ):
-        evidence = one_parameter.Evidence(model, model_pieces(model), units, 0.0, 0)
+        evidence = one_parameter.IntervalEvidence(model, model_pieces(model), units, 0.0, 0)
         assert evidence.fault(P, "stability", (0.0,)) is None
         assert evidence.exact(P, np.nan) is holds
 
@@ -175,7 +175,7 @@ def test_a_slope_in_the_last_places_counts_among_several_parameters():
         model = nearly_cancelling([80 * last, least, 80 * last, least], basis)
         demand = Demand("stability", Motion.of(model.parameters))
         units = Scaling(np.eye(2), np.eye(2), 1.0, 1.0, np.eye(2))
-        evidence = box.Evidence(pieces(model), units, demand)
+        evidence = box.BoxEvidence(pieces(model), units, demand)
         assert evidence.fault(P, "stability", (0.0, 0.0)) is None
         assert evidence.exact(P, np.nan) is holds
 
@@ -189,8 +189,8 @@ def test_a_decay_rate_in_the_last_places_is_not_rounded_up():
     P = BoxLyapunov((np.array([0.0, 1.0]),), (0,), np.ones((1, 1, 1)))
     units = Scaling(np.eye(1), np.eye(1), 1.0, 1.0, np.eye(1))
     demand = Demand("decay rate", Motion.of(slow.parameters))
-    evidence = box.Evidence(pieces(slow), units, demand)
+    evidence = box.BoxEvidence(pieces(slow), units, demand)
     assert evidence.exact(P, 0.0)
     assert not evidence.exact(P, 1.6e-16)
     ten = replace(slow, A=np.full((1, 1, 1), np.exp(-1.0)))
-    assert box.Evidence(pieces(ten), units, demand).exact(P, 1.0 - 1e-14)
+    assert box.BoxEvidence(pieces(ten), units, demand).exact(P, 1.0 - 1e-14)

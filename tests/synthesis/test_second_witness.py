@@ -157,8 +157,8 @@ def test_an_error_shared_by_assembly_and_proof_is_found(case, analysis, monkeypa
     # the witness in floating point is kept out, so that what the mutant believes becomes a
     # certificate
     with monkeypatch.context() as blind:
-        blind.setattr(verify.Evidence, "on_grid", lambda *args: True)
-        blind.setattr(proof.Evidence, "on_grid", lambda *args: True)
+        blind.setattr(verify.IntervalEvidence, "on_grid", lambda *args: True)
+        blind.setattr(proof.BoxEvidence, "on_grid", lambda *args: True)
         try:
             cert = ANALYSES[analysis](model())
         except CertificateError:

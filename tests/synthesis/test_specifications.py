@@ -23,9 +23,9 @@ from synthesis.sheet.measures import (
 )
 from synthesis.sheet.probed import probed
 from synthesis.sheet.proven import prove
-from synthesis.sheet.sheet import Axis, Sheet, Specification
+from synthesis.sheet.sheet import ControlAxis, Sheet, Specification
 
-AXIS = Axis(name="arm", control="u", response="y")
+AXIS = ControlAxis(name="arm", control="u", response="y")
 DISK = Specification(
     name="disk",
     axis="arm",

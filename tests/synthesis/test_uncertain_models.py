@@ -312,7 +312,7 @@ def test_half_a_block_in_search_and_proof_is_found_by_the_second_witness(monkeyp
         lambda model, region, P, block, number: supply(model, region, P, halved(block), number),
     )
     with monkeypatch.context() as blind:
-        blind.setattr(one_parameter.Evidence, "on_grid", lambda *args: True)
+        blind.setattr(one_parameter.IntervalEvidence, "on_grid", lambda *args: True)
         # the worst model is known, and would contradict it
         found = searched(unc, 0.3, "l2 gain", form=COARSE)
     assert found.proof.evidence.floating(found.proof.lyapunov, found.bound) is False

@@ -14,14 +14,14 @@ from typing import Any
 import numpy as np
 
 from identification.recursive.kernel import twin
-from identification.recursive.kernel.configuration import Configuration
+from identification.recursive.kernel.configuration import KernelConfiguration
 from symheli.errors import CompilerWarning
 
 SOURCES = ("rls.h", "rls.c", "python.c")
 """Source files of the compiled kernel, in this folder; an autopilot needs only the first two."""
 
 
-def kernel(configuration: Configuration) -> Any:
+def kernel(configuration: KernelConfiguration) -> Any:
     """The compiled kernel, or, with one `CompilerWarning`, the NumPy one: the same numbers,
     slowly.
     """

@@ -12,7 +12,7 @@ import numpy as np
 
 from identification.design.determined import largest
 from identification.recursive.forgetting import Forgetting, numbers
-from identification.structure.lpvarx import LPVARX, Group
+from identification.structure.lpvarx import LPVARX, EquationGroup
 from symheli.errors import InputError
 from symheli.lpv import Basis, Product
 from symheli.values.arrays import Array
@@ -79,7 +79,7 @@ class GroupLayout:
     after the start of the whole.
     """
 
-    group: Group
+    group: EquationGroup
     n: int
     m: int
     state: int
@@ -163,7 +163,7 @@ class Factor:
 
 
 @dataclass(frozen=True, eq=False)
-class Configuration:
+class KernelConfiguration:
     """A structure, a way of forgetting and a precision, as arrays; see rls.h for their meaning."""
 
     structure: LPVARX

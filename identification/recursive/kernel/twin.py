@@ -11,7 +11,12 @@ import numpy as np
 
 from identification.design.determined import MIN_INFORMATION_RATIO, PRIOR, determined
 from identification.recursive.kernel import configuration as at
-from identification.recursive.kernel.configuration import LANES, Configuration, Factor, GroupLayout
+from identification.recursive.kernel.configuration import (
+    LANES,
+    Factor,
+    GroupLayout,
+    KernelConfiguration,
+)
 from symheli.values.arrays import Array
 
 LEARNT, DETERMINED, SATURATED, REFUSED = 1, 2, 4, 8
@@ -83,9 +88,9 @@ class View:
 
 
 class Kernel:
-    """NumPy twin of the compiled `Kernel`, made from a `Configuration`."""
+    """NumPy twin of the compiled `Kernel`, made from a `KernelConfiguration`."""
 
-    def __init__(self, configuration: Configuration):
+    def __init__(self, configuration: KernelConfiguration):
         self._c = configuration
         self._real: Any = float if configuration.dtype is np.float64 else configuration.dtype
         real, (kind, *values) = self._real, configuration.arguments[-1]
@@ -539,7 +544,7 @@ def power(base: Any, exponent: int) -> Any:
     return result
 
 
-def theta(c: Configuration, state: Array) -> Array:
+def theta(c: KernelConfiguration, state: Array) -> Array:
     """Coefficients (n_regressors, ny) in a state, in its precision."""
     out = np.zeros((c.structure.n_regressors, c.structure.ny), state.dtype)
     for layout in c.groups:

@@ -15,7 +15,7 @@ from symheli.lpv.bases.polynomials import (
     scaled_powers,
 )
 from symheli.lpv.lft.model import LFT, Block, parts
-from symheli.lpv.lpv_state_space import LPVStateSpace, Residuals
+from symheli.lpv.lpv_state_space import FitResiduals, LPVStateSpace
 from symheli.lpv.monomials import as_blocks
 from symheli.lpv.recentred import centre, recentred
 from symheli.lpv.scheduling import Scheduling
@@ -212,7 +212,7 @@ def to_lpv(lft: LFT, degree: int | Sequence[int] | None) -> LPVStateSpace:
         values = lft.matrix(np.stack(delta, axis=-1))
         M = basis.fit(nodes, values)
         wrong = np.tensordot(basis(nodes), M, axes=1) - values
-        misfit = Residuals(
+        misfit = FitResiduals(
             nodes, wrong[:, :nx, :nx], wrong[:, :nx, nx:], wrong[:, nx:, :nx], wrong[:, nx:, nx:]
         )
     return LPVStateSpace(

@@ -16,7 +16,7 @@ from symheli.lpv import BSpline, Polynomial
 from symheli.progress import watched
 from synthesis import L2, Gain, Plant, Structure, hinf, structured
 from synthesis.structures import descent, design
-from synthesis.structures.peaks import Loops
+from synthesis.structures.peaks import StructureLoops
 
 
 def integrator(dt=None):
@@ -61,7 +61,9 @@ def test_slopes_are_those_of_differences(dt, what):
     structure = Structure.pid(plant, paths, corner=5.0, bounds={"u1_y1_P": (-0.1, 0.1)})
     units = np.full(12, 0.5)
     one = np.array([[0.0]])
-    loops = Loops.of(plant, structure, one, [L2(), L2(performance=["z1"])], units, one, 100.0)
+    loops = StructureLoops.of(
+        plant, structure, one, [L2(), L2(performance=["z1"])], units, one, 100.0
+    )
     rng = np.random.default_rng(0)
     x = descent.bfgs(
         lambda x, _: loops.pole(x),
@@ -352,7 +354,7 @@ def test_conditions_are_added_where_the_gain_between_is_larger():
     plant = spring(0.5)
     u, y = plant.controls[0], plant.measurements[0]
     structure = Structure.pid(plant, {(u, y): "PD"}, corner=20.0)
-    search = design._Search.of(plant, structure, (), None, None, 0.0, 1)
+    search = design._StructureSearch.of(plant, structure, (), None, None, 0.0, 1)
     search.points = np.array([[v] for v in plant.nominal.box[0]])
     search.loops = search._loops(search.points)
     search.run(np.random.default_rng(0))
