@@ -26,7 +26,6 @@ import math
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -71,8 +70,8 @@ not bound the level and the result does not count as reached.
 """
 PRODUCT_COST = 10
 """Number of products of matrices by coefficient that take the time of one product by place."""
-CHUNK_ENTRIES = 2_000_000
-"""Number of entries of n^4 by place that are summed at a time: 16 MB."""
+CHUNK_ENTRIES = 200_000
+"""Number of entries of n^4 by place that are summed at a time: they stay in the cache."""
 
 
 class Early(NamedTuple):
@@ -288,9 +287,9 @@ class _Inequalities:
         xf = [xH[:, :, r, a][:, :, :, None] @ f for a, r in enumerate(self.used)]
 
         def stacked(*each: Array) -> Array:
-            """(places, terms, n^2)."""
-            flat = np.concatenate([M.reshape(*M.shape[:2], -1, n * n) for M in each], axis=2)
-            return np.moveaxis(flat, 0, 1).reshape(flat.shape[1], -1, n * n)
+            """(places, terms, n, n)."""
+            flat = np.concatenate([M.reshape(*M.shape[:2], -1, n, n) for M in each], axis=2)
+            return np.moveaxis(flat, 0, 1).reshape(flat.shape[1], -1, n, n)
 
         for a, r in enumerate(self.used):
             for b, s in enumerate(self.used[: a + 1]):
@@ -302,8 +301,7 @@ class _Inequalities:
                     left.append(xH[:, :, r, a][:, :, :, None] @ x[:, :, s, b][:, :, None])
                     right.append(np.swapaxes(ff[:, :, s][:, :, :, r], 2, 3))
                     factor = 2.0
-                K = np.swapaxes(stacked(*left), 1, 2) @ stacked(*right)
-                yield a, b, factor * _on_vectors(K, n)
+                yield a, b, factor * _on_vectors(stacked(*left), stacked(*right))
 
 
 class _Bounds:
@@ -326,9 +324,8 @@ class _Bounds:
         out += self.sign * Z
 
     def add_normal(self, H: Array, out: Normal) -> None:
-        n = H.shape[1]
         for j, h in enumerate(H):
-            _add(out, (j, j), _on_vectors(np.outer(h, h), n)[0])
+            _add(out, (j, j), _on_vectors(h[None], h[None]))
 
 
 class _Multiplier:
@@ -380,27 +377,30 @@ def _add(out: Normal, at: tuple[int, int], block: Array) -> None:
         out[i, j] = block
 
 
-def _on_vectors(K: Array, n: int) -> Array:
-    """Return the map V -> the symmetric part of sum L V R as matrices on vectors, where K = sum
-    vec(L) vec(R)' by rows, (..., n^2, n^2).
+def _on_vectors(left: Array, right: Array) -> Array:
+    """Return the maps V -> the symmetric part of sum L V R as matrices on vectors, (..., v, v); the
+    L and R of a map are `left` and `right` (..., terms, n, n).
     """
-    terms, scale = _entries(n)
-    out = np.empty((K.size // n**4, len(scale), len(scale)))
-    for flat, each in zip(K.reshape(-1, n**4), out, strict=True):
-        np.multiply(sum(flat[at] for at in terms), scale[:, None], out=each)
-    return np.multiply(out, scale, out=out)
-
-
-@lru_cache(maxsize=2)
-def _entries(n: int) -> tuple[Array, Array]:
-    """Return where in K, flat, the four terms of every entry stand, and the weights of rows and
-    columns of the entries.
-    """
+    terms, n = left.shape[-3:-1]
     rows, columns, weight = indices(n)
-    i, k = rows.astype(np.int32), columns.astype(np.int32)
-    outer = ((i[:, None], k[:, None]), (k[:, None], i[:, None]))
-    terms = [((a * n + p) * n + q) * n + b for a, b in outer for p, q in ((i, k), (k, i))]
-    return np.array(terms), weight / 2.0
+    if 2 * terms <= n:
+        L = np.concatenate([left[..., rows, :], left[..., columns, :]], axis=-3)
+        R = np.concatenate([right[..., columns], right[..., rows]], axis=-3)
+        L, R = np.moveaxis(L, -3, -1), np.moveaxis(R, -1, -3)
+        by_entry = np.ascontiguousarray(L) @ np.ascontiguousarray(R)
+    else:  # one product for all entries
+        shape = (*left.shape[:-3], terms, n * n)
+        product = np.swapaxes(left.reshape(shape), -1, -2) @ right.reshape(shape)
+        product = np.moveaxis(product.reshape(*shape[:-2], n, n, n, n), -1, -3)
+        by_entry = product[..., rows, columns, :, :] + product[..., columns, rows, :, :]
+    # of every entry of the image, the matrix that is multiplied with V entry by entry
+    flat = by_entry.reshape(*by_entry.shape[:-2], n * n)
+    out = flat.take(rows * n + columns, axis=-1)
+    out += flat.take(columns * n + rows, axis=-1)
+    scale = weight / 2.0
+    out *= scale[:, None]
+    out *= scale
+    return out
 
 
 class _Cones:

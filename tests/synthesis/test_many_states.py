@@ -79,6 +79,16 @@ MODELS = {
 }
 
 
+@pytest.mark.parametrize("terms", [1, 3, 9])
+def test_maps_of_products_are_what_they_do_to_matrices(terms):
+    n, rng = 5, np.random.default_rng(terms)
+    left, right = rng.normal(size=(2, 3, terms, n, n))
+    V = symmetrized(rng.normal(size=(n, n)))
+    image = symmetrized(np.sum(left @ V @ right, axis=1))
+    found = method._on_vectors(left, right) @ svec(V)
+    np.testing.assert_allclose(found, svec(image), rtol=0, atol=1e-12)
+
+
 @pytest.mark.parametrize("dt", [None, 0.1])
 @pytest.mark.parametrize("degree", [0, 1, 2])
 @pytest.mark.parametrize("with_gain", [True, False])
