@@ -93,6 +93,7 @@ class Spline(_InP):
         Of P in every parameter, or one each, 0 to 4; 0 is a constant P. By default for `l2_gain`
         and `stability` of one parameter 3 in continuous and 2 in discrete time (more than 12
         states: 2 and 1), for several 2 and 1, but as for one in a parameter whose rate is another.
+        A gain of several that is far above the worst frozen one is computed with degree 4 too.
         Where p may jump P is constant, whatever the degree.
     segments : int or tuple, optional
         Of P in every parameter; several numbers are tried in turn until the bound is good enough,

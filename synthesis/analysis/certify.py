@@ -16,6 +16,7 @@ from symheli.errors import InputError
 from symheli.lpv import LFT, LPVStateSpace, Scheduling, UncertainStateSpace
 from synthesis.analysis.adjoint import ADJOINT, FAR_ABOVE, backwards
 from synthesis.analysis.apart import apart
+from synthesis.analysis.finer import ABOVE_FROZEN, finer
 from synthesis.analysis.general_search import General
 from synthesis.analysis.hypotheses import VERIFIED, hypotheses
 from synthesis.analysis.ladder import Found, Ladder
@@ -97,18 +98,20 @@ def certify(problem: BoundProblem) -> Certificate:
     cert = report.found(best, beaten, ladder)
     if stability:
         return cert
-    other = None if best.bound <= FAR_ABOVE * frozen.value else backwards(problem)
-    if other is not None:
-        both = cert, _of_adjoint(other, beaten)
-        tried = tuple(attempt for each in both for attempt in each.attempts)
-        cert = replace(min(both, key=attrgetter("gamma")), attempts=tried)
+    second = ((ABOVE_FROZEN, finer, ()), (FAR_ABOVE, backwards, (ADJOINT,)))
+    for above, other, added in second:
+        again = other(problem) if cert.gamma > above * frozen.value else None
+        if again is not None:
+            both = cert, _searched(again, beaten).resting_on(added)
+            tried = tuple(attempt for each in both for attempt in each.attempts)
+            cert = replace(min(both, key=attrgetter("gamma")), attempts=tried)
     return cert.resting_on(search_hypothesis(search and search.seconds, beaten.seconds))
 
 
-def _of_adjoint(problem: BoundProblem, beaten: Beaten) -> Certificate:
-    """Search a proof of the adjoint of a loop, whose lower bound is known."""
+def _searched(problem: BoundProblem, beaten: Beaten) -> Certificate:
+    """Search a proof of a loop whose lower bound is known."""
     ladder = route(problem)
-    return Report(problem).found(ladder.search(beaten.frozen), beaten, ladder).resting_on([ADJOINT])
+    return Report(problem).found(ladder.search(beaten.frozen), beaten, ladder)
 
 
 class _LoopAndWorst(NamedTuple):
