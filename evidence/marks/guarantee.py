@@ -4,6 +4,7 @@ the exact model.
 
 from __future__ import annotations
 
+from argparse import Namespace
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ import numpy as np
 
 import symheli
 import synthesis
+from evidence.marks import unseen
 from evidence.marks.coverage import coverage
 from evidence.seeds import over_seeds, parser_of, seeds_of
 from evidence.tables import DOCS, keep, parsed
@@ -72,8 +74,8 @@ def of_seed(
     autopilot = autopilot_for(heli)
     plans = [aggressive(seed, autopilot), *([gentle(seed, autopilot)] if with_gentle else [])]
     model = identified([symheli.fly(heli, plan) for plan in plans], other)
-    unseen = unseen_flight(model, symheli.fly(heli, transition(seed, autopilot)))
-    unseen.require()
+    judged = unseen_flight(model, symheli.fly(heli, transition(seed, autopilot)))
+    judged.require()
     loop = robust_loop(model)
     proof = synthesis.l2_gain(loop, rate=RATE, form=FORM, search=None)
     nominal = synthesis.frozen_gain(loop.nominal).gain
@@ -85,7 +87,7 @@ def of_seed(
         verdict=verdict(proof.gamma, *exact),
         ratio=proof.gamma / exact[0],
         covered=coverage(model, Truth.of(heli)),
-        unseen=unseen.power,
+        unseen=judged.power,
     )
 
 
@@ -116,12 +118,26 @@ def table(truth: str, exact: tuple[float, float], found: Sequence[Guarantee]) ->
     )
 
 
+def _unseen(options: Namespace) -> None:
+    """How many flights of the same and of changed vehicles are refused."""
+    calls = [partial(unseen.of_seed, seed, options.truth) for seed in seeds_of(options)]
+    text = unseen.table(options.truth, list(over_seeds(options, calls)))
+    print(text)
+    if options.write:
+        keep(DOCS / "identified.md", f"unseen flights {options.truth}", text)
+
+
 def main() -> None:
     """Count how often a certificate from flight data holds."""
     parser = parser_of(__doc__, "0-59")
     parser.add_argument("--truth", default="xcell60", choices=sorted(PAIRS))
     parser.add_argument("--aggressive-alone", action="store_true", help="without the gentle flight")
+    parser.add_argument(
+        "--unseen", action="store_true", help="flights of changed vehicles held against the model"
+    )
     options = parsed(parser, "identified.md", timed=False)
+    if options.unseen:
+        return _unseen(options)
     proof = exact_gain(Helicopter.load(options.truth, governor="ideal"))
     exact = proof.gamma, proof.lower
     progress(f"exact loop: proven {exact[0]:.3f}, lower bound {exact[1]:.3f}")

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification.model import kinematic_run
+from identification.model.flown_in import sentence
 from identification.model.kinematic_realization import Realization
 from identification.model.kinematic_run import Run
 from identification.model.lpvarx_model import LEAST_SQUARES, LPVARXModel
@@ -368,7 +369,8 @@ class KinematicModel:
             source=(
                 f"the coefficients identified by {self.method!r} lie within this bound with"
                 f" probability {probability:g} if their errors are Gaussian with the estimated"
-                " covariance; that the vehicle is of this structure is assumed"
+                " covariance; that the vehicle is of this structure is assumed;"
+                f" {sentence(self.details)}"
             ),
         )
 
