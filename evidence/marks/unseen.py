@@ -21,8 +21,8 @@ from studies.transition.guarantees import PERIOD
 from symheli import DataWarning, FlightPlan, Helicopter, SimulatedFlight, Wind
 from symheli.flight import XCELL_SERVOS, Autopilot, gain_scheduled_lqr
 
-SAME = 5
-"""Flights of the same vehicle for each model."""
+SAME = {True: 20, False: 4}
+"""Flights of the same vehicle for each model, with multisines and without."""
 
 ANOTHER = 100
 """What is added to the seed for each of them."""
@@ -110,7 +110,7 @@ def of_seed(seed: int, truth: str = "xcell60") -> Judged:
     for kind, changes in KINDS.items():
         heli, autopilot, model = _identified(kind, seed, truth)
         for excited in (True, False):
-            for i in range(SAME):
+            for i in range(SAME[excited]):
                 plan = _plan(kind, seed + i * ANOTHER, autopilot, excited)
                 own = found.setdefault((kind, excited, SAME_VEHICLE), [])
                 own.append(unseen_flight(model, symheli.fly(heli, plan)).explained)
