@@ -15,7 +15,7 @@ import numpy as np
 
 import symheli
 import synthesis
-from evidence.marks import unseen
+from evidence.marks import spanning, unseen
 from evidence.marks.coverage import coverage
 from evidence.seeds import over_seeds, parser_of, seeds_of
 from evidence.tables import DOCS, keep, parsed
@@ -127,6 +127,22 @@ def _unseen(options: Namespace) -> None:
         keep(DOCS / "identified.md", f"unseen flights {options.truth}", text)
 
 
+def _spanning(options: Namespace) -> None:
+    """How certificates for two masses and a range of winds stand beside the exact loops."""
+    places = [(m, w) for m in spanning.MASSES for w in (*spanning.WINDS, spanning.TOO_MUCH)]
+    calls = [partial(spanning.of_seed, options.truth, seed) for seed in seeds_of(options)]
+    calls += [partial(spanning.exact, options.truth, mass, wind) for mass, wind in places]
+    found = []
+    for answer in over_seeds(options, calls):
+        found.append(answer)
+        progress(str(answer))
+    seeds = len(found) - len(places)
+    text = spanning.table(options.truth, found[seeds:], found[:seeds])
+    print(text)
+    if options.write:
+        keep(DOCS / "identified.md", f"two masses in wind {options.truth}", text)
+
+
 def main() -> None:
     """Count how often a certificate from flight data holds."""
     parser = parser_of(__doc__, "0-59")
@@ -135,9 +151,14 @@ def main() -> None:
     parser.add_argument(
         "--unseen", action="store_true", help="flights of changed vehicles held against the model"
     )
+    parser.add_argument(
+        "--spanning", action="store_true", help="certificates that span two masses and winds"
+    )
     options = parsed(parser, "identified.md", timed=False)
     if options.unseen:
         return _unseen(options)
+    if options.spanning:
+        return _spanning(options)
     proof = exact_gain(Helicopter.load(options.truth, governor="ideal"))
     exact = proof.gamma, proof.lower
     progress(f"exact loop: proven {exact[0]:.3f}, lower bound {exact[1]:.3f}")

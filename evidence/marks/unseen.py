@@ -147,7 +147,7 @@ def table(truth: str, found: Sequence[Judged]) -> str:
     for kind, changes in KINDS.items():
         for name in (SAME_VEHICLE, *changes):
             refused = [
-                np.concatenate([np.logical_not(one.explained[kind, excited, name]) for one in found])
+                np.logical_not([ok for one in found for ok in one.explained[kind, excited, name]])
                 for excited in (True, False)
             ]
             asked = "at most 5 %" if name == SAME_VEHICLE else "all"
@@ -157,7 +157,7 @@ def table(truth: str, found: Sequence[Judged]) -> str:
     return "\n".join(
         [
             f"Truth {truth}, {len(found)} seeds from {found[0].seed} to {found[-1].seed}; one"
-            " aggressive flight identified, flights of 18.7 s from hover to 13 m/s and back judged.",
+            " aggressive flight identified, others of 18.7 s from hover to 13 m/s and back judged.",
             "",
             markdown(head, rows),
         ]

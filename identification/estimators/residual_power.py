@@ -5,6 +5,7 @@ leaves of the flights it was identified from, and of another flight.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -35,9 +36,6 @@ def window_powers(parts: Sequence[Array], dt: float, window: float = WINDOW) -> 
     spectra = np.abs(np.fft.rfft(np.stack(whole), axis=1)) ** 2 / size
     share = np.fft.rfftfreq(size) / 0.5
     return np.stack(
-        [
-            spectra[:, (share >= low) & (share < high)].mean(axis=1)
-            for low, high in zip(BANDS, BANDS[1:], strict=False)
-        ],
+        [spectra[:, (share >= low) & (share < high)].mean(axis=1) for low, high in pairwise(BANDS)],
         axis=1,
     )

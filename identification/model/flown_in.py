@@ -23,11 +23,29 @@ def flown_in(records: Sequence[FlightRecord]) -> dict[str, str]:
     }
 
 
-def sentence(details: Mapping[str, Any]) -> str:
-    """Return for which vehicle in which air a statement on an identified model holds."""
-    said = dict.fromkeys(CONDITIONS, UNKNOWN) | dict(details.get("flown_in", {}))
-    if found := details.get("wind"):
-        each = (f"{name} {value:.2g} +- {size:.1g}" for name, (value, size) in found.items())
-        said["wind"] += f" (estimated: {', '.join(each)} m/s)"
-    each = (f"{name}: {said[name]}" for name in CONDITIONS)
-    return f"it is about the vehicle as the flights found it ({', '.join(each)}), and no other"
+def sentence(
+    details: Sequence[Mapping[str, Any]], head_wind: tuple[float, float] = (0.0, 0.0)
+) -> str:
+    """Return for which vehicle in which air a statement on identified models holds; `head_wind`
+    (m/s): what the statement adds along the heading.
+    """
+    each = []
+    for name in CONDITIONS:
+        said = [one.get("flown_in", {}).get(name, UNKNOWN) for one in details]
+        if name == "wind":
+            said = [text + _estimated(one) for text, one in zip(said, details, strict=True)]
+        each.append(f"{name}: {'; '.join(dict.fromkeys(said))}")
+    low, high = head_wind
+    still = low == high == 0.0
+    more = "" if still else f", and in a steady head wind of {low:g} to {high:g} m/s besides"
+    found = f"it is about the vehicle as the flights found it ({', '.join(each)}){more}"
+    return f"{found}, and about no other"
+
+
+def _estimated(details: Mapping[str, Any]) -> str:
+    """The wind that was found of the flights."""
+    found = details.get("wind")
+    if not found:
+        return ""
+    each = (f"{name} {value:.2g} +- {size:.1g}" for name, (value, size) in found.items())
+    return f" (estimated: {', '.join(each)} m/s)"

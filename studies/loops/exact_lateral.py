@@ -97,8 +97,6 @@ class ExactLateral:
         return there - here
 
 
-def _family(
-    heli: Helicopter, airspeeds: Sequence[float] | Array, head_wind: float
-) -> LinearFamily:
+def _family(heli: Helicopter, airspeeds: Sequence[float] | Array, head_wind: float) -> LinearFamily:
     wind = (-head_wind, 0.0, 0.0)
     return symheli.sweep(heli, airspeeds, wind=wind, inputs=INPUTS).select(STATES, INPUTS)  # type: ignore[arg-type]
