@@ -91,7 +91,8 @@ def response_regions(
         Only these.
     bias : array (K, w, ny, nu), optional
         What the structure is off besides, as from `structure_bias`: its size counts, its phase does
-        not, so that |bias|^2/2 is added to the variance of both parts.
+        not, and its zeros do not: half the mean of |bias|^2 over neighbouring points and
+        frequencies is added to the variance of both parts.
     draws, seed : int
         Of a normal distribution.
 
@@ -133,7 +134,8 @@ def response_regions(
             raise InputError(
                 f"bias: expected finite numbers of shape {centre.shape}, got shape {off.shape}"
             )
-        covariance += 0.5 * (np.abs(off) ** 2)[..., None, None] * np.eye(2)
+        power = _with_neighbours(_with_neighbours(np.abs(off) ** 2, 0), 1)
+        covariance += 0.5 * power[..., None, None] * np.eye(2)
     return ResponseRegions(centre, covariance)
 
 
@@ -220,6 +222,13 @@ def structure_bias(
         part = truth.select(inputs=plant.inputs, outputs=plant.outputs)
         off.append(plant.at(*p).frequency_response(omega) - part.frequency_response(omega))
     return np.stack(off)
+
+
+def _with_neighbours(values: Array, axis: int) -> Array:
+    """The mean of each of three neighbours along an axis, ends twice."""
+    ends = [(1, 1) if i == axis else (0, 0) for i in range(values.ndim)]
+    wide = np.moveaxis(np.pad(values, ends, mode="edge"), axis, 0)
+    return np.moveaxis((wide[:-2] + wide[1:-1] + wide[2:]) / 3.0, 0, axis)
 
 
 def _plant(
