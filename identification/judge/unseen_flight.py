@@ -85,7 +85,7 @@ class UnseenFlight:
                 f" explains, {self.largest:.2f} is allowed"
                 + f", and in bands more than the flights used to identify allow ({where})"
                 * bool(where)
-                + ": no certificate about the model holds for this vehicle as it flew; identify"
+                + ": no certificate about it holds for this vehicle as it flew; identify"
                 " from this flight too, or find out what has changed"
             )
 
