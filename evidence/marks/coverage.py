@@ -69,8 +69,8 @@ def held(
         response_regions(model, own, FREQUENCIES, *signals, bias=bias) for bias in (None, off)
     )
     exact = np.stack([m.frequency_response(FREQUENCIES) for m in own.values()])
-    shares = (float(regions.contains(exact).mean()) for regions in (narrow, wide))
-    return (*shares, float(np.median(wide.width / narrow.width)))
+    nominal, covered = (float(regions.contains(exact).mean()) for regions in (narrow, wide))
+    return nominal, covered, float(np.median(wide.width / narrow.width))
 
 
 def _at_points(

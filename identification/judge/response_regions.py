@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.stats import chi2
@@ -55,7 +56,7 @@ class ResponseRegions:
     def contains(self, exact: object) -> Array:
         """Whether each response (K, w, ny, nu) is in its region."""
         away = np.asarray(exact, complex) - self.centre
-        off = np.stack([away.real, away.imag], axis=-1)[..., None]
+        off = np.stack([np.real(away), np.imag(away)], axis=-1)[..., None]
         distance = np.sum(off * np.linalg.solve(self.covariance, off), axis=(-2, -1))
         return distance <= chi2.ppf(0.95, 2)
 
@@ -124,7 +125,7 @@ def response_regions(
     for p in _chosen(points):
         own = plant.at(*p).frequency_response(omega)
         spread = np.stack([m.frequency_response(omega) for m in plant.of_each(thetas, *p)]) - own
-        parts = np.stack([spread.real, spread.imag], axis=-1)
+        parts = np.stack([np.real(spread), np.imag(spread)], axis=-1)
         centres.append(own)
         covariances.append(np.einsum("d...i,d...j->...ij", parts, parts) / len(thetas))
     centre, covariance = np.stack(centres), np.stack(covariances)
@@ -143,7 +144,7 @@ def structure_bias(
     model: Model,
     records: FlightRecord | Sequence[FlightRecord],
     simulator: FlightSource,
-    exact: Mapping[Point, LinearModel],
+    exact: Mapping[Any, LinearModel],
     frequencies: object,
     outputs: Sequence[str] | None = None,
     inputs: Sequence[str] | None = None,

@@ -397,7 +397,7 @@ def covering(covariances: Sequence[Array]) -> Array:
     """Return a covariance (m, n, m, n) that is at least each of these: their mean, times the least
     factor that does.
     """
-    mean = sum(covariances) / len(covariances)
+    mean = np.asarray(np.mean(covariances, axis=0))
     if len(covariances) == 1:
         return mean
     size = int(np.sqrt(mean.size))
