@@ -14,6 +14,7 @@ import numpy as np
 import symheli
 from evidence.seeds import over_seeds, parser_of, seeds_of
 from evidence.tables import DOCS, keep, parsed
+from identification import KinematicModel, frozen_stability
 from studies.known_kinematics.flights import aggressive, transition
 from studies.known_kinematics.models import PAIRS, identified
 from studies.known_kinematics.predictions import HORIZON, OUTPUTS, fits_of, states_of
@@ -30,6 +31,9 @@ from studies.transition.flights import (
 from symheli import Dryden, FlightRecord, Helicopter, Wind
 from symheli.values.arrays import Array
 
+CALLS = 50
+"""Draws of a call of stability."""
+
 STATIC_SPEEDS = (0.0, 1.0, 2.0, 4.0, 7.0, 10.0, 13.0)
 """Airspeeds at which static gains are compared, m/s."""
 
@@ -37,7 +41,8 @@ STATIC_SPEEDS = (0.0, 1.0, 2.0, 4.0, 7.0, 10.0, 13.0)
 @dataclass(frozen=True, kw_only=True)
 class Marks:
     """Of one seed. `gaps`: worst nu-gap by axis and where; `stability`: airspeeds on which model
-    and truth disagree; `static`: ratio of static gains by airspeed; fits in percent by output:
+    and truth disagree; `calls`: airspeeds where stability is called not known, and where it is
+    called wrongly; `static`: ratio of static gains by airspeed; fits in percent by output:
     `ahead` and `baseline` 1 s ahead against the noise-free states, `measured` against the measured
     ones, `closed_loop`.
     """
@@ -45,6 +50,7 @@ class Marks:
     seed: int
     gaps: dict[str, tuple[float, float]]
     stability: int
+    calls: tuple[int, int]
     static: dict[float, float]
     ahead: dict[str, float]
     baseline: dict[str, float]
@@ -91,12 +97,22 @@ def of_seed(setting: Setting, seed: int) -> Marks:
         seed=seed,
         gaps={name: (float(g.max()), float(SPEEDS[g.argmax()])) for name, g in gaps.items()},
         stability=beside["all axes"].otherwise_stable("model"),
+        calls=stability_calls(model, truth),
         static={v: truth.static_ratio(models, v) for v in STATIC_SPEEDS},
         ahead=fits_of(clean, model.predict(test, HORIZON)),
         baseline=fits_of(clean, baseline_of(heli, test)),
         measured=fits_of(test.columns(OUTPUTS), model.predict(test, HORIZON)),
         closed_loop=fits_of(clean, model.closed_loop(test)),
     )
+
+
+def stability_calls(model: KinematicModel, truth: Truth) -> tuple[int, int]:
+    """At how many of `SPEEDS` stability is called not known, and at how many wrongly."""
+    points = [(float(v), 0.0)[: len(model.parameters)] for v in SPEEDS]
+    calls = frozen_stability(model, points, draws=CALLS).calls
+    exact = ["stable" if m.is_stable() else "unstable" for m in truth.models["all axes"]]
+    unknown = calls.count("not known")
+    return unknown, sum(a != b for a, b in zip(calls, exact, strict=True)) - unknown
 
 
 def baseline_of(heli: Helicopter, record: FlightRecord) -> Array:
@@ -128,6 +144,12 @@ def table(setting: Setting, marks: Sequence[Marks], simulator_gaps: dict[str, fl
         lines.append(_row(f"worst nu-gap, {axis}", limits[axis], values, marks, 2 * limits[axis]))
     stable = np.array([m.stability for m in marks], float)
     lines.append(_row("airspeeds (of 27) where stability differs", 0.0, stable, marks, 0.0))
+    unknown, wrong = np.array([m.calls for m in marks], float).T
+    third = len(SPEEDS) / 3
+    lines.append(
+        _row("airspeeds where stability is called not known", third, unknown, marks, third)
+    )
+    lines.append(_row("airspeeds where stability is called wrongly", 0.0, wrong, marks, 0.0))
     for airspeed in marks[0].static:
         values = np.array([m.static[airspeed] for m in marks])
         off = np.abs(np.log(values))

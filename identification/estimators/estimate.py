@@ -22,6 +22,7 @@ from identification.estimators.least_squares import residual_covariance
 from identification.estimators.method import Method, method_of
 from identification.estimators.prediction_error import OutputError
 from identification.estimators.state_space_search import state_space_of
+from identification.model.flown_in import flown_in
 from identification.model.kinematic_fit import mean_trim
 from identification.model.kinematic_model import KinematicModel
 from identification.model.lpvarx_model import LPVARXModel
@@ -181,6 +182,8 @@ def _rigid(
         known = {n: p.settled(aerodynamics.details.get(n, {})) for n, p in parts.items()}
         structure = replace(structure, **known)
         aerodynamics = replace(aerodynamics, structure=structure.aerodynamics)
+    flown = {"flown_in": flown_in(records)}
+    aerodynamics = replace(aerodynamics, details={**aerodynamics.details, **flown})
     drive = structure.drive
     return KinematicModel(
         structure=structure,

@@ -19,6 +19,7 @@ from identification.estimators.instruments import FlightSource, flown_rows
 from identification.estimators.least_squares import least_squares
 from identification.estimators.method import Estimate, Method, not_settled
 from identification.estimators.newey_west import long_run_covariance
+from identification.estimators.residual_power import window_powers
 from identification.estimators.simulator_prior import Simulated, SimulatorPrior
 from identification.structure.kinematic_arx import STATES, Aerodynamics, increments
 from identification.structure.lpvarx import LPVARX
@@ -237,6 +238,9 @@ class FilterError(Method):
                 "equation_variances": Noise.of(R, left, *air).Q.tolist(),
                 "gust": self.gust,
                 "gust_remains": air[1],
+                "residual_windows": window_powers(
+                    [s.whitened(theta, noise) for s, noise in flights], records[0].dt
+                ).tolist(),
             }
             | beside,
             remarks=(

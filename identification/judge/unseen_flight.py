@@ -2,25 +2,61 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from scipy.stats import t as student
 
 from identification.estimators.filter_error import Noise, SmoothedStretch, noise_of_flight, unbroken
+from identification.estimators.residual_power import BANDS, WINDOW, window_powers
 from identification.model.kinematic_model import KinematicModel
 from identification.structure.kinematic_arx import STATES
 from symheli.errors import InputError
 from symheli.records import FlightRecord
+from symheli.values.arrays import Array
 
 SURE = 3.0
 """Acceptance threshold, in standard deviations of the noise power."""
+
+LEVEL = 0.01
+"""Probability that a flight of the same vehicle exceeds what the flights used to identify left in
+one of the bands.
+"""
+
+FEWEST = 4
+"""Least number of windows from which the spread between windows is estimated."""
+
+SHORTEST = 0.25
+"""Shortest stretch judged by bands, as a fraction of a window."""
+
+
+class ResidualBand(NamedTuple):
+    """Residual power of one equation between two frequencies (Hz), relative to the most that the
+    flights used to identify make likely.
+
+    Examples
+    --------
+    >>> from identification.judge.unseen_flight import ResidualBand
+    >>> print(ResidualBand("w", 0.0, 1.0, 640.0))
+    w, 0 to 1 Hz: 640 times
+    """
+
+    equation: str
+    low: float
+    high: float
+    ratio: float
+
+    def __str__(self) -> str:
+        return f"{self.equation}, {self.low:g} to {self.high:g} Hz: {self.ratio:.3g} times"
 
 
 @dataclass(frozen=True, kw_only=True)
 class UnseenFlight:
     """Residual power of a model on a flight, relative to the power that its noise explains: `power`
     over all whitened equations together, `largest`: acceptance threshold, `samples`: number of
-    samples used.
+    samples used. `bands`: those above what the flights used to identify make likely, worst first.
 
     Examples
     --------
@@ -33,30 +69,38 @@ class UnseenFlight:
     power: float
     largest: float
     samples: int
+    bands: tuple[ResidualBand, ...] = ()
 
     @property
     def explained(self) -> bool:
-        """Whether the residual power is within the acceptance threshold."""
-        return self.power <= self.largest
+        """Whether the residual power is within the acceptance threshold, in every band too."""
+        return self.power <= self.largest and not self.bands
 
     def require(self) -> None:
         """Raise `InputError` if the model does not explain the flight."""
         if not self.explained:
+            where = "; ".join(map(str, self.bands[:3]))
             raise InputError(
                 f"the residual power on this flight is {self.power:.2f} of what the noise model"
-                f" explains, more than {self.largest:.2f}: no certificate about it holds for this"
-                " vehicle; identify from this flight too, or find out what has changed"
+                f" explains, {self.largest:.2f} is allowed"
+                + f", and in bands more than the flights used to identify allow ({where})"
+                * bool(where)
+                + ": no certificate about it holds for this vehicle as it flew; identify"
+                " from this flight too, or find out what has changed"
             )
 
 
 def unseen_flight(model: KinematicModel, record: FlightRecord) -> UnseenFlight:
     """Validate a model on a flight it was not identified from, by the chi-squared statistic of its
     equations, whitened by the covariance of sensor noise, of what the structure leaves out and of
-    the errors of the coefficients.
+    the errors of the coefficients; and band by band of each equation against windows of 20 s of
+    the flights used to identify, as they left it.
 
     The noise level of the sensors is estimated from the spectrum of this flight, as it was for the
-    flights used to identify, unless `FilterError` was given it; the threshold allows for the error
-    of that estimate.
+    flights used to identify, unless `FilterError` was given it; both thresholds allow for the error
+    of that estimate. The logarithm of the power in a band is taken to be Gaussian over windows: a
+    band is above what is likely at Student's quantile for a probability of 1 % in all bands
+    together. With fewer than four windows, and for flights shorter than 5 s, bands are not judged.
 
     Parameters
     ----------
@@ -116,11 +160,13 @@ def unseen_flight(model: KinematicModel, record: FlightRecord) -> UnseenFlight:
     assert covariance is not None  # noqa: S101  what says its noise says this too
     C = covariance.reshape(model.theta.size, -1)
     power, unknown, spread, count, samples = 0.0, 0.0, 0.0, 0, 0
+    residuals = []
     louder = np.zeros(len(R))  # how much less is left where one sensor is louder by its error
     errors = np.where(told, found.errors, 0.0)
     for part in unbroken(aero, prepared):
         s = SmoothedStretch.of(aero, prepared, part)
         white = s.whitened(model.theta, noise)
+        residuals.append(white)
         power += float(np.sum(white**2))
         known = s.normal(model.theta, noise)[0] @ C  # what errors of the coefficients add
         unknown, spread = unknown + np.trace(known), spread + np.sum(known * known.T)
@@ -132,4 +178,32 @@ def unseen_flight(model: KinematicModel, record: FlightRecord) -> UnseenFlight:
         raise InputError("the record is shorter than 1 s; record longer")
     chance = SURE * float(np.sqrt(2 * (count + spread) + np.sum(louder**2)))
     largest = (count + float(unknown) + chance) / count
-    return UnseenFlight(power=power / count, largest=largest, samples=samples)
+    return UnseenFlight(
+        power=power / count,
+        largest=largest,
+        samples=samples,
+        bands=_unlikely(np.array(details.get("residual_windows", ())), residuals, model.dt, errors),
+    )
+
+
+def _unlikely(
+    known: Array, residuals: Sequence[Array], dt: float, errors: Array
+) -> tuple[ResidualBand, ...]:
+    """Return the bands of residuals (m, 8) above what `known` powers (windows, bands, 8) make
+    likely; `errors` (8,): relative ones of the noise variances of this flight.
+    """
+    length = min(WINDOW, max(map(len, residuals)) * dt)
+    if len(known) < FEWEST or length < SHORTEST * WINDOW:
+        return ()
+    found = np.log(window_powers(residuals, dt, length).mean(axis=0))
+    n, before = len(known), np.log(known)
+    seconds = sum(map(len, residuals)) * dt
+    variance = np.var(before, axis=0, ddof=1) * (WINDOW / length + 1.0 / n)
+    variance += errors**2 * (1.0 + seconds / (n * WINDOW))
+    limit = before.mean(axis=0) + student.isf(LEVEL / found.size, n - 1) * np.sqrt(variance)
+    above = np.exp(found - limit)
+    edges = 0.5 / dt * np.array(BANDS)
+    return tuple(
+        ResidualBand(STATES[i], float(edges[band]), float(edges[band + 1]), float(above[band, i]))
+        for band, i in sorted(np.argwhere(above > 1.0).tolist(), key=lambda at: -above[tuple(at)])
+    )

@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from identification.judge.excited_directions import excited_directions
 from identification.model import kinematic_run
+from identification.model.flown_in import sentence
 from identification.model.kinematic_realization import Realization
 from identification.model.kinematic_run import Run
 from identification.model.lpvarx_model import LEAST_SQUARES, LPVARXModel
@@ -309,6 +311,9 @@ class KinematicModel:
         held: Mapping[str, float] | None = None,
         degree: int | None = None,
         draws: int = 0,
+        other: KinematicModel | None = None,
+        head_wind: tuple[float, float] = (0.0, 0.0),
+        tight_for: UncertainStateSpace | None = None,
     ) -> UncertainStateSpace:
         """Return `to_state_space` with every model of an ellipsoid of coefficients: the set for
         which a certificate must hold to hold for the vehicle.
@@ -316,6 +321,12 @@ class KinematicModel:
         The ellipsoid covers the estimated covariance, with the offsets and what `outputs` and
         `inputs` leave out as they may be; kinematic rows are known numbers and carry no
         uncertainty. One full block: d = Delta v, |Delta|_2 <= bound.
+
+        With an `other` model the set has, equation by equation, what lies between the two: the
+        vehicle with another mass, say. With a `head_wind` the velocity over ground in the kinematic
+        rows is less than the one through the air by any number in that range; the scheduling
+        parameter stays the airspeed, of flights in still air. Each is a block of its own beside
+        that of the coefficients, and what is proven holds too where they move.
 
         Parameters
         ----------
@@ -325,6 +336,13 @@ class KinematicModel:
             As of `to_state_space`.
         draws : int
             0: a proven radius; else that of so many draws, see `matrix_ellipsoid`.
+        other : KinematicModel, optional
+            Of the same structure and sample period, from flights of the vehicle in another state.
+        head_wind : (float, float)
+            Least and largest steady wind along the heading, m/s; from behind where negative.
+        tight_for : UncertainStateSpace, optional
+            A loop closed around what the same call without it returns: the ellipsoid becomes tight
+            where this loop excites errors of the coefficients, at the same probability.
 
         Returns
         -------
@@ -343,22 +361,32 @@ class KinematicModel:
         state feedback with ellipsoidal parametric uncertainty via LMIs, Automatica 44, for
         ellipsoids of coefficients in LMIs.
         """
-        if self.covariance is None or self.method in LEAST_SQUARES:
+        ends = [self] if other is None else [self, other]
+        for end in ends:
+            end._require_a_set(self)
+        low, high = (float(w) for w in head_wind)
+        if not -np.inf < low <= high < np.inf:
             raise InputError(
-                f"method {self.method!r} gives no covariance that holds for noise in the"
-                " regressors: fit by FilterError(SimulatedFlight(...))"
+                f"head_wind: expected (least, largest) in m/s, such as (-2.0, 2.0), got {head_wind}"
             )
-        self.structure.require_plain("a set of models")
-        block, ellipsoid = self.realization.uncertain_part(
+        middle, apart = replace(self.realization, head_wind=0.5 * (low + high)), None
+        if other is not None:
+            apart = 0.5 * (other.theta - self.theta)
+            middle = replace(middle, theta=self.theta + apart, trim=0.5 * (self.trim + other.trim))
+        block, ellipsoid = middle.uncertain_part(
             self.parameters,
             outputs,
             inputs,
             held or {},
-            self.covariance,
+            [end.covariance for end in ends if end.covariance is not None],
             probability,
             draws,
+            apart,
+            0.5 * (high - low),
+            None if tight_for is None else excited_directions(tight_for),
         )
-        model = self.realization.lpv(self.parameters, outputs, inputs, held or {}, degree, block)
+        model = middle.lpv(self.parameters, outputs, inputs, held or {}, degree, block)
+        between = ", between two such in each equation," if other is not None else ""
         return UncertainStateSpace(
             model,
             block.perturbations,
@@ -366,11 +394,29 @@ class KinematicModel:
             bound=ellipsoid.bound,
             probability=probability,
             source=(
-                f"the coefficients identified by {self.method!r} lie within this bound with"
-                f" probability {probability:g} if their errors are Gaussian with the estimated"
-                " covariance; that the vehicle is of this structure is assumed"
+                f"the coefficients identified by {self.method!r}{between} lie within this bound"
+                f" with probability {probability:g} if their errors are Gaussian with the estimated"
+                " covariance; that the vehicle is of this structure is assumed;"
+                f" {sentence([end.details for end in ends], (low, high))}"
             ),
+            parts=block.parts,
         )
+
+    def _require_a_set(self, first: KinematicModel) -> None:
+        """Raises `InputError` for a model without a covariance that holds, of another structure
+        than `first`, or with more than the vehicle in it.
+        """
+        if self.covariance is None or self.method in LEAST_SQUARES:
+            raise InputError(
+                f"method {self.method!r} gives no covariance that holds for noise in the"
+                " regressors: fit by FilterError(SimulatedFlight(...))"
+            )
+        self.structure.require_plain("a set of models")
+        if self.structure != first.structure or self.dt != first.dt:
+            raise InputError(
+                "other: expected a model of the same structure and sample period; identify both"
+                " with one KinematicARX"
+            )
 
     # --- files -----------------------------------------------------------------------------------
 

@@ -14,6 +14,7 @@ from identification.structure.kinematic_arx import MOVING, STATES, KinematicARX
 from symheli.errors import InputError
 from symheli.lpv import FunctionSpace, LinearModel, LPVStateSpace, Matrices, Scheduling
 from symheli.lpv.bases.polynomials import interpolation_points, lobatto_points, polynomials
+from symheli.lpv.uncertain_state_space import DeltaPart
 from symheli.values import Signal
 from symheli.values.arrays import Array
 from symheli.values.kinematics import RIGID_BODY, kinematic_jacobian
@@ -22,14 +23,21 @@ from symheli.values.signal import indices
 INTERPOLATION_TOLERANCE = 1e-9
 """Largest error of an interpolated entry, as a fraction of the largest entry."""
 
+ROUNDING = 1e-10
+"""Relative error of the factor between two covariances: eigenvalues of matrices scaled to a unit
+diagonal below it are rounding.
+"""
+
 MAX_DEGREE = 16
 """Highest degree in each parameter that interpolation tries."""
 
 
 @dataclass(frozen=True, eq=False)
 class BoundedCoefficients:
-    """Coefficients (n, m) known to left D right, |D|_2 bounded: of the lagged signals `kept` and
-    the equations `rows`, as coefficients of `functions` of the parameters that move.
+    """Coefficients (n, m) known to left D right + apart diag(delta), |D|_2 <= bound and |delta| <=
+    bound: of the lagged signals `kept` and the equations `rows`, as coefficients of `functions` of
+    the parameters that move. `apart` (n, m) or None; `wind`: along the heading, m/s a unit of a
+    delta, in each equation of a velocity (`blown`); 0: none.
     """
 
     kept: tuple[int, ...]
@@ -37,8 +45,33 @@ class BoundedCoefficients:
     functions: FunctionSpace
     left: Array
     right: Array
-    perturbations: tuple[Signal, ...]
-    excited: tuple[Signal, ...]
+    apart: Array | None
+    wind: float
+    blown: tuple[int, ...]
+
+    @property
+    def perturbations(self) -> tuple[Signal, ...]:
+        """Names of d, part by part."""
+        equations = [RIGID_BODY[i] for i in self.rows]
+        apart = equations if self.apart is not None else []
+        blown = [RIGID_BODY[i] for i in self.blown]
+        groups = ("delta", equations), ("apart", apart), ("wind", blown)
+        return tuple(Signal(f"{name}_{s}", s.unit) for name, of in groups for s in of)
+
+    @property
+    def excited(self) -> tuple[Signal, ...]:
+        """Names of v, part by part."""
+        count = self.left.shape[1]
+        names = [f"excited_{i}" for i in range(1, count + 1)]
+        names += [f"excited_{d}" for d in self.perturbations[len(self.rows) :]]
+        return tuple(Signal(name, "1") for name in names)
+
+    @property
+    def parts(self) -> tuple[DeltaPart, ...]:
+        """The parts of Delta; none where it is one full matrix."""
+        single = len(self.perturbations) - len(self.rows)
+        whole = DeltaPart(len(self.rows), self.left.shape[1])
+        return (whole, *(DeltaPart(1, 1),) * single) if single else ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +96,8 @@ class Realization:
     dt: float
     rotor: tuple[Signal, ...] = ()
     """The speed of a governed rotor and its integral: the last states."""
+    head_wind: float = 0.0
+    """Steady, along the heading, m/s: the velocity over ground is that of the trim less this."""
 
     @classmethod
     def of(
@@ -98,6 +133,7 @@ class Realization:
 
     def _jacobian(self, p: Array) -> Array:
         y = self.kin.basis(p) @ self.trim
+        y[..., :3] -= self.head_wind * _along_the_heading(y)
         y[..., 3:6] = 0.0  # straight flight
         return kinematic_jacobian(y)
 
@@ -201,16 +237,7 @@ class Realization:
             found = Matrices(A[:, x_, x], B[:, x_, u], C[:, y_, x], D[:, y_, u])
             if block is None:
                 return found
-            E, G, H = self._block(block, whole, p, line, x, u)
-            A, B, C, D = found
-            nothing = np.zeros((len(p), len(y), E.shape[2]))
-            open_ = np.zeros((len(p), G.shape[1], E.shape[2]))
-            return Matrices(
-                A,
-                np.concatenate([B, E], axis=2),
-                np.concatenate([C, G], axis=1),
-                np.block([[D, nothing], [H, open_]]),
-            )
+            return self._opened(found, block, whole, p, x, u)
 
         basis, fitted, nodes = interpolated(part, line, degree)
         more = ((), ()) if block is None else (block.perturbations, block.excited)
@@ -234,12 +261,17 @@ class Realization:
         outputs: Sequence[str] | None,
         inputs: Sequence[str] | None,
         held: Mapping[str, float],
-        covariance: Array,
+        covariances: Sequence[Array],
         probability: float,
         draws: int,
+        apart: Array | None = None,
+        wind: float = 0.0,
+        emphasis: Array | None = None,
     ) -> tuple[BoundedCoefficients, MatrixEllipsoid]:
         """The ellipsoid of the coefficients that stay where only some signals do, on the line of
-        parameters that move: offsets are no dynamics, and what is left out is left out.
+        parameters that move: offsets are no dynamics, and what is left out is left out. It covers
+        each of the `covariances`; `apart` (n, 6): how far off in each equation coefficients may be
+        besides; `wind` (m/s): how far off along the heading; `emphasis`: see `matrix_ellipsoid`.
         """
         _, u, y = self.kept(outputs, inputs)
         line = MovingParameters.of(self.kin, parameters, held)
@@ -251,46 +283,99 @@ class Realization:
         points = interpolation_points(line.degrees, line.ranges)
         project = own.fit(points, f(line.whole(points)))  # f(p) = project' own(p)
         rows = np.array([i for i in y if i < nz])
-        n = f.size
-        blocks = covariance.reshape(nz, -1, n, nz, covariance.shape[1] // n, n)
-        part = blocks[rows][:, kept][:, :, :, rows][:, :, :, :, kept]
-        part = np.einsum("gf,asfbth,kh->asgbtk", project, part, project, optimize=True)
-        size = len(kept) * own.size
-        part = part.reshape(len(rows), size, len(rows), size)
-        part = 0.5 * (part + part.transpose(2, 3, 0, 1))
-        found = matrix_ellipsoid(part, probability, draws)
-        equations = [RIGID_BODY[i] for i in rows]
+        n, size = f.size, len(kept) * own.size
+
+        def along(covariance: Array) -> Array:
+            blocks = covariance.reshape(nz, -1, n, nz, covariance.shape[1] // n, n)
+            part = blocks[rows][:, kept][:, :, :, rows][:, :, :, :, kept]
+            part = np.einsum("gf,asfbth,kh->asgbtk", project, part, project, optimize=True)
+            part = part.reshape(len(rows), size, len(rows), size)
+            return 0.5 * (part + part.transpose(2, 3, 0, 1))
+
+        cover = covering([along(P) for P in covariances])
+        found = matrix_ellipsoid(cover, probability, draws, emphasis=emphasis)
+        if apart is not None:
+            blocks = apart.reshape(-1, n, nz)[kept][:, :, rows]
+            apart = np.einsum("gf,sfa->sga", project, blocks).reshape(size, -1) / found.bound
         block = BoundedCoefficients(
             tuple(kept),
             tuple(int(i) for i in rows),
             own,
             found.left,
             found.right,
-            tuple(Signal(f"delta_{s}", s.unit) for s in equations),
-            tuple(Signal(f"excited_{i}", "1") for i in range(1, size + 1)),
+            apart,
+            wind / found.bound,
+            tuple(int(i) for i in rows if i < 3) if wind else (),
         )
         return block, found
 
-    def _block(
+    def _opened(
         self,
+        model: Matrices,
         block: BoundedCoefficients,
         whole: Array,
         p: Array,
-        line: MovingParameters,
         x: Array,
         u: Array,
+    ) -> Matrices:
+        """The matrices with what the errors of a block do as inputs, and what shows them as
+        outputs.
+        """
+        A, B, C, D = model
+        E, G, H = self._block(block, whole, p, x, u)
+        J = np.zeros((len(p), G.shape[1], E.shape[2]))
+        if block.blown:
+            # M0 y+ = N0 y + .. + dt/2 W J1 (y+ + y): W acts on both ends of the step
+            blown, turned = self._blown(block, whole)
+            E = np.concatenate([E, blown[:, x]], axis=2)
+            J = np.concatenate([J, np.zeros((len(p), J.shape[1], blown.shape[2]))], axis=2)
+            later = turned[:, :, x]
+            G = np.concatenate([G, later @ A + later], axis=1)
+            H, J = np.concatenate([H, later @ B], axis=1), np.concatenate([J, later @ E], axis=1)
+        nothing = np.zeros((len(p), D.shape[1], E.shape[2]))
+        return Matrices(
+            A,
+            np.concatenate([B, E], axis=2),
+            np.concatenate([C, G], axis=1),
+            np.block([[D, nothing], [H, J]]),
+        )
+
+    def _block(
+        self, block: BoundedCoefficients, whole: Array, p: Array, x: Array, u: Array
     ) -> tuple[Array, Array, Array]:
         """E (K, nx, m), G (K, n, nx), H (K, n, nu): what an error of the coefficients does, and
         what shows it.
         """
         X, U = self.regressor()
-        E = np.zeros((len(p), len(self.states), len(block.rows)))
-        E[:, : len(STATES)] = self.solved(whole)[:, :, list(block.rows)] @ block.right.T
+        lefts, rights = [block.left], [block.right]
+        if block.apart is not None:
+            lefts.append(block.apart)
+            rights.append(np.eye(len(block.rows)))
+        E = np.zeros((len(p), len(self.states), sum(map(len, rights))))
+        solved = self.solved(whole)[:, :, list(block.rows)]
+        E[:, : len(STATES)] = solved @ np.hstack([right.T for right in rights])
         g = block.functions(p)
-        seen = block.left.T.reshape(-1, len(block.kept), block.functions.size)
+        seen = np.hstack(lefts).T.reshape(-1, len(block.kept), block.functions.size)
         seen = np.einsum("vsg,kg->kvs", seen, g)
         rows = list(block.kept)
         return E[:, x], seen @ X[rows][:, x], seen @ U[rows][:, u]
+
+    def _blown(self, block: BoundedCoefficients, whole: Array) -> tuple[Array, Array]:
+        """What a wind along the heading does, (K, nx, rows), and half a step of how it turns the
+        velocity in each equation of one, (K, rows, nx).
+        """
+        rows, size = list(block.blown), len(STATES)
+        enters = np.zeros((len(whole), len(self.states), len(rows)))
+        enters[:, :size] = self.solved(whole)[:, :, rows]
+        y = self.kin.basis(whole) @ self.trim
+        still = np.zeros_like(y)
+        still[:, 6:] = y[:, 6:]
+        along = still.copy()
+        along[:, :3] = -_along_the_heading(y)
+        change = kinematic_jacobian(along) - kinematic_jacobian(still)
+        turned = np.zeros((len(whole), len(rows), len(self.states)))
+        turned[:, :, :size] = 0.5 * self.dt * block.wind * change[:, rows]
+        return enters, turned
 
     def remembered(self, y: Array, u: Array, segments: Sequence[slice]) -> Array:
         """x (n, nx) along samples y (n, 8), u (n, nu)."""
@@ -305,6 +390,33 @@ class Realization:
         if self.rotor:
             out[:, -len(self.rotor) :] = u[:, -len(self.rotor) :]
         return out
+
+
+def _along_the_heading(y: Array) -> Array:
+    """Horizontal unit vector (..., 3) along the heading in body axes, at roll and pitch of y."""
+    phi, theta = y[..., 6], y[..., 7]
+    across = np.sin(theta)
+    return np.stack([np.cos(theta), np.sin(phi) * across, np.cos(phi) * across], axis=-1)
+
+
+def covering(covariances: Sequence[Array]) -> Array:
+    """Return a covariance (m, n, m, n) that is at least each of these: their mean, times the least
+    factor that does.
+    """
+    mean = np.asarray(np.mean(covariances, axis=0))
+    if len(covariances) == 1:
+        return mean
+    size = int(np.sqrt(mean.size))
+    joint = mean.reshape(size, size)
+    scale = 1.0 / np.sqrt(np.where(np.diag(joint) > 0, np.diag(joint), 1.0))
+    values, vectors = np.linalg.eigh(joint * np.outer(scale, scale))
+    told = values > ROUNDING * values[-1]
+    root = vectors[:, told] / np.sqrt(values[told])
+    factor = 1.0
+    for P in covariances:
+        own = P.reshape(size, size) * np.outer(scale, scale)
+        factor = max(factor, float(np.linalg.eigvalsh(root.T @ own @ root)[-1]))
+    return min(factor * (1 + ROUNDING), float(len(covariances))) * mean  # each is at most their sum
 
 
 class MovingParameters(NamedTuple):

@@ -30,12 +30,37 @@ the time.
 Verdict = Literal["holds", "fails", "undecided", "no certificate"]
 
 
-def robust_loop(model: KinematicModel) -> UncertainStateSpace:
+def robust_loop(
+    model: KinematicModel,
+    other: KinematicModel | None = None,
+    head_wind: tuple[float, float] = (0.0, 0.0),
+) -> UncertainStateSpace:
     """The loop with a margin around every lateral model of the set, disturbances at the inputs to
-    r and phi, in their sizes.
+    r and phi, in their sizes; `other` and `head_wind` (m/s) as of `KinematicModel.uncertain`.
     """
+    wide = _loop(model, other, head_wind, None)
+    return _loop(model, other, head_wind, wide)
+
+
+def _loop(
+    model: KinematicModel,
+    other: KinematicModel | None,
+    head_wind: tuple[float, float],
+    tight_for: UncertainStateSpace | None,
+) -> UncertainStateSpace:
+    """The loop around a set, tight where another loop around it has its errors."""
     held = {"acceleration_command": 0.0} if len(model.parameters) == 2 else None
-    every = model.uncertain(PROBABILITY, OUTPUTS, INPUTS, held=held, degree=DEGREE, draws=DRAWS)
+    every = model.uncertain(
+        PROBABILITY,
+        OUTPUTS,
+        INPUTS,
+        held=held,
+        degree=DEGREE,
+        draws=DRAWS,
+        other=other,
+        head_wind=head_wind,
+        tight_for=tight_for,
+    )
     loop = every.feedback(FEEDBACK).select(inputs=INPUTS, outputs=("r", "phi"))
     return loop.scaled({u: SIZES[u] for u in INPUTS}, {y: SIZES[y] for y in ("r", "phi")})
 

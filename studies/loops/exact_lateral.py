@@ -42,11 +42,14 @@ class ExactLateral:
     between: LinearFamily
 
     @classmethod
-    def of(cls, heli: Helicopter, low: float = 0.0, high: float = 13.0) -> ExactLateral:
-        """From `low` to `high` m/s, cut at the corners of the model and where an interval would
-        exceed `LONGEST`.
+    def of(
+        cls, heli: Helicopter, low: float = 0.0, high: float = 13.0, head_wind: float = 0.0
+    ) -> ExactLateral:
+        """From `low` to `high` m/s through the air, in a steady `head_wind` (m/s), cut at the
+        corners of the model and where an interval would exceed `LONGEST`.
         """
-        found = _family(heli, np.linspace(low, high, max(2, math.ceil(4 * (high - low))))).kinks
+        first = np.linspace(low, high, max(2, math.ceil(4 * (high - low))))
+        found = _family(heli, first, head_wind).kinks
         ends = [low, *sorted(c for places in found.values() for c in places), high]
         breaks = [
             float(p)
@@ -56,8 +59,8 @@ class ExactLateral:
         basis = Patches(DEGREE, (*breaks, high))
         return cls(
             basis,
-            _family(heli, basis.points(2 * DEGREE + 2)),
-            _family(heli, basis.points(4 * DEGREE + 5)),
+            _family(heli, basis.points(2 * DEGREE + 2), head_wind),
+            _family(heli, basis.points(4 * DEGREE + 5), head_wind),
         )
 
     def loop(
@@ -94,5 +97,6 @@ class ExactLateral:
         return there - here
 
 
-def _family(heli: Helicopter, airspeeds: Sequence[float] | Array) -> LinearFamily:
-    return symheli.sweep(heli, airspeeds, inputs=INPUTS).select(STATES, INPUTS)  # type: ignore[arg-type]
+def _family(heli: Helicopter, airspeeds: Sequence[float] | Array, head_wind: float) -> LinearFamily:
+    wind = (-head_wind, 0.0, 0.0)
+    return symheli.sweep(heli, airspeeds, wind=wind, inputs=INPUTS).select(STATES, INPUTS)  # type: ignore[arg-type]

@@ -8,6 +8,7 @@ import numpy as np
 
 from symheli.flight.course import Clock, Course
 from symheli.flight.disturbance import excitation_of
+from symheli.flight.flown_conditions import flown_conditions
 from symheli.flight.in_numpy import MAX_BANK
 from symheli.flight.plan import FlightPlan
 from symheli.helicopter import Helicopter
@@ -78,7 +79,7 @@ class FlightData:
             values,
             signals_of(self.heli, self.plan),
             note=self._note(),
-            meta={"plan": self.plan},
+            meta={"plan": self.plan, "flown": flown_conditions(self.heli, self.plan)},
         )
 
     def _note(self) -> str:

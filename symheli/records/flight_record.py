@@ -60,7 +60,8 @@ class FlightRecord:
     note : str
         Where the record comes from.
     meta : mapping
-        Anything worth keeping.
+        Anything worth keeping; "flown": what it was flown with, {"wind", "mass", "governor",
+        "servos"} in words, which statements on a model identified from it repeat.
     resampled : str
         How its samples were made of others ("means of 4 samples"; empty where each is what was
         measured at its instant): then y(k) may depend on u(k).

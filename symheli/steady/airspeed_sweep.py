@@ -30,6 +30,7 @@ def sweep(
     *,
     climb_rate: float = 0.0,
     acceleration: float = 0.0,
+    wind: Sequence[float] | Array = (0.0, 0.0, 0.0),
     inputs: Sequence[str] | None = None,
     start: LinearFamily | None = None,
 ) -> LinearFamily:
@@ -45,6 +46,8 @@ def sweep(
         m/s, up.
     acceleration : float
         m/s^2, horizontal, along the nose: quasi-steady points of an accelerating flight.
+    wind : (float, float, float)
+        North, east, down as seen by a nose pointing north, m/s: the same at every airspeed.
     inputs : sequence of str, optional
         As in `linearize`.
     start : LinearFamily, optional
@@ -78,7 +81,9 @@ def sweep(
     speeds = increasing(airspeeds)
     if start and not np.array_equal(start.over_airspeed("a sweep from a family"), speeds):
         raise InputError("the family to start from has other airspeeds")
-    conditions = FlightConditions(speeds, climb_rate=climb_rate, acceleration=acceleration)
+    conditions = FlightConditions(
+        speeds, climb_rate=climb_rate, acceleration=acceleration, wind=wind
+    )
     flights = SteadyFlights.of(heli, conditions)
     if start:
         known = start.known_trims("a sweep from a family")

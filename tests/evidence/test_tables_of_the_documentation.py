@@ -29,7 +29,15 @@ from evidence.bracket.measured import GAINS, bracket
 from evidence.flown import campaign, designs
 from evidence.flown import tuning as sizes
 from evidence.jerk.measured import TransitionPlan, fastest
-from evidence.marks import calibrated, conditions, guarantee, measured
+from evidence.marks import (
+    calibrated,
+    conditions,
+    coverage,
+    guarantee,
+    measured,
+    spanning,
+    unseen,
+)
 from evidence.planar_vtol import tubes as planar_vtol
 from evidence.public_files import fetched
 from evidence.reach.measured import gains
@@ -108,6 +116,28 @@ def guarantee_of_the_worst_seed():
     found = guarantee.of_seed("xcell60", guarantee.PAIRS["xcell60"], seed, exact)
     assert same(shown, found.ratio)
     assert found.verdict == "holds"
+
+
+def unseen_flights_of_the_first_seed():
+    """One heavier vehicle of the table is refused, as the row says of all."""
+    section = KEPT["identified.md", "unseen flights xcell60"]
+    found = unseen.of_seed(0)
+    assert section.cells("deflections")
+    assert found.explained["deflections", True, "20 % heavier"] == [False]
+    assert sum(found.explained["deflections", True, unseen.SAME_VEHICLE]) >= 19
+
+
+def exact_loop_in_the_most_head_wind():
+    shown = KEPT["identified.md", "two masses in wind xcell60"].cells("1.2")
+    found = spanning.exact("xcell60", 1.2, spanning.WINDS[0], prove=False)
+    assert same(shown[1], found.frozen, rel=1e-3)
+
+
+def regions_of_the_first_seed():
+    """A seed lies between the least and the largest that the table prints."""
+    cell = KEPT["identified.md", "regions xcell60"].cells(conditions.CONDITIONS["ideal"].about)[1]
+    least, most = map(float, re.findall(r"[\d.]+", cell)[1:])
+    assert least - 0.06 <= 100 * coverage.of_seed("ideal", 0).covered <= most + 0.06
 
 
 def calibrated_vehicle_of_the_worst_seed():
@@ -431,6 +461,9 @@ ROWS = {
         "xcell60 in turbulence", turbulent=True
     ),
     ("identified.md", "guarantee xcell60"): guarantee_of_the_worst_seed,
+    ("identified.md", "unseen flights xcell60"): unseen_flights_of_the_first_seed,
+    ("identified.md", "two masses in wind xcell60"): exact_loop_in_the_most_head_wind,
+    ("identified.md", "regions xcell60"): regions_of_the_first_seed,
     ("identified.md", "xcell60 under real conditions"): flight_with_servos_of_the_worst_seed,
     ("identified.md", "xcell60 calibrated"): calibrated_vehicle_of_the_worst_seed,
     ("identification.md", "Box-Jenkins system"): coefficient_of_the_box_jenkins_system,

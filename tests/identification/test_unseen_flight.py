@@ -7,6 +7,8 @@ import pytest
 from known_vehicles import STATES, Vehicle
 
 import identification as idn
+from identification.estimators.residual_power import BANDS, window_powers
+from identification.judge import unseen_flight as judge
 from symheli.errors import InputError
 
 SENSORS = np.array([0.02] * 3 + [0.005] * 3 + [0.002] * 2)
@@ -79,3 +81,39 @@ def test_the_noise_it_judges_by_is_kept_in_files(model, vehicle, tmp_path):
     again = idn.KinematicModel.load(model.save(tmp_path / "model.json"))
     assert idn.unseen_flight(again, record) == idn.unseen_flight(model, record)
     assert replace(again, trim=model.trim).details == model.details
+
+
+DT, LONG = 0.02, 1000
+
+
+def white(seed, windows=1):
+    return np.random.default_rng(seed).standard_normal((windows * LONG, 8))
+
+
+def test_power_by_band_is_one_for_white_noise_and_stays_in_its_band():
+    found = window_powers([white(1, 6), white(2, 2)[:-1]], DT)
+    assert found.shape == (7, len(BANDS) - 1, 8)
+    assert np.abs(found.mean(axis=0) - 1).max() < 0.4  # 7 windows of 20 lines: 4.7 deviations
+    slow = np.zeros((LONG, 8))
+    slow[:, 2] = np.sin(2 * np.pi * 0.5 * DT * np.arange(LONG))
+    bands = window_powers([slow], DT)[0]
+    assert bands[0, 2] > 1e6 * bands[1:, 2].max()
+    assert not bands[:, [0, 1, 3]].any()
+    assert window_powers([white(1)[:-1]], DT).shape == (0, len(BANDS) - 1, 8)
+
+
+def test_bands_refuse_one_flight_of_a_hundred_and_find_what_is_slow():
+    known = window_powers([white(1, 8)], DT)
+    refused = sum(
+        bool(judge._unlikely(known, [white(s)], DT, np.zeros(8))) for s in range(100, 200)
+    )
+    assert refused <= 4  # binomial, .01: more than 4 of 100 in three of a thousand
+    # power 1.05 in all, but half a band's in one equation
+    slow = white(300)
+    slow[:, 3] += 1.3 * np.sin(2 * np.pi * 0.5 * DT * np.arange(LONG) + 0.2)
+    (worst, *_) = judge._unlikely(known, [slow], DT, np.zeros(8))
+    assert (worst.equation, worst.low, worst.high) == ("p", 0.0, 1.0)
+    assert "p, 0 to 1 Hz" in str(worst)
+    # too few windows, or too short a flight, are not judged by bands
+    assert judge._unlikely(known[:3], [slow], DT, np.zeros(8)) == ()
+    assert judge._unlikely(known, [slow[:200]], DT, np.zeros(8)) == ()

@@ -348,3 +348,15 @@ def test_tables_of_a_batch_are_those_of_its_points(ideal):
     np.testing.assert_array_equal(found.input(inputs), listed.input(inputs))
     with pytest.raises(symheli.UnknownNameError, match="theta"):
         found.state(["thet"])
+
+
+def test_a_sweep_in_wind_is_the_linearization_in_wind():
+    """At the trim of the velocity through the air, over ground slower by the head wind."""
+    heli, wind = symheli.Helicopter.load("xcell60", governor="ideal"), (-3.0, 0.0, 0.0)
+    family = symheli.sweep(heli, [2.0, 6.0], wind=wind)
+    for speed, found in zip([2.0, 6.0], family.A, strict=True):
+        own = symheli.linearize(heli, symheli.trim(heli, speed, wind=wind)).A
+        np.testing.assert_allclose(found, own, atol=1e-6 * np.abs(own).max())
+    still = symheli.sweep(heli, [2.0, 6.0])
+    turn = family.A[:, 1, 5] - still.A[:, 1, 5]  # dv'/dr is minus the velocity over ground
+    np.testing.assert_allclose(turn, 3.0 * np.cos(still.trims[0].x["theta"]), atol=0.01)

@@ -1,0 +1,247 @@
+"""Regions of identified frequency responses, and the bias of a structure in them as the simulator
+shows it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.stats import chi2
+
+from identification.estimators.estimate import fit
+from identification.estimators.instruments import FlightSource
+from identification.judge.coefficient_covariance import drawn
+from identification.judge.frozen_plant import FrozenPlant, Model, Point
+from symheli.errors import InputError
+from symheli.lpv import LinearModel
+from symheli.records import FlightRecord
+from symheli.values.arrays import Array, frozen
+from symheli.values.numbers import whole
+from symheli.values.summary import summarized
+
+
+@dataclass(frozen=True, eq=False)
+class ResponseRegions:
+    """Frequency responses with an elliptic region of 95 % for each, in the complex plane.
+
+    Parameters
+    ----------
+    centre : array (K, w, ny, nu), complex
+        Responses of the estimate at points of the scheduling and frequencies.
+    covariance : array (K, w, ny, nu, 2, 2)
+        Of real and imaginary part.
+
+    Examples
+    --------
+    >>> from identification.judge.response_regions import ResponseRegions
+    >>> one = ResponseRegions(np.ones((1, 1, 1, 1)), np.eye(2)[None, None, None, None])
+    >>> one.contains([[[[3.4]]]]).item(), one.contains([[[[3.5]]]]).item()
+    (True, False)
+    """
+
+    centre: Array
+    covariance: Array
+
+    __repr__ = summarized
+
+    def __post_init__(self) -> None:
+        centre = np.array(self.centre, complex)
+        object.__setattr__(self, "centre", centre)
+        shape = (*centre.shape, 2, 2)
+        object.__setattr__(self, "covariance", frozen(self.covariance, "covariance", shape))
+
+    def contains(self, exact: object) -> Array:
+        """Whether each response (K, w, ny, nu) is in its region."""
+        away = np.asarray(exact, complex) - self.centre
+        off = np.stack([np.real(away), np.imag(away)], axis=-1)[..., None]
+        distance = np.sum(off * np.linalg.solve(self.covariance, off), axis=(-2, -1))
+        return distance <= chi2.ppf(0.95, 2)
+
+    @property
+    def width(self) -> Array:
+        """Standard deviation of each response (K, w, ny, nu)."""
+        return np.sqrt(np.trace(self.covariance, axis1=-2, axis2=-1))
+
+
+def response_regions(
+    model: Model,
+    points: Iterable[Point],
+    frequencies: object,
+    outputs: Sequence[str] | None = None,
+    inputs: Sequence[str] | None = None,
+    *,
+    bias: object = None,
+    draws: int = 120,
+    seed: int = 0,
+) -> ResponseRegions:
+    """Return regions of 95 % of the frequency responses of an identified model with the scheduling
+    held, by draws of its coefficients.
+
+    Parameters
+    ----------
+    model : LPVARXModel or KinematicModel
+        With a covariance.
+    points : iterable
+        K values of the scheduling: numbers, or tuples of one number a parameter.
+    frequencies : array (w,)
+        rad/s.
+    outputs, inputs : sequence of str, optional
+        Only these.
+    bias : array (K, w, ny, nu), optional
+        What the structure is off besides, as from `structure_bias`: its size counts, its phase does
+        not, and its zeros do not: half the mean of |bias|^2 over neighbouring points and
+        frequencies is added to the variance of both parts.
+    draws, seed : int
+        Of a normal distribution.
+
+    Returns
+    -------
+    ResponseRegions
+        `.contains(exact)`, `.width`.
+
+    Raises
+    ------
+    InputError
+        No covariance, no points, a bias of another shape.
+
+    Examples
+    --------
+    >>> found = idn.response_regions(model, [-0.5, 0.5], [0.1, 1.0])
+    >>> found.centre.shape[:2], bool(found.contains(found.centre).all())
+    ((2, 2), True)
+    """
+    if model.covariance is None:
+        raise InputError(
+            f"method {model.method!r} gives no covariance; fit by FilterError or least squares"
+        )
+    plant = _plant(model, outputs, inputs)
+    thetas = drawn(
+        model.theta, model.covariance, plant.regression.free, whole(draws, "draws", 3), seed
+    )
+    omega, centres, covariances = frozen(frequencies, "frequencies", (None,)), [], []
+    for p in _chosen(points):
+        own = plant.at(*p).frequency_response(omega)
+        spread = np.stack([m.frequency_response(omega) for m in plant.of_each(thetas, *p)]) - own
+        parts = np.stack([np.real(spread), np.imag(spread)], axis=-1)
+        centres.append(own)
+        covariances.append(np.einsum("d...i,d...j->...ij", parts, parts) / len(thetas))
+    centre, covariance = np.stack(centres), np.stack(covariances)
+    if bias is not None:
+        off = np.asarray(bias)
+        if off.shape != centre.shape or not np.isfinite(off).all():
+            raise InputError(
+                f"bias: expected finite numbers of shape {centre.shape}, got shape {off.shape}"
+            )
+        power = _with_neighbours(_with_neighbours(np.abs(off) ** 2, 0), 1)
+        covariance += 0.5 * power[..., None, None] * np.eye(2)
+    return ResponseRegions(centre, covariance)
+
+
+def structure_bias(
+    model: Model,
+    records: FlightRecord | Sequence[FlightRecord],
+    simulator: FlightSource,
+    exact: Mapping[Any, LinearModel],
+    frequencies: object,
+    outputs: Sequence[str] | None = None,
+    inputs: Sequence[str] | None = None,
+) -> Array:
+    """Return how far the structure of a model is off on flights like these, as a simulator of known
+    linear models shows it: the same flights in the simulator, without noise, identified in the
+    same structure by least squares, less its exact responses.
+
+    No noise is in it, so that all of it is what the structure leaves out of a nonlinear vehicle in
+    these manoeuvres. The simulator may be another vehicle: sizes of the bias carry over, phases
+    need not.
+
+    Parameters
+    ----------
+    model : LPVARXModel or KinematicModel
+        Of the structure.
+    records : FlightRecord or sequence of them
+        What it was identified from.
+    simulator : FlightSource
+        `symheli.SimulatedFlight(heli)`.
+    exact : mapping of point to LinearModel
+        Linear models of the simulator's vehicle at points of the scheduling, sampled at the period
+        of the model, with its outputs and inputs.
+    frequencies : array (w,)
+        rad/s.
+    outputs, inputs : sequence of str, optional
+        Only these.
+
+    Returns
+    -------
+    array (K, w, ny, nu), complex
+        At the points of `exact`, in their order.
+
+    Raises
+    ------
+    InputError
+        Another source, no points, linear models of another period.
+
+    References
+    ----------
+    Goodwin, Gevers and Ninness (1992), Quantifying the error in estimated transfer functions with
+    application to model order selection, IEEE Trans. Automatic Control 37, for undermodelling as
+    a random part of the error; its size from a simulator: here.
+
+    Examples
+    --------
+    >>> import symheli
+    >>> heli = symheli.Helicopter.load("xcell60", governor="ideal")
+    >>> ramps = symheli.AirspeedSchedule((6.0, 2.0), (1.5, 1.5), (2.0, 2.0), start=2.0)
+    >>> flight = symheli.fly(heli, ramps, noise_db=30.0,
+    ...     excitation=symheli.Excitation(dict.fromkeys(heli.inputs, 0.01)))
+    >>> kin = idn.KinematicARX(heli.inputs, "airspeed_command", nb=1,
+    ...     basis=idn.Polynomial(1, 2.0, 6.0))
+    >>> wrong = symheli.Helicopter.load("xcell_kahn_hudson", governor="ideal")
+    >>> there = {4.0: symheli.linearize(wrong, airspeed=4.0).discretize(0.02)}
+    >>> off = idn.structure_bias(idn.fit(kin, flight), flight, symheli.SimulatedFlight(wrong),
+    ...     there, [1.0, 5.0], ["p"], ["d_lat"])
+    >>> off.shape
+    (1, 2, 1, 1)
+    """
+    if not isinstance(simulator, FlightSource):
+        raise InputError(
+            "simulator: expected a source of flights such as SimulatedFlight(heli), got"
+            f" {simulator!r:.80}"
+        )
+    given = [records] if isinstance(records, FlightRecord) else list(records)
+    own = fit(model.structure, [simulator.flown(record) for record in given])
+    plant = _plant(own, outputs, inputs)  # type: ignore[arg-type]
+    omega, off = frozen(frequencies, "frequencies", (None,)), []
+    for p, truth in zip(_chosen(exact), exact.values(), strict=True):
+        if truth.dt is None or not np.isclose(truth.dt, model.dt, rtol=1e-9):
+            raise InputError(
+                f"exact: expected linear models sampled every {model.dt:g} s, got {truth.dt}; use"
+                " .discretize(dt)"
+            )
+        part = truth.select(inputs=plant.inputs, outputs=plant.outputs)
+        off.append(plant.at(*p).frequency_response(omega) - part.frequency_response(omega))
+    return np.stack(off)
+
+
+def _with_neighbours(values: Array, axis: int) -> Array:
+    """The mean of each of three neighbours along an axis, ends twice."""
+    ends = [(1, 1) if i == axis else (0, 0) for i in range(values.ndim)]
+    wide = np.moveaxis(np.pad(values, ends, mode="edge"), axis, 0)
+    return np.moveaxis((wide[:-2] + wide[1:-1] + wide[2:]) / 3.0, 0, axis)
+
+
+def _plant(
+    model: Model, outputs: Sequence[str] | None, inputs: Sequence[str] | None
+) -> FrozenPlant:
+    y = tuple(map(str, model.outputs)) if outputs is None else tuple(outputs)
+    u = tuple(map(str, model.inputs)) if inputs is None else tuple(inputs)
+    return FrozenPlant(model, y, u)
+
+
+def _chosen(points: Iterable[Point]) -> list[tuple[float, ...]]:
+    chosen = [p if isinstance(p, tuple) else (p,) for p in points]
+    if not chosen:
+        raise InputError("points: give at least one value of the scheduling")
+    return chosen

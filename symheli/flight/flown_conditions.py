@@ -1,0 +1,35 @@
+"""What a simulated flight was flown with, in words that a record keeps."""
+
+from __future__ import annotations
+
+from symheli.environment import Wind
+from symheli.flight.plan import FlightPlan
+from symheli.helicopter import Helicopter
+
+MASS = "body.mass"
+
+
+def flown_conditions(heli: Helicopter, plan: FlightPlan) -> dict[str, str]:
+    """Return the wind, mass, governor and servos of a flight: `meta["flown"]` of its record."""
+    return {
+        "wind": _wind(plan.wind),
+        "mass": f"{float(heli.parameters[MASS]):.4g} kg",
+        "governor": heli.governor,
+        "servos": _servos(plan),
+    }
+
+
+def _wind(wind: Wind) -> str:
+    gusts = ["gusts"] * bool(wind.gusts) + ["turbulence"] * (wind.turbulence is not None)
+    if not any(wind.steady):
+        return " and ".join(gusts) or "still air"
+    north, east, down = wind.steady
+    return " with ".join([f"({north:g}, {east:g}, {down:g}) m/s north east down", *gusts])
+
+
+def _servos(plan: FlightPlan) -> str:
+    late = f", {1e3 * plan.delay:g} ms late" if plan.delay else ""
+    if plan.servos is None:
+        return f"none{late}"
+    each = (f"{name} {servo.natural_frequency:.3g} rad/s" for name, servo in plan.servos.items())
+    return f"{', '.join(each)}{late}"

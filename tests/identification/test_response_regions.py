@@ -1,0 +1,88 @@
+"""Regions of frequency responses, and the bias of a structure in them."""
+
+import numpy as np
+import pytest
+from known_vehicles import CONTROLS, STATES, Vehicle
+
+import identification as idn
+from symheli.errors import InputError
+
+OMEGA = [0.5, 3.0]
+
+
+@pytest.fixture(scope="module")
+def vehicle():
+    return Vehicle(na=1, nb=1)
+
+
+@pytest.fixture(scope="module")
+def record(vehicle):
+    return vehicle.record(500, seed=1, process=1e-3)
+
+
+@pytest.fixture(scope="module")
+def model(vehicle, record):
+    return idn.fit(vehicle.kin, record)
+
+
+def exact(vehicle, record, *points):
+    own = vehicle.model(record)
+    return {p: own.at(p, outputs=STATES, inputs=CONTROLS) for p in points}
+
+
+def test_a_vehicle_of_the_structure_has_no_bias(vehicle, record, model):
+    """Without noise least squares finds its coefficients but for rounding; the trim of the exact
+    models is that of another flight, and is what is left.
+    """
+    there = exact(vehicle, vehicle.record(500, seed=1), 3.0, 7.0)
+    off = idn.structure_bias(model, record, vehicle.without_noise(seed=1), there, OMEGA)
+    size = np.abs(np.stack([m.frequency_response(OMEGA) for m in there.values()])).max()
+    assert np.abs(off).max() < 1e-6 * size
+
+
+def test_a_structure_of_too_low_a_degree_has_one(record):
+    """Coefficients that move with p, identified as constants."""
+    vehicle = Vehicle(na=1, nb=1)
+    still = idn.KinematicARX(
+        CONTROLS, "airspeed_command", na=1, nb=1, basis=idn.Polynomial(0, 0, 10)
+    )
+    model = idn.fit(still, record)
+    there = exact(vehicle, record, 1.0)
+    off = idn.structure_bias(
+        model, record, vehicle.without_noise(seed=1), there, OMEGA, ["p"], ["d_lat"]
+    )
+    own = there[1.0].select(inputs=["d_lat"], outputs=["p"]).frequency_response(OMEGA)
+    assert np.abs(off[0] / own).min() > 0.02
+
+
+def test_bias_widens_regions_by_its_power_and_moves_no_centre(model):
+    points = [2.0, 5.0, 8.0]
+    plain = idn.response_regions(model, points, OMEGA, ["p"], ["d_lat"], draws=20)
+    off = np.full(plain.centre.shape, 0.3 + 0.4j)
+    wide = idn.response_regions(model, points, OMEGA, ["p"], ["d_lat"], bias=off, draws=20)
+    assert np.array_equal(wide.centre, plain.centre)
+    assert wide.width**2 == pytest.approx(plain.width**2 + 0.25)
+    assert wide.contains(wide.centre + off).all()
+
+
+def test_regions_hold_draws_as_often_as_they_say(vehicle, model):
+    regions = idn.response_regions(model, [5.0], OMEGA, ["p"], ["d_lat"], draws=400)
+    values, vectors = np.linalg.eigh(model.covariance.reshape(2 * (model.theta.size,)))
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    rng, held = np.random.default_rng(3), []
+    for _ in range(200):
+        moved = (root @ rng.normal(size=model.theta.size)).reshape(6, -1).T
+        one = model.with_theta(model.theta + moved).at(5.0, outputs=["p"], inputs=["d_lat"])
+        held.append(regions.contains(one.frequency_response(OMEGA)[None]).mean())
+    assert 0.9 < np.mean(held) < 0.99  # 200 draws: three deviations of .95 are .046
+
+
+def test_what_is_missing_is_said(vehicle, record, model):
+    with pytest.raises(InputError, match="no covariance"):
+        idn.response_regions(model.with_theta(model.theta), [5.0], OMEGA)
+    with pytest.raises(InputError, match="at least one value"):
+        idn.response_regions(model, [], OMEGA)
+    with pytest.raises(InputError, match="bias: expected"):
+        idn.response_regions(model, [5.0], OMEGA, bias=np.zeros(3))
+    with pytest.raises(InputError, match="source of flights"):
+        idn.structure_bias(model, record, record, {}, OMEGA)
