@@ -36,11 +36,13 @@ from synthesis.tubes.inequality import Multipliers
 from synthesis.tubes.motions import Motions
 from synthesis.tubes.proof import holds
 from synthesis.tubes.reference import TUBE_SIZES, Reference, held, moving
-from synthesis.tubes.search import Enclosed, Found, smallest
+from synthesis.tubes.search import Enclosed, Found, multipliers, smallest
 
 Array = np.ndarray
 
-SCHEMA, VERSION = "symheli tube", 3
+SCHEMA, VERSION = "symheli tube", 4
+OLDER = (3,)
+"""Versions whose kinks were enclosed in another way: their multipliers are found anew."""
 INTERVAL = 1.0
 """Largest distance of the nodes of reference, feedback and P along airspeed, m/s."""
 DOWNWARD = 0.75
@@ -66,6 +68,8 @@ the deviations enclosed were too large for any ellipsoid, a smaller start may le
 ROUNDS = 15
 SPARE = 0.02
 """Spare of the inequality in the search, 1/s."""
+RENEWED = 0.005
+"""Spare with which multipliers of a file of an older version are found anew, 1/s."""
 INSIDE = 1 - 1e-6
 """Share of the enclosed deviations that the tube may fill, for rounding of the search."""
 TOLERANCE = 1e-6
@@ -273,14 +277,17 @@ class Tube:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Tube:
-        """Read a tube and prove it again; `proven` says whether that succeeded."""
-        content = content_of(path, SCHEMA, VERSION, "a tube", "Tube.save")
+        """Read a tube and prove it again; `proven` says whether that succeeded. Of a file of an
+        older version the set is the one written, the multipliers of its proof may be others.
+        """
+        content = content_of(path, SCHEMA, VERSION, "a tube", "Tube.save", OLDER)
         try:
             found = _read(content)
         except InputError:
             raise
         except DAMAGED as error:
             raise InputError(f"{path}: damaged, a value is invalid or missing ({error})") from None
+        found = _renewed(found) if content["version"] in OLDER else found
         proven = found.verify()
         why = "" if proven else "the inequality does not hold in exact arithmetic"
         return replace(found, proven=proven, why=why)
@@ -515,6 +522,18 @@ def _fills(boxes: Array, whole: Array) -> bool:
 
 Grown = tuple[Found | None, Array, Array, str]
 """What was found, factors, P, why nothing was."""
+
+
+def _renewed(found: Tube, solver: Solver | None = None) -> Tube:
+    """The same tube with other multipliers in the cells whose terms are others than written."""
+    loop, own = found.deviations, list(found.multipliers)
+    parts = zip(found.cells, found.factors, own, strict=False)
+    for k, (cell, factor, by) in enumerate(parts):
+        made = _enclosed(loop, [cell], factor[None], loop.drifts([cell]))
+        if made is not None and by.terms.shape != (len(made[0].over.left),) * 2:
+            solver = solver or Solver(tolerance=TOLERANCE)
+            own[k] = multipliers(made[0], found.P, by.decay, RENEWED, solver) or by
+    return replace(found, multipliers=tuple(own))
 
 
 def _found(loop: Deviations, cells: tuple[Cell, ...], sizes: Array, solver: Solver) -> Tube:
