@@ -291,8 +291,8 @@ def _bounds(
     sides: Mapping[int, Array] | None = None,
     kept: Sequence[int] | None = None,
 ) -> tuple[_Symbols, _Over, AffineForm, Any, AffineForm]:
-    """Symbols, the program with its kinks, values, Jacobian and roots; the bounds of the sides, 1 or -1
-    in each set, of some kinks, at the points on these sides. `kept`: kinks that have symbols.
+    """Symbols, the program with its kinks, values, Jacobian and roots; the bounds of the sides, 1
+    or -1 in each set, of some kinks, at the points on these sides. `kept`: kinks that have symbols.
     """
     implicit = 0 if start is None else start.numel_out(0)
     program = operations(function)
@@ -541,8 +541,8 @@ class _Kink:
     """A number in [-1, 1], one of the symbols: where between the slopes of its two sides a kink is.
 
     Symbols from `first` on are those of kinks; the one at `product` is the product of this number
-    with another of them, another one in each set, both of which join the `partners`. `side`: 1 or -1 in each set, where bounds are
-    wanted of no other points than those on this side.
+    with another of them, another one in each set; both join the `partners`. `side`: 1 or -1 in
+    each set, where bounds are wanted of no other points than those on this side.
     """
 
     form: AffineForm

@@ -247,15 +247,21 @@ class Tube:
         parts = list(zip(self.cells, self.factors, self.multipliers, strict=True))
         for k, (cell, factor, by) in enumerate(tracked("verifying cells", parts)):
             made = _enclosed(loop, [cell], factor[None], loop.drifts([cell]))
-            nodes = list(_nodes(cell, len(p)))
             if (
                 made is None
-                or by.terms.shape != (len(made[0].over.left),) * 2
-                or not holds(self.P[nodes], p[nodes], cell, made[0].over, factor, by)
+                or not self._holds(made[0], by)
                 or not all(gain.holds_in(k, made[0], p) for gain in self.gains)
             ):
                 return False
         return True
+
+    def _holds(self, made: Enclosed, by: Multipliers) -> bool:
+        """Whether the inequality holds in a cell."""
+        if by.terms.shape != (len(made.over.left),) * 2:
+            return False
+        nodes = list(made.nodes)
+        own = (self.P[nodes], self.nodes[nodes])
+        return holds(*own, made.cell, made.over, made.factor, by)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the tube as JSON: equations (the vehicle file, or the operations of the model),
@@ -520,8 +526,8 @@ def _fills(boxes: Array, whole: Array) -> bool:
     )
 
 
-Grown = tuple[Found | None, Array, Array, str]
-"""What was found, factors, P, why nothing was."""
+Grown = tuple[Found | None, Sequence[Enclosed], Array, str]
+"""What was found, the cells enclosed, P, why nothing was."""
 
 
 def _renewed(found: Tube, solver: Solver | None = None) -> Tube:
@@ -541,11 +547,15 @@ def _found(loop: Deviations, cells: tuple[Cell, ...], sizes: Array, solver: Solv
     that satisfy the inequality lie inside.
     """
     with task("tube", len(GROWTHS)) as progress:
-        found, factors, P, why = _grown(loop, cells, sizes, solver, progress)
+        found, over, P, why = _grown(loop, cells, sizes, solver, progress)
+    factors = np.array([cell.factor for cell in over])
     if found is None:
         return Tube(loop, P, cells, factors, (), False, why)
     made = Tube(loop, P, cells, factors, tuple(found.multipliers), True, "")
-    if made.verify():
+    parts = list(zip(over, made.multipliers, strict=True))
+    if _covers(cells, loop.reference) and all(
+        made._holds(*part) for part in tracked("checking cells", parts)
+    ):
         return made
     return replace(made, proven=False, why="the inequality does not hold in exact arithmetic")
 
@@ -561,12 +571,12 @@ def _grown(
     drifts = loop.drifts(cells)
     linear = _enclosed(loop, cells, factors, drifts, FIRST_SHARE)
     if linear is None or not np.all(np.isfinite(drifts)):
-        return None, factors, P, "the equations have no bounds near the reference"
+        return None, (), P, "the equations have no bounds near the reference"
     decay = _decay(loop, cells, linear, sizes, solver)
     found = None if decay is None else smallest(linear, roots, sizes, decay, SPARE, solver)
     if decay is None or found is None:
-        return None, factors, P, "the linear loop has no invariant ellipsoid"
-    made: Grown = (None, factors, P, "")
+        return None, (), P, "the linear loop has no invariant ellipsoid"
+    made: Grown = (None, (), P, "")
     for first, growth in GROWTHS:
         made = _from_below(loop, cells, sizes, drifts, (decay, first, growth), found.P, solver)
         if made[0] is not None:
@@ -592,20 +602,20 @@ def _from_below(
         factors = np.array([_around(_ends(P, cell)) for cell in cells])
         over = _enclosed(loop, cells, factors, drifts)
         if over is None:
-            return None, factors, P, "the equations have no bounds over a tube of the size needed"
+            return None, (), P, "the equations have no bounds over a tube of the size needed"
         found = smallest(over, roots, sizes, decay, SPARE, solver)
         if found is None:
             why = "no ellipsoid satisfies the inequality: the gusts are too large"
-            return None, factors, P, why
+            return None, over, P, why
         least = min(
             np.linalg.eigvalsh(L.T @ end @ L)[0]
             for cell, L in zip(cells, factors, strict=True)
             for end in _ends(found.P, cell)
         )
         if least * INSIDE > 1:
-            return found, factors, found.P, ""
+            return found, over, found.P, ""
         P = found.P
-    return None, factors, P, f"the tube still grew after {ROUNDS} rounds"
+    return None, over, P, f"the tube still grew after {ROUNDS} rounds"
 
 
 def _decay(
