@@ -658,12 +658,7 @@ class _Over:
         if self.program.operations[position].name not in KINKS:
             return None
         if position not in self.kinks:
-            any_ = AffineForm(
-                *(np.zeros(s) for s in (like.shape, like.slopes.shape)),
-                np.ones(like.shape),
-                like.groups,
-            )
-            return _Kink(any_, like.slopes.shape[-1], 0, None, self.partners)
+            return _Kink(_between(like, -1.0, 1.0), like.slopes.shape[-1], 0, None, self.partners)
         i, count = self.kinks.index(position), len(self.kinks)
         side = self.sides.get(position)
         return _Kink(self._symbol(i, like), self.first, self.first + count + i, side, self.partners)

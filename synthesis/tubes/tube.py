@@ -284,7 +284,7 @@ class Tube:
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Tube:
         """Read a tube and prove it again; `proven` says whether that succeeded. Of a file of an
-        older version the set is the one written, the multipliers of its proof may be others.
+        older version the set is the one written; multipliers and gains may be found anew.
         """
         content = content_of(path, SCHEMA, VERSION, "a tube", "Tube.save", OLDER)
         try:
@@ -293,10 +293,15 @@ class Tube:
             raise
         except DAMAGED as error:
             raise InputError(f"{path}: damaged, a value is invalid or missing ({error})") from None
-        found = _renewed(found) if content["version"] in OLDER else found
-        proven = found.verify()
+        gains = found.gains
+        renewed = _renewed(found) if content["version"] in OLDER else found
+        proven = renewed.verify()
         why = "" if proven else "the inequality does not hold in exact arithmetic"
-        return replace(found, proven=proven, why=why)
+        made = replace(renewed, proven=proven, why=why)
+        if proven and len(made.gains) < len(gains):
+            for gain in gains:
+                made = made.with_gain(gain.outputs, energy=gain.energy)
+        return made
 
 
 def _read(content: dict[str, Any]) -> Tube:
@@ -531,15 +536,18 @@ Grown = tuple[Found | None, Sequence[Enclosed], Array, str]
 
 
 def _renewed(found: Tube, solver: Solver | None = None) -> Tube:
-    """The same tube with other multipliers in the cells whose terms are others than written."""
+    """The same tube with other multipliers in the cells where those written prove nothing; then
+    without gains.
+    """
     loop, own = found.deviations, list(found.multipliers)
-    parts = zip(found.cells, found.factors, own, strict=False)
+    parts = zip(found.cells, found.factors, found.multipliers, strict=False)
     for k, (cell, factor, by) in enumerate(parts):
         made = _enclosed(loop, [cell], factor[None], loop.drifts([cell]))
-        if made is not None and by.terms.shape != (len(made[0].over.left),) * 2:
+        if made is not None and not found._holds(made[0], by):
             solver = solver or Solver(tolerance=TOLERANCE)
             own[k] = multipliers(made[0], found.P, by.decay, RENEWED, solver) or by
-    return replace(found, multipliers=tuple(own))
+    same = all(new is old for new, old in zip(own, found.multipliers, strict=True))
+    return found if same else replace(found, multipliers=tuple(own), gains=())
 
 
 def _found(loop: Deviations, cells: tuple[Cell, ...], sizes: Array, solver: Solver) -> Tube:
