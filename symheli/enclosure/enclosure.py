@@ -488,10 +488,10 @@ class _Dual:
     def absolute(self, kink: _Kink | None) -> _Dual:
         """`kink`: the number in [-1, 1] of the slope where the sign is open."""
         x = self.value.interval
+        value = self.value.absolute()
         if self.slope is None or kink is None:
-            return _Dual(self.value.absolute())
-        slope = _either(x.lower >= 0, x.upper <= 0, self.slope, -self.slope, kink)
-        return _Dual(kink.at_side(self.value.absolute(), self.value, -self.value), slope)
+            return _Dual(value)
+        return kink.either(x.lower >= 0, x.upper <= 0, self, -self, value)
 
     def signed_square(self, share: AffineForm | None) -> _Dual:
         """x|x|, whose derivative is 2|x|. `share`: the number in [-1, 1] that |x| has instead of
@@ -507,33 +507,11 @@ class _Dual:
         return self.chain(value, size.scaled(2.0))
 
     def maximum(self, other: _Dual, kink: _Kink | None) -> _Dual:
-        a, b = self.value.interval, other.value.interval
-        slope = _either(a.lower >= b.upper, b.lower >= a.upper, self.slope, other.slope, kink)
         value = self.value.maximum(other.value)
-        return _Dual(value if kink is None else kink.at_side(value, self.value, other.value), slope)
-
-
-def _either(
-    first: Array,
-    second: Array,
-    left: AffineForm | None,
-    right: AffineForm | None,
-    kink: _Kink | None,
-) -> AffineForm | None:
-    """`left` where `first` holds, `right` where `second` does, else a mean of both: its weights are
-    given by the number of the kink, the same ones for all derivatives.
-    """
-    some = right if left is None else left
-    if some is None or kink is None:
-        return None
-    left, right = (_zero_like(some) if form is None else form for form in (left, right))
-    if kink.side is not None:
-        first, second = first | (~second & (kink.side > 0)), second | (~first & (kink.side < 0))
-    if np.all(first | second):
-        return pick(first[:, None], left, right)
-    mean, half = (left + right).scaled(0.5), (left - right).scaled(0.5)
-    both = mean + kink.times(half)
-    return pick(first[:, None], left, pick(second[:, None], right, both))
+        if kink is None:
+            return _Dual(value)
+        over = (self.value - other.value).interval
+        return kink.either(over.lower >= 0, over.upper <= 0, self, other, value)
 
 
 @dataclass(frozen=True)
@@ -551,9 +529,26 @@ class _Kink:
     side: Array | None
     partners: set[tuple[int, int]]
 
-    def at_side(self, value: AffineForm, left: AffineForm, right: AffineForm) -> AffineForm:
-        """The function's value: that of its known side."""
-        return value if self.side is None else pick(self.side > 0, left, right)
+    def either(
+        self, first: Array, second: Array, left: _Dual, right: _Dual, value: AffineForm
+    ) -> _Dual:
+        """`left` where `first` holds, `right` where `second` does, else, where no side is known,
+        `value` with a mean of both slopes: its weights are given by the number, the same ones for
+        all derivatives.
+        """
+        if self.side is not None:
+            first, second = first | (~second & (self.side > 0)), second | (~first & (self.side < 0))
+        value = pick(first, left.value, pick(second, right.value, value))
+        some = right.slope if left.slope is None else left.slope
+        if some is None:
+            return _Dual(value)
+        slopes = (_zero_like(some) if d.slope is None else d.slope for d in (left, right))
+        one, other = slopes
+        if np.all(first | second):
+            return _Dual(value, pick(first[:, None], one, other))
+        mean, half = (one + other).scaled(0.5), (one - other).scaled(0.5)
+        both = mean + self.times(half)
+        return _Dual(value, pick(first[:, None], one, pick(second[:, None], other, both)))
 
     def times(self, slope: AffineForm) -> AffineForm:
         """The number times derivatives (N, seeds). Where these hold another kink's number, the
@@ -783,12 +778,11 @@ class _Over:
         value = pick(condition == 1, yes.value, value)
         if kink is None:
             return _Dual(value)
-        value = kink.at_side(value, yes.value, no.value)
-        slope = _either(condition == 1, condition == 0, yes.slope, no.slope, kink)
+        found = kink.either(condition == 1, condition == 0, yes, no, value)
         if self.continuous or np.all(condition >= 0):
-            return _Dual(value, slope)
+            return found
         # the function may jump: no bound of its slope
-        return _Dual(value, _endless(slope or _zero(kink.form, self.seeds), condition < 0))
+        return _Dual(found.value, _endless(found.derivative(self.seeds), condition < 0))
 
 
 def _endless(slope: AffineForm, where: Array) -> AffineForm:

@@ -279,8 +279,9 @@ class AffineForm:
         a, b = self.interval, other.interval
         bound = Interval(np.maximum(a.lower, b.lower), np.maximum(a.upper, b.upper))
         chosen = replace(sum_, bound=sum_.interval.intersect(bound)).settled()
-        chosen = pick(a.lower >= b.upper, self, chosen)
-        return pick(b.lower >= a.upper, other, chosen)
+        apart = difference.interval
+        chosen = pick((a.lower >= b.upper) | (apart.lower >= 0), self, chosen)
+        return pick((b.lower >= a.upper) | (apart.upper <= 0), other, chosen)
 
     def minimum(self, other: AffineForm) -> AffineForm:
         """The smaller of two numbers."""
