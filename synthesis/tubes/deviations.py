@@ -26,7 +26,7 @@ SMALL = 1e-3
 TAMED = 1e-3
 """Share of the largest kinks' squares below which offsets of a kink are kept small."""
 TINY = 1e-300
-"""Added to squares that may be 0."""
+"""Least divisor where a square may be 0."""
 CORNERS = 3
 """Commands at whose ends the inequality is checked; the others are terms of the remainder."""
 
