@@ -287,6 +287,16 @@ def test_a_jump_between_the_parts_of_a_cell_is_one_number_times_a_matrix():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("airspeeds", "gust"), [((9.0, 10.0), 0.25), ((8.0, 13.0), 0.2)])
+def test_a_tube_crosses_the_edges_where_the_tail_stalls_and_the_wake_covers_it(airspeeds, gust):
+    heli = Helicopter.load("xcell60", governor="ideal")
+    found = tube(heli, airspeeds, gust=gust, acceleration=0.5, jerk=0.5, snap=0.5)
+    assert found.proven, found.why
+    assert from_its_border(found, 1000, 0.25) < 1
+    assert max(worst(found, p) for p in airspeeds) < 1
+
+
+@pytest.mark.slow
 def test_the_set_of_a_cell_with_two_kinks_holds_the_jacobians_in_it():
     heli, n, count = Helicopter.load("xcell60", governor="ideal"), 10, 4000
     loop = Deviations(heli, moving(heli, np.array([9.0, 10.0]), (1.0, 1.0, 1.0)), 0.15)
