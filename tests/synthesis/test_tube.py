@@ -13,7 +13,8 @@ from evidence.planar_vtol.model import over_ground
 from evidence.planar_vtol.tubes import CASES as VTOL
 from evidence.planar_vtol.tubes import motions, sizes
 from evidence.planar_vtol.tubes import proven as vtol_tube
-from evidence.tubes import from_its_border, worst
+from evidence.tables import DOCS, kept_rows
+from evidence.tubes import _chosen, from_its_border, transitions, worst
 from studies.cli import main
 from symheli import Helicopter
 from symheli.enclosure import AffineForm, SegmentAverages, equations
@@ -284,6 +285,14 @@ def test_a_jump_between_the_parts_of_a_cell_is_one_number_times_a_matrix():
             abs(x @ row) * np.sqrt(v @ W @ v) for row, W in zip(left, weights, strict=True)
         )
         assert abs(x @ (J - at) @ v[:4]) <= bound * (1 + 1e-12)
+
+
+def test_rows_that_are_not_run_stay_as_the_page_has_them():
+    shown = kept_rows(DOCS / "tubes.md", "transitions")
+    assert transitions([], 0, 0.0, shown) in (DOCS / "tubes.md").read_text(encoding="utf-8")
+    assert _chosen(["xcell60, 8 to 13, 0.2"]) == [("xcell60", 8.0, 13.0, 0.2, 0.5, 0.5, 0.5)]
+    with pytest.raises(InputError, match="rows are 'xcell60, 3 to 6, 0.25'"):
+        _chosen(["xcell60"])
 
 
 @pytest.mark.slow
