@@ -26,6 +26,10 @@ NEWTON_STEPS = 20
 GROWTH = 4.0
 BRANCHED = 2
 """Number of kinks both of whose sides are enclosed."""
+WORTH = 0.2
+"""Share of the remainder from which on a kink is one of these: the equations of one side, taken at
+all points, may leave more than the hull of both sides.
+"""
 FIRST_RADIUS = 1.5
 """First radius tried, in units of the remainder divided by the slope."""
 
@@ -236,7 +240,9 @@ def _branches(
     kept = sorted({k for k, any_ in zip(_numbers(function, kinks), used, strict=True) if any_})
     found = found[:, [kinks.index(k) for k in kept]]
     largest = np.argsort(-found.max(axis=0, initial=0.0))[:BRANCHED]
-    chosen = [int(k) for k in largest if np.any(found[:, k] > 0)]
+    left = np.where(np.isfinite(j.rest), j.rest, 0.0) * reach[:, None]
+    worth = WORTH * left.sum(axis=(1, 2))
+    chosen = [int(k) for k in largest if np.any((found[:, k] > 0) & (found[:, k] >= worth))]
     pairs = list(product((1, -1), repeat=len(chosen)))
     signs = np.array(pairs, int).reshape(len(pairs), len(chosen))
     # J of each pair of sides by the products of their signs (Walsh's functions)
