@@ -53,6 +53,17 @@ def keep(page: Path, section: str, text: str, machine: str = "", command: str = 
     )
 
 
+def kept_rows(page: Path, section: str) -> list[list[str]]:
+    """The cells of each row of the table that stands between the marks of `section`, without its
+    head; none where there is no table.
+    """
+    begin, end = f"<!-- {section}: written by its command -->", f"<!-- {section}: end -->"
+    document = page.read_text(encoding="utf-8") if page.is_file() else ""
+    _, _, rest = document.partition(begin)
+    lines = [line for line in rest.partition(end)[0].splitlines() if line.startswith("|")]
+    return [[cell.strip() for cell in line.strip().strip("|").split("|")] for line in lines[2:]]
+
+
 def own_command() -> str:
     """What started this process, as one would type it in a clone; without --out DIR and --processes
     N, which decide where results are kept and how fast, not what they are.

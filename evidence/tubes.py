@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from datetime import date
 from typing import Any, cast
 
 import casadi
@@ -16,7 +17,7 @@ from scipy.linalg import expm
 
 from evidence import tube_gains
 from evidence.planar_vtol import tubes as planar_vtol
-from evidence.tables import DOCS, keep, markdown
+from evidence.tables import DOCS, keep, kept_rows, markdown
 from symheli import Helicopter
 from symheli.errors import InputError
 from synthesis import Tube, tube
@@ -32,8 +33,10 @@ GUSTS = (0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.75, 1.0, 1.25, 1.5)
 TRANSITIONS = (
     ("xcell60", 3.0, 6.0, 0.25, 1.0, 1.0, 1.0),
     ("xcell60", 6.0, 7.0, 0.15, 1.0, 1.0, 1.0),
-    ("xcell_kahn_hudson", 3.0, 4.0, 0.25, 1.0, 1.0, 1.0),
     ("xcell60", 9.0, 10.0, 0.25, 0.5, 0.5, 0.5),
+    ("xcell60", 8.0, 13.0, 0.2, 0.5, 0.5, 0.5),
+    ("xcell_kahn_hudson", 3.0, 4.0, 0.25, 1.0, 1.0, 1.0),
+    ("xcell_kahn_hudson", 3.0, 13.0, 0.25, 1.0, 1.0, 1.0),
 )
 """Helicopter, range, m/s; gusts, m/s; largest acceleration, jerk and snap, m/s^2, m/s^3, m/s^4."""
 FLIGHTS, SECONDS = 10_000, 0.25
@@ -209,30 +212,56 @@ def table(vehicles: Sequence[str], airspeeds: Sequence[float]) -> str:
     return markdown([*head, "worst gust found"], rows)
 
 
-def transitions(cases: Sequence[tuple[Any, ...]], count: int, seconds: float) -> str:
-    """The table of tubes along ranges of airspeed in Markdown, a row for each case."""
+def transitions(
+    cases: Sequence[tuple[Any, ...]], count: int, seconds: float, shown: Sequence[Sequence[str]]
+) -> str:
+    """The table of tubes along ranges of airspeed in Markdown, a row for each of `TRANSITIONS`:
+    those of `cases` are found now, of the others the rows `shown` before stay.
+    """
+    old = {tuple(row[:NAMED]): list(row) for row in shown}
     rows = []
-    for name, *limits in cases:
-        low, high, gust, acceleration, jerk, snap = limits
-        heli = Helicopter.load(name, governor="ideal")
-        found = tube(heli, (low, high), gust=gust, acceleration=acceleration, jerk=jerk, snap=snap)
-        row = [
-            *(name, f"{low:g} to {high:g}"),
-            *(f"{gust:g}", f"{acceleration:g}, {jerk:g}, {snap:g}"),
-        ]
-        if found.proven:
-            widths = [f"{w:.2g}" for w in found.half_widths[:8]]
-            share = max(worst(found, float(p)) for p in (low, high))
-            border = from_its_border(found, count, seconds)
-            row += [" ".join(widths[:3]) + "; " + " ".join(widths[3:6]), " ".join(widths[6:])]
-            row += [f"{share:.2f}", f"{border:.3f}"]
-        else:
-            row += [f"none: {found.why}", "", "", ""]
-        rows.append(row)
-        print(*row, flush=True)
+    for case in TRANSITIONS:
+        if case in cases:
+            rows.append(_transition(case, count, seconds))
+            print(*rows[-1], flush=True)
+        elif tuple(_named(case)) in old:
+            rows.append(old[tuple(_named(case))])
     head = ["helicopter", "airspeed, m/s", "gusts, m/s", "limits, m/s^2, m/s^3, m/s^4"]
     head += ["u v w, m/s; p q r, rad/s", "phi theta, rad", "worst gust found", "furthest flight"]
-    return markdown(head, rows)
+    return markdown([*head, "of"], rows)
+
+
+NAMED = 4
+"""First cells of a row of transitions, which name its case."""
+
+
+def _named(case: tuple[Any, ...]) -> list[str]:
+    name, low, high, gust, *limits = case
+    return [name, f"{low:g} to {high:g}", f"{gust:g}", ", ".join(f"{limit:g}" for limit in limits)]
+
+
+def _transition(case: tuple[Any, ...], count: int, seconds: float) -> list[str]:
+    """The row of a case."""
+    name, low, high, gust, acceleration, jerk, snap = case
+    heli = Helicopter.load(name, governor="ideal")
+    found = tube(heli, (low, high), gust=gust, acceleration=acceleration, jerk=jerk, snap=snap)
+    today = f"{date.today():%d %B %Y}"
+    if not found.proven:
+        return [*_named(case), f"none: {found.why}", "", "", "", today]
+    widths = [f"{w:.2g}" for w in found.half_widths[:8]]
+    share = max(worst(found, float(p)) for p in (low, high))
+    border = from_its_border(found, count, seconds)
+    sizes = [" ".join(widths[:3]) + "; " + " ".join(widths[3:6]), " ".join(widths[6:])]
+    return [*_named(case), *sizes, f"{share:.2f}", f"{border:.3f}", today]
+
+
+def _chosen(rows: Sequence[str]) -> list[tuple[Any, ...]]:
+    """The cases whose first cells are one of "helicopter, low to high, gust"; all without any."""
+    names = {", ".join(_named(case)[:3]): case for case in TRANSITIONS}
+    unknown = [row for row in rows if row not in names]
+    if unknown:
+        raise InputError(f"no row {unknown[0]!r}; rows are {', '.join(map(repr, names))}")
+    return [case for name, case in names.items() if not rows or name in rows]
 
 
 def remainders(intervals: Sequence[float]) -> str:
@@ -269,12 +298,23 @@ def main() -> None:
         choices=("amplitudes", "transitions", "remainders", "gains", "vtol"),
         help="one of the tables",
     )
+    parser.add_argument(
+        "--rows",
+        nargs="+",
+        default=[],
+        metavar="ROW",
+        help='of transitions, "helicopter, low to high, gust"; the page keeps the others',
+    )
     given = parser.parse_args()
+    if given.rows and given.only != "transitions":
+        parser.error("--rows names rows of --only transitions")
     if given.write and given.quick:
         parser.error("--write keeps whole tables: leave out --quick")
     makers = {
         "amplitudes": lambda: table(VEHICLES, AIRSPEEDS),
-        "transitions": lambda: transitions(TRANSITIONS, FLIGHTS, SECONDS),
+        "transitions": lambda: transitions(
+            _chosen(given.rows), FLIGHTS, SECONDS, kept_rows(DOCS / "tubes.md", "transitions")
+        ),
         "remainders": lambda: remainders(INTERVALS),
         "gains": tube_gains.table,
         "vtol": planar_vtol.table,

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import Any
 
-from symheli.codegen.symbolic import clip, maximum, where
+from symheli.codegen.symbolic import clip, maximum, minimum, where
 from symheli.components.component import AirMotion, Component, Effect, Flow
 from symheli.components.entry import Entry
 
@@ -24,17 +24,28 @@ def evaluate(
         K_lam = 0 where V_imr <= w_a or chi <= g_i, 1.5 where chi >= g_f,
                 else 1.5 (chi - g_i)/(g_f - g_i)
 
+    Without smoothing 1.5 (chi - g_i)/(g_f - g_i) V_imr is written w_p, with chi V_imr = u_a (1 +
+    w_a/(V_imr - w_a)): a product of chi and V_imr, which vary against each other, would widen
+    bounds of it over a set of flights (`symheli.enclosure`).
+
     Source: G15, wake intensity factor. `smoothing` rounds both corners (in units of K_lam).
     """
     g_i = flow.name("g_i", (par.tail_arm - par.rotor_radius - par.tail_radius) / par.tail_height)
     g_f = flow.name("g_f", (par.tail_arm - par.rotor_radius + par.tail_radius) / par.tail_height)
     down = motion.w_a - flow["V_imr"]
     # guarded: where the flow goes up through the disc the wake is above the tail
-    chi = flow.name(r"\chi", motion.u_a / maximum(-down, 1e-3))
+    through = maximum(-down, 1e-3)
+    chi = flow.name(r"\chi", motion.u_a / through)
     share = flow.name(r"\kappa", 1.5 * (chi - g_i) / (g_f - g_i))
     k_lam = flow.name(r"K_\lambda", where(down < 0, clip(share, 0.0, 1.5, par.smoothing), 0.0))
+    w_wake = k_lam * flow["V_imr"]
+    if par.smoothing == 0.0:
+        most = 1.5 * flow["V_imr"]
+        back = motion.u_a * (1 + minimum(motion.w_a, flow["V_imr"] - 1e-3) / through)
+        partly = flow.name("w_p", 1.5 * (back - g_i * flow["V_imr"]) / (g_f - g_i))
+        w_wake = where(down < 0, clip(partly, minimum(most, 0.0), maximum(most, 0.0)), 0.0)
     return Effect(
-        flow={"w_wake": k_lam * flow["V_imr"], "K_lam": k_lam},
+        flow={"w_wake": w_wake, "K_lam": k_lam},
         switches={
             "wake reaches the tail": chi - g_i,
             "tail fully in the wake": chi - g_f,

@@ -4,7 +4,7 @@ Every bound is first order in the symbols of the domain, rounding errors include
 """
 
 from symheli.enclosure.domain import Domain
-from symheli.enclosure.enclosure import Enclosure, enclose, segment_averages
+from symheli.enclosure.enclosure import Enclosure, SegmentAverages, enclose, segment_averages
 from symheli.enclosure.form import AffineForm
 
-__all__ = ["AffineForm", "Domain", "Enclosure", "enclose", "segment_averages"]
+__all__ = ["AffineForm", "Domain", "Enclosure", "SegmentAverages", "enclose", "segment_averages"]

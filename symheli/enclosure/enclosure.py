@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass, field, replace
+from itertools import product
+from typing import Any, NamedTuple
 
 import casadi
 import numpy as np
@@ -23,6 +24,12 @@ TRIALS = 8
 NEWTON_STEPS = 20
 """At most, towards the root at the centre of a set."""
 GROWTH = 4.0
+BRANCHED = 2
+"""Number of kinks both of whose sides are enclosed."""
+WORTH = 0.2
+"""Share of the remainder from which on a kink is one of these: the equations of one side, taken at
+all points, may leave more than the hull of both sides.
+"""
 FIRST_RADIUS = 1.5
 """First radius tried, in units of the remainder divided by the slope."""
 
@@ -115,15 +122,200 @@ def enclose(
     >>> print(bounds.lower.round(6), bounds.upper.round(6))
     [-0.5] [0.5]
     """
+    symbols, _, *forms = _bounds(function, domains, start, by, continuous)
+    return Enclosure(*symbols.finished(*forms), symbols.own)
+
+
+class SegmentAverages(NamedTuple):
+    """Averages of a Jacobian over segments: average(z) + mean over the pieces of the sums over
+    kinks of k switched + k' turning z, for symbols z of the domains and numbers k, k' in [-1, 1],
+    others of each kink and piece.
+
+    average : AffineForm (N, n_out, n_in), or without the axis N
+        In the symbols of the domains.
+    switched : array (N, pieces, n_out, n_in, kinks), or without the axis N
+        Half the jump of the Jacobian at a kink,
+    turning : array (N, pieces, n_out, n_in, symbols, kinks), or without the axis N
+        and its change with z.
+    """
+
+    average: AffineForm
+    switched: Array
+    turning: Array
+
+
+def segment_averages(
+    function: casadi.Function,
+    *domains: Domain,
+    along: Sequence[int],
+    start: casadi.Function | None = None,
+    continuous: bool = False,
+    pieces: int = 4,
+) -> SegmentAverages:
+    """Averages of the Jacobian over segments from the centre of a set to each of its points.
+
+    f(x(z)) - f(x(0)) = J [x(z) - x(0)] with J (n_out, n_in) in the form returned, by the mean value
+    theorem. What is linear in z is averaged over [0, z], and halves. The equations are enclosed
+    over `pieces` sets of 1/pieces, 2/pieces, ... of the size, one for each part of a segment: a
+    remainder of second order falls to a third, one of first order to a half. Where the two largest
+    kinks lie in a set, the Jacobian is that of one of their four pairs of sides at each point: each
+    is enclosed, and J has the numbers k_1, k_2 and k_1 k_2.
+
+    Parameters
+    ----------
+    function, domains, start, continuous
+        As for `enclose`.
+    along : sequence of int
+        Positions of the inputs that move along the segment; J has their derivatives. The others are
+        the same all along it, any ones of their domains.
+    pieces : int
+        Parts of a segment.
+
+    Examples
+    --------
+    >>> import casadi
+    >>> x = casadi.SX.sym("x", 1)
+    >>> f = casadi.Function("f", [x], [x**2])
+    >>> average, *_ = segment_averages(f, Domain.box([-1.0], [1.0]), along=[0])
+    >>> print(average.centre.round(6), average.slopes.round(6))
+    [[0.]] [[[1.]]]
+    """
+    counts = [
+        len(m) for d in domains for m, axes in ((d.centre, 1), (d.generators, 2)) if m.ndim > axes
+    ]
+    count, sizes = max(counts, default=1), np.arange(1, pieces + 1) / pieces
+    over = [
+        _pieces(d, count, sizes if i in along else np.ones(pieces)) for i, d in enumerate(domains)
+    ]
+    if not along:
+        raise InputError("averages along segments need along=[0, ...]: inputs that move")
+    moving = np.concatenate([np.full(sum(d.groups), i in along) for i, d in enumerate(domains)])
+    centre, slopes, rest, own = _branches(function, over, pieces, start, along, continuous)
+
+    def parts(values: Array) -> Array:
+        return values.reshape(-1, pieces, *values.shape[1:])
+
+    # on part k of the segment, s z is at (k + 1/2) / (k + 1) of the set's size on average
+    share = (np.arange(pieces) + 0.5) / np.arange(1, pieces + 1)
+    centre, slopes, rest = parts(centre), parts(slopes), parts(rest).mean(axis=1)
+    size = (np.abs(centre).sum(axis=2) + np.abs(slopes).sum(axis=(2, -1))).mean(axis=1)
+    linear = slopes[..., :own] * np.where(moving, share[:, None], 1.0)[:, None, None, None]
+    switched, turning = (np.moveaxis(m[:, :, 1:], 2, -1) for m in (centre, linear))
+    switched = np.concatenate([switched, slopes[:, :, 0, ..., own:]], axis=-1)
+    more = np.zeros((*turning.shape[:-1], slopes.shape[-1] - own))
+    turning = np.concatenate([turning, more], axis=-1)
+    used = np.any(switched != 0, axis=(0, 1, 2, 3)) | np.any(turning != 0, axis=(0, 1, 2, 3, 4))
+    average = AffineForm(
+        centre[:, :, 0].mean(axis=1),
+        linear[:, :, 0].mean(axis=1),
+        (rest + 4 * pieces * EPS * size) * MARGIN,
+        tuple(g for d in domains for g in d.groups),
+    )
+    found = SegmentAverages(average, switched[..., used], turning[..., used])
+    return found if counts else SegmentAverages(*(part[0] for part in found))
+
+
+def _branches(
+    function: casadi.Function,
+    domains: Sequence[Domain],
+    pieces: int,
+    start: casadi.Function | None,
+    along: Sequence[int],
+    continuous: bool,
+) -> tuple[Array, Array, Array, int]:
+    """The Jacobian of N sets as sum over b of k_b (centre_b + slopes_b z) + [-rest, rest], k_0 = 1,
+    the others -1 or 1 at each point, for the two largest kinks and their product: centre (N, b, n,
+    m), slopes (N, b, n, m, .), rest (N, n, m), and the number of symbols of the domains. Of each
+    `pieces` sets the last one holds the others.
+    """
+    whole = [_chosen(d, slice(pieces - 1, None, pieces)) for d in domains]
+    symbols, first, _, j, _ = _bounds(function, whole, start, along, continuous)
+    kinks = first.kinks
+    own, count = symbols.own, len(domains[0].centre)
+    reach = np.concatenate([np.abs(whole[i].generators).sum(axis=-1) for i in along], axis=-1)
+    found = (np.abs(j.slopes[..., own:]) * reach[:, None, :, None]).sum((1, 2))
+    for both, partner in first.partners:
+        found[:, partner - own] += found[:, both - own]
+    used = np.any(found > 0, axis=0)
+    kept = sorted({k for k, any_ in zip(_numbers(function, kinks), used, strict=True) if any_})
+    found = found[:, [kinks.index(k) for k in kept]]
+    largest = np.argsort(-found.max(axis=0, initial=0.0))[:BRANCHED]
+    left = np.where(np.isfinite(j.rest), j.rest, 0.0) * reach[:, None]
+    worth = WORTH * left.sum(axis=(1, 2))
+    chosen = [int(k) for k in largest if np.any((found[:, k] > 0) & (found[:, k] >= worth))]
+    pairs = list(product((1, -1), repeat=len(chosen)))
+    signs = np.array(pairs, int).reshape(len(pairs), len(chosen))
+    # J of each pair of sides by the products of their signs (Walsh's functions)
+    walsh = np.array([np.prod(signs[:, row < 0], axis=1) for row in signs]) / len(signs)
+    open_ = np.repeat(np.any(found[:, chosen] > 0, axis=1), pieces)
+    parts = []
+    for sets, own_signs in ((~open_, signs[:1]), (open_, signs)):
+        each = np.repeat(np.flatnonzero(sets), len(own_signs))
+        if not len(each):
+            continue
+        sides = {kept[k]: np.tile(own_signs[:, i], sets.sum()) for i, k in enumerate(chosen)}
+        sides = sides if len(own_signs) > 1 else {}
+        some = [_chosen(d, each) for d in domains]
+        *_, b, _ = _bounds(function, some, start, along, continuous, sides, kept)
+        parts.append((np.flatnonzero(sets), b))
+    m = parts[0][1].slopes.shape[-1]
+    centre = np.zeros((count, len(signs), *j.shape[1:]))
+    slopes, rest = np.zeros((*centre.shape, m)), np.zeros((count, *j.shape[1:]))
+    for sets, b in parts:
+        shape, branches = (len(sets), -1, *j.shape[1:]), len(b.centre) // len(sets)
+        weights = walsh if branches == len(signs) else np.eye(len(signs), 1)
+        size = np.abs(b.centre) + np.abs(b.slopes).sum(axis=-1)
+        bound = np.where(np.isfinite(size), b.rest + 8 * EPS * size, np.inf)
+        rest[sets] = bound.reshape(shape).max(axis=1)
+        for out, values in ((centre, b.centre), (slopes, b.slopes)):
+            own_values = np.nan_to_num(values).reshape(*shape, *values.shape[3:])
+            out[sets] = np.moveaxis(np.tensordot(weights, own_values, axes=(1, 1)), 0, 1)
+    rest += np.abs(slopes[:, 1:, ..., own:]).sum(axis=(1, -1))
+    slopes[:, 1:, ..., own:] = 0.0
+    return centre, slopes, rest * MARGIN, own
+
+
+def _chosen(domain: Domain, sets: Any) -> Domain:
+    """Some of the sets of a domain."""
+    return Domain(domain.centre[sets], domain.generators[sets], domain.groups)
+
+
+def _numbers(function: casadi.Function, kinks: Sequence[int]) -> list[int]:
+    """The kink of each of their symbols: each has a number of its own and a product with another's;
+    of |x| the size has one more.
+    """
+    names = [o.name for o in operations(function).operations]
+    return [*kinks, *kinks, *(k for k in kinks if names[k] == "fabs")]
+
+
+def _bounds(
+    function: casadi.Function,
+    domains: Sequence[Domain],
+    start: casadi.Function | None,
+    by: Sequence[int],
+    continuous: bool,
+    sides: Mapping[int, Array] | None = None,
+    kept: Sequence[int] | None = None,
+) -> tuple[_Symbols, _Over, AffineForm, Any, AffineForm]:
+    """Symbols, the program with its kinks, values, Jacobian and roots; the bounds of the sides, 1
+    or -1 in each set, of some kinks, at the points on these sides. `kept`: kinks that have symbols.
+    """
     implicit = 0 if start is None else start.numel_out(0)
     program = operations(function)
     kinks = [k for k, o in enumerate(program.operations) if o.name in KINKS]
-    kinks = kinks if by or implicit else []
-    symbols = _Symbols.of(function, domains, implicit, len(kinks))
+    kinks = (kinks if kept is None else list(kept)) if by or implicit else []
+    numbers = _numbers(function, kinks)
+    symbols = _Symbols.of(function, domains, implicit, len(numbers))
     seeds = sum(domains[i].size for i in by)
     inputs = symbols.inputs(by, implicit)
     over = _Over(
-        program, {k: symbols.own + i for i, k in enumerate(kinks)}, continuous, seeds + implicit
+        program,
+        tuple(kinks),
+        tuple(numbers[2 * len(kinks) :]),
+        symbols.own,
+        continuous,
+        seeds + implicit,
+        sides or {},
     )
     outputs = list(program.outputs)
     values: list[Value] = [None] * len(program.operations)
@@ -141,81 +333,7 @@ def enclose(
     if by:
         rows = [d.derivative(over.seeds)[:, :seeds] for d in flat]
         slopes = _stacked(rows, like, (seeds,))
-    return Enclosure(*symbols.finished(value, slopes, roots), symbols.own)
-
-
-def segment_averages(
-    function: casadi.Function,
-    *domains: Domain,
-    along: Sequence[int],
-    start: casadi.Function | None = None,
-    continuous: bool = False,
-    pieces: int = 4,
-) -> tuple[AffineForm, int]:
-    """Averages of the Jacobian over segments from the centre of a set to each of its points.
-
-    f(x(z)) - f(x(0)) = J [x(z) - x(0)] with J (n_out, n_in) in the form returned, by the mean value
-    theorem. What is linear in z is averaged over [0, z], and halves. The equations are enclosed
-    over `pieces` sets of 1/pieces, 2/pieces, ... of the size, one for each part of a segment: a
-    remainder of second order falls to a third, one of first order to a half.
-
-    Parameters
-    ----------
-    function, domains, start, continuous
-        As for `enclose`.
-    along : sequence of int
-        Positions of the inputs that move along the segment; J has their derivatives. The others are
-        the same all along it, any ones of their domains.
-    pieces : int
-        Parts of a segment.
-
-    Returns
-    -------
-    average : AffineForm (N, n_out, n_in), or without the axis N
-        In the symbols of the domains, and of kinks.
-    symbols : int
-        Number of those of the domains.
-
-    Examples
-    --------
-    >>> import casadi
-    >>> x = casadi.SX.sym("x", 1)
-    >>> f = casadi.Function("f", [x], [x**2])
-    >>> average, _ = segment_averages(f, Domain.box([-1.0], [1.0]), along=[0])
-    >>> print(average.centre.round(6), average.slopes.round(6))
-    [[0.]] [[[1.]]]
-    """
-    counts = [
-        len(m) for d in domains for m, axes in ((d.centre, 1), (d.generators, 2)) if m.ndim > axes
-    ]
-    count, sizes = max(counts, default=1), np.arange(1, pieces + 1) / pieces
-    over = [
-        _pieces(d, count, sizes if i in along else np.ones(pieces)) for i, d in enumerate(domains)
-    ]
-    found = enclose(function, *over, start=start, by=along, continuous=continuous)
-    j = found.jacobian
-    if j is None:
-        raise InputError("averages along segments need along=[0, ...]: inputs that move")
-    moving = np.concatenate([np.full(sum(d.groups), i in along) for i, d in enumerate(domains)])
-    groups, own = j.groups, found.symbols
-
-    def parts(values: Array) -> Array:
-        return values.reshape(-1, pieces, *values.shape[1:])
-
-    # on part k of the segment, s z is at (k + 1/2) / (k + 1) of the set's size on average
-    share = (np.arange(pieces) + 0.5) / np.arange(1, pieces + 1)
-    slopes, rest = parts(j.slopes), parts(j.rest).mean(axis=1)
-    linear = slopes[..., :own] * np.where(moving, share[:, None], 1.0)[:, None, None]
-    kinks, more = _common(slopes[..., own:])
-    size = np.abs(parts(j.centre)).mean(axis=1) + np.abs(slopes).sum(axis=-1).mean(axis=1)
-    rest = (rest + more + 4 * pieces * EPS * size) * MARGIN
-    average = AffineForm(
-        parts(j.centre).mean(axis=1),
-        np.concatenate([linear.mean(axis=1), kinks], axis=-1),
-        rest,
-        groups,
-    )
-    return (average if counts else average[0]), own
+    return symbols, over, value, slopes, roots
 
 
 def _pieces(domain: Domain, count: int, sizes: Array) -> Domain:
@@ -224,21 +342,6 @@ def _pieces(domain: Domain, count: int, sizes: Array) -> Domain:
     each = np.broadcast_to(domain.generators, (count, *domain.generators.shape[-2:]))
     generators = (sizes[:, None, None] * each[:, None]).reshape(count * len(sizes), *each.shape[1:])
     return Domain(np.repeat(centre, len(sizes), axis=0), generators, domain.groups)
-
-
-def _common(slopes: Array) -> tuple[Array, Array]:
-    """Factors of numbers in [-1, 1], another one on each part of a segment, (N, K, ..., k): those
-    of their averages (N, ..., k), and what that leaves (N, ...).
-
-    sum of M_i s_i / K = M s + ..., M_i = c_i M + ..., with s between the averages of -|c_i|, |c_i|.
-    """
-    mean = slopes.mean(axis=1)
-    axes = tuple(range(2, slopes.ndim - 1))
-    product = (slopes * mean[:, None]).sum(axis=axes, keepdims=True)
-    square = (mean * mean).sum(axis=tuple(a - 1 for a in axes), keepdims=True)[:, None]
-    share = np.divide(product, square, out=np.zeros(product.shape), where=square > 0)
-    left = np.abs(slopes - share * mean[:, None]) + 4 * EPS * np.abs(slopes)
-    return np.abs(share).mean(axis=1) * mean * MARGIN, left.mean(axis=1).sum(axis=-1) * MARGIN
 
 
 # --- inputs and outputs --------------------------------------------------------------------------
@@ -388,53 +491,89 @@ class _Dual:
         value = self.value.inverse()
         return self.chain(value, None if self.slope is None else -value.square())
 
-    def absolute(self, kink: AffineForm | None) -> _Dual:
-        """`kink`: the symbol in [-1, 1] of the slope where the sign is open."""
+    def absolute(self, kink: _Kink | None) -> _Dual:
+        """`kink`: the number in [-1, 1] of the slope where the sign is open."""
         x = self.value.interval
+        value = self.value.absolute()
         if self.slope is None or kink is None:
-            return _Dual(self.value.absolute())
-        one = AffineForm.constant(1.0, self.value)
-        sign = pick(x.lower >= 0, one, pick(x.upper <= 0, -one, kink))
-        return self.chain(self.value.absolute(), sign)
+            return _Dual(value)
+        return kink.either(x.lower >= 0, x.upper <= 0, self, -self, value)
 
-    def signed_square(self, kink: AffineForm | None) -> _Dual:
-        """x|x|, whose derivative is 2|x|. `kink`: the symbol in [-1, 1] that |x| has instead of
+    def signed_square(self, share: AffineForm | None) -> _Dual:
+        """x|x|, whose derivative is 2|x|. `share`: the number in [-1, 1] that |x| has instead of
         its remainder, the same one for all derivatives.
         """
         size = self.value.absolute()
         value = self.value * size
         if self.slope is None:
             return _Dual(value)
-        if kink is not None:
+        if share is not None:
             free = replace(size, rest=np.zeros(size.shape))
-            size = replace(free + kink.scaled(size.rest), bound=size.bound)
+            size = replace(free + share.scaled(size.rest), bound=size.bound)
         return self.chain(value, size.scaled(2.0))
 
-    def maximum(self, other: _Dual, kink: AffineForm | None) -> _Dual:
-        a, b = self.value.interval, other.value.interval
-        slope = _either(a.lower >= b.upper, b.lower >= a.upper, self.slope, other.slope, kink)
-        return _Dual(self.value.maximum(other.value), slope)
+    def maximum(self, other: _Dual, kink: _Kink | None) -> _Dual:
+        value = self.value.maximum(other.value)
+        if kink is None:
+            return _Dual(value)
+        over = (self.value - other.value).interval
+        return kink.either(over.lower >= 0, over.upper <= 0, self, other, value)
 
 
-def _either(
-    first: Array,
-    second: Array,
-    left: AffineForm | None,
-    right: AffineForm | None,
-    kink: AffineForm | None,
-) -> AffineForm | None:
-    """`left` where `first` holds, `right` where `second` does, else a mean of both: its weights are
-    given by the symbol of the kink, the same ones for all derivatives.
+@dataclass(frozen=True)
+class _Kink:
+    """A number in [-1, 1], one of the symbols: where between the slopes of its two sides a kink is.
+
+    Symbols from `first` on are those of kinks; the one at `product` is the product of this number
+    with another of them, another one in each set; both join the `partners`. `side`: 1 or -1 in
+    each set, where bounds are wanted of no other points than those on this side.
     """
-    some = right if left is None else left
-    if some is None or kink is None:
-        return None
-    left, right = (_zero_like(some) if form is None else form for form in (left, right))
-    if np.all(first | second):
-        return pick(first[:, None], left, right)
-    mean, half = (left + right).scaled(0.5), (left - right).scaled(0.5)
-    both = mean + kink.broadcast(half.shape) * half
-    return pick(first[:, None], left, pick(second[:, None], right, both))
+
+    form: AffineForm
+    first: int
+    product: int
+    side: Array | None
+    partners: set[tuple[int, int]]
+
+    def either(
+        self, first: Array, second: Array, left: _Dual, right: _Dual, value: AffineForm
+    ) -> _Dual:
+        """`left` where `first` holds, `right` where `second` does, else, where no side is known,
+        `value` with a mean of both slopes: its weights are given by the number, the same ones for
+        all derivatives.
+        """
+        if self.side is not None:
+            first, second = first | (~second & (self.side > 0)), second | (~first & (self.side < 0))
+        value = pick(first, left.value, pick(second, right.value, value))
+        some = right.slope if left.slope is None else left.slope
+        if some is None:
+            return _Dual(value)
+        slopes = (_zero_like(some) if d.slope is None else d.slope for d in (left, right))
+        one, other = slopes
+        if np.all(first | second):
+            return _Dual(value, pick(first[:, None], one, other))
+        mean, half = (one + other).scaled(0.5), (one - other).scaled(0.5)
+        both = mean + self.times(half)
+        return _Dual(value, pick(first[:, None], one, pick(second[:, None], other, both)))
+
+    def times(self, slope: AffineForm) -> AffineForm:
+        """The number times derivatives (N, seeds). Where these hold another kink's number, the
+        product of both is a number in [-1, 1] too, the same one for all derivatives.
+        """
+        number = self.form.broadcast(slope.shape)
+        others = slope.slopes[..., self.first :]
+        if not np.any(others):
+            return number * slope
+        sets = np.arange(len(others))
+        largest = np.abs(others).sum(axis=1).argmax(axis=-1)
+        self.partners.update((self.product, self.first + int(k)) for k in np.unique(largest))
+        free, bilinear = slope.slopes.copy(), np.zeros(slope.slopes.shape)
+        free[sets, :, self.first + largest] = 0.0
+        bilinear[..., self.product] = others[sets, :, largest]
+        rest, zero = AffineForm(slope.centre, free, slope.rest, slope.groups), 0 * slope.centre
+        found = number * rest + AffineForm(zero, bilinear, zero, slope.groups)
+        bound = found.interval.intersect(number.interval * slope.interval)
+        return replace(found, bound=bound).settled()
 
 
 def _zero(value: AffineForm, seeds: int) -> AffineForm:
@@ -481,14 +620,20 @@ KINKS = ("fabs", "min", "max", "select", "number")
 
 @dataclass(frozen=True)
 class _Over:
-    """A program evaluated over sets, with derivatives by `seeds` variables; `kinks`: the symbol of
-    each operation that may have a kink.
+    """A program evaluated over sets, with derivatives by `seeds` variables; positions of the
+    operations that may have `kinks`, and of absolute values; the `first` symbol of kinks; the
+    `sides`, 1 or -1 in each set, of some of them; the `partners`, symbols of products and of
+    numbers in them, fill as it is evaluated.
     """
 
     program: ScalarProgram
-    kinks: Mapping[int, int]
+    kinks: tuple[int, ...]
+    absolutes: tuple[int, ...]
+    first: int
     continuous: bool
     seeds: int
+    sides: Mapping[int, Array]
+    partners: set[tuple[int, int]] = field(default_factory=set)
 
     def evaluate(
         self, positions: Sequence[int], inputs: Sequence[Sequence[_Dual]], values: list[Value]
@@ -510,11 +655,24 @@ class _Over:
                 used.update(self.program.operations[k].arguments)
         return sorted(used)
 
-    def _kink(self, position: int, like: AffineForm) -> AffineForm | None:
-        if position not in self.kinks:
+    def _kink(self, position: int, like: AffineForm) -> _Kink | None:
+        if self.program.operations[position].name not in KINKS:
             return None
+        if position not in self.kinks:
+            return _Kink(_between(like, -1.0, 1.0), like.slopes.shape[-1], 0, None, self.partners)
+        i, count = self.kinks.index(position), len(self.kinks)
+        side = self.sides.get(position)
+        return _Kink(self._symbol(i, like), self.first, self.first + count + i, side, self.partners)
+
+    def _size(self, position: int, like: AffineForm) -> AffineForm | None:
+        """The symbol of |x| between its bounds."""
+        if position not in self.absolutes:
+            return None
+        return self._symbol(2 * len(self.kinks) + self.absolutes.index(position), like)
+
+    def _symbol(self, i: int, like: AffineForm) -> AffineForm:
         slopes = np.zeros(like.slopes.shape)
-        slopes[:, self.kinks[position]] = 1.0
+        slopes[:, self.first + i] = 1.0
         return AffineForm(np.zeros(like.shape), slopes, np.zeros(like.shape), like.groups)
 
     def _apply(self, k: int, values: list[Value], inputs: Sequence[Sequence[_Dual]]) -> Value:
@@ -591,9 +749,9 @@ class _Over:
             parts = self._with_absolute(other, x, values, like)
             if parts is not None:
                 free, size, position = parts
-                kink = self._kink(position, like) if self.seeds else None
+                share = self._size(position, like) if self.seeds else None
                 own = _dual(values[x], like)
-                square = own.signed_square(kink) * size
+                square = own.signed_square(share) * size
                 return square if free is None else square + free * own
         return None
 
@@ -620,17 +778,17 @@ class _Over:
             return (None if free is None else -free), -size, position
         return None
 
-    def _select(self, condition: Array, yes: _Dual, no: _Dual, kink: AffineForm | None) -> _Dual:
+    def _select(self, condition: Array, yes: _Dual, no: _Dual, kink: _Kink | None) -> _Dual:
         """One of two numbers; both where the condition is open."""
         value = pick(condition == 0, no.value, hull(yes.value, no.value))
         value = pick(condition == 1, yes.value, value)
         if kink is None:
             return _Dual(value)
-        slope = _either(condition == 1, condition == 0, yes.slope, no.slope, kink)
+        found = kink.either(condition == 1, condition == 0, yes, no, value)
         if self.continuous or np.all(condition >= 0):
-            return _Dual(value, slope)
+            return found
         # the function may jump: no bound of its slope
-        return _Dual(value, _endless(slope or _zero(kink, self.seeds), condition < 0))
+        return _Dual(found.value, _endless(found.derivative(self.seeds), condition < 0))
 
 
 def _endless(slope: AffineForm, where: Array) -> AffineForm:
@@ -755,10 +913,13 @@ def _solve(
     if fixed:
         over.evaluate(fixed, inputs, values)
 
-    def residual(guess: AffineForm) -> _Dual:
+    # the root is that of both sides of every kink
+    both = replace(over, sides={})
+
+    def residual(guess: AffineForm, by: _Over = both) -> _Dual:
         """The residual with its derivatives, the implicit variable free."""
         free = [*inputs[:-1], [*inputs[-1], _Dual(guess, _seed(guess, own, over.seeds))]]
-        return over.evaluate([position], free, list(values))[0]
+        return by.evaluate([position], free, list(values))[0]
 
     with np.errstate(all="ignore"):
         line = AffineForm.constant(start, like)
@@ -802,7 +963,7 @@ def _solve(
             like.groups,
         ).settled()
         # dx_root = -(dF/dinputs) / (dF/droot)
-        total = residual(value).derivative(over.seeds)
+        total = residual(value, over).derivative(over.seeds)
         derivative = _times(-total[:, own].inverse(), total)
         return _Dual(value, None if derivative is None else _without(derivative, seeds))
 

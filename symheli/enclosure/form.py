@@ -7,9 +7,8 @@ Source: affine arithmetic (de Figueiredo & Stolfi 2004), balls instead of boxes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -280,8 +279,9 @@ class AffineForm:
         a, b = self.interval, other.interval
         bound = Interval(np.maximum(a.lower, b.lower), np.maximum(a.upper, b.upper))
         chosen = replace(sum_, bound=sum_.interval.intersect(bound)).settled()
-        chosen = pick(a.lower >= b.upper, self, chosen)
-        return pick(b.lower >= a.upper, other, chosen)
+        apart = difference.interval
+        chosen = pick((a.lower >= b.upper) | (apart.lower >= 0), self, chosen)
+        return pick((b.lower >= a.upper) | (apart.upper <= 0), other, chosen)
 
     def minimum(self, other: AffineForm) -> AffineForm:
         """The smaller of two numbers."""
@@ -348,18 +348,42 @@ def _derivatives(name: str, at: Interval, x: Interval) -> tuple[Interval, Interv
     raise AssertionError(name)
 
 
-def _by_group(values: Array, groups: Sequence[int]) -> Array:
+@cache
+def _runs(groups: tuple[int, ...]) -> list[tuple[int, slice, slice]]:
+    """Groups side by side of one size where that is 1, else each: (size, groups, symbols)."""
+    out: list[tuple[int, slice, slice]] = []
+    for i, (group, start) in enumerate(zip(groups, np.cumsum([0, *groups]).tolist(), strict=False)):
+        if group == 1 and out and out[-1][0] == 1:
+            _, which, symbols = out.pop()
+            out.append((1, slice(which.start, i + 1), slice(symbols.start, start + 1)))
+        else:
+            out.append((group, slice(i, i + 1), slice(start, start + group)))
+    return out
+
+
+def _by_group(values: Array, groups: tuple[int, ...]) -> Array:
     """Sums over the symbols of each group."""
     if all(g == 1 for g in groups):
         return values
-    starts = np.cumsum([0, *groups[:-1]])
-    return np.add.reduceat(values, starts, axis=-1)
+    out = np.empty((*values.shape[:-1], len(groups)))
+    for group, which, symbols in _runs(groups):
+        own = values[..., symbols]
+        out[..., which] = own if group == 1 else own.sum(axis=-1, keepdims=True)
+    return out
 
 
-def _norms(slopes: Array, groups: Sequence[int]) -> Array:
+def _norms(slopes: Array, groups: tuple[int, ...]) -> Array:
     if all(g == 1 for g in groups):
         return np.abs(slopes)
-    return np.sqrt(_by_group(slopes * slopes, groups)) * MARGIN + UNDERFLOW
+    out = np.empty((*slopes.shape[:-1], len(groups)))
+    for group, which, symbols in _runs(groups):
+        own = slopes[..., symbols]
+        if group == 1:
+            out[..., which] = np.abs(own)
+        else:
+            square = np.einsum("...i,...i->...", own, own)[..., None]
+            out[..., which] = np.sqrt(square) * MARGIN + UNDERFLOW
+    return out
 
 
 def pick(condition: Array, yes: AffineForm, no: AffineForm) -> AffineForm:

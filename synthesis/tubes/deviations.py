@@ -11,7 +11,7 @@ import casadi
 import numpy as np
 
 from symheli import Helicopter
-from symheli.enclosure import AffineForm, Domain, enclose, segment_averages
+from symheli.enclosure import AffineForm, Domain, SegmentAverages, enclose, segment_averages
 from symheli.enclosure.form import EPS
 from symheli.values.summary import summarized
 from synthesis.tubes.inequality import ROUNDED, ROUNDED_UP, MatrixSet, elementwise, rank_one
@@ -23,6 +23,10 @@ Array = np.ndarray
 SMALL = 1e-3
 """Rate, 1/s, up to which a term is part of the remainder: the deviations' change over their size.
 """
+TAMED = 1e-3
+"""Share of the largest kinks' squares below which offsets of a kink are kept small."""
+TINY = 1e-300
+"""Least divisor where a square may be 0."""
 CORNERS = 3
 """Commands at whose ends the inequality is checked; the others are terms of the remainder."""
 
@@ -137,10 +141,11 @@ class Deviations:
             places, widths, commands, data = self._parts(cell, self.reference.jacobian_parts)
             ellipsoid = Domain.ellipsoid(zero, share * factor)
             over = (ellipsoid, Domain.ellipsoid(calm, share * np.eye(m)), commands, data)
-            average, symbols = segment_averages(function, *over, along=[0, 1], start=start)
-            if np.all(np.isfinite(average.rest)):
-                own = _covered(average, symbols, places, widths, whole)
-                found.append(_matrix_set(own, symbols, drift, factor, m))
+            parts = segment_averages(function, *over, along=[0, 1], start=start)
+            if np.all(np.isfinite(parts.average.rest)):
+                units = np.concatenate([np.linalg.norm(factor, axis=1), np.ones(m + 1)])
+                own = _covered(parts, places, widths, whole, units)
+                found.append(_matrix_set(*own, drift, factor, units))
             else:
                 found.append(None)
         return found
@@ -195,60 +200,197 @@ class Deviations:
 
 
 def _covered(
-    forms: AffineForm, symbols: int, places: Array, widths: Array, whole: int
-) -> AffineForm:
-    """One form of a cell that covers those of its parts, linear in all of its ranges.
+    parts: SegmentAverages, places: Array, widths: Array, whole: int, units: Array
+) -> tuple[AffineForm, Array, Array]:
+    """One form of a cell that covers those of its parts, linear in all of its ranges, and (left,
+    weights) of its kinks as in a `MatrixSet`.
 
-    `forms` (parts, n, .): their symbols are those of the domains, the last ones those of the ranges
-    and of `whole` other commands, and of kinks.
+    `parts` of (parts, n, .): the last symbols of the domains are those of the ranges and of `whole`
+    other commands. `units` (q,): sizes of deviations and inputs.
     """
-    weights = np.linalg.pinv(np.hstack([np.ones((len(places), 1)), places]))
-    centre, *by = np.tensordot(weights, forms.centre, axes=1)
-    slopes, command = forms.slopes[..., :symbols].mean(axis=0), _commands(symbols, places, whole)
+    forms, switched, turning = parts
+    kinks, rest = _kinks(switched, turning, forms.groups, units)
+    design = np.hstack([np.ones((len(places), 1)), places])
+    slopes, command = forms.slopes.mean(axis=0), _commands(forms, places, whole)
+    _place(
+        kinks, forms.centre, slopes[..., command] / np.where(widths > 0, widths, 1.0), places, units
+    )
+    moved = np.array([kink.offset for kink in kinks]).reshape(len(kinks), len(places))
+    mains = np.array([kink.main for kink in kinks]).reshape(len(kinks), *rest.shape[1:])
+    centres = forms.centre - np.tensordot(moved.T, mains, axes=1)
+    centre, *by = np.tensordot(np.linalg.pinv(design), centres, axes=1)
     slopes[..., command] = np.stack(by, axis=-1)
-    missed = np.abs(forms.centre - centre - np.tensordot(places, np.array(by), axes=1))
+    missed = rest + np.abs(centres - centre - np.tensordot(places, np.array(by), axes=1))
     own = slopes.copy()
     own[..., command] *= widths
-    apart = np.abs(forms.slopes[..., :symbols] - own)
-    start = 0
-    for group in forms.groups:
-        if start < symbols:
-            missed = missed + np.linalg.norm(apart[..., start : start + group], axis=-1)
-            start += group
-    kinks, more = _common_kinks(forms.slopes[..., symbols:])
+    missed += _by_groups(np.abs(forms.slopes - own), forms.groups)
     size = np.abs(forms.centre) + np.abs(forms.slopes).sum(axis=-1)
-    rest = (forms.rest + missed + 16 * EPS * size).max(axis=0) + more
-    return AffineForm(
-        centre, np.concatenate([slopes, kinks], axis=-1), rest * ROUNDED_UP, forms.groups
+    size = size + np.tensordot(np.abs(moved.T), np.abs(mains), axes=1)
+    rest = (forms.rest + missed + 16 * EPS * size).max(axis=0)
+    left, weights = [], []
+    for kink in kinks:
+        if kink.rate > SMALL:
+            left.append(kink.left * units[: len(rest)])
+            weights.append(kink.weight(units))
+        else:
+            rest = rest + kink.bound(units)
+    n, q = len(rest), len(units)
+    return (
+        AffineForm(centre, slopes, rest * ROUNDED_UP, forms.groups),
+        np.reshape(left, (-1, n)),
+        np.reshape(weights, (-1, q, q)),
     )
 
 
-def _commands(symbols: int, places: Array, whole: int) -> slice:
+@dataclass
+class _Kink:
+    """Matrices left (offset + number) row' of a kink over the parts of a cell, in units of equal
+    weight: left (n,); row (m,) and further `blocks` (m, .), each times a vector of norm <= 1 of its
+    own; share (parts,) >= |number|; offset (parts,) of the parts on one side; main (n, m), left
+    row' in SI units.
+    """
+
+    left: Array
+    row: Array
+    blocks: list[Array]
+    share: Array
+    main: Array
+    offset: Array
+    size: float
+
+    def is_placed(self, offset: Array) -> None:
+        """Let the parts have these offsets (parts,), up to a constant with which the sum of offset
+        and share is the smallest.
+        """
+        upper, lower = (offset + self.share).max(), (offset - self.share).min()
+        self.offset = offset - 0.5 * (upper + lower)
+        self.size = float((np.abs(self.offset) + self.share).max() * ROUNDED_UP)
+
+    @property
+    def _all(self) -> list[Array]:
+        return [self.size * self.row[:, None], *self.blocks]
+
+    @property
+    def rate(self) -> float:
+        """Its size, 1/s."""
+        return float(sum(np.linalg.norm(block) for block in self._all) * np.linalg.norm(self.left))
+
+    def weight(self, units: Array) -> Array:
+        """(q, q): of the squares of all rows, by Cauchy's inequality."""
+        blocks = [block for block in self._all if np.any(block)]
+        sizes = np.array([np.linalg.norm(block) for block in blocks])
+        total, out = sizes.sum(), np.zeros((len(units), len(units)))
+        for block, size in zip(blocks, sizes, strict=True):
+            own = np.zeros((len(units), block.shape[1]))
+            own[: len(block)] = block / units[: len(block), None] * np.sqrt(total / size)
+            # not less than the exact product, in the order of matrices, by Gershgorin's theorem
+            out += own @ own.T + (ROUNDED_UP - 1) * np.diag((own**2).sum(axis=1))
+        return out * ROUNDED_UP
+
+    def bound(self, units: Array) -> Array:
+        """Sizes of its entries (n, m)."""
+        rows = sum(np.linalg.norm(block, axis=1) for block in self._all)
+        n, m = self.main.shape
+        return np.abs(self.left * units[:n])[:, None] * rows / units[:m] * ROUNDED_UP
+
+
+def _place(kinks: Sequence[_Kink], centres: Array, by: Array, places: Array, units: Array) -> None:
+    """Choose the offsets of the kinks: with them the centres (parts, n, m) of parts at these places
+    are most nearly linear in the ranges, of slopes near by (n, m, r), by least squares.
+    """
+    if not kinks:
+        return
+    n, m = centres.shape[1:]
+
+    def scaled(matrices: Array) -> Array:
+        return (matrices / units[:n, None] * units[:m]).reshape(len(matrices), -1)
+
+    mains = np.array([np.outer(kink.left, kink.row).ravel() for kink in kinks])
+    gram = mains @ mains.T
+    gram += (TAMED * np.trace(gram) + TINY) * np.eye(len(gram))
+    off = scaled(centres) - places @ (scaled(np.moveaxis(by, -1, 0)))
+    for kink, offset in zip(
+        kinks, np.linalg.solve(gram, mains @ (off - off.mean(0)).T), strict=True
+    ):
+        kink.is_placed(offset)
+
+
+def _kinks(
+    switched: Array, turning: Array, groups: tuple[int, ...], units: Array
+) -> tuple[list[_Kink], Array]:
+    """Kinks of `SegmentAverages` (parts, pieces, n, m, k), and the sizes of what they leave (parts,
+    n, m).
+    """
+    parts, _, n, m, _ = switched.shape
+    rest, found = np.zeros((parts, n, m)), []
+    over = np.outer(units[:n], 1 / units[:m])
+    for k in range(switched.shape[-1]):
+        each, turns = switched[..., k] / over, turning[..., k] / over[..., None]
+        sizes = np.linalg.norm(each, axis=(2, 3))
+        U, s, V = np.linalg.svd(each[np.unravel_index(sizes.argmax(), sizes.shape)])
+        left, row = U[:, 0], s[0] * V[0]
+        rows, turned = (np.moveaxis(own, 2, -1) @ left for own in (each, turns))
+        missed = np.abs(each - left[:, None] * rows[..., None, :])
+        missed += _by_groups(np.abs(turns - left[:, None, None] * turned[..., None, :, :]), groups)
+        share = rows @ row / max(row @ row, TINY)
+        apart = rows - share[..., None] * row
+        # rows that differ from part to part, by the two main directions of their differences
+        directions = np.linalg.svd(apart.reshape(-1, m), full_matrices=False)[2][:2]
+        along = apart @ directions.T
+        blocks = (directions * np.abs(along).mean(axis=1).max(axis=0)[:, None])[..., None]
+        common, more = _common_turns(turned, groups)
+        more = more + np.abs(apart - along @ directions)
+        missed += np.abs(left)[:, None] * more[..., None, :]
+        size = np.abs(each) + np.abs(turns).sum(axis=-1)
+        missed += 16 * EPS * (size + np.abs(left)[:, None] * size.sum(axis=2, keepdims=True))
+        rest += missed.mean(axis=1) * over
+        shares = np.abs(share).mean(axis=1) * ROUNDED_UP
+        main = left[:, None] * row * over
+        found.append(_Kink(left, row, [*blocks, *common], shares, main, 0 * shares, shares.max()))
+    return found, rest * ROUNDED_UP
+
+
+def _common_turns(turned: Array, groups: tuple[int, ...]) -> tuple[list[Array], Array]:
+    """Blocks (m, .), one for each group of symbols, that cover the means over pieces of turned
+    (parts, pieces, m, symbols), each times a number in [-1, 1], and the sizes of what that leaves
+    (parts, pieces, m).
+    """
+    blocks, rest, start = [], np.zeros(turned.shape[:3]), 0
+    for group in groups:
+        own = turned[..., start : start + group]
+        start += group
+        sizes = np.linalg.norm(own, axis=(2, 3))
+        main = own[np.unravel_index(sizes.argmax(), sizes.shape)]
+        share = np.tensordot(own, main, 2) / max(np.sum(main * main), TINY)
+        left = own - share[..., None, None] * main
+        rest += np.linalg.norm(left, axis=-1) + 4 * EPS * np.abs(own).sum(axis=-1)
+        blocks.append(main * np.abs(share).mean(axis=1).max() * ROUNDED_UP)
+    return blocks, rest
+
+
+def _by_groups(sizes: Array, groups: tuple[int, ...]) -> Array:
+    """Sums over groups of symbols, the last axis, of the norms of sizes of slopes."""
+    out, start = np.zeros(sizes.shape[:-1]), 0
+    for group in groups:
+        if start < sizes.shape[-1]:
+            out += np.linalg.norm(sizes[..., start : start + group], axis=-1)
+            start += group
+    return out
+
+
+def _commands(forms: AffineForm, places: Array, whole: int) -> slice:
     """The symbols of the ranges of a cell."""
+    symbols = forms.slopes.shape[-1]
     return slice(symbols - whole - places.shape[1], symbols - whole)
 
 
-def _common_kinks(slopes: Array) -> tuple[Array, Array]:
-    """Factors of numbers in [-1, 1] that differ from part to part (parts, n, ., k): one for all,
-    and the sizes of what that leaves (n, .).
-    """
-    norms = np.sqrt((slopes**2).sum(axis=(1, 2)))
-    if not slopes.shape[-1]:
-        return slopes[0], np.zeros(slopes.shape[1:3])
-    main = np.stack([slopes[norms[:, k].argmax(), ..., k] for k in range(norms.shape[1])], axis=-1)
-    square = (main**2).sum(axis=(0, 1))
-    share = (slopes * main).sum(axis=(1, 2)) / np.where(square > 0, square, 1.0)
-    left = np.abs(slopes - share[:, None, None] * main) + 4 * EPS * np.abs(slopes)
-    return main * np.abs(share).max(axis=0) * ROUNDED_UP, left.max(axis=0).sum(axis=-1)
-
-
 def _matrix_set(
-    average: AffineForm, symbols: int, drift: Array, factor: Array, m: int
+    average: AffineForm, left: Array, weights: Array, drift: Array, factor: Array, units: Array
 ) -> MatrixSet:
-    n = len(factor)
-    q = n + m + 1
-    units = np.concatenate([np.linalg.norm(factor, axis=1), np.ones(m + 1)])
-    slopes = np.zeros((average.slopes.shape[-1], n, q))
+    """The set of F; left, weights: of the kinks."""
+    n, q, symbols = len(factor), len(units), average.slopes.shape[-1]
+    m = q - n - 1
+    slopes = np.zeros((symbols, n, q))
     slopes[..., :-1] = np.moveaxis(average.slopes, -1, 0)
     slopes[symbols - len(drift) + 2 : symbols, :, -1] = drift[2:]
     tube, gust, command = slopes[:n], slopes[n : n + m], slopes[n + m : symbols]
@@ -270,9 +412,10 @@ def _matrix_set(
     signs = [(-1, 1) if np.any(part) else (0,) for part in at_ends]
     corners = centre + np.tensordot(np.stack(np.meshgrid(*signs, indexing="ij"), -1), at_ends, 1)
     rest += ROUNDED * (np.abs(centre) + np.abs(command).sum(axis=0))
-    others = np.concatenate([command[CORNERS:], slopes[symbols:]])
+    others = command[CORNERS:]
     rates = np.abs(others / units[:n, None] * units).max(axis=(1, 2))
-    left, weights, more = rank_one(others[rates > SMALL], units)
+    own, squares, more = rank_one(others[rates > SMALL], units)
+    left, weights = np.vstack([left, own]), np.concatenate([weights, squares])
     rest += more + np.abs(others[rates <= SMALL]).sum(axis=0) * ROUNDED_UP
     rows, diagonal = elementwise(rest * ROUNDED_UP, units)
     return MatrixSet(

@@ -104,6 +104,18 @@ def least_gain(
     return _solved(nodes, price, made, solver)
 
 
+def multipliers(
+    cell: Enclosed, P: Array, decay: float, spare: float, solver: Solver
+) -> Multipliers | None:
+    """Multipliers with which the ellipsoids P (nodes, n, n) satisfy the inequality of a cell, None:
+    the solver has none.
+    """
+    part = _Inequality(cell, P, decay, spare, fixed=True)
+    part.is_invariant()
+    found = _solved([], None, [part], solver)
+    return None if found is None else found.multipliers[0]
+
+
 def _solved(
     nodes: Sequence[_Node],
     price: _Price | None,
@@ -116,9 +128,10 @@ def _solved(
     prices = columns[len(nodes) :]
     count = int(starts[-1])
     for part in made:
-        shared = [columns[i][nodes[i].P.columns[0]] for i in part.cell.nodes] + prices
+        free = part.cell.nodes if nodes else ()
+        shared = [columns[i][nodes[i].P.columns[0]] for i in free] + prices
         own = part.program.count - sum(map(len, shared))
-        columns.append(np.concatenate([*shared, count + np.arange(own)]))
+        columns.append(np.concatenate([*shared, count + np.arange(own)]).astype(int))
         count += own
     programs = [part.program for part in (*common, *made)]
     rows = [program.placed(c, count) for program, c in zip(programs, columns, strict=True)]
@@ -135,7 +148,7 @@ def _solved(
         return None
     x = [found.x[c] for c in columns]
     P = np.array([node.found(own) for node, own in zip(nodes, x, strict=False)])
-    if np.linalg.eigvalsh(P).min() <= 0:
+    if nodes and np.linalg.eigvalsh(P).min() <= 0:
         return None
     by = [part.found(own) for part, own in zip(made, x[len(common) :], strict=True)]
     bias = 0.0 if price is None else float(x[len(nodes)][1])
@@ -185,12 +198,19 @@ class _Inequality:
     """The inequality of a cell in the coordinates of its factor."""
 
     def __init__(
-        self, cell: Enclosed, roots: Array, decay: float, spare: float, price: _Price | None = None
+        self,
+        cell: Enclosed,
+        roots: Array,
+        decay: float,
+        spare: float,
+        price: _Price | None = None,
+        fixed: bool = False,
     ):
+        """`fixed`: instead of roots of the coordinates of P at the nodes P itself is given."""
         self.cell, self.roots, self.decay, self.spare = cell, roots, decay, spare
         self.program = program = AffineProgram()
         n, self.over = len(cell.factor), cell.over.scaled(cell.factor)
-        self.given = [program.symmetric(n, CONSTANT) for _ in cell.nodes]
+        self.given = [] if fixed else [program.symmetric(n, CONSTANT) for _ in cell.nodes]
         one = np.ones((1, 1, 1))
         common = [] if price is None else [program.variable(one, CONSTANT) for _ in range(2)]
         terms = np.eye(len(self.over.left))
@@ -200,7 +220,7 @@ class _Inequality:
             "terms": program.variable(terms[:, :, None] * terms, CONSTANT),
             "wind": common[0] if common else program.variable(one, CONSTANT),
         }
-        self.shares = [program.symmetric(n, CONSTANT) for _ in range(3 * len(self.given))]
+        self.shares = [program.symmetric(n, CONSTANT) for _ in range(3 * len(cell.nodes))]
         self.bias = common[1:]
 
     def is_invariant(self) -> None:
@@ -223,9 +243,12 @@ class _Inequality:
         """Impose the inequality with the spare, of the constant another."""
         program, cell = self.program, self.cell
         nodes = []
-        for variable, i in zip(self.given, cell.nodes, strict=True):
-            turn = np.linalg.solve(self.roots[i], cell.factor)
-            nodes.append(turn.T @ program.value(variable) @ turn)
+        for k, i in enumerate(cell.nodes):
+            if self.given:
+                turn = np.linalg.solve(self.roots[i], cell.factor)
+                nodes.append(turn.T @ program.value(self.given[k]) @ turn)
+            else:
+                nodes.append(program.known(cell.factor.T @ self.roots[i] @ cell.factor))
         P = motion(nodes, cell.width, *(part[:2] for part in cell.cell.domain))
         values = [program.value(v) for v in self.shares]
         X = [Shares(*values[k : k + 3]) for k in range(0, len(values), 3)]

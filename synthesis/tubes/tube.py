@@ -36,11 +36,13 @@ from synthesis.tubes.inequality import Multipliers
 from synthesis.tubes.motions import Motions
 from synthesis.tubes.proof import holds
 from synthesis.tubes.reference import TUBE_SIZES, Reference, held, moving
-from synthesis.tubes.search import Enclosed, Found, smallest
+from synthesis.tubes.search import Enclosed, Found, multipliers, smallest
 
 Array = np.ndarray
 
-SCHEMA, VERSION = "symheli tube", 3
+SCHEMA, VERSION = "symheli tube", 4
+OLDER = (3,)
+"""Versions whose kinks were enclosed in another way: their multipliers are found anew."""
 INTERVAL = 1.0
 """Largest distance of the nodes of reference, feedback and P along airspeed, m/s."""
 DOWNWARD = 0.75
@@ -66,6 +68,8 @@ the deviations enclosed were too large for any ellipsoid, a smaller start may le
 ROUNDS = 15
 SPARE = 0.02
 """Spare of the inequality in the search, 1/s."""
+RENEWED = 0.005
+"""Spare with which multipliers of a file of an older version are found anew, 1/s."""
 INSIDE = 1 - 1e-6
 """Share of the enclosed deviations that the tube may fill, for rounding of the search."""
 TOLERANCE = 1e-6
@@ -243,15 +247,21 @@ class Tube:
         parts = list(zip(self.cells, self.factors, self.multipliers, strict=True))
         for k, (cell, factor, by) in enumerate(tracked("verifying cells", parts)):
             made = _enclosed(loop, [cell], factor[None], loop.drifts([cell]))
-            nodes = list(_nodes(cell, len(p)))
             if (
                 made is None
-                or by.terms.shape != (len(made[0].over.left),) * 2
-                or not holds(self.P[nodes], p[nodes], cell, made[0].over, factor, by)
+                or not self._holds(made[0], by)
                 or not all(gain.holds_in(k, made[0], p) for gain in self.gains)
             ):
                 return False
         return True
+
+    def _holds(self, made: Enclosed, by: Multipliers) -> bool:
+        """Whether the inequality holds in a cell."""
+        if by.terms.shape != (len(made.over.left),) * 2:
+            return False
+        nodes = list(made.nodes)
+        own = (self.P[nodes], self.nodes[nodes])
+        return holds(*own, made.cell, made.over, made.factor, by)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the tube as JSON: equations (the vehicle file, or the operations of the model),
@@ -273,17 +283,25 @@ class Tube:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Tube:
-        """Read a tube and prove it again; `proven` says whether that succeeded."""
-        content = content_of(path, SCHEMA, VERSION, "a tube", "Tube.save")
+        """Read a tube and prove it again; `proven` says whether that succeeded. Of a file of an
+        older version the set is the one written; multipliers and gains may be found anew.
+        """
+        content = content_of(path, SCHEMA, VERSION, "a tube", "Tube.save", OLDER)
         try:
             found = _read(content)
         except InputError:
             raise
         except DAMAGED as error:
             raise InputError(f"{path}: damaged, a value is invalid or missing ({error})") from None
-        proven = found.verify()
+        gains = found.gains
+        renewed = _renewed(found) if content["version"] in OLDER else found
+        proven = renewed.verify()
         why = "" if proven else "the inequality does not hold in exact arithmetic"
-        return replace(found, proven=proven, why=why)
+        made = replace(renewed, proven=proven, why=why)
+        if proven and len(made.gains) < len(gains):
+            for gain in gains:
+                made = made.with_gain(gain.outputs, energy=gain.energy)
+        return made
 
 
 def _read(content: dict[str, Any]) -> Tube:
@@ -513,8 +531,23 @@ def _fills(boxes: Array, whole: Array) -> bool:
     )
 
 
-Grown = tuple[Found | None, Array, Array, str]
-"""What was found, factors, P, why nothing was."""
+Grown = tuple[Found | None, Sequence[Enclosed], Array, str]
+"""What was found, the cells enclosed, P, why nothing was."""
+
+
+def _renewed(found: Tube, solver: Solver | None = None) -> Tube:
+    """The same tube with other multipliers in the cells where those written prove nothing; then
+    without gains.
+    """
+    loop, own = found.deviations, list(found.multipliers)
+    parts = zip(found.cells, found.factors, found.multipliers, strict=False)
+    for k, (cell, factor, by) in enumerate(parts):
+        made = _enclosed(loop, [cell], factor[None], loop.drifts([cell]))
+        if made is not None and not found._holds(made[0], by):
+            solver = solver or Solver(tolerance=TOLERANCE)
+            own[k] = multipliers(made[0], found.P, by.decay, RENEWED, solver) or by
+    same = all(new is old for new, old in zip(own, found.multipliers, strict=True))
+    return found if same else replace(found, multipliers=tuple(own), gains=())
 
 
 def _found(loop: Deviations, cells: tuple[Cell, ...], sizes: Array, solver: Solver) -> Tube:
@@ -522,11 +555,15 @@ def _found(loop: Deviations, cells: tuple[Cell, ...], sizes: Array, solver: Solv
     that satisfy the inequality lie inside.
     """
     with task("tube", len(GROWTHS)) as progress:
-        found, factors, P, why = _grown(loop, cells, sizes, solver, progress)
+        found, over, P, why = _grown(loop, cells, sizes, solver, progress)
+    factors = np.array([cell.factor for cell in over])
     if found is None:
         return Tube(loop, P, cells, factors, (), False, why)
     made = Tube(loop, P, cells, factors, tuple(found.multipliers), True, "")
-    if made.verify():
+    parts = list(zip(over, made.multipliers, strict=True))
+    if _covers(cells, loop.reference) and all(
+        made._holds(*part) for part in tracked("checking cells", parts)
+    ):
         return made
     return replace(made, proven=False, why="the inequality does not hold in exact arithmetic")
 
@@ -542,12 +579,12 @@ def _grown(
     drifts = loop.drifts(cells)
     linear = _enclosed(loop, cells, factors, drifts, FIRST_SHARE)
     if linear is None or not np.all(np.isfinite(drifts)):
-        return None, factors, P, "the equations have no bounds near the reference"
+        return None, (), P, "the equations have no bounds near the reference"
     decay = _decay(loop, cells, linear, sizes, solver)
     found = None if decay is None else smallest(linear, roots, sizes, decay, SPARE, solver)
     if decay is None or found is None:
-        return None, factors, P, "the linear loop has no invariant ellipsoid"
-    made: Grown = (None, factors, P, "")
+        return None, (), P, "the linear loop has no invariant ellipsoid"
+    made: Grown = (None, (), P, "")
     for first, growth in GROWTHS:
         made = _from_below(loop, cells, sizes, drifts, (decay, first, growth), found.P, solver)
         if made[0] is not None:
@@ -573,20 +610,20 @@ def _from_below(
         factors = np.array([_around(_ends(P, cell)) for cell in cells])
         over = _enclosed(loop, cells, factors, drifts)
         if over is None:
-            return None, factors, P, "the equations have no bounds over a tube of the size needed"
+            return None, (), P, "the equations have no bounds over a tube of the size needed"
         found = smallest(over, roots, sizes, decay, SPARE, solver)
         if found is None:
             why = "no ellipsoid satisfies the inequality: the gusts are too large"
-            return None, factors, P, why
+            return None, over, P, why
         least = min(
             np.linalg.eigvalsh(L.T @ end @ L)[0]
             for cell, L in zip(cells, factors, strict=True)
             for end in _ends(found.P, cell)
         )
         if least * INSIDE > 1:
-            return found, factors, found.P, ""
+            return found, over, found.P, ""
         P = found.P
-    return None, factors, P, f"the tube still grew after {ROUNDS} rounds"
+    return None, over, P, f"the tube still grew after {ROUNDS} rounds"
 
 
 def _decay(

@@ -179,9 +179,43 @@ def test_a_kink_has_one_symbol_for_all_derivatives():
     np.testing.assert_allclose(found.jacobian.rest, 0.0, atol=1e-12)
     # an average over segments halves what is linear in the domain, not what a kink leaves open
     g = function(lambda x: casadi.fabs(x[0]) + x[0] ** 2, 2)
-    average, symbols = segment_averages(g, SQUARE, along=[0])
-    assert symbols == 2
-    np.testing.assert_allclose(average.slopes[0, 0], [1.0, 0.0, 1.0])
+    average, switched, _ = segment_averages(g, SQUARE, along=[0])
+    np.testing.assert_allclose(average.slopes[0, 0], [1.0, 0.0])
+    np.testing.assert_allclose(switched[:, 0, 0, 0], 1.0)
+
+
+def test_a_kink_of_a_kink_leaves_no_remainder():
+    # y = x0 + |x1|: d|y| = s [1, t], s and t the signs of y and x1
+    f = function(lambda x: casadi.fabs(x[0] + casadi.fabs(x[1])), 2)
+    found = enclose(f, SQUARE, by=[0])
+    np.testing.assert_allclose(found.jacobian.centre, 0.0)
+    np.testing.assert_allclose(found.jacobian.rest, 0.0, atol=1e-12)
+    np.testing.assert_allclose(sorted(found.jacobian.slopes[0, :, 2:].T.tolist()), [[0, 1], [1, 0]])
+    average, switched, turning = segment_averages(f, SQUARE, along=[0])
+    np.testing.assert_allclose(average.rest, 0.0, atol=1e-12)
+    for piece in switched:
+        numbers = piece[0].T[np.any(piece[0], axis=0)]
+        np.testing.assert_allclose(sorted(numbers.tolist()), [[0, 1], [1, 0]], atol=1e-12)
+    np.testing.assert_allclose(turning, 0.0, atol=1e-12)
+
+
+def test_the_matrix_of_a_kink_turns_with_the_symbols():
+    # |x0| x1, slopes s [x1, x0] on the side s: nothing is left, and half of the turn is the mean
+    f = function(lambda x: casadi.fabs(x[0]) * x[1], 2)
+    average, switched, turning = segment_averages(f, Domain.box([-1.0, 1.0], [1.0, 3.0]), along=[0])
+    np.testing.assert_allclose(average.centre, 0.0, atol=1e-12)
+    np.testing.assert_allclose(average.rest, 0.0, atol=1e-12)
+    np.testing.assert_allclose(switched.mean(axis=0)[0, :, 0], [2.0, 0.0])
+    # the last piece: the set is as large as the domain, the mean place in it 7/8
+    np.testing.assert_allclose(turning[-1, 0, :, :, 0], 7 / 8 * np.array([[0.0, 1.0], [1.0, 0.0]]))
+
+
+def test_the_size_of_a_number_and_its_sign_are_two_numbers():
+    f = function(lambda x: casadi.vertcat(x[0] * casadi.fabs(x[0]), casadi.fabs(x[0])), 1)
+    j = enclose(f, Domain.box([-1.0], [1.0]), by=[0]).jacobian
+    # at x = -1 the slopes are 2 and -1, at 0 they are 0 and 1: no line holds these and (2, 1)
+    kinks = j.slopes[0, :, 1:] if j.slopes.ndim == 4 else j.slopes[:, 0, 1:]
+    assert np.linalg.matrix_rank(kinks) == 2
 
 
 def test_the_slope_of_a_speed_is_bounded_where_it_passes_zero():
@@ -320,15 +354,16 @@ def test_averages_along_segments_are_those_of_quadrature():
     slope = casadi.SX.sym("x", 2)
     jacobian = casadi.Function("j", [slope], [casadi.jacobian(f(slope), slope)])
     domain = Domain.ellipsoid([0.4, 0.05], [[0.3, 0.1], [0.0, 0.2]])
-    average, symbols = segment_averages(f, domain, along=[0])
+    average, switched, turning = segment_averages(f, domain, along=[0])
     points, z = domain.sample(RNG, 300)
     nodes, weights = np.polynomial.legendre.leggauss(200)
     for x, own in zip(points, z, strict=True):
         on = domain.centre[:, None] + (x - domain.centre)[:, None] * (nodes + 1) / 2
         value = np.asarray(jacobian.map(200)(on)).reshape(1, 200, 2).transpose(1, 0, 2)
         mean = np.tensordot(weights / 2, value, axes=1)
-        off = np.abs(mean - average.centre - average.slopes[..., :symbols] @ own)
-        kinks = np.abs(average.slopes[..., symbols:]).sum(axis=-1)
+        off = np.abs(mean - average.centre - average.slopes @ own)
+        turned = np.abs(np.moveaxis(turning, -2, -1) @ own)
+        kinks = (np.abs(switched) + turned).sum(axis=-1).mean(axis=0)
         # a quadrature over a kink is off by a jump of 2 over its 200 nodes
         assert np.all(off <= average.rest + kinks + 2e-2)
 

@@ -13,15 +13,16 @@ from evidence.planar_vtol.model import over_ground
 from evidence.planar_vtol.tubes import CASES as VTOL
 from evidence.planar_vtol.tubes import motions, sizes
 from evidence.planar_vtol.tubes import proven as vtol_tube
-from evidence.tubes import from_its_border, worst
+from evidence.tables import DOCS, kept_rows
+from evidence.tubes import _chosen, from_its_border, transitions, worst
 from studies.cli import main
 from symheli import Helicopter
-from symheli.enclosure import equations
+from symheli.enclosure import AffineForm, SegmentAverages, equations
 from symheli.errors import InputError
 from synthesis import Motions, Tube, tube
-from synthesis.tubes.deviations import Cell, Deviations
+from synthesis.tubes.deviations import Cell, Deviations, _covered
 from synthesis.tubes.inequality import elementwise, rank_one
-from synthesis.tubes.reference import moving
+from synthesis.tubes.reference import TUBE_SIZES, moving
 from synthesis.tubes.tube import _covers
 
 CASES = [
@@ -250,6 +251,104 @@ def test_terms_of_the_remainder_bound_their_matrices():
         assert x @ np.tensordot(signs, matrices, axes=1) @ v <= bound * (1 + 1e-12)
 
 
+def test_a_jump_between_the_parts_of_a_cell_is_one_number_times_a_matrix():
+    # J = A + B s + sign(s - 1/4) l r' (1 + z/10) over four parts of s: two on one side, one open
+    rng = np.random.default_rng(3)
+    units = np.array([0.5, 2.0, 1.0, 3.0, 1.0])
+    A, B = rng.standard_normal((2, 2, 4))
+    jump = np.outer(rng.standard_normal(2), rng.standard_normal(4))
+    places, open_ = np.array([-0.75, -0.25, 0.25, 0.75])[:, None], np.array([0, 0, 1, 0])
+    sides = np.array([-1, -1, 0, 1])
+    slopes = np.zeros((4, 2, 4, 3))  # of z and y, and of s within a part
+    slopes[..., 2] = 0.25 * B
+    slopes[..., 0] = 0.1 * sides[:, None, None] * jump
+    centre = A + places[..., None] * B + sides[:, None, None] * jump
+    form = AffineForm(centre, slopes, np.zeros(centre.shape), (1, 1, 1))
+    switched = open_[:, None, None, None, None] * jump[..., None]
+    turning = np.zeros((4, 1, 2, 4, 3, 1))
+    turning[..., 0, :] = 0.1 * switched
+    parts = SegmentAverages(form, switched, turning)
+    found, left, weights = _covered(parts, places, np.array([0.25]), 0, units)
+    np.testing.assert_allclose(found.centre, A, atol=1e-2)
+    np.testing.assert_allclose(found.slopes[..., 2], B, atol=1e-2)  # offsets are tamed by 1e-3
+    assert len(left) == 1
+    # left is what the parts turn with z: by -.1, -.1, 0 and .1 of the jump, by -.025 on average
+    assert found.rest.max() < 0.13 * np.abs(jump).max()
+    for _ in range(300):
+        part, (z, y), s, k, t = rng.integers(4), *rng.uniform(-1, 1, (2, 2)), *rng.uniform(-1, 1, 2)
+        s = s[0]
+        J = centre[part] + slopes[part] @ [z, y, s] + open_[part] * jump * (k + 0.1 * t * z)
+        at = found.centre + found.slopes @ [z, y, places[part, 0] + 0.25 * s]
+        x, v = rng.standard_normal(2), rng.standard_normal(5)
+        bound = np.abs(x) @ found.rest @ np.abs(v[:4])
+        bound += sum(
+            abs(x @ row) * np.sqrt(v @ W @ v) for row, W in zip(left, weights, strict=True)
+        )
+        assert abs(x @ (J - at) @ v[:4]) <= bound * (1 + 1e-12)
+
+
+def test_rows_that_are_not_run_stay_as_the_page_has_them():
+    shown = kept_rows(DOCS / "tubes.md", "transitions")
+    assert transitions([], 0, 0.0, shown) in (DOCS / "tubes.md").read_text(encoding="utf-8")
+    assert _chosen(["xcell60, 8 to 13, 0.2"]) == [("xcell60", 8.0, 13.0, 0.2, 0.5, 0.5, 0.5)]
+    with pytest.raises(InputError, match="no row 'xcell60'; rows are"):
+        _chosen(["xcell60"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("airspeeds", "gust"), [((9.0, 10.0), 0.25), ((8.0, 13.0), 0.2)])
+def test_a_tube_crosses_the_edges_where_the_tail_stalls_and_the_wake_covers_it(airspeeds, gust):
+    heli = Helicopter.load("xcell60", governor="ideal")
+    found = tube(heli, airspeeds, gust=gust, acceleration=0.5, jerk=0.5, snap=0.5)
+    assert found.proven, found.why
+    assert from_its_border(found, 1000, 0.25) < 1
+    assert max(worst(found, p) for p in airspeeds) < 1
+
+
+@pytest.mark.slow
+def test_the_set_of_a_cell_with_two_kinks_holds_the_jacobians_in_it():
+    heli, n, count = Helicopter.load("xcell60", governor="ideal"), 10, 4000
+    loop = Deviations(heli, moving(heli, np.array([9.0, 10.0]), (1.0, 1.0, 1.0)), 0.15)
+    cell, factor = Cell(0, (0.0, 1.0), (0.0, 0.5)), np.diag(0.2 * np.array(TUBE_SIZES))
+    drifts = np.zeros((1, 4, n))
+    (over,) = loop.enclosed([cell], factor[None], drifts)
+    e, w, c, data = (
+        casadi.SX.sym(name, k)
+        for name, k in zip("ewcd", (n, 3, 4, len(loop.reference.data[0])), strict=True)
+    )
+    rate = loop.rate(e, w, c, data)
+    slopes = casadi.Function("J", [e, w, c, data], [casadi.jacobian(rate, casadi.vertcat(e, w))])
+    rng = np.random.default_rng(4)
+    z, y = (rng.standard_normal((count, k)) for k in (n, 3))
+    z, y = (m / np.linalg.norm(m, axis=1, keepdims=True) for m in (z, y))
+    share = rng.uniform(size=(2, count))
+    c = np.stack([share[0], 0.5 * share[1], *rng.uniform(-1, 1, (2, count))])
+    nodes, weight = np.polynomial.legendre.leggauss(25)  # 1e5 Jacobians
+    J = np.zeros((count, n, n + 3))
+    for at, own in zip((nodes + 1) / 2, weight / 2, strict=True):
+        found = slopes.map(count)(at * (z @ factor).T, at * y.T, c, loop.reference.data[0])
+        J += own * np.asarray(found).reshape(n, count, n + 3).transpose(1, 0, 2)
+    corners, way = over.corners[..., :-1], 2 * share - 1
+    s, a, j = np.stack([way[0], way[1], c[2]])[..., None, None] / 2
+    at = sum(
+        (0.5 + (2 * p - 1) * s)
+        * (0.5 + (2 * q - 1) * a)
+        * (0.5 + (2 * r - 1) * j)
+        * corners[p, q, r]
+        for p in (0, 1)
+        for q in (0, 1)
+        for r in (0, 1)
+    )
+    linear = np.tensordot(z, over.tube, axes=1) + np.tensordot(y, over.gust, axes=1)
+    off = J - at - linear[..., :-1]
+    # the products with (e, w): the set has z H w as y G e
+    v = np.hstack([z @ factor, y, np.zeros((count, 1))])
+    missed = np.einsum("cab,cb->ca", off, v[:, :-1])
+    x = rng.standard_normal((200, n)) / np.diag(factor)
+    limit = np.abs(x @ over.left.T) @ np.sqrt(np.einsum("ca,kab,cb->kc", v, over.weights, v))
+    assert np.all(np.abs(x @ missed.T) <= limit + 1e-3)  # of a quadrature over kinks
+
+
 def _pendulum(reference=None, gain=(-3.0, -2.0), **about):
     x, u, w = (casadi.SX.sym(n, k) for n, k in (("x", 2), ("u", 1), ("w", 1)))
     f = casadi.vertcat(x[1], casadi.sin(x[0]) + u + w)
@@ -272,6 +371,23 @@ def test_a_tube_of_any_model_and_its_gains_are_proven_again_from_the_file(uprigh
     assert again.proven
     assert [gain.gamma for gain in again.gains] == [gain.gamma for gain in upright.gains]
     assert again.hypotheses == upright.hypotheses
+
+
+def test_a_file_of_an_older_version_is_proven_by_other_multipliers(upright, tmp_path):
+    content = json.loads(upright.save(tmp_path / "tube.json").read_text())
+    content["version"] = 3
+    for given in [content, *content["gains"]]:
+        for by in given["multipliers"]:
+            by["terms"] = np.eye(len(by["terms"]) + 1).tolist()
+    (tmp_path / "tube.json").write_text(json.dumps(content))
+    again = Tube.load(tmp_path / "tube.json")
+    assert again.proven
+    np.testing.assert_array_equal(again.P, upright.P)
+    gammas = [gain.gamma for gain in upright.gains]
+    np.testing.assert_allclose([gain.gamma for gain in again.gains], gammas, rtol=1e-3)
+    content["P"] = (np.array(content["P"]) * 4).tolist()  # half as large: the gusts leave it
+    (tmp_path / "tube.json").write_text(json.dumps(content))
+    assert not Tube.load(tmp_path / "tube.json").proven
 
 
 @pytest.mark.parametrize(
