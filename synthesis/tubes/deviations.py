@@ -71,21 +71,39 @@ class Deviations:
     def name(self) -> str:
         """Of the vehicle, or of the model's function."""
         own = self.model
-        return own.vehicle.name if isinstance(own, Helicopter) else own.name()
+        if not isinstance(own, Helicopter):
+            return own.name()
+        governor = "an ideal governor" if own.governor == "ideal" else "the governor and engine"
+        return f"{own.vehicle.name} with {governor}"
 
     @property
     def _named(self) -> Any:
         return self.reference if isinstance(self.reference, Motions) else self.model
 
     @property
+    def hypotheses(self) -> tuple[str, ...]:
+        """What is modelled and assumed, in sentences."""
+        return self.reference.hypotheses(self.name, self.gust, self.states)
+
+    @property
     def states(self) -> tuple[str, ...]:
-        """Names of the states."""
-        return tuple(self._named.states)
+        """Names of the states, those of the controller and of servos after those of the model."""
+        own = self.reference
+        further = () if isinstance(own, Motions) else own.equipment.names
+        return (*map(str, self._named.states), *further)
 
     @property
     def inputs(self) -> tuple[str, ...]:
         """Names of the controls."""
         return tuple(self._named.inputs)
+
+    @property
+    def feedback(self) -> Array:
+        """K (nodes, k + m, n + m), or one for all: controls, and the rates of the further states,
+        by the deviations.
+        """
+        own = self.reference
+        return own.gain if isinstance(own, Motions) else own.closed
 
     @property
     def disturbances(self) -> int:
@@ -102,14 +120,27 @@ class Deviations:
         e, w, c = (casadi.SX.sym(name, k) for name, k in zip("ewc", sizes, strict=True))
         data = casadi.SX.sym("data", r.data.shape[1])
         x, moving, u, K = r.between(data, c)
-        at = (x + e, u + K @ e, self.gust * w)
+        n, moved = len(self._named.states), u + K @ e
+        at = ((x + e)[:n], moved[: len(self.inputs)], self.gust * w)
         if not isinstance(self.model, Helicopter):
             rate = self.model(*at) - (self.model(x, u, 0) if moving is None else moving)
             return casadi.Function("deviation", [e, w, c, data], [casadi.densify(rate)]), None
         lam = casadi.SX.sym("lam", 2)
         xdot, balance = self.model.implicit(*at, lam)
-        function = casadi.Function("deviation", [e, w, c, data, lam], [xdot - moving, balance])
+        rate = casadi.vertcat(xdot, moved[len(self.inputs) :]) - moving
+        function = casadi.Function("deviation", [e, w, c, data, lam], [rate, balance])
         return function, casadi.Function("inflow", [e, w, c, data], [self.model.inflow(*at)])
+
+    @cached_property
+    def _steps(self) -> Array:
+        """(states, q): rates that servos add by resolving their commands in steps, each times a
+        number within [-1, 1].
+        """
+        n, r = len(self._named.states), self.reference
+        if isinstance(r, Motions) or not isinstance(self.model, Helicopter):
+            return np.zeros((n, 0))
+        further = r.equipment.steps(self.model.travel)
+        return np.vstack([np.zeros((n, further.shape[1])), further])
 
     @property
     def rate(self) -> casadi.Function:
@@ -140,7 +171,7 @@ class Deviations:
             average, symbols = segment_averages(function, *over, along=[0, 1], start=start)
             if np.all(np.isfinite(average.rest)):
                 own = _covered(average, symbols, places, widths, whole)
-                found.append(_matrix_set(own, symbols, drift, factor, m))
+                found.append(_matrix_set(own, symbols, drift, factor, m, self._steps))
             else:
                 found.append(None)
         return found
@@ -243,7 +274,7 @@ def _common_kinks(slopes: Array) -> tuple[Array, Array]:
 
 
 def _matrix_set(
-    average: AffineForm, symbols: int, drift: Array, factor: Array, m: int
+    average: AffineForm, symbols: int, drift: Array, factor: Array, m: int, steps: Array
 ) -> MatrixSet:
     n = len(factor)
     q = n + m + 1
@@ -275,6 +306,13 @@ def _matrix_set(
     left, weights, more = rank_one(others[rates > SMALL], units)
     rest += more + np.abs(others[rates <= SMALL]).sum(axis=0) * ROUNDED_UP
     rows, diagonal = elementwise(rest * ROUNDED_UP, units)
+    size = np.linalg.norm(steps / units[:n, None], axis=0) ** 0.5
+    constant = np.zeros((steps.shape[1], q, q))
+    constant[:, -1, -1] = size**2 * ROUNDED_UP
     return MatrixSet(
-        corners, tube, gust, np.vstack([left, rows]), np.concatenate([weights, diagonal])
+        corners,
+        tube,
+        gust,
+        np.vstack([left, rows, (steps / size).T]),
+        np.concatenate([weights, diagonal, constant]),
     )

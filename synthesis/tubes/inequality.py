@@ -125,9 +125,10 @@ def motion(nodes: Sequence[Any], width: Any, centre: Array, half: Array) -> Moti
     (s, a), (s_half, a_half) = centre, half
     if len(nodes) == 1:
         return Motion(nodes, None, [a])
+    accelerations = [a - a_half, a + a_half] if a_half != 0 else [a]
     step = nodes[1] - nodes[0]
     ends = [nodes[0] + (s + side * s_half) * step for side in (-1, 1)]
-    return Motion(ends, step / width, [a - a_half, a + a_half])
+    return Motion(ends, step / width, accelerations)
 
 
 def invariant(by: Multipliers, shape: tuple[int, int], number: Number = float) -> Any:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise, product
@@ -18,11 +18,13 @@ from scipy.linalg import eigh
 
 from symheli import Helicopter
 from symheli.errors import InputError
+from symheli.flight import Servo
 from symheli.progress import Task, task, tracked
 from symheli.values.summary import summarized
 from symheli.values.whole_files import write_text
 from synthesis.certificate_file import DAMAGED, content_of
 from synthesis.program.cone_program import Solver
+from synthesis.tubes.controllers import Choice
 from synthesis.tubes.deviations import Cell, Deviations
 from synthesis.tubes.files import (
     numbers,
@@ -34,7 +36,7 @@ from synthesis.tubes.files import (
 from synthesis.tubes.gain import LocalGain, least
 from synthesis.tubes.inequality import Multipliers
 from synthesis.tubes.motions import Motions
-from synthesis.tubes.proof import holds
+from synthesis.tubes.proof import falls_in, holds
 from synthesis.tubes.reference import TUBE_SIZES, Reference, held, moving
 from synthesis.tubes.search import Enclosed, Found, smallest
 
@@ -148,7 +150,8 @@ class Tube:
     @cached_property
     def control_half_widths(self) -> Array:
         """Largest deviation of each control from that of the reference at the nodes, (k,), SI."""
-        K = self.deviations.reference.gain
+        K = self.deviations.feedback[:, : len(self.deviations.inputs)]
+        K = np.broadcast_to(K, (len(self.P), *K.shape[1:]))
         return np.sqrt(np.einsum("kui,kij,kuj->ku", K, np.linalg.inv(self.P), K)).max(axis=0)
 
     @property
@@ -156,7 +159,7 @@ class Tube:
         """What the statement rests on, in sentences."""
         d = self.deviations
         return (
-            *d.reference.hypotheses(d.name, d.gust),
+            *d.hypotheses,
             "controls within their travel: they differ from those of the reference by no more than"
             " the control deviations",
             "the deviation lies in the tube at the start",
@@ -217,6 +220,8 @@ class Tube:
         """
         if not self.proven:
             raise InputError(f"only a proven tube has gains; here {self.why}")
+        if self.deviations.reference.jump is not None:
+            raise InputError("gains are of loops in continuous time: the tube's is sampled")
         d, own = self.deviations, solver or Solver(tolerance=TOLERANCE)
         cells = _enclosed(d, self.cells, self.factors, d.drifts(self.cells))
         found = least(cells or [], self.P, d.states, outputs, energy, d.gust, own)
@@ -238,7 +243,10 @@ class Tube:
         counts = {len(gain.multipliers) for gain in self.gains}
         if not (complete and counts <= {len(self.cells)} and _covers(self.cells, loop.reference)):
             return False
+        jump = loop.reference.jump
         if not all(gain.has_storage for gain in self.gains):
+            return False
+        if jump is not None and (self.gains or not falls_in(jump, self.P[0], self.P[-1])):
             return False
         parts = list(zip(self.cells, self.factors, self.multipliers, strict=True))
         for k, (cell, factor, by) in enumerate(tracked("verifying cells", parts)):
@@ -315,6 +323,10 @@ def tube(
     jerk: float = 0.0,
     snap: float = math.inf,
     gain: Any = None,
+    known: Sequence[str] | None = None,
+    servos: Mapping[str, Servo] | None = None,
+    period: float = 0.0,
+    delay: int = 0,
     sizes: Any = None,
     solver: Solver | None = None,
 ) -> Tube:
@@ -382,31 +394,37 @@ def tube(
     if not (np.isfinite(gust) and gust >= 0):
         raise InputError(f"gust must be a number >= 0; got {gust!r:.60}")
     limits = _limits(acceleration, jerk, snap)
+    made: Reference | Motions
     if isinstance(model, Helicopter):
-        made = _flight(model, reference, limits, gain)
+        choice = Choice(gain, known, period, bool(period) or servos is not None)
+        made = _flight(model, reference, limits, choice, servos, delay)
+        own = np.concatenate([TUBE_SIZES[: made.own], made.equipment.sizes])
     else:
-        made = _checked(model, reference, [*limits[:2], 0 if gain is None else 1], sizes)
+        others = [gain, known, servos, period or None, delay or None]
+        made = _checked(model, reference, [*limits[:2], *(x is not None for x in others)], sizes)
     loop = Deviations(model, made, float(gust))
-    own = np.array(TUBE_SIZES if sizes is None else sizes, float)
+    own = own if sizes is None else np.array(sizes, float)
     if own.shape != (len(loop.states),) or not (np.all(np.isfinite(own)) and np.all(own > 0)):
         raise InputError(f"sizes must be {len(loop.states)} numbers > 0; got {sizes}")
     return _found(loop, tuple(_cells(made)), own, solver or Solver(tolerance=TOLERANCE))
 
 
 def _flight(
-    heli: Helicopter, airspeed: Any, limits: tuple[float, float, float], gain: Any
+    heli: Helicopter,
+    airspeed: Any,
+    limits: tuple[float, float, float],
+    choice: Choice,
+    servos: Mapping[str, Servo] | None,
+    delay: int,
 ) -> Reference:
     """The reference of a helicopter."""
-    if heli.governor != "ideal" or len(heli.states) != 10:
-        raise InputError(
-            "a tube needs the ten states of an ideal governor: Helicopter.load(...,"
-            " governor='ideal')"
-        )
     if np.ndim(airspeed) > 0 or isinstance(airspeed, Motions):
-        return moving(heli, _range(airspeed, limits), limits, gain)
+        if choice.period or delay:
+            raise InputError("a sampled loop needs one airspeed: its P follows the clock alone")
+        return moving(heli, _range(airspeed, limits), limits, choice, servos)
     if limits[0] or limits[1]:
         raise InputError("a held airspeed has no acceleration or jerk: give (low, high)")
-    return held(heli, airspeed, gain)
+    return held(heli, airspeed, choice, servos, delay)
 
 
 def _checked(model: Any, motions: Any, flight: Sequence[float], sizes: Any) -> Motions:
@@ -423,7 +441,7 @@ def _checked(model: Any, motions: Any, flight: Sequence[float], sizes: Any) -> M
     if model.n_out() != 1 or model.size_out(0) != (n, 1):
         raise InputError(f"the model must return dx/dt ({n}), one column")
     if any(flight):
-        raise InputError("acceleration, jerk and gain are those of a helicopter: see Motions")
+        raise InputError("limits, gain, known, servos, period and delay are those of a helicopter: see Motions")
     if sizes is None:
         raise InputError(f"sizes are needed: {n} half widths of equal weight")
     return motions
@@ -431,7 +449,7 @@ def _checked(model: Any, motions: Any, flight: Sequence[float], sizes: Any) -> M
 
 def _cells(reference: Reference | Motions) -> list[Cell]:
     """The commands in cells."""
-    if isinstance(reference, Reference) and len(reference.nodes) > 1:
+    if isinstance(reference, Reference) and len(reference.airspeeds) > 1:
         return [
             Cell(i, (0.0, 1.0), (low, high))
             for i, p in enumerate(reference.nodes[1:])
@@ -543,8 +561,8 @@ def _grown(
     linear = _enclosed(loop, cells, factors, drifts, FIRST_SHARE)
     if linear is None or not np.all(np.isfinite(drifts)):
         return None, factors, P, "the equations have no bounds near the reference"
-    decay = _decay(loop, cells, linear, sizes, solver)
-    found = None if decay is None else smallest(linear, roots, sizes, decay, SPARE, solver)
+    decay, jump = _decay(loop, cells, linear, sizes, solver), loop.reference.jump
+    found = None if decay is None else smallest(linear, roots, sizes, decay, SPARE, solver, jump)
     if decay is None or found is None:
         return None, factors, P, "the linear loop has no invariant ellipsoid"
     made: Grown = (None, factors, P, "")
@@ -574,7 +592,7 @@ def _from_below(
         over = _enclosed(loop, cells, factors, drifts)
         if over is None:
             return None, factors, P, "the equations have no bounds over a tube of the size needed"
-        found = smallest(over, roots, sizes, decay, SPARE, solver)
+        found = smallest(over, roots, sizes, decay, SPARE, solver, loop.reference.jump)
         if found is None:
             why = "no ellipsoid satisfies the inequality: the gusts are too large"
             return None, factors, P, why
@@ -593,14 +611,17 @@ def _decay(
     loop: Deviations, cells: Sequence[Cell], linear: list[Enclosed], sizes: Array, solver: Solver
 ) -> float | None:
     """The rate alpha of the smallest ellipsoids of the linear loop, by the cells of one interval in
-    the middle; None: there are none.
+    the middle, of a sampled loop by all; None: there are none.
     """
-    middle = cells[len(cells) // 2].interval
-    nodes = _nodes(cells[len(cells) // 2], len(loop.reference.nodes))
-    own = [o._replace(nodes=tuple(range(len(nodes)))) for o in linear if o.cell.interval == middle]
-    roots = np.broadcast_to(own[0].factor, (len(nodes), *own[0].factor.shape))
+    middle, jump = cells[len(cells) // 2].interval, loop.reference.jump
+    count = len(loop.reference.nodes)
+    if jump is None:
+        linear = [o for o in linear if o.cell.interval == middle]
+        count = len(linear[0].nodes)
+        linear = [o._replace(nodes=tuple(range(count))) for o in linear]
+    roots = np.broadcast_to(linear[0].factor, (count, *linear[0].factor.shape))
     rates = DECAYS if isinstance(loop.model, Helicopter) else MORE_DECAYS
-    tries = [(smallest(own, roots, sizes, decay, SPARE, solver), decay) for decay in rates]
+    tries = [(smallest(linear, roots, sizes, decay, SPARE, solver, jump), decay) for decay in rates]
     return min(((f.size, decay) for f, decay in tries if f is not None), default=(0.0, None))[1]
 
 
