@@ -165,7 +165,7 @@ class Deviations:
         zero, calm = np.zeros(factors.shape[-1]), np.zeros(m)
         found: list[MatrixSet | None] = []
         for cell, factor, drift in zip(cells, factors, drifts, strict=True):
-            places, widths, commands, data = self._parts(cell, self.reference.jacobian_parts)
+            places, widths, commands, data = self.parts(cell, self.reference.jacobian_parts)
             ellipsoid = Domain.ellipsoid(zero, share * factor)
             over = (ellipsoid, Domain.ellipsoid(calm, share * np.eye(m)), commands, data)
             average, symbols = segment_averages(function, *over, along=[0, 1], start=start)
@@ -188,7 +188,7 @@ class Deviations:
         still = (Domain.point(np.zeros(n)), Domain.point(np.zeros(self.disturbances)))
         found = []
         for cell in cells:
-            _, _, commands, data = self._parts(cell, self.reference.drift_parts)
+            _, _, commands, data = self.parts(cell, self.reference.drift_parts)
             value = enclose(function, *still, commands, data, start=start).value
             split = value.slopes.shape[-1] - whole
             by = value.slopes[..., split:]
@@ -200,7 +200,7 @@ class Deviations:
             found.append([middle, rest * ROUNDED_UP, *linear.T])
         return np.array(found)
 
-    def _parts(self, cell: Cell, parts: Sequence[int]) -> tuple[Array, Array, Domain, Domain]:
+    def parts(self, cell: Cell, parts: Sequence[int]) -> tuple[Array, Array, Domain, Domain]:
         """A cell in so many parts along each of its ranges, with all the other commands: the parts'
         places (N, r) and half widths (r,) in units of the cell's half widths, the commands, and the
         data of the reference.

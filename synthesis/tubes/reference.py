@@ -154,6 +154,24 @@ class Reference:
         position between its nodes. Of the further states 0; the controls after the first four are
         their rates.
         """
+        z, moving, added, K = self._along(data, c)
+        n, further = self.own, casadi.SX.zeros(1, self.equipment.count)
+        u = casadi.horzcat(z[n:] + added, further)
+        if self.equipment.bank is not None:  # its states follow the rest of the controls alone
+            forward = zip(self.equipment.forward, (moving[n:], added), strict=True)
+            u = casadi.horzcat(z[n:], sum((by @ casadi.DM(M.T) for M, by in forward), further))
+        x, moving = (casadi.horzcat(row[:n], further) for row in (z, moving))
+        return x.T, moving.T, u.T, K
+
+    def commands(self, data: Any, c: Any) -> Any:
+        """The controls u_r (4,) in CasADi, as `between`, as they are commanded."""
+        z, _, added, _ = self._along(data, c)
+        return (z[self.own :] + added).T
+
+    def _along(self, data: Any, c: Any) -> tuple[Any, Any, Any, Any]:
+        """State and controls (1, n + 4) but for what is added to the controls where the jerk
+        changes (1, 4), the rates of the first, and K.
+        """
         powers, n = self.steady.shape[2], self.own
         place = 2
 
@@ -177,14 +195,7 @@ class Reference:
             z, along = value[i, :] + a * z, slope[i, :] + a * along
         Y, turn = Y0 + s * (Y1 - Y0), (Y1 - Y0) / width
         z, moving = z + Y * j, (along + turn * j) * a + by * j + Y * snap
-        added = (V0 + s * (V1 - V0)) * snap
-        further = casadi.SX.zeros(1, self.equipment.count)
-        u = casadi.horzcat(z[n:] + added, further)
-        if self.equipment.bank is not None:  # its states follow the rest of the controls alone
-            forward = zip(self.equipment.forward, (moving[n:], added), strict=True)
-            u = casadi.horzcat(z[n:], sum((by @ casadi.DM(M.T) for M, by in forward), further))
-        x, moving = (casadi.horzcat(row[:n], further) for row in (z, moving))
-        return x.T, moving.T, u.T, K0 + s * (K1 - K0)
+        return z, moving, (V0 + s * (V1 - V0)) * snap, K0 + s * (K1 - K0)
 
     def place(self, commands: Any) -> tuple[Array, Array]:
         """Intervals of airspeeds (N,) within the range, m/s, or of times since a sample, and their

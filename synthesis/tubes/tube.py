@@ -39,10 +39,11 @@ from synthesis.tubes.motions import Motions
 from synthesis.tubes.proof import falls_in, holds
 from synthesis.tubes.reference import TUBE_SIZES, Reference, held, moving
 from synthesis.tubes.search import Enclosed, Found, smallest
+from synthesis.tubes.travel import why_not_free
 
 Array = np.ndarray
 
-SCHEMA, VERSION = "symheli tube", 3
+SCHEMA, VERSION = "symheli tube", 4
 INTERVAL = 1.0
 """Largest distance of the nodes of reference, feedback and P along airspeed, m/s."""
 DOWNWARD = 0.75
@@ -158,12 +159,14 @@ class Tube:
     def hypotheses(self) -> tuple[str, ...]:
         """What the statement rests on, in sentences."""
         d = self.deviations
-        return (
-            *d.hypotheses,
-            "controls within their travel: they differ from those of the reference by no more than"
-            " the control deviations",
-            "the deviation lies in the tube at the start",
+        travel = (
+            "shown, not assumed: commands and blade pitch stay within their travel, servos below"
+            " their rate limits"
+            if isinstance(d.model, Helicopter)
+            else "controls within their travel: they differ from those of the reference by no more"
+            " than the control deviations"
         )
+        return (*d.hypotheses, "the deviation lies in the tube at the start", travel)
 
     def __str__(self) -> str:
         named = zip(self.deviations.states, self.half_widths, strict=True)
@@ -238,17 +241,22 @@ class Tube:
 
     def verify(self) -> bool:
         """Enclose the equations again and check the inequality in exact arithmetic."""
+        return not self._refused()
+
+    def _refused(self) -> str:
+        """Empty where the proof holds, else what does not."""
         loop, p = self.deviations, self.nodes
+        jump, no_fall = loop.reference.jump, "the inequality does not hold in exact arithmetic"
         complete = len(self.cells) == len(self.factors) == len(self.multipliers)
         counts = {len(gain.multipliers) for gain in self.gains}
         if not (complete and counts <= {len(self.cells)} and _covers(self.cells, loop.reference)):
-            return False
-        jump = loop.reference.jump
+            return "the cells do not cover all commands"
         if not all(gain.has_storage for gain in self.gains):
-            return False
+            return "a gain has no storage"
         if jump is not None and (self.gains or not falls_in(jump, self.P[0], self.P[-1])):
-            return False
+            return "the deviation grows at a sample"
         parts = list(zip(self.cells, self.factors, self.multipliers, strict=True))
+        sets = []
         for k, (cell, factor, by) in enumerate(tracked("verifying cells", parts)):
             made = _enclosed(loop, [cell], factor[None], loop.drifts([cell]))
             nodes = list(_nodes(cell, len(p)))
@@ -258,8 +266,9 @@ class Tube:
                 or not holds(self.P[nodes], p[nodes], cell, made[0].over, factor, by)
                 or not all(gain.holds_in(k, made[0], p) for gain in self.gains)
             ):
-                return False
-        return True
+                return no_fall
+            sets.append((made[0].over, factor))
+        return why_not_free(loop, self.cells, self.P, sets)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the tube as JSON: equations (the vehicle file, or the operations of the model),
@@ -289,9 +298,8 @@ class Tube:
             raise
         except DAMAGED as error:
             raise InputError(f"{path}: damaged, a value is invalid or missing ({error})") from None
-        proven = found.verify()
-        why = "" if proven else "the inequality does not hold in exact arithmetic"
-        return replace(found, proven=proven, why=why)
+        why = found._refused()
+        return replace(found, proven=not why, why=why)
 
 
 def _read(content: dict[str, Any]) -> Tube:
@@ -544,9 +552,8 @@ def _found(loop: Deviations, cells: tuple[Cell, ...], sizes: Array, solver: Solv
     if found is None:
         return Tube(loop, P, cells, factors, (), False, why)
     made = Tube(loop, P, cells, factors, tuple(found.multipliers), True, "")
-    if made.verify():
-        return made
-    return replace(made, proven=False, why="the inequality does not hold in exact arithmetic")
+    why = made._refused()
+    return replace(made, proven=not why, why=why)
 
 
 def _grown(
