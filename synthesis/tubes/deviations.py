@@ -120,7 +120,7 @@ class Deviations:
         e, w, c = (casadi.SX.sym(name, k) for name, k in zip("ewc", sizes, strict=True))
         data = casadi.SX.sym("data", r.data.shape[1])
         x, moving, u, K = r.between(data, c)
-        n, moved = len(self._named.states), u + K @ e
+        n, moved = self.moved, u + K @ e
         at = ((x + e)[:n], moved[: len(self.inputs)], self.gust * w)
         if not isinstance(self.model, Helicopter):
             rate = self.model(*at) - (self.model(x, u, 0) if moving is None else moving)
@@ -131,16 +131,23 @@ class Deviations:
         function = casadi.Function("deviation", [e, w, c, data, lam], [rate, balance])
         return function, casadi.Function("inflow", [e, w, c, data], [self.model.inflow(*at)])
 
+    @property
+    def moved(self) -> int:
+        """Number of states of the model; the others' rates are linear in the deviations."""
+        return len(self._named.states)
+
     @cached_property
-    def _steps(self) -> Array:
-        """(states, q): rates that servos add by resolving their commands in steps, each times a
-        number within [-1, 1].
+    def _linear(self) -> tuple[int, Array | None, Array]:
+        """`moved`, the rates of the other states by all deviations where they are the same for all
+        commands, and (states, k): rates that servos add by resolving their commands in steps, each
+        times a number within [-1, 1].
         """
-        n, r = len(self._named.states), self.reference
+        n, r = self.moved, self.reference
         if isinstance(r, Motions) or not isinstance(self.model, Helicopter):
-            return np.zeros((n, 0))
+            return n, None, np.zeros((n, 0))
         further = r.equipment.steps(self.model.travel)
-        return np.vstack([np.zeros((n, further.shape[1])), further])
+        rates = r.closed[0, len(self.inputs) :] if len(r.airspeeds) == 1 else None
+        return n, rates, np.vstack([np.zeros((n, further.shape[1])), further])
 
     @property
     def rate(self) -> casadi.Function:
@@ -171,7 +178,7 @@ class Deviations:
             average, symbols = segment_averages(function, *over, along=[0, 1], start=start)
             if np.all(np.isfinite(average.rest)):
                 own = _covered(average, symbols, places, widths, whole)
-                found.append(_matrix_set(own, symbols, drift, factor, m, self._steps))
+                found.append(_matrix_set(own, symbols, drift, factor, m, self._linear))
             else:
                 found.append(None)
         return found
@@ -274,18 +281,28 @@ def _common_kinks(slopes: Array) -> tuple[Array, Array]:
 
 
 def _matrix_set(
-    average: AffineForm, symbols: int, drift: Array, factor: Array, m: int, steps: Array
+    average: AffineForm,
+    symbols: int,
+    drift: Array,
+    factor: Array,
+    m: int,
+    linear: tuple[int, Array | None, Array],
 ) -> MatrixSet:
-    n = len(factor)
+    n, (r, rates, steps) = len(factor), linear
     q = n + m + 1
     units = np.concatenate([np.linalg.norm(factor, axis=1), np.ones(m + 1)])
     slopes = np.zeros((average.slopes.shape[-1], n, q))
     slopes[..., :-1] = np.moveaxis(average.slopes, -1, 0)
     slopes[symbols - len(drift) + 2 : symbols, :, -1] = drift[2:]
+    if np.any(slopes[: n + m, r:]):
+        raise ValueError("the rates of controller and servos are linear in the deviations")
     tube, gust, command = slopes[:n], slopes[n : n + m], slopes[n + m : symbols]
     centre, rest = np.zeros((n, q)), np.zeros((n, q))
     centre[:, :-1], centre[:, -1] = average.centre, drift[0]
     rest[:, :-1], rest[:, -1] = average.rest, drift[1]
+    if rates is not None:  # as stored, without rounding; the reference misses nothing of them
+        centre[r:], rest[r:], slopes[:, r:] = 0.0, 0.0, 0.0
+        centre[r:, :n] = rates
     # z_k H_k w = y_m G_m e, since z = factor^-1 e and y = w: one multiplier takes both
     inverse, wind = np.linalg.inv(factor), slice(n, n + m)
     cross = tube[:, :, wind].copy()
@@ -300,7 +317,8 @@ def _matrix_set(
     at_ends[: len(command)] = command[:CORNERS]
     signs = [(-1, 1) if np.any(part) else (0,) for part in at_ends]
     corners = centre + np.tensordot(np.stack(np.meshgrid(*signs, indexing="ij"), -1), at_ends, 1)
-    rest += ROUNDED * (np.abs(centre) + np.abs(command).sum(axis=0))
+    rounded = ROUNDED * (np.abs(centre) + np.abs(command).sum(axis=0))
+    rest[: n if rates is None else r] += rounded[: n if rates is None else r]
     others = np.concatenate([command[CORNERS:], slopes[symbols:]])
     rates = np.abs(others / units[:n, None] * units).max(axis=(1, 2))
     left, weights, more = rank_one(others[rates > SMALL], units)
@@ -311,8 +329,9 @@ def _matrix_set(
     constant[:, -1, -1] = size**2 * ROUNDED_UP
     return MatrixSet(
         corners,
-        tube,
-        gust,
+        np.eye(n)[:, :r],
+        tube[:, :r],
+        gust[:, :r],
         np.vstack([left, rows, (steps / size).T]),
         np.concatenate([weights, diagonal, constant]),
     )

@@ -114,7 +114,7 @@ def written_multipliers(by: Multipliers) -> dict[str, Any]:
 
 
 def read_multipliers(given: dict[str, Any], n: int) -> Multipliers:
-    """Multipliers of n states."""
+    """Multipliers of a model with n states."""
     terms = np.asarray(given["terms"], float)
     return Multipliers(
         numbers(given["tube"], n, n),

@@ -145,7 +145,7 @@ def _matrices(
 
 def _shares(P: Array, over: MatrixSet, by: Multipliers) -> Shares:
     """Those that leave a little to spare."""
-    rows = (P, P, P @ over.left.T)
+    rows = (P @ over.onto, P @ over.onto, P @ over.left.T)
     X = [
         row @ np.linalg.solve(multiplier, row.T)
         for row, multiplier in zip(rows, by[:3], strict=True)

@@ -213,10 +213,10 @@ class _Inequality:
         self.given = [program.symmetric(n, CONSTANT) for _ in cell.nodes]
         one = np.ones((1, 1, 1))
         common = [] if price is None else [program.variable(one, CONSTANT) for _ in range(2)]
-        terms = np.eye(len(self.over.left))
+        terms, r = np.eye(len(self.over.left)), self.over.onto.shape[1]
         self.variables: dict[str, Variable] = {
-            "tube": program.symmetric(n, CONSTANT),
-            "gust": program.symmetric(n, CONSTANT),
+            "tube": program.symmetric(r, CONSTANT),
+            "gust": program.symmetric(r, CONSTANT),
             "terms": program.variable(terms[:, :, None] * terms, CONSTANT),
             "wind": common[0] if common else program.variable(one, CONSTANT),
         }
@@ -258,7 +258,7 @@ class _Inequality:
             self.cost[variable.columns[0]] = PRICE * np.einsum("eii->e", variable.entries)
 
     def found(self, x: Array) -> Multipliers:
-        back = np.linalg.inv(self.cell.factor)
+        back = np.linalg.inv(self.cell.over.unit(self.cell.factor))
         own = {name: v.coefficients(x)[0] for name, v in self.variables.items()}
         own["tube"], own["gust"] = (back.T @ own[name] @ back for name in ("tube", "gust"))
         return Multipliers(decay=self.decay, **own)

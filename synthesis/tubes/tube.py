@@ -315,10 +315,10 @@ def _read(content: dict[str, Any]) -> Tube:
         numbers(content["P"], k, n, n),
         tuple(cells),
         numbers(content["factors"], count, n, n),
-        tuple(read_multipliers(given, n) for given in content["multipliers"]),
+        tuple(read_multipliers(given, loop.moved) for given in content["multipliers"]),
         False,
         "not verified",
-        tuple(LocalGain.read(given, k, loop.states) for given in content["gains"]),
+        tuple(LocalGain.read(given, k, loop.states, loop.moved) for given in content["gains"]),
     )
 
 

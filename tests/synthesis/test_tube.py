@@ -136,8 +136,14 @@ def test_where_there_is_no_tube_it_says_why(tmp_path):
 
 def test_wrong_arguments_are_refused():
     heli = Helicopter.load("xcell60", governor="ideal")
-    with pytest.raises(InputError, match="ideal governor"):
-        tube(Helicopter.load("xcell60"), 3.0, gust=0.1)
+    with pytest.raises(InputError, match="given"):
+        tube(heli, 3.0, gust=0.1, known=["u"], gain=np.zeros((4, 10)))
+    with pytest.raises(InputError, match="known"):
+        tube(heli, 3.0, gust=0.1, known="u")
+    with pytest.raises(InputError, match="sampled"):
+        tube(heli, (3.0, 4.0), gust=0.1, acceleration=1.0, jerk=1.0, period=0.02)
+    with pytest.raises(InputError, match="period"):
+        tube(heli, 3.0, gust=0.1, delay=1)
     with pytest.raises(InputError, match="gust"):
         tube(heli, 3.0, gust=float("nan"))
     with pytest.raises(InputError, match="4 by 10"):
@@ -401,8 +407,8 @@ def test_the_cells_of_a_schedule_are_enclosed_with_all_others():
         # x'F (e, w, 1) is at most that at a corner, plus what symbols and terms add
         v = np.concatenate([e, [w, 1.0]])
         bound = max(x @ F @ v for F in over.corners.reshape(-1, 6, 8))
-        bound += np.linalg.norm([x @ H @ v for H in over.tube])
-        bound += np.linalg.norm([x @ H @ v for H in over.gust])
+        bound += np.linalg.norm([x @ over.onto @ H @ v for H in over.tube])
+        bound += np.linalg.norm([x @ over.onto @ H @ v for H in over.gust])
         for row, W in zip(over.left, over.weights, strict=True):
             bound += abs(x @ row) * np.sqrt(v @ W @ v)
         assert x @ moved <= bound * (1 + 1e-9) + 1e-12  # roundings of this sum
