@@ -73,7 +73,7 @@ class Equipment:
     servos: Mapping[str, Servo] | None = field(default=None)
     period: float = 0.0
     delay: int = 0
-    parts: int = 2
+    parts: int = 1
 
     __repr__ = summarized
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import casadi
 import numpy as np
-from scipy.linalg import eigh
+from scipy.linalg import eigh, expm
 
 from symheli import Helicopter
 from symheli.errors import InputError
@@ -628,6 +628,10 @@ def _decay(
         linear = [o._replace(nodes=tuple(range(count))) for o in linear]
     roots = np.broadcast_to(linear[0].factor, (count, *linear[0].factor.shape))
     rates = DECAYS if isinstance(loop.model, Helicopter) else MORE_DECAYS
+    if jump is not None:  # each try is long: that of the slowest mode of the linear loop
+        A, period = linear[0].over.corners[0, 0, 0][:, : len(jump)], loop.reference.nodes[-1]
+        modes = np.linalg.eigvals(jump @ expm(A * period))
+        rates = (float(max(-np.log(np.abs(modes).max()) / period, DECAYS[0])),)
     tries = [(smallest(linear, roots, sizes, decay, SPARE, solver, jump), decay) for decay in rates]
     return min(((f.size, decay) for f, decay in tries if f is not None), default=(0.0, None))[1]
 
