@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -39,7 +39,7 @@ class Check(NamedTuple):
     def __str__(self) -> str:
         if math.isnan(self.flown):
             return self.words
-        return f"{self.words}: {self.flown:.3g}, {self.allowed:.3g} in the tube"
+        return f"{self.words}: {self.flown:.3g} flown, {self.allowed:.3g} in the tube"
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +49,7 @@ class Coverage:
     Examples
     --------
     >>> Coverage((Check("gusts, m/s", False, 0.25, 3.1),)).fails
-    'gusts, m/s: 3.1, 0.25 in the tube'
+    'gusts, m/s: 3.1 flown, 0.25 in the tube'
     """
 
     checks: tuple[Check, ...]
@@ -120,16 +120,6 @@ def coverage(tube: Tube, flight: FlightRecord) -> Coverage:
             _start(tube, heli, flight),
         )
     )
-
-
-def share(checked: Sequence[Coverage]) -> tuple[float, Mapping[str, int]]:
-    """Percent of flights that are covered, and how many fail first by each hypothesis."""
-    fails: dict[str, int] = {}
-    for one in checked:
-        first = next((c.words for c in one.checks if not c.kept), None)
-        if first is not None:
-            fails[first] = fails.get(first, 0) + 1
-    return 100.0 * sum(one.covered for one in checked) / max(len(checked), 1), fails
 
 
 def _at_most(words: str, allowed: float, flown: float) -> Check:
