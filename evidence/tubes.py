@@ -14,7 +14,7 @@ import casadi
 import numpy as np
 from scipy.linalg import expm
 
-from evidence import tube_gains
+from evidence import tube_gains, tube_loops
 from evidence.planar_vtol import tubes as planar_vtol
 from evidence.tables import DOCS, keep, markdown
 from symheli import Helicopter
@@ -240,7 +240,7 @@ def remainders(intervals: Sequence[float]) -> str:
     to 1 m/s^2, the rates (1/s) at which terms of the Jacobian that are bounded in size alone may
     move the deviations, on a small tube.
     """
-    heli, sizes = Helicopter.load(VEHICLES[0], governor="ideal"), np.array(TUBE_SIZES)
+    heli, sizes = Helicopter.load(VEHICLES[0], governor="ideal"), np.array(TUBE_SIZES[:10])
     units = np.concatenate([SMALL_TUBE * sizes, np.ones(4)])
     rows = []
     for low in intervals:
@@ -266,7 +266,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="one helicopter at 0 and 8 m/s")
     parser.add_argument(
         "--only",
-        choices=("amplitudes", "transitions", "remainders", "gains", "vtol"),
+        choices=("amplitudes", "transitions", "remainders", "gains", "loops", "whole loop", "vtol"),
         help="one of the tables",
     )
     given = parser.parse_args()
@@ -277,6 +277,8 @@ def main() -> None:
         "transitions": lambda: transitions(TRANSITIONS, FLIGHTS, SECONDS),
         "remainders": lambda: remainders(INTERVALS),
         "gains": tube_gains.table,
+        "loops": lambda: tube_loops.table(tube_loops.CASES, worst, from_its_border),
+        "whole loop": lambda: tube_loops.table(tube_loops.WHOLE, worst, from_its_border),
         "vtol": planar_vtol.table,
     }
     if given.quick:

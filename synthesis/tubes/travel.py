@@ -92,14 +92,14 @@ def fastest(row: Array, over: MatrixSet, factor: Array) -> float:
     right = np.eye(q)
     right[:n, :n] = factor
 
-    def size(F: Array) -> Array:
-        """Of k'F v, (...,), for v = (e, w, 1)."""
-        k = row @ F @ right
-        parts = (k[..., :n], k[..., n:-1], k[..., -1:])
-        return sum(np.linalg.norm(part, axis=-1) for part in parts)
+    def size(k: Array) -> Array:
+        """Of k'v, (...,), for v = (e, w, 1)."""
+        own = k @ right
+        parts = (own[..., :n], own[..., n:-1], own[..., -1:])
+        return sum((np.linalg.norm(part, axis=-1) for part in parts), np.zeros(own.shape[:-1]))
 
-    total = size(over.corners).max()
-    total += sum(np.linalg.norm(size(H)) for H in (over.tube, over.gust))
+    total = size(row @ over.corners).max()
+    total += sum(np.linalg.norm(size(row @ over.onto @ H)) for H in (over.tube, over.gust))
     # each of e, w and 1 has size 1: |v| <= sqrt 3
     terms = np.linalg.norm(right.T @ over.weights @ right, ord=2, axis=(1, 2))
     total += (np.abs(over.left @ row) * np.sqrt(3 * terms)).sum()
