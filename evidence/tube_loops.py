@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, cast
 
 import casadi
 import numpy as np
@@ -70,20 +70,12 @@ CASES = (
     Case("twelve states", "xcell60", "pi", 3.0, 0.25, {"known": TWELVE}),
     Case("eight states, observer", "xcell60", "ideal", 3.0, 0.25, {"known": EIGHT}),
     Case("eight states, observer", "xcell60", "pi", 3.0, 0.25, {"known": EIGHT}),
-    Case(
-        "eight states, observer", "xcell_kahn_hudson", "pi", 3.0, 0.25, {"known": EIGHT}
-    ),
-    Case(
-        "eight states, observer", "xcell60", "pi", (3.0, 4.0), 0.25, {"known": EIGHT, **LIMITS}
-    ),
+    Case("eight states, observer", "xcell_kahn_hudson", "pi", 3.0, 0.25, {"known": EIGHT}),
+    Case("eight states, observer", "xcell60", "pi", (3.0, 4.0), 0.25, {"known": EIGHT, **LIMITS}),
     Case("ten states, servos", "xcell60", "ideal", 3.0, 0.25, {"servos": FINE}),
-    Case(
-        "ten states, servos with steps", "xcell60", "ideal", 3.0, 0.25, {"servos": XCELL_SERVOS}
-    ),
+    Case("ten states, servos with steps", "xcell60", "ideal", 3.0, 0.25, {"servos": XCELL_SERVOS}),
     Case("ten states, 50 Hz", "xcell60", "ideal", 3.0, 0.25, {"period": PERIOD}),
-    Case(
-        "ten states, 50 Hz, delay", "xcell60", "ideal", 3.0, 0.25, {"period": PERIOD, "delay": 1}
-    ),
+    Case("ten states, 50 Hz, delay", "xcell60", "ideal", 3.0, 0.25, {"period": PERIOD, "delay": 1}),
 )
 """Delay: one period from the sample to the command."""
 
@@ -158,16 +150,14 @@ class Sampled:
 
     @property
     def _reference(self) -> Reference:
-        reference = self.found.deviations.reference
-        assert isinstance(reference, Reference)
-        return reference
+        return cast(Reference, self.found.deviations.reference)
 
     def flown(self, e: Array, gust: Callable[[int], Array], steps: int) -> tuple[Array, Array]:
         """The largest e'P e of each flight (N,), and the last deviations (N, n)."""
         loop, r, count = self.found.deviations, self._reference, len(e)
         rhs, period = compiled(loop.rate).map(count), r.equipment.period
         each = round(period / self.step)
-        c, jump = np.zeros((1 + len(r.ranges) + len(r.whole), count)), r.jump
+        c, jump = np.zeros((loop.rate.size1_in(2), count)), cast(Array, r.jump)
         data = np.repeat(r.data[:1], count, axis=0).T
 
         def rate(e: Array, w: Array) -> Array:

@@ -8,8 +8,8 @@ from inspect import Parameter, signature
 from typing import Any
 
 from studies.controllers.certified import controller_questions
-from studies.controllers.designs import Designs, design_questions
 from studies.controllers.covered import proven
+from studies.controllers.designs import Designs, design_questions
 from studies.controllers.flown import FlownControllers, fly_controllers
 from studies.transition.baseline import Baseline, build_baseline
 from studies.transition.comparison import compare

@@ -42,9 +42,7 @@ def pi_governor(
     throttle = name(r"\delta_t", clip(wanted, 0.0, 1.0))
     torque = name("Q_e", par.max_power * throttle / Om)
     # stops while pushed further; decided by `wanted` alone, so that bounds over a set decide it too
-    integral = where(
-        wanted > 1, minimum(error, 0.0), where(wanted < 0, maximum(error, 0.0), error)
-    )
+    integral = where(wanted > 1, minimum(error, 0.0), where(wanted < 0, maximum(error, 0.0), error))
     sign = 1.0 if "rotor_reaction" in par.printed else -1.0
     return Drive(
         torque,

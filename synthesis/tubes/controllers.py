@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 from scipy.linalg import solve_continuous_are
 
-from symheli import Helicopter, LinearModel
+from symheli import Helicopter
 from symheli.errors import InputError
 from symheli.flight.controller import deviations
+from symheli.lpv.linear_model import LinearModel
 from symheli.values.sample_period import same_period
-from symheli.values.signal import indices
+from symheli.values.signal import indices, signals
 
 Array = np.ndarray
 
@@ -83,9 +84,7 @@ class Choice:
     def regulator(self, heli: Helicopter, x: Array, u: Array) -> Array:
         """K (4, n) of the linear-quadratic regulator."""
         A, B, _ = (np.asarray(m) for m in heli.jacobian(x, u, np.zeros(3)))
-        states, control = (
-            (SLOW_SIZES, SLOW_CONTROL) if self.slow else (STATE_SIZES, CONTROL_SIZE)
-        )
+        states, control = (SLOW_SIZES, SLOW_CONTROL) if self.slow else (STATE_SIZES, CONTROL_SIZE)
         Q, R = np.diag(1 / np.array(states[: len(x)]) ** 2), np.eye(4) / control**2
         return -np.linalg.solve(R, B.T @ solve_continuous_are(A, B, Q, R))
 
@@ -101,14 +100,18 @@ class Choice:
         K = self.regulator(heli, x, u)
         y = np.array([s in own for s in map(str, heli.states)])
         sizes = np.array(STATE_SIZES[: len(x)])
-        names = [f"{s}_observer" for s, is_known in zip(heli.states, y, strict=True) if not is_known]
+        names = [
+            f"{s}_observer" for s, is_known in zip(heli.states, y, strict=True) if not is_known
+        ]
         L = np.zeros((len(names), int(y.sum())))
         if names:
             Q, R = np.diag(FLAP_ERROR * sizes[~y]) ** 2, np.diag(RATE_ERROR * sizes[y]) ** 2
             X = solve_continuous_are(A[np.ix_(~y, ~y)].T, A[np.ix_(y, ~y)].T, Q, R)
             L = np.linalg.solve(R, A[np.ix_(y, ~y)] @ X).T
         # z follows the unknown states minus L times the known ones; T takes it from all states
-        T, by_known, by_own = (np.zeros(shape) for shape in ((len(L), len(x)), (len(x), L.shape[1]), (len(x), len(L))))
+        T, by_known, by_own = (
+            np.zeros(shape) for shape in ((len(L), len(x)), (len(x), L.shape[1]), (len(x), len(L)))
+        )
         T[:, y], T[:, ~y] = -L, np.eye(len(L))
         by_known[y], by_known[~y], by_own[~y] = np.eye(L.shape[1]), L, np.eye(len(L))
         F = T @ (A + B @ K)
@@ -118,7 +121,7 @@ class Choice:
             F @ by_known,
             K @ by_own,
             K @ by_known,
-            tuple(names),
+            signals(names),
             tuple(states),
             tuple(heli.inputs),
         )

@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
 from symheli import Helicopter
 from symheli.errors import InputError
-from symheli.flight.flight_data import WIND
 from symheli.records.flight_record import FlightRecord
 from symheli.values.summary import summarized
 from synthesis.tubes.controllers import Choice
@@ -158,8 +157,7 @@ def _commanded(reference: Reference, flight: FlightRecord) -> Iterator[Check]:
 
 def _start(tube: Tube, heli: Helicopter, flight: FlightRecord) -> Check:
     """Whether the first deviation lies in the tube; controller and servos at rest."""
-    reference, p = tube.deviations.reference, float(flight["airspeed_command"][0])
-    assert isinstance(reference, Reference)
+    reference, p = cast(Reference, tube.deviations.reference), float(flight["airspeed_command"][0])
     inside = float(np.clip(p, *reference.airspeeds[[0, -1]]))
     i, s = (np.zeros(1, int), np.zeros(1)) if reference.sampled else reference.place([inside])
     c = np.zeros(1 + len(reference.ranges) + len(reference.whole))

@@ -71,7 +71,9 @@ def _read_flight(content: dict[str, Any]) -> tuple[Helicopter, Reference]:
         file.write_text(content["vehicle"], encoding="utf-8")
         vehicle = load_vehicle(file)
     density, smoothing = float(content["density"]), float(content["smoothing"])
-    heli = Helicopter(vehicle, content["governor"], density, frozenset(content["printed"]), smoothing)
+    heli = Helicopter(
+        vehicle, content["governor"], density, frozenset(content["printed"]), smoothing
+    )
     n, k = len(heli.states), len(content["airspeeds"])
     equipment = Equipment.read(content["equipment"])
     powers, c = np.shape(content["steady"])[2], len(equipment.states)
@@ -82,7 +84,9 @@ def _read_flight(content: dict[str, Any]) -> tuple[Helicopter, Reference]:
     a, j, snap = (math.inf if limit is None else float(limit) for limit in content["limits"])
     if equipment.period and k > 1:
         raise ValueError("a sampled loop has one airspeed")
-    return heli, Reference(**own, limits=(float(numbers(a)), float(numbers(j)), snap), equipment=equipment)
+    return heli, Reference(
+        **own, limits=(float(numbers(a)), float(numbers(j)), snap), equipment=equipment
+    )
 
 
 def _written_motions(r: Motions) -> dict[str, Any]:

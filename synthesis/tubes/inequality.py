@@ -165,8 +165,8 @@ def conditions(
     """The matrices that must be positive definite, in two lists.
 
     For each end of the cell, with its shares X: [X_tube, P o; o'P, S], [X_gust, P o; o'P, T] and
-    [X_terms, P l; l'P, r]. For each corner of the cell, as Bernstein coefficients of degree 2 in the
-    scheduling command, minus
+    [X_terms, P l; l'P, r]. For each corner of the cell, as Bernstein coefficients of degree 2 in
+    the scheduling command, minus
 
         [P A + A'P + alpha P + dP/dt, P E, P d; ., 0, 0; ., ., 0] + supply
         + sum of H'S H and H'T H over the symbols + sum of r times weights

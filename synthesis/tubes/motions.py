@@ -150,9 +150,7 @@ class Motions:
         """and what the reference misses."""
         return (16,) + (4,) * len(self.ranges)
 
-    def hypotheses(
-        self, name: str, gust: float, states: tuple[str, ...] = ()
-    ) -> tuple[str, ...]:
+    def hypotheses(self, name: str, gust: float, states: tuple[str, ...] = ()) -> tuple[str, ...]:
         """What a tube about them rests on, in sentences."""
         limits = [f"[{low:g}, {high:g}]" for low, high in self.ranges]
         command = []

@@ -47,8 +47,8 @@ class Reference:
 
     airspeeds (k,): nodes, m/s. steady (k, 2, powers, n + 4): values of X_i at the nodes, states and
     controls, and their slopes by airspeed. jerk (k, n + 4): Y; snap (k, 4): V. gain (k, 4 + c, n +
-    c): of the controller with c states, rad per SI unit. limits (3,): the largest sizes of a, j and b, m/s^2, m/s^3, m/s^4; b infinite
-    where the jerk may jump (Y and V are then 0 for all states).
+    c): of the controller with c states, rad per SI unit. limits (3,): the largest sizes of a, j and
+    b, m/s^2, m/s^3, m/s^4; b infinite where the jerk may jump (Y and V are then 0 for all states).
     """
 
     airspeeds: Array
@@ -111,9 +111,7 @@ class Reference:
         held = len(self.airspeeds) == 1 and any(self.limits)
         return bool(held or (np.isinf(self.limits[2]) and with_jerk))
 
-    def hypotheses(
-        self, name: str, gust: float, states: tuple[str, ...] = ()
-    ) -> tuple[str, ...]:
+    def hypotheses(self, name: str, gust: float, states: tuple[str, ...] = ()) -> tuple[str, ...]:
         """What a tube about it rests on, in sentences."""
         p, (a, j, b) = self.airspeeds, self.limits
         command = f"the commanded airspeed is {p[0]:g} m/s"
@@ -183,7 +181,8 @@ class Reference:
         s, a, j, snap, width = *casadi.vertsplit(c), data[1] - data[0]
         (y0, m0), (y1, m1) = (casadi.vertsplit(part(2 * powers, n + 4), powers) for _ in range(2))
         (Y0, Y1), (V0, V1), (K0, K1) = (
-            [part(*shape) for _ in range(2)] for shape in ((1, n + 4), (1, 4), self.closed.shape[1:])
+            [part(*shape) for _ in range(2)]
+            for shape in ((1, n + 4), (1, 4), self.closed.shape[1:])
         )
         # y0 + s (d0 + s (c2 + s c3)): small numbers beside the first
         d0, d1, step = width * m0, width * m1, y1 - y0

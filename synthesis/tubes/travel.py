@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import casadi
 import numpy as np
@@ -24,7 +24,7 @@ RAISED = 1 + 1e-9
 
 
 class Row(NamedTuple):
-    """An output of the deviations: k (nodes, n), and which of the reference's controls it adds to."""
+    """An output of the deviations, k (nodes, n), and which control of the reference it adds to."""
 
     name: str
     rows: Array
@@ -40,7 +40,9 @@ def outputs(loop: Deviations) -> list[Row]:
     if r.equipment.bank is not None or r.sampled:
         made.append(("_command", r.equipment.commands(r.gain)))
     return [
-        Row(f"{u}{kind}", K[:, i], i) for kind, K in made for i, u in enumerate(map(str, loop.inputs))
+        Row(f"{u}{kind}", K[:, i], i)
+        for kind, K in made
+        for i, u in enumerate(map(str, loop.inputs))
     ]
 
 
@@ -48,8 +50,7 @@ def largest_controls(loop: Deviations, cells: Sequence[Cell]) -> Array:
     """Largest size of each of the reference's controls in each cell (cells, 4), rad, with and
     without what is added to the commands alone; rounded up.
     """
-    r = loop.reference
-    assert isinstance(r, Reference)
+    r = cast(Reference, loop.reference)
     c = casadi.SX.sym("c", 1 + len(r.ranges) + len(r.whole))
     data = casadi.SX.sym("data", r.data.shape[1])
     both = casadi.horzcat(r.between(data, c)[2][:4], r.commands(data, c))

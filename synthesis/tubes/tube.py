@@ -341,17 +341,18 @@ def tube(
     """A proven invariant tube of a nonlinear helicopter in level flight in gusts, or of any other
     model about its motions.
 
-    With u = u_r + K e, the deviation e = x - x_r from the reference stays in e'P e <= 1 for every
-    gust history of the amplitude, and every history of the commands within their limits. The
-    difference of the nonlinear equations from those of the reference is an average of their
-    Jacobian times (e, w); the Jacobian is enclosed over the whole tube (`symheli.enclosure`), and a
-    matrix inequality is checked for all enclosed matrices in rational arithmetic.
+    With u = u_r + K e, the deviation e = x - x_r from the reference, with the states of controller
+    and servos where there are any, stays in e'P e <= 1 for every gust history of the amplitude, and
+    every history of the commands within their limits. The difference of the nonlinear equations
+    from those of the reference is an average of their Jacobian times (e, w); the Jacobian is
+    enclosed over the whole tube (`symheli.enclosure`), and a matrix inequality is checked for all
+    enclosed matrices in rational arithmetic. So is that controls stay within their travel.
 
     Parameters
     ----------
     model : Helicopter or casadi.Function
-        With governor "ideal": ten states. Or (x, u, w) -> dx/dt, of dense columns and of the
-        operations that `symheli.enclosure.enclose` knows.
+        With either governor: ten or twelve states. Or (x, u, w) -> dx/dt, of dense columns and of
+        the operations that `symheli.enclosure.enclose` knows.
     reference : float, (float, float) or Motions
         Of a helicopter the airspeed held, or the range of its command, m/s. Of another model its
         motions and the feedback about them.
@@ -363,9 +364,20 @@ def tube(
     snap : float
         Largest derivative of the jerk, m/s^4. Infinite: the jerk may jump, and the pitch rate of
         the reference does not follow it.
-    gain : array (4, 10) or (nodes, 4, 10), optional
-        K of a helicopter, rad per SI unit, at all airspeeds or at each node. Default:
-        linear-quadratic regulators on all states.
+    gain : array (4, n) or (nodes, 4, n), LinearModel, LPVStateSpace or design, optional
+        Of a helicopter: K, rad per SI unit, at all airspeeds or at each node; or a controller from
+        deviations to commands by name, taken at the commanded airspeed, in continuous time or with
+        `period`. Default: linear-quadratic regulators.
+    known : sequence of str, optional
+        States that the default feedback knows; by default the ten of an ideal governor. An observer
+        estimates the others, but for the rotor's where neither is known.
+    servos : mapping of Servo, optional
+        One for each control. With a rate limit: continuous time and a held airspeed.
+    period : float
+        Sample period of the controller, s, whose command is held between; 0: continuous time. At a
+        held airspeed.
+    delay : int
+        Whole periods from a sample to its command.
     sizes : array (n,), optional
         Half widths of equal weight: the mean square of the tube's half widths over these is made
         small. Needed for another model than a helicopter.
@@ -380,7 +392,7 @@ def tube(
     Raises
     ------
     InputError
-        Another governor, a gust that is no number >= 0, limits that do not fit, a gain or sizes of
+        A gust that is no number >= 0, limits that do not fit, a controller, servos or sizes of
         another shape.
     TrimError
         No flight at one of these airspeeds and accelerations.
@@ -449,7 +461,9 @@ def _checked(model: Any, motions: Any, flight: Sequence[float], sizes: Any) -> M
     if model.n_out() != 1 or model.size_out(0) != (n, 1):
         raise InputError(f"the model must return dx/dt ({n}), one column")
     if any(flight):
-        raise InputError("limits, gain, known, servos, period and delay are those of a helicopter: see Motions")
+        raise InputError(
+            "limits, gain, known, servos, period and delay are those of a helicopter: see Motions"
+        )
     if sizes is None:
         raise InputError(f"sizes are needed: {n} half widths of equal weight")
     return motions
