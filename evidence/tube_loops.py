@@ -11,15 +11,14 @@ from typing import Any, cast
 
 import casadi
 import numpy as np
-from scipy.linalg import expm, solve_continuous_are
+from scipy.linalg import expm
 
 from evidence.tables import markdown
-from symheli import Helicopter, trim
+from symheli import Helicopter
 from symheli.codegen.compile import compiled
 from symheli.dynamics import Governor
 from symheli.flight import XCELL_SERVOS
 from synthesis import Tube, tube
-from synthesis.tubes.controllers import SLOW_CONTROL, SLOW_SIZES
 from synthesis.tubes.reference import Reference
 
 Array = np.ndarray
@@ -58,10 +57,7 @@ class Case:
     def found(self) -> Tube:
         """The tube."""
         heli = Helicopter.load(self.vehicle, governor=self.governor)
-        given = dict(self.given)
-        if callable(given.get("gain")):
-            given["gain"] = given["gain"](heli, self.airspeed)
-        return tube(heli, self.airspeed, gust=self.gust, **given)
+        return tube(heli, self.airspeed, gust=self.gust, **self.given)
 
 
 LIMITS = {"acceleration": 1.0, "jerk": 1.0, "snap": 1.0}
@@ -78,31 +74,6 @@ CASES = (
     Case("ten states, 50 Hz, delay", "xcell60", "ideal", 3.0, 0.25, {"period": PERIOD, "delay": 1}),
 )
 """Delay: one period from the sample to the command."""
-
-
-def slow_feedback(heli: Helicopter, airspeed: float) -> Array:
-    """K (4, n) of the eight measured states alone, slow enough for servos and a delay: the default
-    regulator for half the control, without its gains from flapping and rotor.
-    """
-    ideal, steady = replace(heli, governor="ideal"), trim(heli, airspeed=airspeed)
-    x, u = np.array(steady.x), np.array(steady.u)
-    A, B, _ = (np.asarray(m) for m in ideal.jacobian(x[:10], u, np.zeros(3)))
-    Q, R = np.diag(np.array(SLOW_SIZES[:10]) ** -2.0), 4 * np.eye(4) / SLOW_CONTROL**2
-    K = -np.linalg.solve(R, B.T @ solve_continuous_are(A, B, Q, R))
-    return np.hstack([K[:, : len(EIGHT)], np.zeros((4, len(x) - len(EIGHT)))])
-
-
-WHOLE = (
-    Case(
-        "eight states, servos, 50 Hz, delay",
-        "xcell60",
-        "ideal",
-        3.0,
-        0.25,
-        {"gain": slow_feedback, "servos": FINE, "period": PERIOD, "delay": 1},
-    ),
-)
-"""All parts but the governor at once."""
 
 
 def row(case: Case, worst: Worst, border: Border) -> list[str]:

@@ -22,6 +22,7 @@ from evidence import (
     specs,
     structured,
     tube_gains,
+    tube_loops,
     tuning,
     two_bands,
 )
@@ -205,6 +206,18 @@ def tube_in_hover():
     airspeed, gust, _, attitude, _ = KEPT["tubes.md", "amplitudes"].cells("xcell60")
     found = synthesis.tube(_xcell(), float(airspeed), gust=float(gust))
     assert found.proven
+    assert attitude == " ".join(f"{w:.2g}" for w in found.half_widths[6:8])
+
+
+def tube_of_a_governed_helicopter():
+    governor, _, airspeed, gust, states, _, attitude, *_ = KEPT["tubes.md", "loops"].cells(
+        "xcell60"
+    )
+    case = tube_loops.CASES[0]
+    assert (governor, airspeed, gust) == (case.governor, f"{case.airspeed:g}", f"{case.gust:g}")
+    found = case.found()
+    assert found.proven
+    assert states == str(len(found.deviations.states))
     assert attitude == " ".join(f"{w:.2g}" for w in found.half_widths[6:8])
 
 
@@ -421,6 +434,7 @@ ROWS = {
     ("tubes.md", "transitions"): tube_along_a_transition,
     ("tubes.md", "remainders"): remainder_of_one_cell,
     ("tubes.md", "gains"): gains_on_one_tube,
+    ("tubes.md", "loops"): tube_of_a_governed_helicopter,
     ("tubes.md", "vtol"): tube_of_the_planar_vtol,
     ("identify.md", "public logs"): one_public_log,
     ("identified.md", "xcell60"): lambda: marks_of_the_worst_seed("xcell60"),
