@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple, cast
 
+import casadi
 import numpy as np
 
 from symheli import Helicopter
@@ -162,7 +163,7 @@ def _start(tube: Tube, heli: Helicopter, flight: FlightRecord) -> Check:
     i, s = (np.zeros(1, int), np.zeros(1)) if reference.sampled else reference.place([inside])
     c = np.zeros(1 + len(reference.ranges) + len(reference.whole))
     c[0] = s[0]
-    x = np.asarray(reference.between(reference.data[i[0]], c)[0])[:, 0]
+    x = np.asarray(casadi.evalf(casadi.SX(reference.between(reference.data[i[0]], c)[0])))[:, 0]
     at = [flight[str(name)][0] if name in flight.signals else np.nan for name in heli.states]
     e = np.zeros(len(x))
     e[: reference.own] = np.array(at) - x[: reference.own]

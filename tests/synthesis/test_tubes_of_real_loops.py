@@ -45,6 +45,12 @@ def closed(A, B, gain, equipment):
     return F
 
 
+def flown_law(heli, x, u):
+    """The regulator's gains from the states that flights measure, sampled."""
+    K = Choice(slow=True).regulator(heli, x, u)[:, : len(EIGHT)]
+    return replace(LinearModel.gain(K, heli.states[: len(EIGHT)], heli.inputs), dt=PERIOD)
+
+
 def sorted_poles(M):
     return np.sort_complex(np.linalg.eigvals(M).round(6))
 
@@ -212,13 +218,35 @@ def test_the_integral_of_the_governor_stops_as_printed():
         assert rhs(x, np.array(steady.u), np.zeros(3))[0][11] == (0.0 if pushed else error)
 
 
+def test_the_first_hypothesis_that_a_flight_breaks_is_named(at_3):
+    heli, x, u, *_ = at_3
+    law = flown_law(heli, x, u)
+    loop = Deviations(heli, held(heli, 3.0, Choice(law, period=PERIOD)), 0.2)
+    n = len(loop.states)
+    given = Tube(loop, np.tile(100 * np.eye(n), (2, 1, 1)), (), np.zeros((0, n, n)), (), True, "")
+    calm = symheli.AirspeedSchedule((3.0,), (1.0,), (0.2,), lead=0.1, start=3.0)
+    climb = symheli.AirspeedSchedule.transition(3.0, 3.1, acceleration=1.0, hold=0.1)
+    for schedule, options, words in (
+        (calm, {}, ""),
+        (calm, {"controller": None}, "the controller is that of the tube"),
+        (calm, {"noise_db": 30.0}, "sensors without noise and bias"),
+        (calm, {"delay": PERIOD}, "servos and delay are those of the tube"),
+        (calm, {"wind": (0.3, 0.0, 0.0)}, "gusts, m/s: 0.3 flown, 0.2 in the tube"),
+        (climb, {}, "commanded airspeed, m/s, at most: 3.1 flown, 3 in the tube"),
+    ):
+        flight = symheli.fly(heli, schedule, **{"controller": law, "dt": PERIOD, **options})
+        assert coverage(given, flight).fails == words
+    with pytest.raises(InputError, match="proven"):
+        coverage(replace(given, proven=False), flight)
+
+
 # --- whole tubes --------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
-def sampled():
-    heli = Helicopter.load("xcell60", governor="ideal")
-    found = tube(heli, 3.0, gust=0.2, period=PERIOD)
+def sampled(at_3):
+    heli, x, u, *_ = at_3
+    found = tube(heli, 3.0, gust=0.2, gain=flown_law(heli, x, u), period=PERIOD)
     assert found.proven, found.why
     return found
 
@@ -265,14 +293,13 @@ def test_a_sampled_tube_is_proven_again_and_its_forgeries_are_not(sampled, tmp_p
 @pytest.mark.slow
 def test_flights_of_the_package_are_covered_and_stay_inside(sampled):
     heli, reference = sampled.deviations.model, sampled.deviations.reference
-    law = LinearModel.gain(reference.gain[0], heli.states, list(map(str, heli.inputs)))
+    x, u = np.split(reference.steady[0, 0, 0], [reference.own])
     calm = symheli.AirspeedSchedule((3.0,), (1.0,), (3.0,), lead=0.1, start=3.0)
-    schedule = {"dt": PERIOD, "controller": replace(law, dt=PERIOD)}
+    schedule = {"dt": PERIOD, "controller": flown_law(heli, x, u)}
     flight = symheli.fly(heli, calm, wind=(0.1, 0.1, 0.1), **schedule)
     found = coverage(sampled, flight)
     assert found.covered, found.fails
     windy = coverage(sampled, symheli.fly(heli, calm, wind=(0.3, 0.0, 0.0), **schedule))
     assert windy.fails == "gusts, m/s: 0.3 flown, 0.2 in the tube"
-    x = reference.steady[0, 0, 0, : reference.own]
     for name, state, most in zip(heli.states, x, sampled.half_widths, strict=False):
         assert np.abs(flight[str(name)] - state).max() <= most
