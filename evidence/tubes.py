@@ -266,7 +266,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="one helicopter at 0 and 8 m/s")
     parser.add_argument(
         "--only",
-        choices=("amplitudes", "transitions", "remainders", "gains", "loops", "vtol"),
+        choices=("amplitudes", "transitions", "remainders", "gains", "loops", "governed", "vtol"),
         help="one of the tables",
     )
     given = parser.parse_args()
@@ -278,6 +278,7 @@ def main() -> None:
         "remainders": lambda: remainders(INTERVALS),
         "gains": tube_gains.table,
         "loops": lambda: tube_loops.table(tube_loops.CASES, worst, from_its_border),
+        "governed": lambda: tube_loops.table(tube_loops.GOVERNED, worst, from_its_border),
         "vtol": planar_vtol.table,
     }
     if given.quick:

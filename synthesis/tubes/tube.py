@@ -54,6 +54,8 @@ GRAVITY = 9.8
 """m/s^2; of the choice of cells only."""
 DECAYS = (1.0, 2.0, 3.0)
 """Rates alpha that are tried on the linear loop of a helicopter, 1/s,"""
+SLOW_DECAYS = (0.3, 0.6)
+"""those tried where none of these is feasible, as with a slow governor,"""
 MORE_DECAYS = (0.3, 0.5, 0.8, 1.2, 2.0, 3.0, 5.0)
 """and of any other model, whose time scale is not known."""
 FIRST_SHARE = 0.1
@@ -641,13 +643,19 @@ def _decay(
         count = len(linear[0].nodes)
         linear = [o._replace(nodes=tuple(range(count))) for o in linear]
     roots = np.broadcast_to(linear[0].factor, (count, *linear[0].factor.shape))
-    rates = DECAYS if isinstance(loop.model, Helicopter) else MORE_DECAYS
+    rates: tuple[float, ...] = DECAYS if isinstance(loop.model, Helicopter) else MORE_DECAYS
     if jump is not None:  # each try is long: that of the slowest mode of the linear loop
         A, period = linear[0].over.corners[0, 0, 0][:, : len(jump)], loop.reference.nodes[-1]
         modes = np.linalg.eigvals(jump @ expm(A * period))
         rates = (float(max(-np.log(np.abs(modes).max()) / period, DECAYS[0])),)
-    tries = [(smallest(linear, roots, sizes, decay, SPARE, solver, jump), decay) for decay in rates]
-    return min(((f.size, decay) for f, decay in tries if f is not None), default=(0.0, None))[1]
+    for own in (rates, SLOW_DECAYS) if isinstance(loop.model, Helicopter) else (rates,):
+        tries = [
+            (smallest(linear, roots, sizes, decay, SPARE, solver, jump), decay) for decay in own
+        ]
+        found = min(((f.size, decay) for f, decay in tries if f is not None), default=None)
+        if found is not None:
+            return found[1]
+    return None
 
 
 def _enclosed(
