@@ -209,11 +209,9 @@ def tube_in_hover():
     assert attitude == " ".join(f"{w:.2g}" for w in found.half_widths[6:8])
 
 
-def tube_of_a_governed_helicopter():
-    governor, _, airspeed, gust, states, _, attitude, *_ = KEPT["tubes.md", "loops"].cells(
-        "xcell60"
-    )
-    case = tube_loops.CASES[0]
+def tube_of_a_loop(section, case):
+    cells = KEPT["tubes.md", section].cells(case.vehicle)
+    governor, _, airspeed, gust, states, _, attitude, *_ = cells
     assert (governor, airspeed, gust) == (case.governor, f"{case.airspeed:g}", f"{case.gust:g}")
     found = case.found()
     assert found.proven
