@@ -15,7 +15,7 @@ import casadi
 import numpy as np
 from scipy.linalg import expm
 
-from evidence import tube_gains
+from evidence import tube_gains, tube_loops
 from evidence.planar_vtol import tubes as planar_vtol
 from evidence.tables import DOCS, keep, kept_rows, markdown
 from symheli import Helicopter
@@ -269,7 +269,7 @@ def remainders(intervals: Sequence[float]) -> str:
     to 1 m/s^2, the rates (1/s) at which terms of the Jacobian that are bounded in size alone may
     move the deviations, on a small tube.
     """
-    heli, sizes = Helicopter.load(VEHICLES[0], governor="ideal"), np.array(TUBE_SIZES)
+    heli, sizes = Helicopter.load(VEHICLES[0], governor="ideal"), np.array(TUBE_SIZES[:10])
     units = np.concatenate([SMALL_TUBE * sizes, np.ones(4)])
     rows = []
     for low in intervals:
@@ -295,7 +295,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="one helicopter at 0 and 8 m/s")
     parser.add_argument(
         "--only",
-        choices=("amplitudes", "transitions", "remainders", "gains", "vtol"),
+        choices=("amplitudes", "transitions", "remainders", "gains", "loops", "governed", "vtol"),
         help="one of the tables",
     )
     parser.add_argument(
@@ -317,6 +317,8 @@ def main() -> None:
         ),
         "remainders": lambda: remainders(INTERVALS),
         "gains": tube_gains.table,
+        "loops": lambda: tube_loops.table(tube_loops.CASES, worst, from_its_border),
+        "governed": lambda: tube_loops.table(tube_loops.GOVERNED, worst, from_its_border),
         "vtol": planar_vtol.table,
     }
     if given.quick:

@@ -118,6 +118,8 @@ from synthesis.switching.dwell_time import DwellTime as DwellTime
 from synthesis.switching.dwell_time import dwell_time as dwell_time
 from synthesis.switching.switched import SwitchedController as SwitchedController
 from synthesis.switching.switched import switched as switched
+from synthesis.tubes.coverage import Coverage as Coverage
+from synthesis.tubes.coverage import coverage as coverage
 from synthesis.tubes.gain import LocalGain as LocalGain
 from synthesis.tubes.motions import Motions as Motions
 from synthesis.tubes.tube import Tube as Tube

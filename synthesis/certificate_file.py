@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
@@ -132,15 +132,10 @@ DAMAGED = (
 
 
 def content_of(
-    path: str | os.PathLike[str],
-    schema: str,
-    version: int,
-    what: str,
-    writer: str,
-    older: Sequence[int] = (),
+    path: str | os.PathLike[str], schema: str, version: int, what: str, writer: str
 ) -> dict[str, Any]:
-    """Read a JSON file of this schema and version, or of an older one that is read too, which
-    `writer` writes; raise `InputError` for any other.
+    """Read a JSON file of this schema and version, which `writer` writes; raise `InputError` for
+    any other.
     """
     try:
         content = json.loads(Path(path).read_text(encoding="utf-8"), parse_constant=_refused)
@@ -155,7 +150,7 @@ def content_of(
         raise InputError(
             f"{path}: expected the schema {schema!r}; this file was not written by {writer}"
         )
-    if content.get("version") not in (version, *older) or isinstance(content["version"], bool):
+    if content.get("version") != version or isinstance(content.get("version"), bool):
         raise InputError(
             f"{path}: expected version {version} of the schema, got {content.get('version')!r:.60};"
             " read it with the version of symheli that wrote it"

@@ -52,8 +52,14 @@ NONLINEAR = (
     "symheli.enclosure",
     "symheli.airframe.vehicle.load_vehicle",
     "symheli.airframe.written.as_toml",
+    "symheli.dynamics.INPUTS",
+    "symheli.flight.Servo",
+    "symheli.flight.servo.one_each",
+    "symheli.flight.controller.deviations",
 )
-"""What a statement about the nonlinear equations, and the file of its proof, is made of."""
+"""What a statement about the nonlinear equations in their loop, and the file of its proof, is made
+of.
+"""
 
 
 EQUATIONS = (

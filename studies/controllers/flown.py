@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -32,6 +33,9 @@ from symheli import (
 )
 from symheli.errors import ValidityWarning
 from symheli.flight import XCELL_SERVOS, Sensor
+
+if TYPE_CHECKING:
+    from synthesis import Tube
 
 LOW, HIGH = 0.5, 12.0
 """Lowest and highest airspeed of the transition, m/s; the acceleration between them is the
@@ -136,13 +140,15 @@ def plan(controller: LPVStateSpace, wind: float) -> FlightPlan:
     )
 
 
-def fly_controllers(vehicle: str, designs: Designs, seeds: Sequence[int]) -> FlownControllers:
+def fly_controllers(
+    vehicle: str, designs: Designs, seeds: Sequence[int], tubes: Sequence[Tube] = ()
+) -> FlownControllers:
     """Simulate every controller and size with every seed: the same gusts and noise for all
-    of them.
+    of them; compared with these proven tubes.
     """
     heli = Helicopter.load(vehicle, governor="pi")
     planned = list(plans(designs))
-    each = measures(heli, [p for *_, p in planned], seeds) if planned else []
+    each = measures(heli, [p for *_, p in planned], seeds, tubes=tubes) if planned else []
     n = len(seeds)
     return FlownControllers(
         flown=tuple(
@@ -160,11 +166,15 @@ def fly_controllers(vehicle: str, designs: Designs, seeds: Sequence[int]) -> Flo
 
 
 def measures(
-    heli: Helicopter, plans: Sequence[FlightPlan], seeds: Sequence[int], workers: int | None = None
+    heli: Helicopter,
+    plans: Sequence[FlightPlan],
+    seeds: Sequence[int],
+    workers: int | None = None,
+    tubes: Sequence[Tube] = (),
 ) -> list[Measures]:
     """Return the measures of every plan with every seed, with the time outside the validity range
     of the equations.
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ValidityWarning)
-        return measured(fly_batch(heli, plans, seeds=seeds, workers=workers).data)
+        return measured(fly_batch(heli, plans, seeds=seeds, workers=workers).data, tubes=tubes)

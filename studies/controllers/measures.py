@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from studies.controllers.covered import uncovered
 from studies.controllers.design_choices import CONTROLS, GUSTS, MEASUREMENTS, DesignChoices
 from studies.controllers.plant import STUDY
 from symheli.flight import FlightPlan
@@ -15,6 +17,9 @@ from symheli.flight.equipment import Readings
 from symheli.flight.flight_data import WIND, FlightData
 from symheli.steady.validity import Validity
 from symheli.values.arrays import Array
+
+if TYPE_CHECKING:
+    from synthesis import Tube
 
 AT_THE_STOP = 0.999
 """Of the travel."""
@@ -42,16 +47,22 @@ class Measures:
     outside: float
     faster: float
     beyond: float
+    wind: float
+    uncovered: str
 
 
-def measured(flights: Iterable[FlightData], choices: DesignChoices = STUDY) -> list[Measures]:
+def measured(
+    flights: Iterable[FlightData], choices: DesignChoices = STUDY, tubes: Sequence[Tube] = ()
+) -> list[Measures]:
     """Return the measures of every flight."""
-    return [of_flight(flown, choices) for flown in flights]
+    return [of_flight(flown, choices, tubes) for flown in flights]
 
 
-def of_flight(flown: FlightData, choices: DesignChoices = STUDY) -> Measures:
+def of_flight(
+    flown: FlightData, choices: DesignChoices = STUDY, tubes: Sequence[Tube] = ()
+) -> Measures:
     """Return the measures of one flight, for the performance and the disturbances of the
-    controller's specification.
+    controller's specification, and whether one of the tubes covers it.
     """
     column, travel = flown.columns(), flown.heli.travel
     noise = noise_of(flown)
@@ -77,6 +88,8 @@ def of_flight(flown: FlightData, choices: DesignChoices = STUDY) -> Measures:
         outside=float(np.mean((forward < low) | (forward > high))),
         faster=float(np.mean(np.abs(change) > choices.acceleration)),
         beyond=float(np.mean(column["airspeed"] > Validity.of(flown.heli).harmless[0])),
+        wind=float(np.linalg.norm(np.column_stack([column[n] for n in WIND]), axis=1).max()),
+        uncovered=uncovered(flown, tubes),
     )
 
 

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from studies.controllers.design_choices import RATE, TOP
 from studies.controllers.designs import LQR
@@ -39,6 +42,8 @@ def every(study: Outcome) -> list[Table]:
     if study.flown_controllers is not None:
         out.append(ranking(study.flown_controllers))
         out.append(flown(study.flown_controllers, study.certified_controllers))
+        if study.flown_controllers.flown:
+            out.append(covered(study.flown_controllers))
         if study.certified_controllers is not None and study.certified_controllers.bounds:
             out.append(exceeded(study.flown_controllers, study.certified_controllers))
     return out
@@ -167,6 +172,34 @@ def exceeded(found: FlownControllers, proofs: CertifiedControllers) -> Table:
             [name, gain(limit), f"{_worst(largest):.2f}", f"{largest.gust:.1f}", first]
         )
     table.remarks.append("None: nothing is proven, there is nothing to exceed.")
+    return table
+
+
+def covered(found: FlownControllers) -> Table:
+    """A row a controller: the share of its flights that a tube covers, and what fails first."""
+    table = Table(
+        "Flights covered by a proven tube of the nonlinear equations",
+        ["controller", "flights", "covered (%)", "fails first", "largest wind (m/s)"],
+        name="covered",
+        source="controllers",
+    )
+    for name in dict.fromkeys(one.name for one in found.flown):
+        flights = [flight for one in found.of(name) for flight in one.flights]
+        fails = Counter(flight.uncovered for flight in flights)
+        kept = 100 * fails.pop("", 0) / len(flights)
+        words = "; ".join(f"{why} ({count})" for why, count in fails.most_common())
+        winds = [flight.wind for flight in flights]
+        table.rows.append(
+            [name, str(len(flights)), f"{kept:.0f}", words, f"{min(winds):.1f} to {max(winds):.1f}"]
+        )
+    calm = min((one for one in found.flown), key=lambda one: one.wind)
+    table.remarks.append(
+        "A tube speaks of one controller, as its matrices are, of gusts up to its amplitude with"
+        " the steady wind among them, without sensor noise, and of servos whose rate limit is not"
+        f" reached. In the least turbulence flown ({calm.gust:.1f} m/s) the wind had up to"
+        f" {np.median([flight.wind for flight in calm.flights]):.1f} m/s by median. Tubes are made"
+        " by synthesis.tube, and given by their files: tubes = [...] under [effort]."
+    )
     return table
 
 

@@ -56,5 +56,7 @@ def _flown(one: TurbulentFlights) -> dict[str, Any]:
         "at_a_stop": values((100 * f.stops for f in each), "%"),
         "outside_the_range": values((100 * f.outside for f in each), "%"),
         "faster_than_the_rate": values((100 * f.faster for f in each), "%"),
+        "largest_wind": values((f.wind for f in each), "m/s"),
+        "not_covered_by_a_tube": [f.uncovered for f in each],
         "beyond_the_equations": values((100 * f.beyond for f in each), "%"),
     }

@@ -67,6 +67,9 @@ class Effort:
     controller_seeds: int = choice(
         20, "flights of each controller in turbulence of each size", least=1
     )
+    tubes: tuple[str, ...] = choice(
+        (), "files of proven tubes, by Tube.save, that these flights are compared with", empty=True
+    )
     search: Search = field(
         default_factory=Search, metadata=about("for bad trajectories of the lateral gust loop")
     )

@@ -8,6 +8,7 @@ from inspect import Parameter, signature
 from typing import Any
 
 from studies.controllers.certified import controller_questions
+from studies.controllers.covered import proven
 from studies.controllers.designs import Designs, design_questions
 from studies.controllers.flown import FlownControllers, fly_controllers
 from studies.transition.baseline import Baseline, build_baseline
@@ -79,10 +80,10 @@ def exact_recovery(baseline: Baseline, seed: int) -> Recoveries:
 
 
 def flown_controllers(
-    vehicle: str, controllers: Designs, controller_seeds: int
+    vehicle: str, controllers: Designs, controller_seeds: int, tubes: tuple[str, ...]
 ) -> FlownControllers:
-    """Every controller flown with so many seeds."""
-    return fly_controllers(vehicle, controllers, range(controller_seeds))
+    """Every controller flown with so many seeds, and compared with the tubes in these files."""
+    return fly_controllers(vehicle, controllers, range(controller_seeds), proven(tubes))
 
 
 STAGES = (

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
-from symheli.codegen.symbolic import clip, where
+from symheli.codegen.symbolic import clip, maximum, minimum, where
 from symheli.components import unnamed
 
 
@@ -41,12 +41,13 @@ def pi_governor(
     wanted = name(r"\delta_w", par.governor_kp * error + par.governor_ki * om_i)
     throttle = name(r"\delta_t", clip(wanted, 0.0, 1.0))
     torque = name("Q_e", par.max_power * throttle / Om)
-    winding = (wanted - throttle) * error > 0
+    # stops while pushed further; decided by `wanted` alone, so that bounds over a set decide it too
+    integral = where(wanted > 1, minimum(error, 0.0), where(wanted < 0, maximum(error, 0.0), error))
     sign = 1.0 if "rotor_reaction" in par.printed else -1.0
     return Drive(
         torque,
         0.0,
-        {"Om": (torque - shaft_torque) / par.inertia, "om_i": where(winding, 0.0, error)},
+        {"Om": (torque - shaft_torque) / par.inertia, "om_i": integral},
         sign,
     )
 

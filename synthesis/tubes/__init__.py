@@ -2,8 +2,9 @@
 the gusts.
 """
 
+from synthesis.tubes.coverage import Coverage, coverage
 from synthesis.tubes.gain import LocalGain
 from synthesis.tubes.motions import Motions
 from synthesis.tubes.tube import Tube, tube
 
-__all__ = ["LocalGain", "Motions", "Tube", "tube"]
+__all__ = ["Coverage", "LocalGain", "Motions", "Tube", "coverage", "tube"]

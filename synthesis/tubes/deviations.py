@@ -75,21 +75,39 @@ class Deviations:
     def name(self) -> str:
         """Of the vehicle, or of the model's function."""
         own = self.model
-        return own.vehicle.name if isinstance(own, Helicopter) else own.name()
+        if not isinstance(own, Helicopter):
+            return own.name()
+        governor = "an ideal governor" if own.governor == "ideal" else "the governor and engine"
+        return f"{own.vehicle.name} with {governor}"
 
     @property
     def _named(self) -> Any:
         return self.reference if isinstance(self.reference, Motions) else self.model
 
     @property
+    def hypotheses(self) -> tuple[str, ...]:
+        """What is modelled and assumed, in sentences."""
+        return self.reference.hypotheses(self.name, self.gust, self.states)
+
+    @property
     def states(self) -> tuple[str, ...]:
-        """Names of the states."""
-        return tuple(self._named.states)
+        """Names of the states, those of the controller and of servos after those of the model."""
+        own = self.reference
+        further = () if isinstance(own, Motions) else own.equipment.names
+        return (*map(str, self._named.states), *further)
 
     @property
     def inputs(self) -> tuple[str, ...]:
         """Names of the controls."""
         return tuple(self._named.inputs)
+
+    @property
+    def feedback(self) -> Array:
+        """K (nodes, k + m, n + m), or one for all: controls, and the rates of the further states,
+        by the deviations.
+        """
+        own = self.reference
+        return own.gain if isinstance(own, Motions) else own.closed
 
     @property
     def disturbances(self) -> int:
@@ -106,14 +124,34 @@ class Deviations:
         e, w, c = (casadi.SX.sym(name, k) for name, k in zip("ewc", sizes, strict=True))
         data = casadi.SX.sym("data", r.data.shape[1])
         x, moving, u, K = r.between(data, c)
-        at = (x + e, u + K @ e, self.gust * w)
+        n, moved = self.moved, u + K @ e
+        at = ((x + e)[:n], moved[: len(self.inputs)], self.gust * w)
         if not isinstance(self.model, Helicopter):
             rate = self.model(*at) - (self.model(x, u, 0) if moving is None else moving)
             return casadi.Function("deviation", [e, w, c, data], [casadi.densify(rate)]), None
         lam = casadi.SX.sym("lam", 2)
         xdot, balance = self.model.implicit(*at, lam)
-        function = casadi.Function("deviation", [e, w, c, data, lam], [xdot - moving, balance])
+        rate = casadi.vertcat(xdot, moved[len(self.inputs) :]) - moving
+        function = casadi.Function("deviation", [e, w, c, data, lam], [rate, balance])
         return function, casadi.Function("inflow", [e, w, c, data], [self.model.inflow(*at)])
+
+    @property
+    def moved(self) -> int:
+        """Number of states of the model; the others' rates are linear in the deviations."""
+        return len(self._named.states)
+
+    @cached_property
+    def _linear(self) -> tuple[int, Array | None, Array]:
+        """`moved`, the rates of the other states by all deviations where they are the same for all
+        commands, and (states, k): rates that servos add by resolving their commands in steps, each
+        times a number within [-1, 1].
+        """
+        n, r = self.moved, self.reference
+        if isinstance(r, Motions) or not isinstance(self.model, Helicopter):
+            return n, None, np.zeros((n, 0))
+        further = r.equipment.steps(self.model.travel)
+        rates = r.closed[0, len(self.inputs) :] if len(r.airspeeds) == 1 else None
+        return n, rates, np.vstack([np.zeros((n, further.shape[1])), further])
 
     @property
     def rate(self) -> casadi.Function:
@@ -138,14 +176,14 @@ class Deviations:
         zero, calm = np.zeros(factors.shape[-1]), np.zeros(m)
         found: list[MatrixSet | None] = []
         for cell, factor, drift in zip(cells, factors, drifts, strict=True):
-            places, widths, commands, data = self._parts(cell, self.reference.jacobian_parts)
+            places, widths, commands, data = self.parts(cell, self.reference.jacobian_parts)
             ellipsoid = Domain.ellipsoid(zero, share * factor)
             over = (ellipsoid, Domain.ellipsoid(calm, share * np.eye(m)), commands, data)
             parts = segment_averages(function, *over, along=[0, 1], start=start)
             if np.all(np.isfinite(parts.average.rest)):
                 units = np.concatenate([np.linalg.norm(factor, axis=1), np.ones(m + 1)])
                 own = _covered(parts, places, widths, whole, units)
-                found.append(_matrix_set(*own, drift, factor, units))
+                found.append(_matrix_set(*own, drift, factor, units, self._linear))
             else:
                 found.append(None)
         return found
@@ -162,7 +200,7 @@ class Deviations:
         still = (Domain.point(np.zeros(n)), Domain.point(np.zeros(self.disturbances)))
         found = []
         for cell in cells:
-            _, _, commands, data = self._parts(cell, self.reference.drift_parts)
+            _, _, commands, data = self.parts(cell, self.reference.drift_parts)
             value = enclose(function, *still, commands, data, start=start).value
             split = value.slopes.shape[-1] - whole
             by = value.slopes[..., split:]
@@ -174,7 +212,7 @@ class Deviations:
             found.append([middle, rest * ROUNDED_UP, *linear.T])
         return np.array(found)
 
-    def _parts(self, cell: Cell, parts: Sequence[int]) -> tuple[Array, Array, Domain, Domain]:
+    def parts(self, cell: Cell, parts: Sequence[int]) -> tuple[Array, Array, Domain, Domain]:
         """A cell in so many parts along each of its ranges, with all the other commands: the parts'
         places (N, r) and half widths (r,) in units of the cell's half widths, the commands, and the
         data of the reference.
@@ -385,18 +423,30 @@ def _commands(forms: AffineForm, places: Array, whole: int) -> slice:
 
 
 def _matrix_set(
-    average: AffineForm, left: Array, weights: Array, drift: Array, factor: Array, units: Array
+    average: AffineForm,
+    left: Array,
+    weights: Array,
+    drift: Array,
+    factor: Array,
+    units: Array,
+    linear: tuple[int, Array | None, Array],
 ) -> MatrixSet:
-    """The set of F; left, weights: of the kinks."""
-    n, q, symbols = len(factor), len(units), average.slopes.shape[-1]
+    """The set of F; left, weights: of the kinks; linear: see `Deviations._linear`."""
+    n, (r, rates, steps) = len(factor), linear
+    q, symbols = len(units), average.slopes.shape[-1]
     m = q - n - 1
     slopes = np.zeros((symbols, n, q))
     slopes[..., :-1] = np.moveaxis(average.slopes, -1, 0)
     slopes[symbols - len(drift) + 2 : symbols, :, -1] = drift[2:]
+    if np.any(slopes[: n + m, r:]):
+        raise ValueError("the rates of controller and servos are linear in the deviations")
     tube, gust, command = slopes[:n], slopes[n : n + m], slopes[n + m : symbols]
     centre, rest = np.zeros((n, q)), np.zeros((n, q))
     centre[:, :-1], centre[:, -1] = average.centre, drift[0]
     rest[:, :-1], rest[:, -1] = average.rest, drift[1]
+    if rates is not None:  # as stored, without rounding; the reference misses nothing of them
+        centre[r:], rest[r:], slopes[:, r:] = 0.0, 0.0, 0.0
+        centre[r:, :n] = rates
     # z_k H_k w = y_m G_m e, since z = factor^-1 e and y = w: one multiplier takes both
     inverse, wind = np.linalg.inv(factor), slice(n, n + m)
     cross = tube[:, :, wind].copy()
@@ -411,13 +461,22 @@ def _matrix_set(
     at_ends[: len(command)] = command[:CORNERS]
     signs = [(-1, 1) if np.any(part) else (0,) for part in at_ends]
     corners = centre + np.tensordot(np.stack(np.meshgrid(*signs, indexing="ij"), -1), at_ends, 1)
-    rest += ROUNDED * (np.abs(centre) + np.abs(command).sum(axis=0))
+    rounded = ROUNDED * (np.abs(centre) + np.abs(command).sum(axis=0))
+    rest[: n if rates is None else r] += rounded[: n if rates is None else r]
     others = command[CORNERS:]
     rates = np.abs(others / units[:n, None] * units).max(axis=(1, 2))
     own, squares, more = rank_one(others[rates > SMALL], units)
     left, weights = np.vstack([left, own]), np.concatenate([weights, squares])
     rest += more + np.abs(others[rates <= SMALL]).sum(axis=0) * ROUNDED_UP
     rows, diagonal = elementwise(rest * ROUNDED_UP, units)
+    size = np.linalg.norm(steps / units[:n, None], axis=0) ** 0.5
+    constant = np.zeros((steps.shape[1], q, q))
+    constant[:, -1, -1] = size**2 * ROUNDED_UP
     return MatrixSet(
-        corners, tube, gust, np.vstack([left, rows]), np.concatenate([weights, diagonal])
+        corners,
+        np.eye(n)[:, :r],
+        tube[:, :r],
+        gust[:, :r],
+        np.vstack([left, rows, (steps / size).T]),
+        np.concatenate([weights, diagonal, constant]),
     )

@@ -14,6 +14,7 @@ from symheli.airframe.vehicle import load_vehicle
 from symheli.airframe.written import as_toml
 from symheli.enclosure import equations
 from synthesis.tubes.deviations import Deviations
+from synthesis.tubes.equipment import Equipment
 from synthesis.tubes.inequality import Multipliers
 from synthesis.tubes.motions import Motions
 from synthesis.tubes.reference import Reference
@@ -43,6 +44,7 @@ def written_loop(loop: Deviations) -> dict[str, Any]:
             "name": model.vehicle.name,
             "vehicle": as_toml(model.vehicle),
             "density": model.density,
+            "governor": model.governor,
             "smoothing": model.smoothing,
             "printed": sorted(model.printed),
         }
@@ -59,7 +61,8 @@ def read_loop(content: dict[str, Any]) -> Deviations:
 
 def _written(r: Reference) -> dict[str, Any]:
     limits = [limit if math.isfinite(limit) else None for limit in r.limits]
-    return {"limits": limits, **{name: getattr(r, name).tolist() for name in ARRAYS}}
+    arrays = {name: getattr(r, name).tolist() for name in ARRAYS}
+    return {"limits": limits, "equipment": r.equipment.written(), **arrays}
 
 
 def _read_flight(content: dict[str, Any]) -> tuple[Helicopter, Reference]:
@@ -68,15 +71,22 @@ def _read_flight(content: dict[str, Any]) -> tuple[Helicopter, Reference]:
         file.write_text(content["vehicle"], encoding="utf-8")
         vehicle = load_vehicle(file)
     density, smoothing = float(content["density"]), float(content["smoothing"])
-    heli = Helicopter(vehicle, "ideal", density, frozenset(content["printed"]), smoothing)
+    heli = Helicopter(
+        vehicle, content["governor"], density, frozenset(content["printed"]), smoothing
+    )
     n, k = len(heli.states), len(content["airspeeds"])
-    powers = np.shape(content["steady"])[2]
-    shapes = ((k,), (k, 2, powers, n + 4), (k, n + 4), (k, 4), (k, 4, n))
+    equipment = Equipment.read(content["equipment"])
+    powers, c = np.shape(content["steady"])[2], len(equipment.states)
+    shapes = ((k,), (k, 2, powers, n + 4), (k, n + 4), (k, 4), (k, 4 + c, n + c))
     own = {name: numbers(content[name], *shape) for name, shape in zip(ARRAYS, shapes, strict=True)}
     if not (k > 0 and np.all(np.diff(own["airspeeds"]) > 0)):
         raise ValueError("the airspeeds do not increase")
     a, j, snap = (math.inf if limit is None else float(limit) for limit in content["limits"])
-    return heli, Reference(**own, limits=(float(numbers(a)), float(numbers(j)), snap))
+    if equipment.period and k > 1:
+        raise ValueError("a sampled loop has one airspeed")
+    return heli, Reference(
+        **own, limits=(float(numbers(a)), float(numbers(j)), snap), equipment=equipment
+    )
 
 
 def _written_motions(r: Motions) -> dict[str, Any]:
@@ -108,7 +118,7 @@ def written_multipliers(by: Multipliers) -> dict[str, Any]:
 
 
 def read_multipliers(given: dict[str, Any], n: int) -> Multipliers:
-    """Multipliers of n states."""
+    """Multipliers of a model with n states."""
     terms = np.asarray(given["terms"], float)
     return Multipliers(
         numbers(given["tube"], n, n),

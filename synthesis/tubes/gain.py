@@ -96,15 +96,19 @@ class LocalGain:
         }
 
     @classmethod
-    def read(cls, given: dict[str, Any], nodes: int, states: tuple[str, ...]) -> LocalGain:
-        """The bound so written, for a tube with so many nodes and these states."""
+    def read(
+        cls, given: dict[str, Any], nodes: int, states: tuple[str, ...], moved: int
+    ) -> LocalGain:
+        """The bound so written, for a tube with so many nodes and these states, of which the first
+        ones are those of the model.
+        """
         n = len(states)
         return cls(
             tuple(map(str, given["outputs"])),
             bool(given["energy"]),
             float(numbers(given["gust"])),
             numbers(given["Q"], nodes, n, n),
-            tuple(read_multipliers(by, n) for by in given["multipliers"]),
+            tuple(read_multipliers(by, moved) for by in given["multipliers"]),
             float(numbers(given["bias"])),
             states,
         )

@@ -30,26 +30,33 @@ class MatrixSet(NamedTuple):
     """The set of F (n, q); q = n deviations, m gust components and 1 constant.
 
     corners (2, 2, 2, n, q): at the ends of the cell in its first three commands, as airspeed,
-    acceleration and jerk, 1 for 2 where they are one; tube (n, n, q) and gust (m, n, q), the
-    factors of the symbols; left (k, n)
+    acceleration and jerk, 1 for 2 where they are one; onto (n, r) times tube (n, r, q) and gust
+    (m, r, q), the factors of the symbols; left (k, n)
     and weights (k, q, q): for each other term, x'F v <= |x'left| sqrt(v' weights v).
     """
 
     corners: Array
+    onto: Array
     tube: Array
     gust: Array
     left: Array
     weights: Array
 
+    def unit(self, factor: Array) -> Array:
+        """D (r, r), in whose columns the rows of tube and gust are of the size of e = factor z."""
+        own = self.onto.T @ factor
+        return np.linalg.cholesky(own @ own.T)
+
     def scaled(self, factor: Array) -> MatrixSet:
         """The set in coordinates z, e = factor z."""
         n, q = self.corners.shape[-2:]
-        inverse, right = np.linalg.inv(factor), np.eye(q)
+        inverse, right, unit = np.linalg.inv(factor), np.eye(q), self.unit(factor)
         right[:n, :n] = factor
         return MatrixSet(
             inverse @ self.corners @ right,
-            inverse @ self.tube @ right,
-            inverse @ self.gust @ right,
+            inverse @ self.onto @ unit,
+            np.linalg.solve(unit, self.tube @ right),
+            np.linalg.solve(unit, self.gust @ right),
             self.left @ inverse.T,
             right.T @ self.weights @ right,
         )
@@ -77,7 +84,7 @@ def rank_one(matrices: Array, units: Array) -> tuple[Array, Array, Array]:
     left, weights, rest = [], [], np.zeros((n, q))
     for matrix in matrices:
         U, s, V = np.linalg.svd(matrix / units[:n, None] * units)
-        row = U[:, 0] * np.sqrt(s[0]) * units[:n]
+        row = np.where(matrix.any(axis=1), U[:, 0], 0.0) * np.sqrt(s[0]) * units[:n]
         column = V[0] * np.sqrt(s[0]) / units
         left.append(row)
         # not less than the exact product, in the order of matrices, by Gershgorin's theorem
@@ -88,7 +95,7 @@ def rank_one(matrices: Array, units: Array) -> tuple[Array, Array, Array]:
 
 
 class Multipliers(NamedTuple):
-    """tube S and gust T (n, n), terms (k, k) diagonal, wind mu (1, 1), decay alpha (a number; 0 in
+    """tube S and gust T (r, r), terms (k, k) diagonal, wind mu (1, 1), decay alpha (a number; 0 in
     a gain): numbers, rationals or variables of an `AffineProgram`.
     """
 
@@ -100,7 +107,7 @@ class Multipliers(NamedTuple):
 
 
 class Shares(NamedTuple):
-    """X (n, n) >= P inv(S) P, P inv(T) P, P l inv(r) l'P at one end of a cell."""
+    """X (n, n) >= P o inv(S) o'P, P o inv(T) o'P, P l inv(r) l'P at one end of a cell; o: onto."""
 
     tube: Any
     gust: Any
@@ -125,9 +132,10 @@ def motion(nodes: Sequence[Any], width: Any, centre: Array, half: Array) -> Moti
     (s, a), (s_half, a_half) = centre, half
     if len(nodes) == 1:
         return Motion(nodes, None, [a])
+    accelerations = [a - a_half, a + a_half] if a_half != 0 else [a]
     step = nodes[1] - nodes[0]
     ends = [nodes[0] + (s + side * s_half) * step for side in (-1, 1)]
-    return Motion(ends, step / width, [a - a_half, a + a_half])
+    return Motion(ends, step / width, accelerations)
 
 
 def invariant(by: Multipliers, shape: tuple[int, int], number: Number = float) -> Any:
@@ -156,9 +164,9 @@ def conditions(
 ) -> tuple[list[Any], list[Any]]:
     """The matrices that must be positive definite, in two lists.
 
-    For each end of the cell, with its shares X: [X_tube, P; P, S], [X_gust, P; P, T] and [X_terms,
-    P l; l'P, r]. For each corner of the cell, as Bernstein coefficients of degree 2 in the
-    scheduling command, minus
+    For each end of the cell, with its shares X: [X_tube, P o; o'P, S], [X_gust, P o; o'P, T] and
+    [X_terms, P l; l'P, r]. For each corner of the cell, as Bernstein coefficients of degree 2 in
+    the scheduling command, minus
 
         [P A + A'P + alpha P + dP/dt, P E, P d; ., 0, 0; ., ., 0] + supply
         + sum of H'S H and H'T H over the symbols + sum of r times weights
@@ -168,7 +176,8 @@ def conditions(
     """
     bounds = []
     for end, X in zip(P.ends, shares, strict=True):
-        rows = (end, end, np.swapaxes(end @ over.left.T, -1, -2))
+        onto, left = (np.swapaxes(end @ side, -1, -2) for side in (over.onto, over.left.T))
+        rows = (onto, onto, left)
         for own, row, multiplier in zip(X, rows, by[:3], strict=True):
             bounds.append(from_lower([[own], [row, multiplier]]))
     fixed = supply + _symbols(over, by)

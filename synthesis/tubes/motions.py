@@ -66,6 +66,8 @@ class Motions:
 
     whole = ()
     """Commands that no cell splits."""
+    jump = None
+    """The deviation does not jump."""
     jumps = False
     """Whether a state of the reference may jump: by hypothesis none does."""
 
@@ -148,7 +150,7 @@ class Motions:
         """and what the reference misses."""
         return (16,) + (4,) * len(self.ranges)
 
-    def hypotheses(self, name: str, gust: float) -> tuple[str, ...]:
+    def hypotheses(self, name: str, gust: float, states: tuple[str, ...] = ()) -> tuple[str, ...]:
         """What a tube about them rests on, in sentences."""
         limits = [f"[{low:g}, {high:g}]" for low, high in self.ranges]
         command = []

@@ -80,6 +80,29 @@ def is_above(nodes: Array, output: Array) -> bool:
     return all(positive_definite(_symmetric(Q, number) - C.T @ C) for Q in nodes)
 
 
+def falls_in(jump: Array, after: Array, before: Array) -> bool:
+    """Whether e'P e after a jump R e is less than that before it, with P (n, n) after and before,
+    in rational arithmetic.
+    """
+    number = rational()
+    R, last = exact(jump, number), _symmetric(before, number)
+    return positive_definite(last - R.T @ _symmetric(after, number) @ R)
+
+
+def is_within(nodes: Array, rows: Array, bound: float) -> bool:
+    """Whether |k'e| < bound for all e with e'P e <= 1, P (nodes, n, n) and k (nodes, n) linear
+    between the nodes, in rational arithmetic.
+    """
+    number = rational()
+    size = exact([[bound]], number)
+    for P, row in zip(nodes, rows, strict=True):
+        k = exact(row[None], number)
+        corner = np.block([[_symmetric(P, number), k.T], [k, size * size]])
+        if not (bound > 0 and positive_definite(corner)):
+            return False
+    return True
+
+
 def _symmetric(M: Array, number: Number) -> Array:
     own = exact(M, number)
     return (own + own.T) * number(0.5)
@@ -122,7 +145,7 @@ def _matrices(
 
 def _shares(P: Array, over: MatrixSet, by: Multipliers) -> Shares:
     """Those that leave a little to spare."""
-    rows = (P, P, P @ over.left.T)
+    rows = (P @ over.onto, P @ over.onto, P @ over.left.T)
     X = [
         row @ np.linalg.solve(multiplier, row.T)
         for row, multiplier in zip(rows, by[:3], strict=True)

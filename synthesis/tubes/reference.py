@@ -2,29 +2,30 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
 import casadi
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.linalg import solve_continuous_are, solve_continuous_lyapunov
+from scipy.linalg import solve_continuous_lyapunov
 
 from symheli import Helicopter, trim, trim_batch
-from symheli.errors import InputError, TrimError
+from symheli.errors import TrimError
+from symheli.flight import Servo
 from symheli.progress import task
 from symheli.steady.newton import newton
 from symheli.values.summary import summarized
+from synthesis.tubes.controllers import Choice
+from synthesis.tubes.equipment import Equipment
 
 Array = np.ndarray
 
-STATE_SIZES = (1.0, 1.0, 1.0, 0.5, 0.5, 0.5, 0.2, 0.2, 0.1, 0.1)
-"""Deviations of equal weight in the default feedback: m/s, rad/s, rad."""
-CONTROL_SIZE = 0.1
-"""Control of the weight of these, rad."""
-TUBE_SIZES = (0.4, 0.5, 0.8, 0.1, 0.1, 0.3, 0.08, 0.06, 0.02, 0.02)
-"""Half widths of equal weight in the size of a tube: m/s, rad/s, rad."""
+TUBE_SIZES = (0.4, 0.5, 0.8, 0.1, 0.1, 0.3, 0.08, 0.06, 0.02, 0.02, 3.0, 3.0)
+"""Half widths of equal weight in the size of a tube, m/s, rad/s, rad; rotor speed, rad/s,
+and the governor's integral, rad."""
 GIVEN = ("u", "v", "w", "phi", "theta")
 """States that airspeed and acceleration give."""
 POWERS = 4
@@ -40,12 +41,14 @@ class Reference:
     """x_r, u_r and K of a commanded airspeed p, dp/dt = a, da/dt = j, dj/dt = b.
 
     Between two nodes x_r is sum a^i X_i(p) + Y(p) j, X_i cubic in p by Hermite's formula; u_r
-    likewise, plus V(p) b; Y, V and K linear in p. One node: a held airspeed.
+    likewise, plus V(p) b; Y, V and K linear in p. One node: a held airspeed. The states of a
+    controller and of servos come after those of the helicopter, the further rows of K are their
+    rates; they are deviations, with 0 as their reference.
 
     airspeeds (k,): nodes, m/s. steady (k, 2, powers, n + 4): values of X_i at the nodes, states and
-    controls, and their slopes by airspeed. jerk (k, n + 4): Y; snap (k, 4): V. gain (k, 4, n): K,
-    rad per SI unit. limits (3,): the largest sizes of a, j and b, m/s^2, m/s^3, m/s^4; b infinite
-    where the jerk may jump (Y and V are then 0 for all states).
+    controls, and their slopes by airspeed. jerk (k, n + 4): Y; snap (k, 4): V. gain (k, 4 + c, n +
+    c): of the controller with c states, rad per SI unit. limits (3,): the largest sizes of a, j and
+    b, m/s^2, m/s^3, m/s^4; b infinite where the jerk may jump (Y and V are then 0 for all states).
     """
 
     airspeeds: Array
@@ -54,6 +57,7 @@ class Reference:
     snap: Array
     gain: Array
     limits: tuple[float, float, float]
+    equipment: Equipment = field(default_factory=Equipment)
 
     __repr__ = summarized
 
@@ -65,14 +69,35 @@ class Reference:
     """Whether the reference may miss the equations."""
 
     @property
+    def own(self) -> int:
+        """n, the number of states of the helicopter."""
+        return self.steady.shape[3] - 4
+
+    @property
+    def sampled(self) -> bool:
+        """Whether the scheduling command is the time since the last sample, s, at one airspeed."""
+        return self.equipment.period > 0
+
+    @cached_property
     def nodes(self) -> Array:
-        """Of the scheduling command: the airspeeds."""
-        return self.airspeeds
+        """Of the scheduling command: the airspeeds, or the time since the last sample."""
+        own = self.equipment
+        return np.linspace(0.0, own.period, own.parts + 1) if self.sampled else self.airspeeds
 
     @property
     def ranges(self) -> tuple[tuple[float, float], ...]:
-        """Of the commands that cells split besides the airspeed: the acceleration."""
-        return ((-self.limits[0], self.limits[0]),)
+        """Of the commands that cells split besides the airspeed: the acceleration; 1 of a clock."""
+        return ((1.0, 1.0),) if self.sampled else ((-self.limits[0], self.limits[0]),)
+
+    @cached_property
+    def closed(self) -> Array:
+        """K (k, 4 + m, n + m): blade pitch and the rates of the m further states."""
+        return self.equipment.flow(self.gain)
+
+    @property
+    def jump(self) -> Array | None:
+        """(n + m, n + m): the deviation after a sample by that before; None: there are none."""
+        return self.equipment.jump(self.gain)
 
     @property
     def whole(self) -> tuple[float, ...]:
@@ -82,12 +107,11 @@ class Reference:
     @property
     def jumps(self) -> bool:
         """Whether a state may jump: with the jerk, or as a command that is held has limits."""
-        n = self.gain.shape[-1]
-        with_jerk = np.any(self.jerk[:, :n]) or np.any(self.snap)
+        with_jerk = np.any(self.jerk[:, : self.own]) or np.any(self.snap)
         held = len(self.airspeeds) == 1 and any(self.limits)
         return bool(held or (np.isinf(self.limits[2]) and with_jerk))
 
-    def hypotheses(self, name: str, gust: float) -> tuple[str, ...]:
+    def hypotheses(self, name: str, gust: float, states: tuple[str, ...] = ()) -> tuple[str, ...]:
         """What a tube about it rests on, in sentences."""
         p, (a, j, b) = self.airspeeds, self.limits
         command = f"the commanded airspeed is {p[0]:g} m/s"
@@ -100,8 +124,8 @@ class Reference:
                 f" within {a:g} m/s^2, with a jerk of at most {j:g} m/s^3{bounded}"
             )
         return (
-            f"the equations of {name} with an ideal governor; u = u_r + K e in continuous time with"
-            " all ten states known; no servos, no delay",
+            f"the equations of {name}",
+            *self.equipment.sentences(self.gain, states),
             f"{command}; gusts have at most {gust:g} m/s, any direction in body axes and any"
             " history",
         )
@@ -109,24 +133,44 @@ class Reference:
     @property
     def intervals(self) -> int:
         """Number of intervals between nodes, 1 for a held airspeed."""
-        return max(len(self.airspeeds) - 1, 1)
+        return max(len(self.nodes) - 1, 1)
 
     @cached_property
     def data(self) -> Array:
         """What `between` takes of each interval, (intervals, .)."""
-        ends = [np.arange(self.intervals), np.arange(self.intervals) + (len(self.airspeeds) > 1)]
+        i = np.arange(self.intervals)
+        ends = [0 * i, 0 * i] if self.sampled else [i, i + (len(self.airspeeds) > 1)]
         p = np.stack([self.airspeeds[i] for i in ends], axis=1)
         if len(self.airspeeds) == 1:
             p = p + np.array([0.0, 1.0])
-        given = (self.steady, self.jerk, self.snap, self.gain)
+        given = (self.steady, self.jerk, self.snap, self.closed)
         parts = [m[i].reshape(len(i), -1) for m in given for i in ends]
         return np.hstack([p, *parts])
 
     def between(self, data: Any, c: Any) -> tuple[Any, Any, Any, Any]:
         """(x_r, dx_r/dt, u_r, K) in CasADi; data: of an interval; c = (s, a, j, b), s in [0, 1] the
-        position between its nodes.
+        position between its nodes. Of the further states 0; the controls after the first four are
+        their rates.
         """
-        powers, n = self.steady.shape[2], self.gain.shape[2]
+        z, moving, added, K = self._along(data, c)
+        n, further = self.own, casadi.SX.zeros(1, self.equipment.count)
+        u = casadi.horzcat(z[n:] + added, further)
+        if self.equipment.bank is not None:  # its states follow the rest of the controls alone
+            forward = zip(self.equipment.forward, (moving[n:], added), strict=True)
+            u = casadi.horzcat(z[n:], sum((by @ casadi.DM(M.T) for M, by in forward), further))
+        x, moving = (casadi.horzcat(row[:n], further) for row in (z, moving))
+        return x.T, moving.T, u.T, K
+
+    def commands(self, data: Any, c: Any) -> Any:
+        """The controls u_r (4,) in CasADi, as `between`, as they are commanded."""
+        z, _, added, _ = self._along(data, c)
+        return (z[self.own :] + added).T
+
+    def _along(self, data: Any, c: Any) -> tuple[Any, Any, Any, Any]:
+        """State and controls (1, n + 4) but for what is added to the controls where the jerk
+        changes (1, 4), the rates of the first, and K.
+        """
+        powers, n = self.steady.shape[2], self.own
         place = 2
 
         def part(rows: int, columns: int) -> Any:
@@ -137,7 +181,8 @@ class Reference:
         s, a, j, snap, width = *casadi.vertsplit(c), data[1] - data[0]
         (y0, m0), (y1, m1) = (casadi.vertsplit(part(2 * powers, n + 4), powers) for _ in range(2))
         (Y0, Y1), (V0, V1), (K0, K1) = (
-            [part(*shape) for _ in range(2)] for shape in ((1, n + 4), (1, 4), (4, n))
+            [part(*shape) for _ in range(2)]
+            for shape in ((1, n + 4), (1, 4), self.closed.shape[1:])
         )
         # y0 + s (d0 + s (c2 + s c3)): small numbers beside the first
         d0, d1, step = width * m0, width * m1, y1 - y0
@@ -149,42 +194,54 @@ class Reference:
             z, along = value[i, :] + a * z, slope[i, :] + a * along
         Y, turn = Y0 + s * (Y1 - Y0), (Y1 - Y0) / width
         z, moving = z + Y * j, (along + turn * j) * a + by * j + Y * snap
-        u = z[n:] + (V0 + s * (V1 - V0)) * snap
-        return z[:n].T, moving[:n].T, u.T, K0 + s * (K1 - K0)
+        return z, moving, (V0 + s * (V1 - V0)) * snap, K0 + s * (K1 - K0)
 
-    def place(self, airspeeds: Any) -> tuple[Array, Array]:
-        """Intervals of airspeeds (N,) within the range, m/s, and their shares of the way along it,
-        (N,).
+    def place(self, commands: Any) -> tuple[Array, Array]:
+        """Intervals of airspeeds (N,) within the range, m/s, or of times since a sample, and their
+        shares of the way along it, (N,).
         """
-        p = np.asarray(airspeeds, float)
-        i = np.clip(np.searchsorted(self.airspeeds, p) - 1, 0, self.intervals - 1)
-        low, high = self.data[i, :2].T
-        return i, (p - low) / (high - low)
+        p, nodes = np.asarray(commands, float), self.nodes
+        i = np.clip(np.searchsorted(nodes, p) - 1, 0, self.intervals - 1)
+        width = nodes[i + 1] - nodes[i] if len(nodes) > 1 else 1.0
+        return i, (p - nodes[i]) / width
 
 
-def held(heli: Helicopter, airspeed: Any, gain: Any = None) -> Reference:
-    """Steady level flight."""
+def held(
+    heli: Helicopter,
+    airspeed: Any,
+    choice: Choice | None = None,
+    servos: Mapping[str, Servo] | None = None,
+    delay: int = 0,
+) -> Reference:
+    """Steady level flight with the controller chosen; delay: whole periods of it."""
+    choice = choice or Choice()
     steady = trim(heli, airspeed=airspeed)
-    x, u = np.array(steady.x), np.array(steady.u)
-    K = regulator(heli, x, u) if gain is None else np.asarray(gain, float)
+    x, u, p = np.array(steady.x), np.array(steady.u), np.array([float(airspeed)])
+    gain, states = choice.gains(heli, x[None], u[None], p)
     at = np.concatenate([x, u])[None, None, None]
     return Reference(
-        np.array([float(airspeed)]),
+        p,
         np.concatenate([at, 0 * at], axis=1),
         np.zeros((1, len(x) + 4)),
         np.zeros((1, 4)),
-        _schedule(K, 1, len(x)),
+        gain,
         (0.0, 0.0, 0.0),
+        Equipment(states, servos, choice.period, delay),
     )
 
 
 def moving(
-    heli: Helicopter, airspeeds: Array, limits: tuple[float, float, float], gain: Any = None
+    heli: Helicopter,
+    airspeeds: Array,
+    limits: tuple[float, float, float],
+    choice: Choice | None = None,
+    servos: Mapping[str, Servo] | None = None,
 ) -> Reference:
     """Level flight that accelerates along these nodes, consistent with the equations where the
     acceleration stays the same, with the rates of its attitude; to first order also in a jerk that
     stays the same, where it may not jump.
     """
+    choice = choice or Choice()
     acceleration, k, powers = limits[0], len(airspeeds), POWERS
     a = acceleration * np.cos(np.pi * (np.arange(powers) + 0.5) / powers)
     p, accelerations = np.repeat(airspeeds, powers), np.tile(a, k)
@@ -205,10 +262,10 @@ def moving(
     z = np.stack([z, CubicSpline(airspeeds, z)(airspeeds, 1)], axis=1)
     n = x.shape[1]
     level, controls = z[:, 0, 0, :n], z[:, 0, 0, n:]
-    if gain is None:
-        K = np.stack([regulator(heli, *at) for at in zip(level, controls, strict=True)])
-    else:
-        K = _schedule(gain, k, n)
+    gain, states = choice.gains(heli, level, controls, airspeeds)
+    K = gain
+    if states:  # as if all states were known
+        K = np.stack([choice.regulator(heli, *at) for at in zip(level, controls, strict=True)])
     by, feed = z[:, 0, 1, :n], np.zeros((k, n + 4))
     snap = np.zeros((k, 4))
     for i, at in enumerate(zip(level, controls, K, strict=True)):
@@ -217,24 +274,7 @@ def moving(
             snap[i] = _against(heli, *at, feed[i, :n])
         else:
             feed[i, n:] = _against(heli, *at, by[i])
-    return Reference(airspeeds, z, feed, snap, K, limits)
-
-
-def regulator(heli: Helicopter, x: Array, u: Array) -> Array:
-    """K (4, 10) of the linear-quadratic regulator."""
-    A, B, _ = (np.asarray(m) for m in heli.jacobian(x, u, np.zeros(3)))
-    Q, R = np.diag(1 / np.array(STATE_SIZES) ** 2), np.eye(4) / CONTROL_SIZE**2
-    return -np.linalg.solve(R, B.T @ solve_continuous_are(A, B, Q, R))
-
-
-def _schedule(gain: Any, nodes: int, n: int) -> Array:
-    K = np.asarray(gain, float)
-    if K.shape not in ((4, n), (nodes, 4, n)) or not np.all(np.isfinite(K)):
-        raise InputError(
-            f"gain must be 4 by {n} finite numbers, rad per SI unit, or as many for each of the"
-            f" {nodes} nodes of the airspeed; got {K.shape}"
-        )
-    return np.broadcast_to(K, (nodes, 4, n)).copy()
+    return Reference(airspeeds, z, feed, snap, gain, limits, Equipment(states, servos))
 
 
 def _in_jerk(heli: Helicopter, x: Array, u: Array, by: Array) -> Array:
@@ -244,7 +284,7 @@ def _in_jerk(heli: Helicopter, x: Array, u: Array, by: Array) -> Array:
     A, B, _ = (np.asarray(m) for m in heli.jacobian(x, u, np.zeros(3)))
     free = [i for i, name in enumerate(heli.states) if str(name) not in GIVEN]
     free += range(len(x), len(x) + 4)
-    sizes, Y = np.array(TUBE_SIZES), np.zeros(len(x) + 4)
+    sizes, Y = np.array(TUBE_SIZES[: len(x)]), np.zeros(len(x) + 4)
     rows = np.hstack([A, B])[:, free] / sizes[:, None]
     Y[free] = np.linalg.lstsq(rows, by / sizes, rcond=None)[0]
     return Y
@@ -255,7 +295,7 @@ def _against(heli: Helicopter, x: Array, u: Array, K: Array, by: Array) -> Array
     square of the linear loop's response to an impulse, in units of equal weight.
     """
     A, B, _ = (np.asarray(m) for m in heli.jacobian(x, u, np.zeros(3)))
-    X = solve_continuous_lyapunov((A + B @ K).T, -np.diag(np.array(TUBE_SIZES) ** -2.0))
+    X = solve_continuous_lyapunov((A + B @ K).T, -np.diag(np.array(TUBE_SIZES[: len(x)]) ** -2.0))
     return np.linalg.solve(B.T @ X @ B, B.T @ X @ by)
 
 

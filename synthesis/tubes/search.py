@@ -32,6 +32,8 @@ CONSTANT = Polynomial(0, 0.0, 1.0)
 
 CONSTANT_SPARE = 1e-6
 """Spare of the constant in the inequality of a gain, 1/s: its bias is no less."""
+JUMP_SPARE = 1e-4
+"""Spare of the fall of V at a jump, as a share of V."""
 PRICE = 1e-8
 """Cost of the traces of multipliers: they stay finite where nothing else bounds them."""
 NEGLIGIBLE = 1e-12
@@ -68,12 +70,13 @@ def smallest(
     decay: float,
     spare: float,
     solver: Solver,
+    jump: Array | None = None,
 ) -> Found | None:
     """The smallest ellipsoids that satisfy the inequality of every cell with `spare` (1/s) left,
     None: the solver has none.
 
     roots (nodes, n, n): e = root z are the coordinates at a node in the program. sizes (n,): half
-    widths of equal weight.
+    widths of equal weight. jump (n, n): takes the last ellipsoid into the first.
     """
     nodes = [_Node(root) for root in roots]
     for node in nodes:
@@ -81,7 +84,8 @@ def smallest(
     made = [_Inequality(cell, roots, decay, spare) for cell in cells]
     for part in made:
         part.is_invariant()
-    return _solved(nodes, None, made, solver)
+    jumps = [] if jump is None else [_Jump(roots, jump)]
+    return _solved(nodes, None, [*made, *jumps], solver)
 
 
 def least_gain(
@@ -104,22 +108,10 @@ def least_gain(
     return _solved(nodes, price, made, solver)
 
 
-def multipliers(
-    cell: Enclosed, P: Array, decay: float, spare: float, solver: Solver
-) -> Multipliers | None:
-    """Multipliers with which the ellipsoids P (nodes, n, n) satisfy the inequality of a cell, None:
-    the solver has none.
-    """
-    part = _Inequality(cell, P, decay, spare, fixed=True)
-    part.is_invariant()
-    found = _solved([], None, [part], solver)
-    return None if found is None else found.multipliers[0]
-
-
 def _solved(
     nodes: Sequence[_Node],
     price: _Price | None,
-    made: Sequence[_Inequality],
+    made: Sequence[_Inequality | _Jump],
     solver: Solver,
 ) -> Found | None:
     common = [*nodes, *([] if price is None else [price])]
@@ -128,8 +120,7 @@ def _solved(
     prices = columns[len(nodes) :]
     count = int(starts[-1])
     for part in made:
-        free = part.cell.nodes if nodes else ()
-        shared = [columns[i][nodes[i].P.columns[0]] for i in free] + prices
+        shared = [columns[i][nodes[i].P.columns[0]] for i in part.nodes] + prices
         own = part.program.count - sum(map(len, shared))
         columns.append(np.concatenate([*shared, count + np.arange(own)]).astype(int))
         count += own
@@ -148,9 +139,10 @@ def _solved(
         return None
     x = [found.x[c] for c in columns]
     P = np.array([node.found(own) for node, own in zip(nodes, x, strict=False)])
-    if nodes and np.linalg.eigvalsh(P).min() <= 0:
+    if np.linalg.eigvalsh(P).min() <= 0:
         return None
-    by = [part.found(own) for part, own in zip(made, x[len(common) :], strict=True)]
+    found_in = zip(made, x[len(common) :], strict=True)
+    by = [part.found(own) for part, own in found_in if isinstance(part, _Inequality)]
     bias = 0.0 if price is None else float(x[len(nodes)][1])
     return Found(P, by, float(cost @ found.x), bias)
 
@@ -194,6 +186,20 @@ class _Node:
         return back.T @ self.P.coefficients(x)[0] @ back
 
 
+class _Jump:
+    """V after a jump R e, at the first node, is at most V before it, at the last."""
+
+    def __init__(self, roots: Array, jump: Array):
+        self.program = program = AffineProgram()
+        self.nodes = (0, len(roots) - 1)
+        after, before = (program.symmetric(len(jump), CONSTANT) for _ in range(2))
+        R = np.linalg.solve(roots[0], jump @ roots[-1])
+        least = program.known(JUMP_SPARE * np.eye(len(R)))
+        fall = program.value(before) - R.T @ program.value(after) @ R - least
+        program.positive(POINT, fall)
+        self.cost = np.zeros(program.count)
+
+
 class _Inequality:
     """The inequality of a cell in the coordinates of its factor."""
 
@@ -204,19 +210,18 @@ class _Inequality:
         decay: float,
         spare: float,
         price: _Price | None = None,
-        fixed: bool = False,
     ):
-        """`fixed`: instead of roots of the coordinates of P at the nodes P itself is given."""
         self.cell, self.roots, self.decay, self.spare = cell, roots, decay, spare
+        self.nodes = cell.nodes
         self.program = program = AffineProgram()
         n, self.over = len(cell.factor), cell.over.scaled(cell.factor)
-        self.given = [] if fixed else [program.symmetric(n, CONSTANT) for _ in cell.nodes]
+        self.given = [program.symmetric(n, CONSTANT) for _ in cell.nodes]
         one = np.ones((1, 1, 1))
         common = [] if price is None else [program.variable(one, CONSTANT) for _ in range(2)]
-        terms = np.eye(len(self.over.left))
+        terms, r = np.eye(len(self.over.left)), self.over.onto.shape[1]
         self.variables: dict[str, MatrixVariable] = {
-            "tube": program.symmetric(n, CONSTANT),
-            "gust": program.symmetric(n, CONSTANT),
+            "tube": program.symmetric(r, CONSTANT),
+            "gust": program.symmetric(r, CONSTANT),
             "terms": program.variable(terms[:, :, None] * terms, CONSTANT),
             "wind": common[0] if common else program.variable(one, CONSTANT),
         }
@@ -244,11 +249,8 @@ class _Inequality:
         program, cell = self.program, self.cell
         nodes = []
         for k, i in enumerate(cell.nodes):
-            if self.given:
-                turn = np.linalg.solve(self.roots[i], cell.factor)
-                nodes.append(turn.T @ program.value(self.given[k]) @ turn)
-            else:
-                nodes.append(program.known(cell.factor.T @ self.roots[i] @ cell.factor))
+            turn = np.linalg.solve(self.roots[i], cell.factor)
+            nodes.append(turn.T @ program.value(self.given[k]) @ turn)
         P = motion(nodes, cell.width, *(part[:2] for part in cell.cell.domain))
         values = [program.value(v) for v in self.shares]
         X = [Shares(*values[k : k + 3]) for k in range(0, len(values), 3)]
@@ -261,7 +263,7 @@ class _Inequality:
             self.cost[variable.columns[0]] = PRICE * np.einsum("eii->e", variable.entries)
 
     def found(self, x: Array) -> Multipliers:
-        back = np.linalg.inv(self.cell.factor)
+        back = np.linalg.inv(self.cell.over.unit(self.cell.factor))
         own = {name: v.coefficients(x)[0] for name, v in self.variables.items()}
         own["tube"], own["gust"] = (back.T @ own[name] @ back for name in ("tube", "gust"))
         return Multipliers(decay=self.decay, **own)

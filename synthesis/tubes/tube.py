@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise, product
@@ -14,15 +14,17 @@ from typing import Any
 
 import casadi
 import numpy as np
-from scipy.linalg import eigh
+from scipy.linalg import eigh, expm
 
 from symheli import Helicopter
 from symheli.errors import InputError
+from symheli.flight import Servo
 from symheli.progress import Task, task, tracked
 from symheli.values.summary import summarized
 from symheli.values.whole_files import write_text
 from synthesis.certificate_file import DAMAGED, content_of
 from synthesis.program.cone_program import Solver
+from synthesis.tubes.controllers import Choice
 from synthesis.tubes.deviations import Cell, Deviations
 from synthesis.tubes.files import (
     numbers,
@@ -34,15 +36,14 @@ from synthesis.tubes.files import (
 from synthesis.tubes.gain import LocalGain, least
 from synthesis.tubes.inequality import Multipliers
 from synthesis.tubes.motions import Motions
-from synthesis.tubes.proof import holds
+from synthesis.tubes.proof import falls_in, holds
 from synthesis.tubes.reference import TUBE_SIZES, Reference, held, moving
-from synthesis.tubes.search import Enclosed, Found, multipliers, smallest
+from synthesis.tubes.search import Enclosed, Found, smallest
+from synthesis.tubes.travel import why_not_free
 
 Array = np.ndarray
 
 SCHEMA, VERSION = "symheli tube", 4
-OLDER = (3,)
-"""Versions whose kinks were enclosed in another way: their multipliers are found anew."""
 INTERVAL = 1.0
 """Largest distance of the nodes of reference, feedback and P along airspeed, m/s."""
 DOWNWARD = 0.75
@@ -53,6 +54,8 @@ GRAVITY = 9.8
 """m/s^2; of the choice of cells only."""
 DECAYS = (1.0, 2.0, 3.0)
 """Rates alpha that are tried on the linear loop of a helicopter, 1/s,"""
+SLOW_DECAYS = (0.3, 0.6)
+"""those tried where none of these is feasible, as with a slow governor,"""
 MORE_DECAYS = (0.3, 0.5, 0.8, 1.2, 2.0, 3.0, 5.0)
 """and of any other model, whose time scale is not known."""
 FIRST_SHARE = 0.1
@@ -68,8 +71,6 @@ the deviations enclosed were too large for any ellipsoid, a smaller start may le
 ROUNDS = 15
 SPARE = 0.02
 """Spare of the inequality in the search, 1/s."""
-RENEWED = 0.005
-"""Spare with which multipliers of a file of an older version are found anew, 1/s."""
 INSIDE = 1 - 1e-6
 """Share of the enclosed deviations that the tube may fill, for rounding of the search."""
 TOLERANCE = 1e-6
@@ -152,19 +153,22 @@ class Tube:
     @cached_property
     def control_half_widths(self) -> Array:
         """Largest deviation of each control from that of the reference at the nodes, (k,), SI."""
-        K = self.deviations.reference.gain
+        K = self.deviations.feedback[:, : len(self.deviations.inputs)]
+        K = np.broadcast_to(K, (len(self.P), *K.shape[1:]))
         return np.sqrt(np.einsum("kui,kij,kuj->ku", K, np.linalg.inv(self.P), K)).max(axis=0)
 
     @property
     def hypotheses(self) -> tuple[str, ...]:
         """What the statement rests on, in sentences."""
         d = self.deviations
-        return (
-            *d.reference.hypotheses(d.name, d.gust),
-            "controls within their travel: they differ from those of the reference by no more than"
-            " the control deviations",
-            "the deviation lies in the tube at the start",
+        travel = (
+            "shown, not assumed: commands and blade pitch stay within their travel, servos below"
+            " their rate limits"
+            if isinstance(d.model, Helicopter)
+            else "controls within their travel: they differ from those of the reference by no more"
+            " than the control deviations"
         )
+        return (*d.hypotheses, "the deviation lies in the tube at the start", travel)
 
     def __str__(self) -> str:
         named = zip(self.deviations.states, self.half_widths, strict=True)
@@ -221,6 +225,8 @@ class Tube:
         """
         if not self.proven:
             raise InputError(f"only a proven tube has gains; here {self.why}")
+        if self.deviations.reference.jump is not None:
+            raise InputError("gains are of loops in continuous time: the tube's is sampled")
         d, own = self.deviations, solver or Solver(tolerance=TOLERANCE)
         cells = _enclosed(d, self.cells, self.factors, d.drifts(self.cells))
         found = least(cells or [], self.P, d.states, outputs, energy, d.gust, own)
@@ -237,23 +243,32 @@ class Tube:
 
     def verify(self) -> bool:
         """Enclose the equations again and check the inequality in exact arithmetic."""
+        return not self._refused()
+
+    def _refused(self, over: Sequence[Enclosed] | None = None) -> str:
+        """Empty where the proof holds, else what does not; `over`: the cells, if enclosed."""
         loop, p = self.deviations, self.nodes
+        jump, no_fall = loop.reference.jump, "the inequality does not hold in exact arithmetic"
         complete = len(self.cells) == len(self.factors) == len(self.multipliers)
         counts = {len(gain.multipliers) for gain in self.gains}
         if not (complete and counts <= {len(self.cells)} and _covers(self.cells, loop.reference)):
-            return False
+            return "the cells do not cover all commands"
         if not all(gain.has_storage for gain in self.gains):
-            return False
+            return "a gain has no storage"
+        if jump is not None and (self.gains or not falls_in(jump, self.P[0], self.P[-1])):
+            return "the deviation grows at a sample"
         parts = list(zip(self.cells, self.factors, self.multipliers, strict=True))
+        sets = []
         for k, (cell, factor, by) in enumerate(tracked("verifying cells", parts)):
-            made = _enclosed(loop, [cell], factor[None], loop.drifts([cell]))
+            made = [over[k]] if over else _enclosed(loop, [cell], factor[None], loop.drifts([cell]))
             if (
                 made is None
                 or not self._holds(made[0], by)
                 or not all(gain.holds_in(k, made[0], p) for gain in self.gains)
             ):
-                return False
-        return True
+                return no_fall
+            sets.append((made[0].over, factor))
+        return why_not_free(loop, self.cells, self.P, sets)
 
     def _holds(self, made: Enclosed, by: Multipliers) -> bool:
         """Whether the inequality holds in a cell."""
@@ -283,25 +298,16 @@ class Tube:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Tube:
-        """Read a tube and prove it again; `proven` says whether that succeeded. Of a file of an
-        older version the set is the one written; multipliers and gains may be found anew.
-        """
-        content = content_of(path, SCHEMA, VERSION, "a tube", "Tube.save", OLDER)
+        """Read a tube and prove it again; `proven` says whether that succeeded."""
+        content = content_of(path, SCHEMA, VERSION, "a tube", "Tube.save")
         try:
             found = _read(content)
         except InputError:
             raise
         except DAMAGED as error:
             raise InputError(f"{path}: damaged, a value is invalid or missing ({error})") from None
-        gains = found.gains
-        renewed = _renewed(found) if content["version"] in OLDER else found
-        proven = renewed.verify()
-        why = "" if proven else "the inequality does not hold in exact arithmetic"
-        made = replace(renewed, proven=proven, why=why)
-        if proven and len(made.gains) < len(gains):
-            for gain in gains:
-                made = made.with_gain(gain.outputs, energy=gain.energy)
-        return made
+        why = found._refused()
+        return replace(found, proven=not why, why=why)
 
 
 def _read(content: dict[str, Any]) -> Tube:
@@ -317,10 +323,10 @@ def _read(content: dict[str, Any]) -> Tube:
         numbers(content["P"], k, n, n),
         tuple(cells),
         numbers(content["factors"], count, n, n),
-        tuple(read_multipliers(given, n) for given in content["multipliers"]),
+        tuple(read_multipliers(given, loop.moved) for given in content["multipliers"]),
         False,
         "not verified",
-        tuple(LocalGain.read(given, k, loop.states) for given in content["gains"]),
+        tuple(LocalGain.read(given, k, loop.states, loop.moved) for given in content["gains"]),
     )
 
 
@@ -333,23 +339,28 @@ def tube(
     jerk: float = 0.0,
     snap: float = math.inf,
     gain: Any = None,
+    known: Sequence[str] | None = None,
+    servos: Mapping[str, Servo] | None = None,
+    period: float = 0.0,
+    delay: int = 0,
     sizes: Any = None,
     solver: Solver | None = None,
 ) -> Tube:
     """A proven invariant tube of a nonlinear helicopter in level flight in gusts, or of any other
     model about its motions.
 
-    With u = u_r + K e, the deviation e = x - x_r from the reference stays in e'P e <= 1 for every
-    gust history of the amplitude, and every history of the commands within their limits. The
-    difference of the nonlinear equations from those of the reference is an average of their
-    Jacobian times (e, w); the Jacobian is enclosed over the whole tube (`symheli.enclosure`), and a
-    matrix inequality is checked for all enclosed matrices in rational arithmetic.
+    With u = u_r + K e, the deviation e = x - x_r from the reference, with the states of controller
+    and servos where there are any, stays in e'P e <= 1 for every gust history of the amplitude, and
+    every history of the commands within their limits. The difference of the nonlinear equations
+    from those of the reference is an average of their Jacobian times (e, w); the Jacobian is
+    enclosed over the whole tube (`symheli.enclosure`), and a matrix inequality is checked for all
+    enclosed matrices in rational arithmetic. So is that controls stay within their travel.
 
     Parameters
     ----------
     model : Helicopter or casadi.Function
-        With governor "ideal": ten states. Or (x, u, w) -> dx/dt, of dense columns and of the
-        operations that `symheli.enclosure.enclose` knows.
+        With either governor: ten or twelve states. Or (x, u, w) -> dx/dt, of dense columns and of
+        the operations that `symheli.enclosure.enclose` knows.
     reference : float, (float, float) or Motions
         Of a helicopter the airspeed held, or the range of its command, m/s. Of another model its
         motions and the feedback about them.
@@ -361,9 +372,20 @@ def tube(
     snap : float
         Largest derivative of the jerk, m/s^4. Infinite: the jerk may jump, and the pitch rate of
         the reference does not follow it.
-    gain : array (4, 10) or (nodes, 4, 10), optional
-        K of a helicopter, rad per SI unit, at all airspeeds or at each node. Default:
-        linear-quadratic regulators on all states.
+    gain : array (4, n) or (nodes, 4, n), LinearModel, LPVStateSpace or design, optional
+        Of a helicopter: K, rad per SI unit, at all airspeeds or at each node; or a controller from
+        deviations to commands by name, taken at the commanded airspeed, in continuous time or with
+        `period`. Default: linear-quadratic regulators.
+    known : sequence of str, optional
+        States that the default feedback knows; by default the ten of an ideal governor. An observer
+        estimates the others, but for the rotor's where neither is known.
+    servos : mapping of Servo, optional
+        One for each control. With a rate limit: continuous time and a held airspeed.
+    period : float
+        Sample period of the controller, s, whose command is held between; 0: continuous time. At a
+        held airspeed.
+    delay : int
+        Whole periods from a sample to its command.
     sizes : array (n,), optional
         Half widths of equal weight: the mean square of the tube's half widths over these is made
         small. Needed for another model than a helicopter.
@@ -378,7 +400,7 @@ def tube(
     Raises
     ------
     InputError
-        Another governor, a gust that is no number >= 0, limits that do not fit, a gain or sizes of
+        A gust that is no number >= 0, limits that do not fit, a controller, servos or sizes of
         another shape.
     TrimError
         No flight at one of these airspeeds and accelerations.
@@ -400,31 +422,37 @@ def tube(
     if not (np.isfinite(gust) and gust >= 0):
         raise InputError(f"gust must be a number >= 0; got {gust!r:.60}")
     limits = _limits(acceleration, jerk, snap)
+    made: Reference | Motions
     if isinstance(model, Helicopter):
-        made = _flight(model, reference, limits, gain)
+        choice = Choice(gain, known, period, bool(period) or servos is not None)
+        made = _flight(model, reference, limits, choice, servos, delay)
+        own = np.concatenate([TUBE_SIZES[: made.own], made.equipment.sizes])
     else:
-        made = _checked(model, reference, [*limits[:2], 0 if gain is None else 1], sizes)
+        others = [gain, known, servos, period or None, delay or None]
+        made = _checked(model, reference, [*limits[:2], *(x is not None for x in others)], sizes)
     loop = Deviations(model, made, float(gust))
-    own = np.array(TUBE_SIZES if sizes is None else sizes, float)
+    own = own if sizes is None else np.array(sizes, float)
     if own.shape != (len(loop.states),) or not (np.all(np.isfinite(own)) and np.all(own > 0)):
         raise InputError(f"sizes must be {len(loop.states)} numbers > 0; got {sizes}")
     return _found(loop, tuple(_cells(made)), own, solver or Solver(tolerance=TOLERANCE))
 
 
 def _flight(
-    heli: Helicopter, airspeed: Any, limits: tuple[float, float, float], gain: Any
+    heli: Helicopter,
+    airspeed: Any,
+    limits: tuple[float, float, float],
+    choice: Choice,
+    servos: Mapping[str, Servo] | None,
+    delay: int,
 ) -> Reference:
     """The reference of a helicopter."""
-    if heli.governor != "ideal" or len(heli.states) != 10:
-        raise InputError(
-            "a tube needs the ten states of an ideal governor: Helicopter.load(...,"
-            " governor='ideal')"
-        )
     if np.ndim(airspeed) > 0 or isinstance(airspeed, Motions):
-        return moving(heli, _range(airspeed, limits), limits, gain)
+        if choice.period or delay:
+            raise InputError("a sampled loop needs one airspeed: its P follows the clock alone")
+        return moving(heli, _range(airspeed, limits), limits, choice, servos)
     if limits[0] or limits[1]:
         raise InputError("a held airspeed has no acceleration or jerk: give (low, high)")
-    return held(heli, airspeed, gain)
+    return held(heli, airspeed, choice, servos, delay)
 
 
 def _checked(model: Any, motions: Any, flight: Sequence[float], sizes: Any) -> Motions:
@@ -441,7 +469,9 @@ def _checked(model: Any, motions: Any, flight: Sequence[float], sizes: Any) -> M
     if model.n_out() != 1 or model.size_out(0) != (n, 1):
         raise InputError(f"the model must return dx/dt ({n}), one column")
     if any(flight):
-        raise InputError("acceleration, jerk and gain are those of a helicopter: see Motions")
+        raise InputError(
+            "limits, gain, known, servos, period and delay are those of a helicopter: see Motions"
+        )
     if sizes is None:
         raise InputError(f"sizes are needed: {n} half widths of equal weight")
     return motions
@@ -449,7 +479,7 @@ def _checked(model: Any, motions: Any, flight: Sequence[float], sizes: Any) -> M
 
 def _cells(reference: Reference | Motions) -> list[Cell]:
     """The commands in cells."""
-    if isinstance(reference, Reference) and len(reference.nodes) > 1:
+    if isinstance(reference, Reference) and len(reference.airspeeds) > 1:
         return [
             Cell(i, (0.0, 1.0), (low, high))
             for i, p in enumerate(reference.nodes[1:])
@@ -535,21 +565,6 @@ Grown = tuple[Found | None, Sequence[Enclosed], Array, str]
 """What was found, the cells enclosed, P, why nothing was."""
 
 
-def _renewed(found: Tube, solver: Solver | None = None) -> Tube:
-    """The same tube with other multipliers in the cells where those written prove nothing; then
-    without gains.
-    """
-    loop, own = found.deviations, list(found.multipliers)
-    parts = zip(found.cells, found.factors, found.multipliers, strict=False)
-    for k, (cell, factor, by) in enumerate(parts):
-        made = _enclosed(loop, [cell], factor[None], loop.drifts([cell]))
-        if made is not None and not found._holds(made[0], by):
-            solver = solver or Solver(tolerance=TOLERANCE)
-            own[k] = multipliers(made[0], found.P, by.decay, RENEWED, solver) or by
-    same = all(new is old for new, old in zip(own, found.multipliers, strict=True))
-    return found if same else replace(found, multipliers=tuple(own), gains=())
-
-
 def _found(loop: Deviations, cells: tuple[Cell, ...], sizes: Array, solver: Solver) -> Tube:
     """The search: the ellipsoids over which the equations are enclosed grow until the smallest ones
     that satisfy the inequality lie inside.
@@ -560,12 +575,8 @@ def _found(loop: Deviations, cells: tuple[Cell, ...], sizes: Array, solver: Solv
     if found is None:
         return Tube(loop, P, cells, factors, (), False, why)
     made = Tube(loop, P, cells, factors, tuple(found.multipliers), True, "")
-    parts = list(zip(over, made.multipliers, strict=True))
-    if _covers(cells, loop.reference) and all(
-        made._holds(*part) for part in tracked("checking cells", parts)
-    ):
-        return made
-    return replace(made, proven=False, why="the inequality does not hold in exact arithmetic")
+    why = made._refused(over)
+    return replace(made, proven=not why, why=why)
 
 
 def _grown(
@@ -580,8 +591,8 @@ def _grown(
     linear = _enclosed(loop, cells, factors, drifts, FIRST_SHARE)
     if linear is None or not np.all(np.isfinite(drifts)):
         return None, (), P, "the equations have no bounds near the reference"
-    decay = _decay(loop, cells, linear, sizes, solver)
-    found = None if decay is None else smallest(linear, roots, sizes, decay, SPARE, solver)
+    decay, jump = _decay(loop, cells, linear, sizes, solver), loop.reference.jump
+    found = None if decay is None else smallest(linear, roots, sizes, decay, SPARE, solver, jump)
     if decay is None or found is None:
         return None, (), P, "the linear loop has no invariant ellipsoid"
     made: Grown = (None, (), P, "")
@@ -611,7 +622,7 @@ def _from_below(
         over = _enclosed(loop, cells, factors, drifts)
         if over is None:
             return None, (), P, "the equations have no bounds over a tube of the size needed"
-        found = smallest(over, roots, sizes, decay, SPARE, solver)
+        found = smallest(over, roots, sizes, decay, SPARE, solver, loop.reference.jump)
         if found is None:
             why = "no ellipsoid satisfies the inequality: the gusts are too large"
             return None, over, P, why
@@ -630,15 +641,28 @@ def _decay(
     loop: Deviations, cells: Sequence[Cell], linear: list[Enclosed], sizes: Array, solver: Solver
 ) -> float | None:
     """The rate alpha of the smallest ellipsoids of the linear loop, by the cells of one interval in
-    the middle; None: there are none.
+    the middle, of a sampled loop by all; None: there are none.
     """
-    middle = cells[len(cells) // 2].interval
-    nodes = _nodes(cells[len(cells) // 2], len(loop.reference.nodes))
-    own = [o._replace(nodes=tuple(range(len(nodes)))) for o in linear if o.cell.interval == middle]
-    roots = np.broadcast_to(own[0].factor, (len(nodes), *own[0].factor.shape))
-    rates = DECAYS if isinstance(loop.model, Helicopter) else MORE_DECAYS
-    tries = [(smallest(own, roots, sizes, decay, SPARE, solver), decay) for decay in rates]
-    return min(((f.size, decay) for f, decay in tries if f is not None), default=(0.0, None))[1]
+    middle, jump = cells[len(cells) // 2].interval, loop.reference.jump
+    count = len(loop.reference.nodes)
+    if jump is None:
+        linear = [o for o in linear if o.cell.interval == middle]
+        count = len(linear[0].nodes)
+        linear = [o._replace(nodes=tuple(range(count))) for o in linear]
+    roots = np.broadcast_to(linear[0].factor, (count, *linear[0].factor.shape))
+    rates: tuple[float, ...] = DECAYS if isinstance(loop.model, Helicopter) else MORE_DECAYS
+    if jump is not None:  # each try is long: that of the slowest mode of the linear loop
+        A, period = linear[0].over.corners[0, 0, 0][:, : len(jump)], loop.reference.nodes[-1]
+        modes = np.linalg.eigvals(jump @ expm(A * period))
+        rates = (float(max(-np.log(np.abs(modes).max()) / period, DECAYS[0])),)
+    for own in (rates, SLOW_DECAYS) if isinstance(loop.model, Helicopter) else (rates,):
+        tries = [
+            (smallest(linear, roots, sizes, decay, SPARE, solver, jump), decay) for decay in own
+        ]
+        found = min(((f.size, decay) for f, decay in tries if f is not None), default=None)
+        if found is not None:
+            return found[1]
+    return None
 
 
 def _enclosed(

@@ -22,6 +22,7 @@ from evidence import (
     specs,
     structured,
     tube_gains,
+    tube_loops,
     tuning,
     two_bands,
 )
@@ -238,6 +239,16 @@ def tube_in_hover():
     assert attitude == " ".join(f"{w:.2g}" for w in found.half_widths[6:8])
 
 
+def tube_of_a_loop(section, case):
+    cells = KEPT["tubes.md", section].cells(case.vehicle)
+    governor, _, airspeed, gust, states, _, attitude, *_ = cells
+    assert (governor, airspeed, gust) == (case.governor, f"{case.airspeed:g}", f"{case.gust:g}")
+    found = case.found()
+    assert found.proven
+    assert states == str(len(found.deviations.states))
+    assert attitude == " ".join(f"{w:.2g}" for w in found.half_widths[6:8])
+
+
 def remainder_of_one_cell():
     *_, row = remainders([3.0]).splitlines()
     shown = KEPT["tubes.md", "remainders"].cells("3 to 4")
@@ -451,6 +462,8 @@ ROWS = {
     ("tubes.md", "transitions"): tube_along_a_transition,
     ("tubes.md", "remainders"): remainder_of_one_cell,
     ("tubes.md", "gains"): gains_on_one_tube,
+    ("tubes.md", "loops"): lambda: tube_of_a_loop("loops", tube_loops.CASES[0]),
+    ("tubes.md", "governed"): lambda: tube_of_a_loop("governed", tube_loops.GOVERNED[0]),
     ("tubes.md", "vtol"): tube_of_the_planar_vtol,
     ("identify.md", "public logs"): one_public_log,
     ("identified.md", "xcell60"): lambda: marks_of_the_worst_seed("xcell60"),

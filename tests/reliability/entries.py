@@ -82,6 +82,7 @@ EXEMPT: dict[str, str] = {
                 "SpecificationTable",
                 "StructuredController",
                 "Tube",
+                "Coverage",
                 "LocalGain",
                 "InvariantSet",
                 "LowComplexitySet",

@@ -13,6 +13,7 @@ import symheli
 from identification import Criterion, FitForControl
 from studies.controllers import tables
 from studies.controllers.certified import CertifiedControllers, bounded
+from studies.controllers.covered import NO_TUBE
 from studies.controllers.design_choices import (
     BACK_OFF,
     CONTROLS,
@@ -289,7 +290,7 @@ def test_measures_of_a_flight_are_those_of_its_record(lqr, base):
 # --- what is said of flights --------------------------------------------------------------------
 
 
-def flight(ratio, lost=False, outside=0.0, beyond=0.0):
+def flight(ratio, lost=False, outside=0.0, beyond=0.0, uncovered=""):
     return Measures(
         lost=lost,
         speed=1.0,
@@ -301,11 +302,21 @@ def flight(ratio, lost=False, outside=0.0, beyond=0.0):
         outside=outside,
         faster=0.0,
         beyond=beyond,
+        wind=3.0,
+        uncovered=uncovered,
     )
 
 
 def flights(name, wind, *each):
     return TurbulentFlights(name=name, wind=wind, gust=wind / 5, flights=each)
+
+
+def test_the_table_says_which_share_of_the_flights_a_tube_covers():
+    some = flights("a", WINDS[0], flight(1.0), flight(1.0, uncovered="gusts, m/s"))
+    none = flights("b", WINDS[0], *[flight(1.0, uncovered=NO_TUBE)] * 2)
+    table = tables.covered(FlownControllers(flown=(some, none), seeds=2, duration=9.0))
+    assert [row[2] for row in table.rows] == ["50", "0"]
+    assert [row[3] for row in table.rows] == ["gusts, m/s (1)", f"{NO_TUBE} (2)"]
 
 
 def test_the_table_says_how_many_flights_the_equations_do_not_promise():

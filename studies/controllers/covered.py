@@ -1,0 +1,44 @@
+"""Which flights of the study a proven tube covers, and what keeps it from the others."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+from symheli.errors import InputError
+
+if TYPE_CHECKING:
+    from symheli.flight.flight_data import FlightData
+    from synthesis import Tube
+
+NO_TUBE = "no tube of this controller was given"
+
+
+def proven(files: Iterable[str]) -> list[Tube]:
+    """Tubes read from files and proven again; raises `InputError` where one is not."""
+    from synthesis import Tube
+
+    found = [(name, Tube.load(name)) for name in files]
+    for name, tube in found:
+        if not tube.proven:
+            raise InputError(f"{name}: not proven: {tube.why}")
+    return [tube for _, tube in found]
+
+
+def uncovered(flown: FlightData, tubes: Sequence[Tube]) -> str:
+    """What keeps a flight from being covered: the first hypothesis that fails, of the tube whose
+    first failure comes last; empty where a tube covers it.
+    """
+    from synthesis import coverage
+
+    record = flown.record()
+    if flown.lost >= 0 or record is None:
+        return "the flight was lost"
+    checks = [coverage(tube, record).checks for tube in tubes]
+    if not checks:
+        return NO_TUBE
+    places = [[i for i, check in enumerate(own) if not check.kept] for own in checks]
+    if not all(places):
+        return ""
+    best = max(range(len(checks)), key=lambda k: places[k][0])
+    return checks[best][places[best][0]].words
