@@ -21,7 +21,7 @@ from evidence.tables import DOCS, keep, kept_rows, markdown
 from symheli import Helicopter
 from symheli.errors import InputError
 from synthesis import Tube, tube
-from synthesis.tubes.deviations import Cell, Deviations
+from synthesis.tubes.deviations import CommandCell, Deviations
 from synthesis.tubes.reference import TUBE_SIZES, Reference, moving
 
 Array = np.ndarray
@@ -274,7 +274,7 @@ def remainders(intervals: Sequence[float]) -> str:
     rows = []
     for low in intervals:
         loop = Deviations(heli, moving(heli, np.array([low, low + 1]), (1.0, 1.0, 1.0)), 0.0)
-        cell = Cell(0, (0.0, 1.0), (0.0, 1.0))
+        cell = CommandCell(0, (0.0, 1.0), (0.0, 1.0))
         (over,) = loop.enclosed([cell], np.diag(units[:10])[None], loop.drifts([cell]))
         if over is None:
             raise InputError(f"no bounds from {low:g} to {low + 1:g} m/s")

@@ -32,7 +32,7 @@ CORNERS = 3
 
 
 @dataclass(frozen=True)
-class Cell:
+class CommandCell:
     """Commands between two nodes of the scheduling command: shares `s` of the way from one to the
     other, its rates `a`, as accelerations in m/s^2, and `others` that cells split, each (lower,
     upper).
@@ -163,7 +163,7 @@ class Deviations:
         return casadi.Function("rate", at, [function(*at, start(*at))[0]])
 
     def enclosed(
-        self, cells: Sequence[Cell], factors: Array, drifts: Array, share: float = 1.0
+        self, cells: Sequence[CommandCell], factors: Array, drifts: Array, share: float = 1.0
     ) -> list[MatrixSet | None]:
         """For each cell the set of F for e = factor z, |z| <= 1, and all gusts; None where there is
         no bound. `share`: of these deviations and gusts, over which the Jacobian is enclosed.
@@ -188,7 +188,7 @@ class Deviations:
                 found.append(None)
         return found
 
-    def drifts(self, cells: Sequence[Cell]) -> Array:
+    def drifts(self, cells: Sequence[CommandCell]) -> Array:
         """For each cell f(x_r, u_r, 0) - dx_r/dt: centre, rest and the parts linear in the commands
         that cells do not split (jerk and its derivative), (N, 2 + k, n). Infinite where there is no
         bound; 0 where the reference is a motion of the equations.
@@ -212,7 +212,7 @@ class Deviations:
             found.append([middle, rest * ROUNDED_UP, *linear.T])
         return np.array(found)
 
-    def parts(self, cell: Cell, parts: Sequence[int]) -> tuple[Array, Array, Domain, Domain]:
+    def parts(self, cell: CommandCell, parts: Sequence[int]) -> tuple[Array, Array, Domain, Domain]:
         """A cell in so many parts along each of its ranges, with all the other commands: the parts'
         places (N, r) and half widths (r,) in units of the cell's half widths, the commands, and the
         data of the reference.

@@ -114,7 +114,7 @@ class Shares(NamedTuple):
     terms: Any
 
 
-class Motion(NamedTuple):
+class MovingEllipsoid(NamedTuple):
     """P (n, n) at the two ends of a cell in airspeed, or one that does not move; its `rate` by
     airspeed (None: 0); the accelerations at the ends of the cell.
     """
@@ -124,18 +124,18 @@ class Motion(NamedTuple):
     accelerations: Sequence[Any]
 
 
-def motion(nodes: Sequence[Any], width: Any, centre: Array, half: Array) -> Motion:
+def motion(nodes: Sequence[Any], width: Any, centre: Array, half: Array) -> MovingEllipsoid:
     """P over a cell, linear between the nodes of its interval, one or two, `width` m/s apart.
 
     centre, half: of the cell, in the share of the interval and in acceleration.
     """
     (s, a), (s_half, a_half) = centre, half
     if len(nodes) == 1:
-        return Motion(nodes, None, [a])
+        return MovingEllipsoid(nodes, None, [a])
     accelerations = [a - a_half, a + a_half] if a_half != 0 else [a]
     step = nodes[1] - nodes[0]
     ends = [nodes[0] + (s + side * s_half) * step for side in (-1, 1)]
-    return Motion(ends, step / width, accelerations)
+    return MovingEllipsoid(ends, step / width, accelerations)
 
 
 def invariant(by: Multipliers, shape: tuple[int, int], number: Number = float) -> Any:
@@ -155,7 +155,7 @@ def bounded(
 
 
 def conditions(
-    P: Motion,
+    P: MovingEllipsoid,
     shares: Sequence[Shares],
     over: MatrixSet,
     by: Multipliers,

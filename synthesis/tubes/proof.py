@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from synthesis.polynomial.exact import Number, exact, positive_definite, rational
-from synthesis.tubes.deviations import Cell
+from synthesis.tubes.deviations import CommandCell
 from synthesis.tubes.inequality import (
     MatrixSet,
-    Motion,
+    MovingEllipsoid,
     Multipliers,
     Shares,
     bounded,
@@ -26,7 +26,7 @@ SPARE = 1e-6
 def holds(
     nodes: Array,
     values: Array,
-    cell: Cell,
+    cell: CommandCell,
     over: MatrixSet,
     factor: Array,
     by: Multipliers,
@@ -54,7 +54,7 @@ def holds(
 def is_bounded(
     nodes: Array,
     values: Array,
-    cell: Cell,
+    cell: CommandCell,
     over: MatrixSet,
     by: Multipliers,
     output: Array,
@@ -118,12 +118,12 @@ def _exact(by: Multipliers, number: Number) -> Multipliers:
 def _matrices(
     nodes: Array,
     values: Array,
-    cell: Cell,
+    cell: CommandCell,
     over: MatrixSet,
     by: Multipliers,
     supply: Array,
     number: Number,
-) -> tuple[Motion, list[Array]] | None:
+) -> tuple[MovingEllipsoid, list[Array]] | None:
     """P over the cell and the matrices that must be positive definite; None where there are no
     shares.
     """

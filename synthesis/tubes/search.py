@@ -12,7 +12,7 @@ from scipy import sparse
 from symheli.lpv import Polynomial
 from synthesis.lpv.affine_program import AffineProgram, BernsteinCell, MatrixVariable, from_lower
 from synthesis.program.cone_program import Answer, ConeProgram, Solver, solve
-from synthesis.tubes.deviations import Cell
+from synthesis.tubes.deviations import CommandCell
 from synthesis.tubes.inequality import (
     MatrixSet,
     Multipliers,
@@ -45,14 +45,14 @@ class Enclosed(NamedTuple):
     and the set of F for e = factor z, |z| <= 1.
     """
 
-    cell: Cell
+    cell: CommandCell
     nodes: tuple[int, ...]
     width: float
     over: MatrixSet
     factor: Array
 
 
-class Found(NamedTuple):
+class TubeSolution(NamedTuple):
     """P (nodes, n, n), the multipliers of each cell, and what was made small: the mean square of
     the half widths over those of equal weight, or wind + bias of a gain.
     """
@@ -71,7 +71,7 @@ def smallest(
     spare: float,
     solver: Solver,
     jump: Array | None = None,
-) -> Found | None:
+) -> TubeSolution | None:
     """The smallest ellipsoids that satisfy the inequality of every cell with `spare` (1/s) left,
     None: the solver has none.
 
@@ -95,7 +95,7 @@ def least_gain(
     energy: bool,
     spare: float,
     solver: Solver,
-) -> Found | None:
+) -> TubeSolution | None:
     """V = e'Q e whose growth is at most wind |w|^2 + bias, |w| <= 1, less |output e|^2 where
     `energy`, else V >= |output e|^2: the one with the least wind + bias. As `smallest`.
     """
@@ -113,7 +113,7 @@ def _solved(
     price: _Price | None,
     made: Sequence[_Inequality | _Jump],
     solver: Solver,
-) -> Found | None:
+) -> TubeSolution | None:
     common = [*nodes, *([] if price is None else [price])]
     starts = np.cumsum([0, *(part.program.count for part in common)])
     columns = [a + np.arange(b - a) for a, b in pairwise(starts)]
@@ -144,7 +144,7 @@ def _solved(
     found_in = zip(made, x[len(common) :], strict=True)
     by = [part.found(own) for part, own in found_in if isinstance(part, _Inequality)]
     bias = 0.0 if price is None else float(x[len(nodes)][1])
-    return Found(P, by, float(cost @ found.x), bias)
+    return TubeSolution(P, by, float(cost @ found.x), bias)
 
 
 class _Price:

@@ -11,7 +11,7 @@ import numpy as np
 
 from symheli import Helicopter
 from symheli.enclosure import enclose
-from synthesis.tubes.deviations import Cell, Deviations
+from synthesis.tubes.deviations import CommandCell, Deviations
 from synthesis.tubes.inequality import MatrixSet
 from synthesis.tubes.proof import is_within
 from synthesis.tubes.reference import Reference
@@ -46,7 +46,7 @@ def outputs(loop: Deviations) -> list[Row]:
     ]
 
 
-def largest_controls(loop: Deviations, cells: Sequence[Cell]) -> Array:
+def largest_controls(loop: Deviations, cells: Sequence[CommandCell]) -> Array:
     """Largest size of each of the reference's controls in each cell (cells, 4), rad, with and
     without what is added to the commands alone; rounded up.
     """
@@ -63,7 +63,9 @@ def largest_controls(loop: Deviations, cells: Sequence[Cell]) -> Array:
     return np.array(found)
 
 
-def why_not_free(loop: Deviations, cells: Sequence[Cell], P: Array, over: Sequence[Any]) -> str:
+def why_not_free(
+    loop: Deviations, cells: Sequence[CommandCell], P: Array, over: Sequence[Any]
+) -> str:
     """Empty where every command and blade pitch is proven to stay within its travel, in rational
     arithmetic, and no servo's rate limit is reached; else what may not.
 

@@ -25,7 +25,7 @@ from symheli.values.whole_files import write_text
 from synthesis.certificate_file import DAMAGED, content_of
 from synthesis.program.cone_program import Solver
 from synthesis.tubes.controllers import Choice
-from synthesis.tubes.deviations import Cell, Deviations
+from synthesis.tubes.deviations import CommandCell, Deviations
 from synthesis.tubes.files import (
     numbers,
     read_loop,
@@ -38,7 +38,7 @@ from synthesis.tubes.inequality import Multipliers
 from synthesis.tubes.motions import Motions
 from synthesis.tubes.proof import falls_in, holds
 from synthesis.tubes.reference import TUBE_SIZES, Reference, held, moving
-from synthesis.tubes.search import Enclosed, Found, smallest
+from synthesis.tubes.search import Enclosed, TubeSolution, smallest
 from synthesis.tubes.travel import why_not_free
 
 Array = np.ndarray
@@ -119,7 +119,7 @@ class Tube:
 
     deviations: Deviations
     P: Array
-    cells: tuple[Cell, ...]
+    cells: tuple[CommandCell, ...]
     factors: Array
     multipliers: tuple[Multipliers, ...]
     proven: bool
@@ -317,7 +317,7 @@ def _read(content: dict[str, Any]) -> Tube:
     for interval, *ranges in content["cells"]:
         own = numbers(ranges, 1 + len(loop.reference.ranges), 2).tolist()
         s, a, *others = ((low, high) for low, high in own)
-        cells.append(Cell(int(interval), s, a, tuple(others)))
+        cells.append(CommandCell(int(interval), s, a, tuple(others)))
     return Tube(
         loop,
         numbers(content["P"], k, n, n),
@@ -477,11 +477,11 @@ def _checked(model: Any, motions: Any, flight: Sequence[float], sizes: Any) -> M
     return motions
 
 
-def _cells(reference: Reference | Motions) -> list[Cell]:
+def _cells(reference: Reference | Motions) -> list[CommandCell]:
     """The commands in cells."""
     if isinstance(reference, Reference) and len(reference.airspeeds) > 1:
         return [
-            Cell(i, (0.0, 1.0), (low, high))
+            CommandCell(i, (0.0, 1.0), (low, high))
             for i, p in enumerate(reference.nodes[1:])
             for low, high in pairwise(_accelerations(float(p), reference.limits[0]))
         ]
@@ -492,7 +492,7 @@ def _cells(reference: Reference | Motions) -> list[Cell]:
     sides = [[(float(a), float(b)) for a, b in pairwise(row)] for row in edges]
     s = (0.0, float(len(reference.nodes) > 1))
     return [
-        Cell(i, s, own[0], tuple(own[1:]))
+        CommandCell(i, s, own[0], tuple(own[1:]))
         for i in range(reference.intervals)
         for own in product(*sides)
     ]
@@ -528,12 +528,12 @@ def _accelerations(airspeed: float, limit: float) -> list[float]:
     return np.linspace(-limit, limit, count + 1).tolist()
 
 
-def _nodes(cell: Cell, count: int) -> tuple[int, ...]:
+def _nodes(cell: CommandCell, count: int) -> tuple[int, ...]:
     """The nodes of a cell's interval, of so many."""
     return (0,) if count == 1 else (cell.interval, cell.interval + 1)
 
 
-def _covers(cells: Sequence[Cell], reference: Reference | Motions) -> bool:
+def _covers(cells: Sequence[CommandCell], reference: Reference | Motions) -> bool:
     """Whether these cells are all commands: of each interval all s in [0, 1] with all commands
     that cells split; and no state of the reference may jump.
     """
@@ -561,11 +561,11 @@ def _fills(boxes: Array, whole: Array) -> bool:
     )
 
 
-Grown = tuple[Found | None, Sequence[Enclosed], Array, str]
+Grown = tuple[TubeSolution | None, Sequence[Enclosed], Array, str]
 """What was found, the cells enclosed, P, why nothing was."""
 
 
-def _found(loop: Deviations, cells: tuple[Cell, ...], sizes: Array, solver: Solver) -> Tube:
+def _found(loop: Deviations, cells: tuple[CommandCell, ...], sizes: Array, solver: Solver) -> Tube:
     """The search: the ellipsoids over which the equations are enclosed grow until the smallest ones
     that satisfy the inequality lie inside.
     """
@@ -580,7 +580,7 @@ def _found(loop: Deviations, cells: tuple[Cell, ...], sizes: Array, solver: Solv
 
 
 def _grown(
-    loop: Deviations, cells: Sequence[Cell], sizes: Array, solver: Solver, progress: Task
+    loop: Deviations, cells: Sequence[CommandCell], sizes: Array, solver: Solver, progress: Task
 ) -> Grown:
     """The search over all cells, from the ellipsoids of the linear loop."""
     count = len(loop.reference.nodes)
@@ -606,7 +606,7 @@ def _grown(
 
 def _from_below(
     loop: Deviations,
-    cells: Sequence[Cell],
+    cells: Sequence[CommandCell],
     sizes: Array,
     drifts: Array,
     numbers: tuple[float, float, float],
@@ -638,7 +638,11 @@ def _from_below(
 
 
 def _decay(
-    loop: Deviations, cells: Sequence[Cell], linear: list[Enclosed], sizes: Array, solver: Solver
+    loop: Deviations,
+    cells: Sequence[CommandCell],
+    linear: list[Enclosed],
+    sizes: Array,
+    solver: Solver,
 ) -> float | None:
     """The rate alpha of the smallest ellipsoids of the linear loop, by the cells of one interval in
     the middle, of a sampled loop by all; None: there are none.
@@ -666,7 +670,11 @@ def _decay(
 
 
 def _enclosed(
-    loop: Deviations, cells: Sequence[Cell], factors: Array, drifts: Array, share: float = 1.0
+    loop: Deviations,
+    cells: Sequence[CommandCell],
+    factors: Array,
+    drifts: Array,
+    share: float = 1.0,
 ) -> list[Enclosed] | None:
     """The cells with the sets of their F; None where one has no bounds."""
     p, out = loop.reference.nodes, []
@@ -680,7 +688,7 @@ def _enclosed(
     return out
 
 
-def _ends(P: Array, cell: Cell) -> list[Array]:
+def _ends(P: Array, cell: CommandCell) -> list[Array]:
     """P at the ends of a cell in airspeed."""
     own = P[list(_nodes(cell, len(P)))]
     return [own[0] + s * (own[-1] - own[0]) for s in cell.s]

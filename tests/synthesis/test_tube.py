@@ -20,7 +20,7 @@ from symheli import Helicopter
 from symheli.enclosure import AffineForm, SegmentAverages, equations
 from symheli.errors import InputError
 from synthesis import Motions, Tube, tube
-from synthesis.tubes.deviations import Cell, Deviations, _covered
+from synthesis.tubes.deviations import CommandCell, Deviations, _covered
 from synthesis.tubes.inequality import elementwise, rank_one
 from synthesis.tubes.reference import TUBE_SIZES, moving
 from synthesis.tubes.tube import _covers
@@ -209,7 +209,7 @@ def test_the_reference_is_smooth_and_its_rate_that_of_the_state(accelerating):
 def test_the_drift_enclosed_holds_that_of_every_command(accelerating):
     heli, reference = accelerating
     loop = Deviations(heli, reference, 0.1)
-    cell = Cell(1, (0.25, 0.75), (-0.5, 0.5))
+    cell = CommandCell(1, (0.25, 0.75), (-0.5, 0.5))
     middle, rest, by_jerk, by_snap = loop.drifts([cell])[0]
     drift, rng = _drift(heli, reference), np.random.default_rng(0)
     for _ in range(300):
@@ -221,18 +221,22 @@ def test_the_drift_enclosed_holds_that_of_every_command(accelerating):
 
 def test_cells_that_leave_a_command_out_are_no_cover(accelerating):
     _, reference = accelerating
-    all_ = [Cell(i, (0.0, 1.0), a) for i in (0, 1) for a in ((-1.0, 0.0), (0.0, 1.0))]
+    all_ = [CommandCell(i, (0.0, 1.0), a) for i in (0, 1) for a in ((-1.0, 0.0), (0.0, 1.0))]
     assert _covers(all_, reference)
     for k in range(4):
         assert not _covers(all_[:k] + all_[k + 1 :], reference)
-    halves = [Cell(0, (0.0, 0.5), (-1.0, 1.0)), Cell(0, (0.6, 1.0), (-1.0, 1.0)), *all_[2:]]
+    halves = [
+        CommandCell(0, (0.0, 0.5), (-1.0, 1.0)),
+        CommandCell(0, (0.6, 1.0), (-1.0, 1.0)),
+        *all_[2:],
+    ]
     assert not _covers(halves, reference)
-    assert not _covers([*all_, Cell(2, (0.0, 1.0), (-1.0, 1.0))], reference)
+    assert not _covers([*all_, CommandCell(2, (0.0, 1.0), (-1.0, 1.0))], reference)
 
 
 def test_a_state_of_the_reference_that_would_jump_with_the_jerk_is_refused(accelerating):
     heli, reference = accelerating
-    cells = [Cell(i, (0.0, 1.0), (-1.0, 1.0)) for i in (0, 1)]
+    cells = [CommandCell(i, (0.0, 1.0), (-1.0, 1.0)) for i in (0, 1)]
     assert not _covers(cells, replace(reference, limits=(1.0, 1.0, np.inf)))
     jumping = moving(heli, reference.airspeeds, (1.0, 1.0, np.inf))
     assert _covers(cells, jumping)
@@ -315,7 +319,7 @@ def test_a_tube_crosses_the_edges_where_the_tail_stalls_and_the_wake_covers_it(a
 def test_the_set_of_a_cell_with_two_kinks_holds_the_jacobians_in_it():
     heli, n, count = Helicopter.load("xcell60", governor="ideal"), 10, 4000
     loop = Deviations(heli, moving(heli, np.array([9.0, 10.0]), (1.0, 1.0, 1.0)), 0.15)
-    cell, factor = Cell(0, (0.0, 1.0), (0.0, 0.5)), np.diag(0.2 * np.array(TUBE_SIZES))
+    cell, factor = CommandCell(0, (0.0, 1.0), (0.0, 0.5)), np.diag(0.2 * np.array(TUBE_SIZES))
     drifts = np.zeros((1, 4, n))
     (over,) = loop.enclosed([cell], factor[None], drifts)
     e, w, c, data = (
@@ -493,7 +497,7 @@ def test_the_planar_vtol_stays_within_less_than_the_published_tube(case):
 def test_the_cells_of_a_schedule_are_enclosed_with_all_others():
     case = next(c for c in VTOL if c.bank)
     loop = Deviations(over_ground(), motions(case), case.gust)
-    cell = Cell(1, (0.0, 1.0), loop.reference.ranges[0], loop.reference.ranges[1:])
+    cell = CommandCell(1, (0.0, 1.0), loop.reference.ranges[0], loop.reference.ranges[1:])
     factor = np.diag([0.1, 0.1, 0.15, 0.3, 0.3, 1.0])
     (over,) = loop.enclosed([cell], factor[None], loop.drifts([cell]))
     rng, data = np.random.default_rng(0), loop.reference.data[1]

@@ -17,7 +17,7 @@ from symheli.lpv import connect
 from symheli.values.signal import Signal
 from synthesis import Tube, coverage, tube
 from synthesis.tubes.controllers import Choice
-from synthesis.tubes.deviations import Cell, Deviations
+from synthesis.tubes.deviations import CommandCell, Deviations
 from synthesis.tubes.equipment import Equipment
 from synthesis.tubes.proof import falls_in, is_within
 from synthesis.tubes.reference import held
@@ -129,7 +129,7 @@ def test_a_jump_is_seen_to_fall_or_to_rise():
 def enclosed():
     heli = Helicopter.load("xcell60", governor="ideal")
     loop = Deviations(heli, held(heli, 3.0, Choice(slow=True), FINE), 0.1)
-    cell = Cell(0, (0.0, 0.0), (0.0, 0.0))
+    cell = CommandCell(0, (0.0, 0.0), (0.0, 0.0))
     factor = 0.05 * np.diag([*(0.4, 0.5, 0.8, 0.1, 0.1, 0.3, 0.08, 0.06, 0.02, 0.02), *[0.05] * 11])
     (over,) = loop.enclosed([cell], factor[None], loop.drifts([cell]))
     return loop, cell, over, factor
