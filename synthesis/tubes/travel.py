@@ -83,6 +83,8 @@ def why_not_free(
                 return f"{row.name} may reach its travel"
     for i, (name, servo) in enumerate(servos.items()):
         if math.isfinite(servo.rate):
+            if len(P) > 1:
+                return f"the rate of {name}_command is bounded at a held airspeed alone"
             K = loop.reference.equipment.commands(loop.reference.gain)[0, i]
             if not max(fastest(K, *at) for at in over) < servo.rate:
                 return f"{name}_command may change faster than its servo follows"

@@ -449,6 +449,11 @@ def _flight(
     if np.ndim(airspeed) > 0 or isinstance(airspeed, Motions):
         if choice.period or delay:
             raise InputError("a sampled loop needs one airspeed: its P follows the clock alone")
+        if any(np.isfinite(servo.rate) for servo in (servos or {}).values()):
+            raise InputError(
+                "servos with a rate limit need one airspeed: along a range the rates of their"
+                " commands are not bounded; leave the limit out (rate=inf) or hold an airspeed"
+            )
         return moving(heli, _range(airspeed, limits), limits, choice, servos)
     if limits[0] or limits[1]:
         raise InputError("a held airspeed has no acceleration or jerk: give (low, high)")

@@ -202,6 +202,9 @@ def test_controllers_that_do_not_fit_are_refused(at_3):
         tube(heli, 3.0, gust=0.1, gain=slow.discretize(PERIOD))
     with pytest.raises(InputError, match="expected"):
         tube(heli, 3.0, gust=0.1, gain=3.0)
+    limited = {name: replace(servo, rate=1.0) for name, servo in FINE.items()}
+    with pytest.raises(InputError, match="rate limit"):
+        tube(heli, (3.0, 4.0), gust=0.1, acceleration=1.0, jerk=1.0, servos=limited)
 
 
 def test_the_integral_of_the_governor_stops_as_printed():
