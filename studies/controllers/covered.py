@@ -31,12 +31,13 @@ def uncovered(flown: FlightData, tubes: Sequence[Tube]) -> str:
     """
     from synthesis import coverage
 
-    record = flown.record()
-    if flown.lost >= 0 or record is None:
+    if flown.lost >= 0:
         return "the flight was lost"
-    checks = [coverage(tube, record).checks for tube in tubes]
-    if not checks:
+    if not tubes:
         return NO_TUBE
+    record = flown.record()
+    assert record is not None  # noqa: S101 - of a flight that was not lost
+    checks = [coverage(tube, record).checks for tube in tubes]
     places = [[i for i, check in enumerate(own) if not check.kept] for own in checks]
     if not all(places):
         return ""

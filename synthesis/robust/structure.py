@@ -109,7 +109,7 @@ class DynamicBlock(NamedTuple):
         if damping is None:
             weight = covers.lag_weight(own)
         else:
-            weight = covers.servo_weight(own, covers.Range.of(damping, given[1], "damping"))
+            weight = covers.servo_weight(own, covers.PositiveRange.of(damping, given[1], "damping"))
         return cls(*_paired(inputs, outputs), 1.0, weight)
 
 

@@ -85,10 +85,10 @@ class SpecificationTable:
     Examples
     --------
     >>> import symheli, synthesis
-    >>> from synthesis.sheet.sheet import Axis
+    >>> from synthesis.sheet.sheet import ControlAxis
     >>> lag = symheli.LinearModel([[-1.0]], [[2.0]], [[1.0]], [[0.0]], ("x",), ("u",), ("y",))
     >>> family = symheli.LinearFamily.from_models([0.0, 5.0], [lag, lag])
-    >>> axis = Axis(name="arm", control="u", response="y")
+    >>> axis = ControlAxis(name="arm", control="u", response="y")
     >>> phase = Specification(
     ...     name="phase margin", axis="arm", measure="phase_margin", unit="deg", sense="at least",
     ...     level_1=45.0, level_2=22.5, source="project target", length=1.0)
@@ -327,12 +327,12 @@ def specifications(
     Examples
     --------
     >>> import numpy as np, symheli, synthesis
-    >>> from synthesis.sheet.sheet import Axis, Sheet, Specification
+    >>> from synthesis.sheet.sheet import ControlAxis, Sheet, Specification
     >>> p = symheli.Scheduling("p", "1", 0.0, 1.0)
     >>> cart = symheli.LPVStateSpace.polynomial(
     ...     [[[0.0]]], [[[1.0]], [[1.0]]], [[[1.0]]], [[[0.0]]], p, inputs=("f",), outputs=("v",))
     >>> sheet = Sheet(
-    ...     title="cart", axes={"speed": Axis(name="speed", control="f", response="v")},
+    ...     title="cart", axes={"speed": ControlAxis(name="speed", control="f", response="v")},
     ...     specifications=(Specification(
     ...         name="rejection", axis="speed", measure="rejection_bandwidth", unit="rad/s",
     ...         sense="at least", level_1=2.0, level_2=1.0, source="project target", length=1.0),))

@@ -141,11 +141,11 @@ def prove(
     --------
     >>> import symheli
     >>> from synthesis.sheet.proven import prove
-    >>> from synthesis.sheet.sheet import Axis, Specification
+    >>> from synthesis.sheet.sheet import ControlAxis, Specification
     >>> p = symheli.Scheduling("p", "1", 0.0, 1.0)
     >>> cart = symheli.LPVStateSpace.polynomial(
     ...     [[[0.0]]], [[[1.0]], [[1.0]]], [[[1.0]]], [[[0.0]]], p, inputs=("f",), outputs=("v",))
-    >>> axis = Axis(name="speed", control="f", response="v")
+    >>> axis = ControlAxis(name="speed", control="f", response="v")
     >>> disk = Specification(
     ...     name="disk", axis="speed", measure="disk_phase", unit="deg", sense="at least",
     ...     level_1=40.0, level_2=20.0, source="project target", length=1.0)

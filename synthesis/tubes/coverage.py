@@ -89,6 +89,7 @@ def coverage(tube: Tube, flight: FlightRecord) -> Coverage:
 
     Examples
     --------
+    >>> import symheli
     >>> heli = symheli.Helicopter.load("xcell60", governor="ideal")
     >>> calm = symheli.AirspeedSchedule((3.0,), (1.0,), (0.5,), lead=0.1, start=3.0)
     >>> flight = symheli.fly(heli, calm, wind=symheli.Wind((0.3, 0.0, 0.0)))
