@@ -211,8 +211,10 @@ def segment_averages(
         (rest + 4 * pieces * EPS * size) * MARGIN,
         tuple(g for d in domains for g in d.groups),
     )
-    found = SegmentAverages(average, switched[..., used], turning[..., used])
-    return found if counts else SegmentAverages(*(part[0] for part in found))
+    switched, turning = switched[..., used], turning[..., used]
+    if counts:
+        return SegmentAverages(average, switched, turning)
+    return SegmentAverages(average[0], switched[0], turning[0])
 
 
 def _branches(
