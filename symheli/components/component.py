@@ -76,8 +76,8 @@ class Component:
     `parameters` {name: `Entry`} come from the vehicle file (a unit alone stands for an `Entry` of
     that unit); `states` are its own; it may use the flow in `needs` and makes the flow in `makes`.
     `evaluate(parameters, motion, controls, own, flow)` returns an `Effect` under these names: where
-    a vehicle has two of a kind or puts one off the c.g., `symheli.airframe.part.InstalledPart` translates.
-    In print, `subscript` marks its forces.
+    a vehicle has two of a kind or puts one off the c.g., `symheli.airframe.part.InstalledPart`
+    translates. In print, `subscript` marks its forces.
     """
 
     evaluate: Callable[

@@ -14,7 +14,7 @@ from symheli.flight.schedule import AirspeedSchedule
 from symheli.flight.sensor import Sensor
 from symheli.flight.servo import XCELL_SERVOS, Servo, ServoBank
 from symheli.flight.simulated_flight import SimulatedFlight
-from symheli.flight.table_arithmetic import Status, TableState
+from symheli.flight.table_arithmetic import StepEvents, TableState
 from symheli.flight.table_controller import TableController
 from symheli.values.controllers import PureController, StatefulController
 
@@ -37,7 +37,7 @@ __all__ = [
     "ServoBank",
     "SimulatedFlight",
     "StatefulController",
-    "Status",
+    "StepEvents",
     "TableController",
     "TableState",
     "fly",

@@ -19,7 +19,7 @@ MAX_COUNT = 2**30
 """Count of samples that is never reached."""
 
 
-class Status(IntFlag):
+class StepEvents(IntFlag):
     """Events of a step of a `TableController`, as flags.
 
     `SATURATED`: a command is at its limit. `PARAMETER`: the reading of the scheduling parameter was
@@ -29,8 +29,8 @@ class Status(IntFlag):
 
     Examples
     --------
-    >>> from symheli.flight import Status
-    >>> Status.PARAMETER in Status.PARAMETER | Status.FALLBACK
+    >>> from symheli.flight import StepEvents
+    >>> StepEvents.PARAMETER in StepEvents.PARAMETER | StepEvents.FALLBACK
     True
     """
 
@@ -100,7 +100,7 @@ class TableState:
         table the last step was.
     same, bad : int
         How often the reading stayed the same, and how many bad ones came in a row.
-    status : Status
+    status : StepEvents
         What the last step met with.
 
     Examples
@@ -109,7 +109,7 @@ class TableState:
     >>> table = symheli.TableController.of(lqr.scheduled_controller.model)
     >>> u, state = table.update(table.init(), np.zeros(8), np.zeros(8), np.zeros(4), 2.0)
     >>> round(float(state.parameter_used), 2), state.status
-    (2.0, <Status.FINE: 0>)
+    (2.0, <StepEvents.FINE: 0>)
     """
 
     flown: Array
@@ -124,7 +124,7 @@ class TableState:
     parameter_used: np.float32 = field(default=np.float32(0))
     same: int = 0
     bad: int = 0
-    status: Status = Status.FINE
+    status: StepEvents = StepEvents.FINE
 
     __repr__ = summarized
 
@@ -149,16 +149,16 @@ def follow_parameter(n: Numbers, s: TableState, reading: np.float32, valid: bool
     """Return the state whose parameter in use has moved towards a reading, or towards the
     replacement of an invalid one; its `status` concerns that alone.
     """
-    status, target = Status.FINE, s.target
+    status, target = StepEvents.FINE, s.target
     same = min(s.same + 1, MAX_COUNT - 1) if reading == s.reading else 0
     if valid and n.plausible[0] <= reading <= n.plausible[1] and same < n.frozen:
         bad = 0
         target = _clip(reading, n.knots[0], n.knots[-1])
     else:
-        status |= Status.PARAMETER
+        status |= StepEvents.PARAMETER
         bad = min(s.bad + 1, MAX_COUNT)
         if not s.started or bad > n.hold:
-            status |= Status.FALLBACK
+            status |= StepEvents.FALLBACK
             target = n.fallback
     if not s.started:
         filtered = used = target
@@ -225,7 +225,7 @@ def commands(n: Numbers, s: TableState, error: Array, trim: Array, others: Array
             s,
             command=np.where(flown, before, applied),
             entry=np.where(flown, s.entry, InitialCommand.IN_FORCE),
-            status=s.status | Status.HELD,
+            status=s.status | StepEvents.HELD,
         )
     kept = np.where(entering, applied - plain, s.offset)
     return replace(
@@ -234,7 +234,8 @@ def commands(n: Numbers, s: TableState, error: Array, trim: Array, others: Array
         command=applied,
         offset=n.fade * np.where(flown & ~n.integrates, kept, np.float32(0)),
         entry=np.where(flown, InitialCommand.UNDER_WAY, InitialCommand.IN_FORCE),
-        status=s.status | (Status.SATURATED if (flown & (excess != 0)).any() else Status.FINE),
+        status=s.status
+        | (StepEvents.SATURATED if (flown & (excess != 0)).any() else StepEvents.FINE),
     )
 
 

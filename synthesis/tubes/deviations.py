@@ -281,7 +281,7 @@ def _covered(
 
 
 @dataclass
-class _Kink:
+class _CellKink:
     """Matrices left (offset + number) row' of a kink over the parts of a cell, in units of equal
     weight: left (n,); row (m,) and further `blocks` (m, .), each times a vector of norm <= 1 of its
     own; share (parts,) >= |number|; offset (parts,) of the parts on one side; main (n, m), left
@@ -332,7 +332,9 @@ class _Kink:
         return np.abs(self.left * units[:n])[:, None] * rows / units[:m] * ROUNDED_UP
 
 
-def _place(kinks: Sequence[_Kink], centres: Array, by: Array, places: Array, units: Array) -> None:
+def _place(
+    kinks: Sequence[_CellKink], centres: Array, by: Array, places: Array, units: Array
+) -> None:
     """Choose the offsets of the kinks: with them the centres (parts, n, m) of parts at these places
     are most nearly linear in the ranges, of slopes near by (n, m, r), by least squares.
     """
@@ -355,7 +357,7 @@ def _place(kinks: Sequence[_Kink], centres: Array, by: Array, places: Array, uni
 
 def _kinks(
     switched: Array, turning: Array, groups: tuple[int, ...], units: Array
-) -> tuple[list[_Kink], Array]:
+) -> tuple[list[_CellKink], Array]:
     """Kinks of `SegmentAverages` (parts, pieces, n, m, k), and the sizes of what they leave (parts,
     n, m).
     """
@@ -384,7 +386,9 @@ def _kinks(
         rest += missed.mean(axis=1) * over
         shares = np.abs(share).mean(axis=1) * ROUNDED_UP
         main = left[:, None] * row * over
-        found.append(_Kink(left, row, [*blocks, *common], shares, main, 0 * shares, shares.max()))
+        found.append(
+            _CellKink(left, row, [*blocks, *common], shares, main, 0 * shares, shares.max())
+        )
     return found, rest * ROUNDED_UP
 
 

@@ -42,7 +42,7 @@ class Bank(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Equipment:
+class LoopEquipment:
     """The parts of a loop whose states are part of the deviation; by default none.
 
     Parameters
@@ -247,7 +247,7 @@ class Equipment:
         }
 
     @classmethod
-    def read(cls, given: Mapping[str, Any]) -> Equipment:
+    def read(cls, given: Mapping[str, Any]) -> LoopEquipment:
         """The equipment so written."""
         servos = given["servos"]
         if servos is not None:

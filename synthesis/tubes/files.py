@@ -14,7 +14,7 @@ from symheli.airframe.vehicle import load_vehicle
 from symheli.airframe.written import as_toml
 from symheli.enclosure import equations
 from synthesis.tubes.deviations import Deviations
-from synthesis.tubes.equipment import Equipment
+from synthesis.tubes.equipment import LoopEquipment
 from synthesis.tubes.inequality import Multipliers
 from synthesis.tubes.motions import Motions
 from synthesis.tubes.reference import Reference
@@ -75,7 +75,7 @@ def _read_flight(content: dict[str, Any]) -> tuple[Helicopter, Reference]:
         vehicle, content["governor"], density, frozenset(content["printed"]), smoothing
     )
     n, k = len(heli.states), len(content["airspeeds"])
-    equipment = Equipment.read(content["equipment"])
+    equipment = LoopEquipment.read(content["equipment"])
     powers, c = np.shape(content["steady"])[2], len(equipment.states)
     shapes = ((k,), (k, 2, powers, n + 4), (k, n + 4), (k, 4), (k, 4 + c, n + c))
     own = {name: numbers(content[name], *shape) for name, shape in zip(ARRAYS, shapes, strict=True)}

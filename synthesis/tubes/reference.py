@@ -19,7 +19,7 @@ from symheli.progress import task
 from symheli.steady.newton import newton
 from symheli.values.summary import summarized
 from synthesis.tubes.controllers import Choice
-from synthesis.tubes.equipment import Equipment
+from synthesis.tubes.equipment import LoopEquipment
 
 Array = np.ndarray
 
@@ -57,7 +57,7 @@ class Reference:
     snap: Array
     gain: Array
     limits: tuple[float, float, float]
-    equipment: Equipment = field(default_factory=Equipment)
+    equipment: LoopEquipment = field(default_factory=LoopEquipment)
 
     __repr__ = summarized
 
@@ -226,7 +226,7 @@ def held(
         np.zeros((1, 4)),
         gain,
         (0.0, 0.0, 0.0),
-        Equipment(states, servos, choice.period, delay),
+        LoopEquipment(states, servos, choice.period, delay),
     )
 
 
@@ -274,7 +274,7 @@ def moving(
             snap[i] = _against(heli, *at, feed[i, :n])
         else:
             feed[i, n:] = _against(heli, *at, by[i])
-    return Reference(airspeeds, z, feed, snap, gain, limits, Equipment(states, servos))
+    return Reference(airspeeds, z, feed, snap, gain, limits, LoopEquipment(states, servos))
 
 
 def _in_jerk(heli: Helicopter, x: Array, u: Array, by: Array) -> Array:

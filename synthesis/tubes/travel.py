@@ -23,7 +23,7 @@ RAISED = 1 + 1e-9
 """Factor on bounds of rates that are computed in floating point, of some thousand roundings."""
 
 
-class Row(NamedTuple):
+class ControlRow(NamedTuple):
     """An output of the deviations, k (nodes, n), and which control of the reference it adds to."""
 
     name: str
@@ -31,7 +31,7 @@ class Row(NamedTuple):
     control: int
 
 
-def outputs(loop: Deviations) -> list[Row]:
+def outputs(loop: Deviations) -> list[ControlRow]:
     """The commands as the servos receive them, and the blade pitch."""
     r = loop.reference
     if not isinstance(r, Reference):
@@ -40,7 +40,7 @@ def outputs(loop: Deviations) -> list[Row]:
     if r.equipment.bank is not None or r.sampled:
         made.append(("_command", r.equipment.commands(r.gain)))
     return [
-        Row(f"{u}{kind}", K[:, i], i)
+        ControlRow(f"{u}{kind}", K[:, i], i)
         for kind, K in made
         for i, u in enumerate(map(str, loop.inputs))
     ]

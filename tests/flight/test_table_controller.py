@@ -12,7 +12,7 @@ from flight.tables import DT, INPUTS, MACH, OUTPUTS, InFlight, over, sampled, st
 import symheli
 import synthesis
 from symheli import InputError, LinearModel, LPVStateSpace, ParameterMonitor, TableController, fly
-from symheli.flight import Status
+from symheli.flight import StepEvents
 from symheli.flight.anti_windup import saturated_radius
 from symheli.flight.table_file import SCHEMA
 from symheli.values import plain_file
@@ -138,7 +138,7 @@ def test_at_its_limit_a_command_that_integrates_waits_there():
     t = InFlight(static(1.0, output="d_lat_rate", limits={"d_lat": (-0.1, 0.1)}))
     up = t.run(np.full((500, 1), 1.0), 5.0)  # 10 s, five times what reaches the limit
     assert up.max() == np.float32(0.1) or up.max() == np.nextafter(np.float32(0.1), np.float32(0))
-    assert t.status == Status.SATURATED
+    assert t.status == StepEvents.SATURATED
     down = t.run(np.full((1, 1), -1.0), 5.0)
     assert down[0, 0] == pytest.approx(0.1 - DT, abs=1e-7)
 
@@ -331,13 +331,13 @@ def test_a_bad_airspeed_is_held_and_then_left_for_the_fallback(wrong):
     late = 24 if wrong == "frozen" else 0  # the 25th repetition is half a second's
     held = used[50 + late : 50 + late + 50]
     np.testing.assert_array_equal(held, np.float32(6.0))
-    assert set(status[50 + late : 50 + late + 50]) == {Status.PARAMETER}
+    assert set(status[50 + late : 50 + late + 50]) == {StepEvents.PARAMETER}
     moving = used[50 + late + 50 :]
     np.testing.assert_allclose(
         moving, np.maximum(6.0 - 3.0 * DT * np.arange(1, len(moving) + 1), 2.0), atol=2e-4
     )
     assert moving[-1] == 2.0
-    assert status[-1] == Status.PARAMETER | Status.FALLBACK
+    assert status[-1] == StepEvents.PARAMETER | StepEvents.FALLBACK
     back, _ = used_along(t, np.linspace(6.1, 6.2, 100))
     assert back[0] == pytest.approx(2.06, abs=1e-5)
 
@@ -346,7 +346,7 @@ def test_an_entry_with_a_bad_airspeed_begins_at_the_fallback():
     t = gain(fallback=3.0)
     used, status = used_along(t, [math.nan, 8.0, 8.0])
     np.testing.assert_allclose(used, [3.0, 3.06, 3.12], rtol=1e-5)
-    assert status[0] == Status.PARAMETER | Status.FALLBACK
+    assert status[0] == StepEvents.PARAMETER | StepEvents.FALLBACK
 
 
 def test_the_filter_before_the_limit_lags_by_its_time_constant():
@@ -373,7 +373,7 @@ def test_numbers_that_are_none_hold_the_commands_and_harm_nothing():
     hurt = errors[1].copy()
     hurt[3] = math.nan
     np.testing.assert_array_equal(t.update(hurt, np.zeros(8), np.zeros(4), 5.0), before)
-    assert t.status & Status.HELD
+    assert t.status & StepEvents.HELD
     huge = np.full(8, 3e38)
     np.testing.assert_array_equal(t.update(huge, np.zeros(8), np.zeros(4), 5.0), before)
     np.testing.assert_array_equal(t.run(errors, 6.0), clean.run(errors, 6.0))

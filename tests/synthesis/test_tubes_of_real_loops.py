@@ -18,7 +18,7 @@ from symheli.values.signal import Signal
 from synthesis import Tube, coverage, tube
 from synthesis.tubes.controllers import Choice
 from synthesis.tubes.deviations import CommandCell, Deviations
-from synthesis.tubes.equipment import Equipment
+from synthesis.tubes.equipment import LoopEquipment
 from synthesis.tubes.proof import falls_in, is_within
 from synthesis.tubes.reference import held
 from synthesis.tubes.travel import fastest, why_not_free
@@ -59,7 +59,7 @@ def test_the_observer_leaves_the_poles_of_the_regulator(at_3):
     heli, x, u, A, B = at_3
     gain, states = Choice(known=EIGHT).gains(heli, x[None], u[None], np.array([3.0]))
     assert states == ("a1_observer", "b1_observer")
-    poles = sorted_poles(closed(A, B, gain, Equipment(states)))
+    poles = sorted_poles(closed(A, B, gain, LoopEquipment(states)))
     K = Choice().regulator(heli, x, u)
     for pole in np.linalg.eigvals(A + B @ K):
         # each again; of 1e-8 relative accuracy of these eigenvalues, far below their distances
@@ -76,7 +76,7 @@ def test_servos_and_clock_make_the_loop_that_connections_make(at_3):
     law = LinearModel.gain(K, heli.states, [Signal(f"{name}_command", "rad") for name in names])
     servos = [FINE[name].linear(name) for name in names]
     loop = connect(plant, law, *servos, inputs=[], outputs=["phi"])
-    own = Equipment(servos=FINE)
+    own = LoopEquipment(servos=FINE)
     np.testing.assert_allclose(
         sorted_poles(closed(A, B, K[None], own)), sorted_poles(loop.A), atol=1e-4
     )
@@ -85,7 +85,7 @@ def test_servos_and_clock_make_the_loop_that_connections_make(at_3):
         plant, *servos, inputs=[f"{name}_command" for name in names], outputs=list(heli.states)
     ).discretize(PERIOD)
     late = np.block([[driven.A, driven.B], [K @ driven.C, np.zeros((4, 4))]])
-    sampled = Equipment(servos=FINE, period=PERIOD, delay=1)
+    sampled = LoopEquipment(servos=FINE, period=PERIOD, delay=1)
     F = closed(A, B, K[None], sampled)
     step = expm(F * PERIOD) @ sampled.jump(K[None])
     own_poles, other = (np.sort(np.abs(np.linalg.eigvals(M))) for M in (step, late))
@@ -165,11 +165,11 @@ def test_a_tube_that_reaches_the_travel_or_a_rate_limit_is_refused(enclosed):
 
 def test_equipment_is_the_same_when_read_again():
     for own in (
-        Equipment(),
-        Equipment(("z",), XCELL_SERVOS),
-        Equipment(servos=FINE, period=PERIOD, delay=2, parts=3),
+        LoopEquipment(),
+        LoopEquipment(("z",), XCELL_SERVOS),
+        LoopEquipment(servos=FINE, period=PERIOD, delay=2, parts=3),
     ):
-        again = Equipment.read(json.loads(json.dumps(own.written())))
+        again = LoopEquipment.read(json.loads(json.dumps(own.written())))
         assert again.written() == own.written()
         assert again.names == own.names
 
@@ -188,7 +188,7 @@ def test_equipment_is_the_same_when_read_again():
 )
 def test_equipment_that_does_not_fit_is_refused(given):
     with pytest.raises(InputError):
-        Equipment(**given)
+        LoopEquipment(**given)
 
 
 def test_controllers_that_do_not_fit_are_refused(at_3):
