@@ -7,7 +7,7 @@ from __future__ import annotations
 import argparse
 import hashlib
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -65,6 +65,16 @@ def over_seeds(options: argparse.Namespace, calls: Sequence[partial[Any]]) -> It
                     stages.save(names[i], known[i])
                 progress(f"{i + 1} of {len(calls)}")
             yield known.pop(i).result
+
+
+def by_name(
+    options: argparse.Namespace, of_seed: Callable[..., Any], names: Sequence[str]
+) -> dict[str, list[Any]]:
+    """The results of of_seed(name, seed, --truth) by name, each for the seeds of --seeds."""
+    seeds = seeds_of(options)
+    calls = [partial(of_seed, name, seed, options.truth) for name in names for seed in seeds]
+    every = iter(list(over_seeds(options, calls)))
+    return {name: [next(every) for _ in seeds] for name in names}
 
 
 def _key(call: partial[Any]) -> str:

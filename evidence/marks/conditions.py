@@ -13,7 +13,7 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 import symheli
-from evidence.seeds import over_seeds, parser_of, seeds_of
+from evidence.seeds import by_name, parser_of
 from evidence.tables import DOCS, keep, markdown, parsed
 from identification import (
     Actuators,
@@ -414,10 +414,7 @@ def main() -> None:
     parser.add_argument("--truth", default="xcell60", choices=sorted(PAIRS))
     parser.add_argument("--only", nargs="+", choices=CONDITIONS, help="default: every condition")
     options = parsed(parser, "identified.md", timed=False)
-    names, seeds = options.only or list(CONDITIONS), seeds_of(options)
-    calls = [partial(of_seed, name, seed, options.truth) for name in names for seed in seeds]
-    marks = list(over_seeds(options, calls))
-    found = {name: marks[i * len(seeds) : (i + 1) * len(seeds)] for i, name in enumerate(names)}
+    found = by_name(options, of_seed, options.only or list(CONDITIONS))
     text = table(options.truth, found)
     plain = {name: [vars(m) for m in of_name] for name, of_name in found.items()}
     print(as_json(plain) if options.json else text)

@@ -7,12 +7,11 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
 from evidence.marks.conditions import ALL, CONDITIONS, Instruments
-from evidence.seeds import over_seeds, parser_of, seeds_of
+from evidence.seeds import by_name, parser_of
 from evidence.tables import DOCS, keep, markdown, parsed
 from identification import (
     FilterError,
@@ -139,12 +138,7 @@ def main() -> None:
     parser.add_argument("--truth", default="xcell60", choices=sorted(PAIRS))
     parser.add_argument("--only", nargs="+", choices=CONDITIONS, default=["ideal"])
     options = parsed(parser, "identified.md", timed=False)
-    seeds = seeds_of(options)
-    calls = [partial(of_seed, name, seed, options.truth) for name in options.only for seed in seeds]
-    answers = list(over_seeds(options, calls))
-    found = {
-        name: answers[i * len(seeds) : (i + 1) * len(seeds)] for i, name in enumerate(options.only)
-    }
+    found = by_name(options, of_seed, options.only)
     text = table(options.truth, found)
     plain = {name: [vars(one) for one in some] for name, some in found.items()}
     print(as_json(plain) if options.json else text)

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from scipy.linalg import solve_triangular
 
+from identification.estimators.symmetric_root import symmetric_root
 from identification.structure.actuators import CONTROLS, SETTLING, Actuators, pieces
 from symheli import Helicopter, trim
 from symheli.airframe.written import as_toml
@@ -149,9 +150,7 @@ class Calibration:
         be are left out.
         """
         relative = self.deviations / self.values
-        covariance = self.correlation * np.outer(relative, relative)
-        sizes, vectors = np.linalg.eigh(covariance)
-        root = vectors * np.sqrt(np.maximum(sizes, 0.0))
+        root = relative[:, None] * symmetric_root(self.correlation)
         rng = np.random.default_rng(seed)
         names = [str(p) for p in self.parameters]
         drawn: list[Helicopter] = []

@@ -18,6 +18,7 @@ from identification.estimators.least_squares import (
     residual_covariance,
     white_covariance,
 )
+from identification.estimators.symmetric_root import symmetric_root
 from identification.structure.lpvarx import LPVARX
 from symheli.values.arrays import Array
 from symheli.values.numbers import whole
@@ -136,8 +137,7 @@ def drawn(
     square = joint.reshape(len(mask), len(mask))[mask][:, mask]
     scale = np.sqrt(np.diagonal(square))
     scale = np.where(scale > 0, scale, 1.0)
-    values, vectors = np.linalg.eigh(square / np.outer(scale, scale))
-    root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+    root = scale[:, None] * symmetric_root(square / np.outer(scale, scale))
     z = np.random.default_rng(seed).standard_normal((count, len(root)))
     if boundary is not None:
         z *= np.sqrt(chi2.ppf(boundary, len(root))) / np.linalg.norm(z, axis=1, keepdims=True)

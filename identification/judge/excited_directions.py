@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from symheli.errors import InputError
 from symheli.lpv import UncertainStateSpace
 from symheli.lpv.bases.function_space import tensor_grid
 from symheli.values.arrays import Array
@@ -21,6 +22,7 @@ def excited_directions(loop: UncertainStateSpace) -> Array:
     """Return the second moments (n, n) of the outputs v of the first block of a sampled set: summed
     over the inputs, frequencies and frozen parameters, each weighted by the gain with which the
     block acts on the outputs; the other blocks at zero and, one after another, at both bounds.
+    Raises `InputError` in continuous time.
     """
     count, (first, *_) = len(loop.outputs), loop.every_part
     inputs = [*loop.inputs, *loop.perturbation_inputs]
@@ -28,11 +30,12 @@ def excited_directions(loop: UncertainStateSpace) -> Array:
     model = loop.model.select(inputs=inputs, outputs=outputs)
     axes = [np.linspace(s.low, s.high, POINTS) for s in loop.parameters]
     grid = axes[0] if len(axes) == 1 else tensor_grid(axes)
-    angles = np.pi * np.geomspace(1e-3, 1.0, FREQUENCIES)
+    if model.dt is None:
+        raise InputError("tight_for: expected a sampled loop, closed around a set of models")
+    omega = np.pi / model.dt * np.geomspace(1e-3, 1.0, FREQUENCIES)
     moments, u = np.zeros((first.outputs, first.outputs)), len(loop.inputs)
-    for A, B, C, D in zip(*model.matrices(grid), strict=True):
-        resolvent = np.exp(1j * angles)[:, None, None] * np.eye(len(A)) - A
-        G = C @ np.linalg.solve(resolvent, np.broadcast_to(B, (len(angles), *B.shape))) + D
+    for p in grid:
+        G = model.at(*np.atleast_1d(p)).frequency_response(omega)
         for H in _at_bounds(G, loop, u, count):
             excited = H[:, count:, :u]
             weight = np.linalg.norm(H[:, :count, u:], 2, axis=(1, 2)) ** 2

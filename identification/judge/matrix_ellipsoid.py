@@ -8,10 +8,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import cholesky, eigh
+from scipy.linalg import cholesky
 from scipy.special import gammaln, ndtri
 from scipy.stats import binom, chi2
 
+from identification.estimators.symmetric_root import symmetric_root
 from symheli.errors import InputError
 from symheli.values.arrays import Array, frozen
 from symheli.values.summary import summarized
@@ -228,11 +229,11 @@ def spectral_radius(n: int, m: int, probability: float) -> float:
 def _shape(emphasis: object, n: int, seen: Array) -> Array:
     """(S/tr S + c 1)^1/2 in the coordinates that have a variance."""
     S = frozen(emphasis, "emphasis", (n, n))[np.ix_(seen, seen)]
-    values, vectors = eigh(0.5 * (S + S.T))
-    total = float(values.sum())
-    if not total > 0 or values[0] < -ROUNDING * n * total:
+    S = 0.5 * (S + S.T)
+    total = float(np.trace(S))
+    if not total > 0 or np.linalg.eigvalsh(S)[0] < -ROUNDING * n * total:
         raise InputError("emphasis: expected a positive semidefinite matrix that is not zero")
-    return (vectors * np.sqrt(np.maximum(values, 0.0) / total + EVENNESS)) @ vectors.T
+    return symmetric_root(S / total + EVENNESS * np.eye(len(S)))
 
 
 def _shaped_radius(shape: Array, m: int, probability: float) -> float:
@@ -262,10 +263,9 @@ def _drawn_radius(
             f" {draws}"
         )
     m, n = P.shape[:2]
-    values, vectors = eigh(P.reshape(m * n, m * n))
     white = np.random.default_rng(seed).standard_normal((draws, m * n))
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    error = (white @ root.T).reshape(draws, m, n).swapaxes(1, 2)
+    root = symmetric_root(P.reshape(m * n, m * n))
+    error = (white @ root).reshape(draws, m, n).swapaxes(1, 2)
     D = np.linalg.solve(left, error) @ np.linalg.inv(right)
     return float(np.sort(np.linalg.norm(D, 2, axis=(1, 2)))[rank - 1])
 
@@ -311,12 +311,7 @@ def _fitted(P: Array) -> tuple[Array, Array]:
         change = np.abs(np.concatenate([V.ravel(), Sigma.ravel()]) - before).max()
         if change <= SETTLED * np.abs(before).max():
             break
-    return _root(V), _root(Sigma)
-
-
-def _root(M: Array) -> Array:
-    values, vectors = eigh(0.5 * (M + M.T))
-    return (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
+    return symmetric_root(V), symmetric_root(Sigma)
 
 
 def _verified(P: Array, K: Array, rows: Array, columns: Array) -> float:

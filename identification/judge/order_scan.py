@@ -71,7 +71,7 @@ class OrderScan:
 
     Parameters
     ----------
-    trials : tuple of Trial
+    trials : tuple of ScannedOrder
         Order by order, degree by degree.
     horizon : int
         Samples ahead of the middle fit.

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from symheli.flight.flown_conditions import CONDITIONS
 from symheli.records import FlightRecord
-
-CONDITIONS = ("wind", "mass", "governor", "servos")
 
 UNKNOWN = "unknown"
 

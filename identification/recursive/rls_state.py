@@ -28,7 +28,7 @@ class RLSState:
 
     Parameters
     ----------
-    configuration : Configuration
+    configuration : KernelConfiguration
         Of the estimator it belongs to.
     memory : array
         The kernel's; the properties are what it means.

@@ -56,7 +56,7 @@ class TermSignal(NamedTuple):
     Examples
     --------
     >>> arx.entries[-1]
-    Entry(kind='input', channel=0, lag=1, p_lag=1)
+    TermSignal(kind='input', channel=0, lag=1, p_lag=1)
     """
 
     kind: Literal["output", "input", "offset", "increment"]
@@ -76,7 +76,7 @@ class EquationGroup(NamedTuple):
     Examples
     --------
     >>> arx.groups
-    (Group(outputs=(0,), entries=(0, 1)),)
+    (EquationGroup(outputs=(0,), entries=(0, 1)),)
     """
 
     outputs: tuple[int, ...]

@@ -192,7 +192,7 @@ def covered(found: FlownControllers) -> Table:
         table.rows.append(
             [name, str(len(flights)), f"{kept:.0f}", words, f"{min(winds):.1f} to {max(winds):.1f}"]
         )
-    calm = min((one for one in found.flown), key=lambda one: one.wind)
+    calm = min(found.flown, key=lambda one: one.wind)
     table.remarks.append(
         "A tube speaks of one controller, as its matrices are, of gusts up to its amplitude with"
         " the steady wind among them, without sensor noise, and of servos whose rate limit is not"

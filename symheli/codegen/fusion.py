@@ -15,7 +15,8 @@ def fused(given: ScalarProgram, varying: Sequence[int]) -> ScalarProgram:
     of the product are sums: fewer operations, and a shorter way through them.
 
     Of two products the one that is ready last is fused. A product that does not depend on the
-    `varying` inputs stays by itself where the sum does: it is computed once (see `Program.hoist`).
+    `varying` inputs stays by itself where the sum does: it is computed once (see
+    `ScalarProgram.hoist`).
     """
     depends, ready = given.depends(varying), _ready(given)
     free = _used_in_sums_alone(given)

@@ -31,9 +31,9 @@ def program(function: casadi.Function, varying: Sequence[int] | None = None) -> 
     | |, fmin, fmax, sin, cos, tan, asin, atan2, exp, comparisons and branches.
 
     Two sides of a branch become one selection; a divisor that is constant, used more than once, or
-    independent of the `varying` inputs (default: all vary; see `Program.hoist`) is inverted once;
-    products are fused with the sums that use them: values differ from CasADi's by rounding. Raises
-    `InputError` where an operation has no such form (log, ...).
+    independent of the `varying` inputs (default: all vary; see `ScalarProgram.hoist`) is inverted
+    once; products are fused with the sums that use them: values differ from CasADi's by rounding.
+    Raises `InputError` where an operation has no such form (log, ...).
     """
     varies = range(function.n_in()) if varying is None else varying
     return without_unused(fused(without_unused(reciprocals(operations(function), varies)), varies))

@@ -6,17 +6,17 @@ from symheli.environment import Wind
 from symheli.flight.plan import FlightPlan
 from symheli.helicopter import Helicopter
 
+CONDITIONS = ("wind", "mass", "governor", "servos")
+"""What `flown_conditions` says."""
 MASS = "body.mass"
 
 
 def flown_conditions(heli: Helicopter, plan: FlightPlan) -> dict[str, str]:
     """Return the wind, mass, governor and servos of a flight: `meta["flown"]` of its record."""
-    return {
-        "wind": _wind(plan.wind),
-        "mass": f"{float(heli.parameters[MASS]):.4g} kg",
-        "governor": heli.governor,
-        "servos": _servos(plan),
-    }
+    mass = f"{float(heli.parameters[MASS]):.4g} kg"
+    return dict(
+        zip(CONDITIONS, (_wind(plan.wind), mass, heli.governor, _servos(plan)), strict=True)
+    )
 
 
 def _wind(wind: Wind) -> str:

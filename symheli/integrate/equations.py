@@ -44,7 +44,7 @@ class Equations:
         self._libraries: dict[tuple[str | tuple[str, ...] | Layout, ...], ctypes.CDLL | None] = {}
 
     def hoisted(self, which: Which) -> tuple[ScalarProgram, ScalarProgram]:
-        """(held, rest) of one of the functions; see `Program.hoist`."""
+        """(held, rest) of one of the functions; see `ScalarProgram.hoist`."""
         if which not in self._hoisted:
             self._hoisted[which] = self._program(which).hoist(VARYING[which])
         return self._hoisted[which]

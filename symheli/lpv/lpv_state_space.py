@@ -102,7 +102,7 @@ class LPVStateSpace:
         Sample period in s; None in continuous time.
     trim : TrimSchedule, optional
         x0(p), u0(p), y0(p) about which the model holds.
-    residuals : Residuals, optional
+    residuals : FitResiduals, optional
         Where the model was fitted or sampled: fit minus what it was fitted to, at its nodes.
 
     Raises

@@ -55,7 +55,7 @@ class SensorCheck:
     ----------
     signal : Signal
         Which one, with its unit.
-    bias, scale, delay : Estimate or None
+    bias, scale, delay : ScalarEstimate or None
         In its unit, 1, and s; None where it is what the others are held against, or cannot show.
     verdict : str
         "consistent", "inconsistent: ..." with what to do, or "not known: ..." with the reason.

@@ -82,7 +82,7 @@ class Faults:
     ----------
     windows : int
         Stretches of flight that were compared.
-    bias, scale, delay : dict of str to Estimate
+    bias, scale, delay : dict of str to ScalarEstimate
         In the signal's unit, 1, and s; a signal is missing where others are held against it.
     explained, moves : dict of str to float
         Of an angle or velocity: the share of its variation inside the windows that the others

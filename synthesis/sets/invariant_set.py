@@ -55,7 +55,7 @@ class InvariantSet(ProvenSet):
 
     Attributes
     ----------
-    statement : Statement
+    statement : SetStatement
         Model, disturbances, controls, limits, and the feedback where it was given.
     shape : LPVStateSpace
         Q(p) as its A, and Y(p) = K(p) Q(p), where the feedback was designed, as its C.

@@ -49,7 +49,7 @@ class LowComplexitySet(ProvenSet):
 
     Attributes
     ----------
-    statement : Statement
+    statement : SetStatement
         Model, feedback, disturbances and limits.
     V : array (n, n)
         Its columns are the directions to the faces; W = V^-1.

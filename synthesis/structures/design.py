@@ -346,7 +346,9 @@ class _StructureSearch:
         )
 
     def function(self, x: Array, limit: float = math.inf) -> Value:
-        """The logarithm of the largest gain over its bound, at the conditions; see `Loops.gain`."""
+        """The logarithm of the largest gain over its bound, at the conditions; see
+        `StructureLoops.gain`.
+        """
         value, active = self.loops.gain(x, self.known, limit)
         if math.isfinite(active.gain):
             self.known = active

@@ -65,7 +65,7 @@ class LoopEquipment:
 
     Examples
     --------
-    >>> Equipment(period=0.02, delay=1).count
+    >>> LoopEquipment(period=0.02, delay=1).count
     8
     """
 

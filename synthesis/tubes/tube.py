@@ -90,7 +90,7 @@ class Tube:
     P : array (k, n, n)
         At the k nodes of the airspeed, or of another scheduling command, linear between, in SI
         units; the search's last ones where nothing was proven.
-    cells : tuple of Cell
+    cells : tuple of CommandCell
         Parts of the commands, each with a proof of its own.
     factors : array (cells, n, n)
         The deviations e = factor z, |z| <= 1, over which the equations are enclosed.

@@ -10,6 +10,8 @@ from known_vehicles import Vehicle
 from scipy.stats import chi2
 
 import identification as idn
+from identification.estimators.symmetric_root import symmetric_root
+from identification.judge import coefficient_covariance
 from identification.structure.regressors import stacked
 from symheli.errors import InputError
 from symheli.records import FlightRecord
@@ -157,3 +159,21 @@ def test_known_kinematics_have_that_of_their_regression_and_it_is_no_proof_by_le
     assert by_instruments.covariance.shape == (6, n, 6, n)
     assert by_instruments.uncertain().probability == 0.95
     assert idn.fit(vehicle.kin, record, "ridge").covariance is None
+
+
+def test_draws_do_not_depend_on_the_signs_of_eigenvectors(monkeypatch):
+    rng, plain = np.random.default_rng(0), np.linalg.eigh
+    M = rng.normal(size=(5, 3))
+    covariance = M @ M.T
+    root = symmetric_root(covariance)
+    # three of five directions have a variance: the root is exact to rounding of its square root
+    np.testing.assert_allclose(root @ root, covariance, atol=1e-12)
+
+    def turned(matrix):
+        values, vectors = plain(matrix)
+        return values, vectors * [1, -1, 1, -1, -1]
+
+    arguments = (np.zeros((5, 1)), covariance.reshape(1, 5, 1, 5), np.ones((5, 1), bool), 4, 1)
+    before = coefficient_covariance.drawn(*arguments)
+    monkeypatch.setattr(np.linalg, "eigh", turned)
+    np.testing.assert_allclose(coefficient_covariance.drawn(*arguments), before, rtol=0, atol=1e-12)
