@@ -6,23 +6,21 @@ tubes; the planar VTOL.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from datetime import date
-from typing import Any, cast
+from typing import Any
 
-import casadi
 import numpy as np
-from scipy.linalg import expm
 
 from evidence import tube_gains, tube_loops
 from evidence.planar_vtol import tubes as planar_vtol
 from evidence.tables import DOCS, keep, kept_rows, markdown
+from evidence.tube_flights import from_its_border, worst
 from symheli import Helicopter
 from symheli.errors import InputError
 from synthesis import Tube, tube
 from synthesis.tubes.deviations import CommandCell, Deviations
-from synthesis.tubes.reference import TUBE_SIZES, Reference, moving
+from synthesis.tubes.reference import TUBE_SIZES, moving
 
 Array = np.ndarray
 
@@ -45,12 +43,6 @@ INTERVALS = (3.0, 5.0, 7.0, 8.0, 9.0, 10.0, 12.0)
 """Where remainders are shown, m/s."""
 SMALL_TUBE = 0.1
 """Its half widths, in units of `TUBE_SIZES`."""
-STEP = 0.005
-"""Of Runge and Kutta's method, s; the fastest pole of the loops is near -40 1/s."""
-HORIZON = 1000
-"""Steps of a flight in the worst gusts."""
-DIRECTIONS = 60
-"""In which the deviation is driven."""
 
 
 def largest(heli: Helicopter, airspeed: float) -> tuple[float, Tube | None]:
@@ -61,126 +53,6 @@ def largest(heli: Helicopter, airspeed: float) -> tuple[float, Tube | None]:
         trial = tube(heli, airspeed, gust=GUSTS[middle])
         low, high, found = (middle, high, trial) if trial.proven else (low, middle, found)
     return (GUSTS[low] if found else 0.0), found
-
-
-def flown(
-    found: Tube,
-    e: Array,
-    gust: Callable[[int], Array],
-    steps: int,
-    command: Command | None = None,
-    step: float = STEP,
-) -> Array:
-    """The largest e'P e of each nonlinear flight (N,) from deviations e (N, n) in gusts gust(k) (N,
-    3), m/s, along a command; by default the first airspeed is held.
-
-    Runge and Kutta's method of order 4.
-    """
-    loop, count = found.deviations, len(e)
-    reference = loop.reference
-    rhs = loop.rate.map(count)
-    command = command or Command.held(found, count)
-
-    def rate(e: Array, w: Array, t: float) -> Array:
-        p, *rest = command.at(t)
-        i, s = reference.place(p)
-        size = w.T / (loop.gust or 1.0)
-        return np.asarray(rhs(e.T, size, np.stack([s, *rest]), reference.data[i].T)).T
-
-    most = np.zeros(count)
-    for k in range(steps):
-        w, t = gust(k), k * step
-        a = rate(e, w, t)
-        b = rate(e + step / 2 * a, w, t + step / 2)
-        c_ = rate(e + step / 2 * b, w, t + step / 2)
-        e = e + step / 6 * (a + 2 * b + 2 * c_ + rate(e + step * c_, w, t + step))
-        P = found.along(command.at(t + step)[0])
-        most = np.maximum(most, np.einsum("ki,kij,kj->k", e, P, e))
-    return most
-
-
-@dataclass(frozen=True)
-class Command:
-    """Commanded airspeeds middle + size sin(rate t + phase), arrays (N,): m/s, rad/s, rad."""
-
-    middle: Array
-    size: Array
-    rate: Array
-    phase: Array
-
-    @classmethod
-    def held(cls, found: Tube, count: int, airspeed: float | None = None) -> Command:
-        """An airspeed for all, by default the first."""
-        p = found.nodes[0] if airspeed is None else airspeed
-        zero = np.zeros(count)
-        return cls(zero + p, zero, zero, zero)
-
-    @classmethod
-    def drawn(cls, found: Tube, count: int, rng: np.random.Generator) -> Command:
-        """As large as range and limits allow, of rates from slow to fast."""
-        low, high = found.nodes[0], found.nodes[-1]
-        rate = np.exp(rng.uniform(np.log(0.1), np.log(4.0), count))
-        a, j, b = cast(Reference, found.deviations.reference).limits
-        size = np.minimum.reduce([a / rate, j / rate**2, b / rate**3, 0 * rate + (high - low) / 2])
-        size = size if high > low else 0 * rate
-        middle = rng.uniform(low + size, high - size)
-        return cls(middle, size, rate, rng.uniform(0, 2 * np.pi, count))
-
-    def at(self, t: float) -> tuple[Array, Array, Array, Array]:
-        """p, its first three derivatives, (N,); the last 0 where the jerk may jump."""
-        angle, rate = self.rate * t + self.phase, self.rate
-        sine, cosine = self.size * np.sin(angle), self.size * np.cos(angle)
-        return self.middle + sine, rate * cosine, -(rate**2) * sine, -(rate**3) * cosine
-
-
-def from_its_border(found: Tube, count: int, seconds: float) -> float:
-    """The largest sqrt(e'P e) of flights that start on the border of the tube, in gusts of full
-    size that change at random, slowly and fast, along commands as large as allowed.
-    """
-    rng = np.random.default_rng(0)
-    command = Command.drawn(found, count, rng)
-    P = found.along(command.at(0.0)[0])
-    e = rng.standard_normal((count, P.shape[-1]))
-    e = np.linalg.solve(np.swapaxes(np.linalg.cholesky(P), 1, 2), e[..., None])[..., 0]
-    e /= np.sqrt(np.einsum("ki,kij,kj->k", e, P, e))[:, None]
-    held, w = rng.integers(1, 100, count), np.zeros((count, 3))
-
-    def gust(k: int) -> Array:
-        new = rng.standard_normal((count, 3))
-        new *= found.deviations.gust / np.linalg.norm(new, axis=1, keepdims=True)
-        change = k % held == 0
-        w[change] = new[change]
-        return w.copy()
-
-    step = 2 * STEP
-    return float(flown(found, e, gust, round(seconds / step), command, step).max() ** 0.5)
-
-
-def worst(found: Tube, airspeed: float | None = None) -> float:
-    """The largest sqrt(e'P e) of nonlinear flights from the reference at an airspeed (by default
-    the first), each in the gust that drives the linear loop furthest in one direction.
-    """
-    loop, p = found.deviations, found.nodes[0] if airspeed is None else airspeed
-    i, s = loop.reference.place([p])
-    c, data = np.array([s[0], 0, 0, 0]), loop.reference.data[i[0]]
-    e, w = casadi.SX.sym("e", len(loop.states)), casadi.SX.sym("w", 3)
-    rate = loop.rate(e, w, c, data)
-    slopes = casadi.Function("AE", [e, w], [casadi.jacobian(rate, e), casadi.jacobian(rate, w)])
-    A, E = (np.asarray(m) for m in slopes(np.zeros(len(loop.states)), np.zeros(3)))
-    root = np.linalg.cholesky(found.at(p))
-    rng = np.random.default_rng(0)
-    drawn = rng.standard_normal((DIRECTIONS - 2 * len(A), len(A)))
-    unit = np.vstack([np.eye(len(A)), -np.eye(len(A)), drawn])
-    adjoint = (root @ unit.T).T  # direction of e'P e at the end
-    back, rows = expm(A.T * STEP), []
-    for _ in range(HORIZON):
-        rows.append(adjoint @ E)
-        adjoint = adjoint @ back.T
-    history = np.array(rows[::-1])
-    history *= loop.gust / np.maximum(np.linalg.norm(history, axis=-1, keepdims=True), 1e-300)
-    command = Command.held(found, len(unit), p)
-    start = np.zeros((len(unit), len(A)))
-    return float(flown(found, start, lambda k: history[k], HORIZON, command).max() ** 0.5)
 
 
 def table(vehicles: Sequence[str], airspeeds: Sequence[float]) -> str:
@@ -317,8 +189,8 @@ def main() -> None:
         ),
         "remainders": lambda: remainders(INTERVALS),
         "gains": tube_gains.table,
-        "loops": lambda: tube_loops.table(tube_loops.CASES, worst, from_its_border),
-        "governed": lambda: tube_loops.table(tube_loops.GOVERNED, worst, from_its_border),
+        "loops": lambda: tube_loops.table(tube_loops.CASES),
+        "governed": lambda: tube_loops.table(tube_loops.GOVERNED),
         "vtol": planar_vtol.table,
     }
     if given.quick:

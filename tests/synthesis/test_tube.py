@@ -14,7 +14,8 @@ from evidence.planar_vtol.tubes import CASES as VTOL
 from evidence.planar_vtol.tubes import motions, sizes
 from evidence.planar_vtol.tubes import proven as vtol_tube
 from evidence.tables import DOCS, kept_rows
-from evidence.tubes import _chosen, from_its_border, transitions, worst
+from evidence.tube_flights import from_its_border, worst
+from evidence.tubes import _chosen, transitions
 from studies.cli import main
 from symheli import Helicopter
 from symheli.enclosure import AffineForm, SegmentAverages, equations

@@ -8,8 +8,8 @@ import pytest
 from scipy.linalg import expm
 
 import symheli
-from evidence.tube_loops import EIGHT, FINE, from_border, worst_gust
-from evidence.tubes import from_its_border, worst
+from evidence.tube_flights import from_its_border, worst
+from evidence.tube_loops import EIGHT, FINE
 from symheli import Helicopter, LinearModel, trim
 from symheli.errors import InputError, UnknownNameError
 from symheli.flight import XCELL_SERVOS
@@ -266,8 +266,8 @@ def test_a_governed_helicopter_with_an_observer_stays_in_its_tube(tmp_path):
 
 @pytest.mark.slow
 def test_no_flight_of_the_sampled_loop_leaves_its_tube(sampled):
-    assert from_border(sampled, 100, 1.0) < 1 + 1e-6  # that of the integration
-    assert 0.4 < worst_gust(sampled) < 1
+    assert from_its_border(sampled, 100, 1.0) < 1 + 1e-6  # that of the integration
+    assert 0.4 < worst(sampled) < 1
 
 
 @pytest.mark.slow
