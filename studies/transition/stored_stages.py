@@ -24,13 +24,15 @@ from studies.transition.configuration import Configuration
 from studies.transition.effort import Effort
 from studies.transition.stages import Stage
 from symheli import Helicopter
-from symheli.errors import SymheliError
+from symheli.errors import InputError, SymheliError
 from symheli.values.whole_files import write_bytes
 
 FORMAT = "symheli stage 2"
 STAGES = "stages"
 """Folder of the stored stages, in that of the run."""
 PACKAGES = ("symheli", "identification", "synthesis", "studies")
+FILES = ("tubes",)
+"""Options that name files."""
 LIBRARIES = ("casadi", "numpy", "scipy", "cvxpy", "clarabel")
 
 
@@ -119,10 +121,23 @@ def stage_keys(stages: Iterable[Stage], content: str, effort: Effort) -> dict[st
     """
     keys: dict[str, str] = {}
     for stage in stages:
-        own = [f"{name} = {getattr(effort, name)!r}" for name in sorted(stage.reads)]
+        own = [f"{name} = {_value(effort, name)}" for name in sorted(stage.reads)]
         before = [keys[name] for name in stage.needs]
         keys[stage.name] = _digest((content, stage.name, *own, *before))
     return keys
+
+
+def _value(effort: Effort, name: str) -> str:
+    """An option of the effort, of one that names files what these hold; raises `InputError` for one
+    that cannot be read.
+    """
+    value = getattr(effort, name)
+    if name not in FILES:
+        return repr(value)
+    try:
+        return repr([hashlib.sha256(Path(file).read_bytes()).hexdigest() for file in value])
+    except OSError as error:
+        raise InputError(f"{name}: {error.filename} cannot be read: {error.strerror}") from error
 
 
 def content_key(heli: Helicopter, vehicle: str, seed: int) -> str:

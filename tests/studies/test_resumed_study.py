@@ -26,6 +26,7 @@ from studies.transition.stored_stages import (
     stage_keys,
 )
 from symheli import Helicopter
+from symheli.errors import InputError
 from synthesis import Search, Spline
 
 FIRST = ("baseline", "paper_experiment", "exact_recovery")
@@ -218,6 +219,18 @@ def test_a_changed_entry_changes_the_keys_of_the_stages_it_reaches(change, reach
     before, after = keys(Effort()), keys(replace(Effort(), **change))
     assert {name for name in before if before[name] != after[name]} == reached
     assert not before.keys() ^ after.keys()
+
+
+def test_what_the_files_of_tubes_hold_decides_the_flights_that_are_compared(tmp_path):
+    file = tmp_path / "tube.json"
+    effort = replace(Effort(), tubes=(str(file),))
+    with pytest.raises(InputError, match="cannot be read"):
+        stage_keys(stages.stages(effort), "content", effort)
+    found = []
+    for text in ("one", "another"):
+        file.write_text(text)
+        found.append(stage_keys(stages.stages(effort), "content", effort))
+    assert {n for n in found[0] if found[0][n] != found[1][n]} == {"flown_controllers"}
 
 
 def test_every_entry_of_the_effort_is_read_by_a_stage_and_all_keys_differ():
