@@ -11,12 +11,13 @@ from itertools import product
 import numpy as np
 
 from identification import Experiment, Plan, choose_experiments, compare_experiments
-from studies.output import columns, progress
+from studies.output import columns
 from studies.transition.axes import Axis
 from studies.transition.flights import AMPLITUDE, TOP, autopilot_for
 from symheli import AirspeedSchedule, Excitation, FlightRecord, Helicopter, SymheliError, fly
 from symheli.flight import Autopilot
 from symheli.flight.excitation import Kind
+from symheli.progress import tracked
 
 KINDS: tuple[Kind, ...] = ("multisine", "prbs", "chirp")
 ACCELERATIONS = (1.0, 3.0)
@@ -108,8 +109,7 @@ def design(
     heli = Helicopter.load(vehicle, governor="ideal")
     autopilot = autopilot_for(heli)
     records, lost = {}, {}
-    for candidate in candidates:
-        progress(f"  {candidate.name}")
+    for candidate in tracked("flying candidates", candidates):
         try:
             records[candidate.name] = candidate.fly(heli, axis, autopilot, seed)
         except SymheliError as error:

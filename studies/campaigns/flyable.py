@@ -15,13 +15,13 @@ import numpy as np
 
 from identification import Experiment, Plan, compare_experiments
 from studies.campaigns.experiments import CANDIDATES, Candidate, Comparison
-from studies.output import progress
 from studies.transition.axes import ALL, LATERAL, LONGITUDINAL, SCHEDULING, Axis
 from studies.transition.flights import AMPLITUDE, TOP, autopilot_for
 from symheli import AirspeedSchedule, Excitation, FlightRecord, Helicopter, SymheliError, fly
 from symheli.errors import InputError
 from symheli.flight.excitation import FADE_IN, FADE_OUT
 from symheli.logs.files import text
+from symheli.progress import tracked
 from symheli.values.whole_files import write_text
 
 AXES = {"longitudinal": LONGITUDINAL, "lateral": LATERAL, "all": ALL}
@@ -143,10 +143,9 @@ def sweeps(
     what each tells, and those that were lost, with the reason.
     """
     made, found, lost = [], [], {}
-    for part in SPEEDS:
+    for part in tracked("finding the largest sweeps", SPEEDS):
         for amplitude in (1.5, 1.0, 0.5, 0.25):
             sweep = Sweeps(axis, part * TOP, amplitude)
-            progress(f"  {sweep.name}")
             try:
                 record = sweep.fly(heli)
             except SymheliError as error:

@@ -18,9 +18,9 @@ from studies.campaigns.campaign import Campaign
 from studies.campaigns.run import columns_of
 from studies.campaigns.runners import Runner
 from studies.campaigns.trials.pays import AXES, MODELS, TRIAL, fit_of, paying
-from studies.output import progress
 from studies.transition.axes import Axis
 from studies.transition.flights import NOISE_DB, TransitionPlan
+from symheli.progress import tracked
 
 CONDITIONS = {
     "still air, no noise": TransitionPlan(),
@@ -59,8 +59,7 @@ def where_scheduling_pays(
     """In each condition fly with the default seed and `seeds` others, fit, and judge on another
     transition; a case is the flights of a seed, kept in the dataset at `path` where one is given.
     """
-    for condition, plan in conditions.items():
-        progress(f"  {condition}")
+    for condition, plan in tracked("conditions", conditions.items()):
         fixed = {
             "vehicle": vehicle,
             "noise_db": math.inf if plan.noise_db is None else plan.noise_db,

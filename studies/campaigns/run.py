@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import math
 import os
-import time
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError, Future
@@ -20,13 +19,10 @@ from studies.campaigns.campaign import Campaign
 from studies.campaigns.dataset import CampaignDataset
 from studies.campaigns.runners import Runner, answers
 from studies.campaigns.trial import Trial, TrialOutcome, Value, reason_of
-from studies.output import progress
 from studies.transition.stored_stages import code_digest
 from symheli.errors import DataWarning, SymheliError
+from symheli.progress import task
 from symheli.values.arrays import Array
-
-PROGRESS_INTERVAL = 2.0
-"""Least time between two lines of progress, s."""
 
 
 def run(
@@ -91,13 +87,9 @@ def run(
             DataWarning,
             stacklevel=2,
         )
-    lines = _ProgressLines(
-        len(rows), len(rows) - len(missing), sum(r in failed for r in rows if not again)
-    )
     cases = [dataset.cases[row].parameters for row in missing]
     for i, outcome in outcomes(campaign.trial, cases, on):
         dataset.write(missing[i], outcome)
-        lines.of(outcome)
     return dataset
 
 
@@ -113,14 +105,12 @@ def columns_of(campaign: Campaign, on: Runner, path: Path | None = None) -> dict
         values = dataset.values[rows]
         failed = {i: reasons[row] for i, row in enumerate(rows) if row in reasons}
     else:
-        lines = _ProgressLines(len(campaign.cases), 0, 0)
         values = np.full((len(campaign.cases), len(campaign.trial.units)), np.nan)
         failed = {}
         for i, one in outcomes(campaign.trial, [c.parameters for c in campaign.cases], on):
             values[i] = one.values
             if one.reason:
                 failed[i] = one.reason
-            lines.of(one)
     if failed:
         first = min(failed)
         raise SymheliError(
@@ -138,6 +128,17 @@ def outcomes(
 
     Raises `SymheliError` where the runner is gone, or cannot hand a case to a worker.
     """
+    failed = 0
+    with task(f"cases of {trial.name}", len(cases)) as shown:
+        for i, outcome in _outcomes(trial, cases, on):
+            failed += bool(outcome.reason)
+            shown.step(f"{failed} failed" if failed else "")
+            yield i, outcome
+
+
+def _outcomes(
+    trial: Trial, cases: Sequence[Mapping[str, Value]], on: Runner
+) -> Iterator[tuple[int, TrialOutcome]]:
     todo = list(range(len(cases)))
     for attempt in range(on.tries):
         lost = []
@@ -174,30 +175,3 @@ def _unable(trial: Trial, error: BaseException) -> SymheliError:
         f"a worker cannot run {trial.name} ({reason_of(error)}): it needs this project, and what"
         " defines the trial, in the same version"
     )
-
-
-class _ProgressLines:
-    """Progress of a campaign on the terminal: a line at once, then at intervals, and at the end."""
-
-    def __init__(self, count: int, there: int, failed: int):
-        self._count, self._there, self._done, self._failed = count, there, there, failed
-        self._begin = self._last = time.monotonic()
-        self._print(f"{there} are there" if there else "")
-
-    def of(self, outcome: TrialOutcome) -> None:
-        """One more."""
-        self._done += 1
-        self._failed += bool(outcome.reason)
-        now = time.monotonic()
-        left = self._count - self._done
-        if now - self._last >= PROGRESS_INTERVAL or not left:
-            self._last = now
-            each = (now - self._begin) / (self._done - self._there)
-            self._print(
-                f"about {each * left:.0f} s to go" if left else f"{now - self._begin:.0f} s"
-            )
-
-    def _print(self, more: str) -> None:
-        failed = f"{self._failed} failed" if self._failed else ""
-        line = ", ".join(filter(None, (f"{self._done} of {self._count} cases", failed, more)))
-        progress(f"  {line}")
