@@ -86,6 +86,7 @@ LONG = (
     "synthesis-StructuredController",
     "synthesis-Tube",
     "synthesis-certify_sampled",
+    "synthesis-coverage",
     "synthesis-decay_rate",
     "synthesis-estimator",
     "synthesis-frozen_gain",

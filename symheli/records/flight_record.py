@@ -41,6 +41,9 @@ GAP = 1.5
 MAX_UPSAMPLING = 1e4
 """Largest number of samples `resample` may produce, relative to the record."""
 
+CONDITIONS = ("wind", "mass", "governor", "servos")
+"""What `meta["flown"]` of a record says in words of a simulated flight."""
+
 
 @dataclass(frozen=True, eq=False)
 class FlightRecord:

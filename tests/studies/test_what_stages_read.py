@@ -14,10 +14,10 @@ ASKING = [
 ]
 
 
-@pytest.mark.slow(but="longitudinal-whole")
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "effort",
-    [Effort(), pytest.param(Effort.look(), marks=pytest.mark.slow)],
+    [Effort(), Effort.look()],
     ids=["whole", "look"],
 )
 @pytest.mark.parametrize("stage", ASKING, ids=lambda stage: stage.name)

@@ -312,6 +312,7 @@ def test_no_command_drives_a_governed_model_out_of_its_set():
             assert np.sum(most > 1) > 450
 
 
+@pytest.mark.slow
 def test_laws_that_switch_inside_their_sets_keep_every_limit():
     bounds = {"state_bounds": {"x": 2.0, "v": 1.0}, "input_bounds": {"u": 0.5}}
     gains = ([[-0.1, -0.5]], [[-4.0, -4.0]])
