@@ -101,15 +101,6 @@ class PolynomialMatrix:
             out = out + np.multiply.outer(weights, np.asarray(M, dtype=float))
         return cls(box, out)
 
-    def to_monomials(self) -> dict[tuple[int, ...], Array]:
-        """Return {exponents: matrix}, every exponent up to the degrees; ill-conditioned for high
-        degrees on a box far from 0.
-        """
-        c = self.coefficients
-        for i, (d, bounds) in enumerate(zip(self.degrees, self.box, strict=True)):
-            c = _along(np.linalg.inv(_power_to_bernstein(d, *bounds)), c, i)
-        return {e: c[e] for e in np.ndindex(*(d + 1 for d in self.degrees))}
-
     @property
     def degrees(self) -> tuple[int, ...]:
         """Degree in each parameter."""

@@ -113,10 +113,6 @@ class Product(FunctionSpace):
         out[tuple(np.array(self.indices).T)] = coefficients
         return out
 
-    def from_tensor(self, tensor: Array) -> Array:
-        """The inverse of `tensor`, without the products left out."""
-        return tensor[tuple(np.array(self.indices).T)]
-
     def _values(self, p: Array, derivative: Any) -> Array:
         orders = (0,) * self.dimension if derivative == 0 else derivative
         if not isinstance(orders, tuple) or len(orders) != self.dimension:
