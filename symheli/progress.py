@@ -1,7 +1,7 @@
 """Progress of long computations, reported to listeners; this module shows nothing itself.
 
-Work tells its tasks and their steps; `watched` names the listener, for everything that is called
-within, in the same thread. Without one, telling costs next to nothing.
+A computation reports its tasks and their steps; `watched` sets the listener for everything that is
+called within it, in the same thread. Without a listener a report costs next to nothing.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ class Progress:
     task : str
         What is done, such as "trimming and linearizing".
     done, total : float
-        Steps finished, and how many there will be; None: nobody knows.
+        Steps finished, and the number of all steps; None where that is not known.
     percent : bool
-        The steps are of no interest, their share of the total is.
+        Show the percentage instead of the number of steps.
     note : str
         What the last step found.
     depth : int
-        How many tasks of the listener it is a part of.
+        Number of reported tasks that it is a part of.
     over : bool
-        It has ended, finished or not: nothing more will be told of it.
+        The task has ended, finished or not.
 
     Examples
     --------
@@ -115,17 +115,17 @@ class Task:
             listener(self._at)
 
     def to(self, done: float, note: str = "") -> None:
-        """So many steps are finished."""
+        """Report that `done` steps are finished."""
         if self._listener is not None:
             self._at = replace(self._at, done=done, note=note)
             self._listener(self._at)
 
     def step(self, note: str = "") -> None:
-        """One step more is finished."""
+        """Report one more finished step."""
         self.to(self._at.done + 1, note)
 
     def end(self) -> None:
-        """Nothing more will be told."""
+        """Report that the task has ended."""
         if self._listener is not None:
             self._listener(replace(self._at, over=True))
 

@@ -69,7 +69,7 @@ TINY = 1e-24
 """Smallest mean square that is divided by, in SI units."""
 
 DRAWS_TRIED = 50
-"""Number of draws tried for each that is asked."""
+"""Number of draws tried for each requested one."""
 
 WHITE = 0.3
 """Correlation of residuals from sample to sample above which the model leaves something out."""

@@ -124,8 +124,8 @@ def fit(
     ConvergenceWarning
         An iteration does not settle.
     DataWarning
-        The scheduling signal tells the model its own answer, samples are means and the delay is not
-        0, or instruments are weak.
+        The scheduling signal contains the outputs that the model is to predict, samples are means
+        and the delay is not 0, or instruments are weak.
 
     References
     ----------

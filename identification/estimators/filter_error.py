@@ -58,7 +58,7 @@ DIFFERENCE = 1e-3
 """Step of central differences by an unknown of actuators or wind, in its prior deviation."""
 
 WIND_TOLD = 0.5
-"""Largest standard deviation of a wind that counts as told by the flights, m/s."""
+"""Largest standard deviation of a wind that counts as determined by the flights, m/s."""
 
 FARTHEST = 4.0
 """Largest move of late sensors, in their prior deviation."""

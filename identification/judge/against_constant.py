@@ -69,7 +69,7 @@ class AgainstConstant:
 
     `hold_p`: one step and 1 s hold p from the start of each prediction, because it is measured.
     `leak`: share of what is new in p that the outputs of the same instant explain; beyond a half
-    free runs, which follow p, are told what they predict. `trim_note`: why the trim moves in the
+    free runs, which follow p, know what they predict. `trim_note`: why the trim moves in the
     model that is judged, or not.
 
     Examples
@@ -113,8 +113,8 @@ class AgainstConstant:
         return self.scheduled.structure.basis.ranges[0]
 
     @property
-    def told(self) -> bool:
-        """Whether a free run is told by p what it has to predict."""
+    def known_from_p(self) -> bool:
+        """Whether p contains what a free run has to predict."""
         return self.hold_p and self.leak > MADE_OF_OUTPUTS
 
     def verdict(self) -> list[str]:
@@ -158,8 +158,8 @@ class AgainstConstant:
         return "better" in found and "worse" not in found
 
     def _differences(self, output: str) -> dict[str, str]:
-        """{horizon: better, worse or no different}; free runs that are told their answer, or of no
-        use either way, are no different.
+        """{horizon: better, worse or no different}; free runs that know their answer from p, or
+        of no use either way, are no different.
         """
         if output not in self.scheduled.outputs:
             raise UnknownNameError("output", output, map(str, self.scheduled.outputs))
@@ -169,7 +169,7 @@ class AgainstConstant:
             )
         lpv, lti = self._fits(output)
         out = {h: difference(lpv[h], lti[h]) for h in HORIZONS[1:]}
-        return {**out, HORIZONS[-1]: "not counted"} if self.told else out
+        return {**out, HORIZONS[-1]: "not counted"} if self.known_from_p else out
 
     def _sentence(self, output: str) -> str:
         lpv, lti = self._fits(output)

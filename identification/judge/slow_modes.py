@@ -45,7 +45,7 @@ class SlowMode:
     standard_error : float
         Of the pole, from that of the coefficients, 1/s.
     shift : float
-        How far it moves when least squares is told that the residuals are noise of the sensors,
+        How far it moves when least squares takes the residuals as noise of the sensors,
         1/s.
 
     Examples

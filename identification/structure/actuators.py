@@ -90,7 +90,7 @@ class Actuators:
         }
 
     def moved(self, z: Sequence[float]) -> Actuators:
-        """Return these at `z` in their prior deviations from what is told."""
+        """Return these at `z` in their prior deviations from the given values."""
         point = self.point(z)
         servos = self.servos and {u: faster(s, point["bandwidth"]) for u, s in self.servos.items()}
         return replace(self, servos=servos, delay=point["delay"])

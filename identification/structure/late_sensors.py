@@ -60,7 +60,7 @@ class LateSensors:
         return ("delay",) if self.deviation else ()
 
     def moved(self, z: Sequence[float]) -> LateSensors:
-        """Return these at `z` in the prior deviation of the delay from what is told."""
+        """Return these at `z` in the prior deviation of the delay from its given value."""
         return replace(self, delay=self.delay + self.deviation * sum(z))
 
     def found(self, z: Sequence[float], deviations: Sequence[float]) -> dict[str, Estimate]:
@@ -72,7 +72,7 @@ class LateSensors:
         return {"delay": (self.moved(z).delay, self.deviation * float(deviations[0]))}
 
     def settled(self, estimates: dict[str, Estimate]) -> LateSensors:
-        """Return these with the estimated delay in place of what was told, as a known one."""
+        """Return these with the estimated delay in place of the given one, as a known one."""
         delay, _ = estimates.get("delay", (self.delay, 0.0))
         return replace(self, delay=delay, deviation=0.0)
 

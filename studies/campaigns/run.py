@@ -40,7 +40,7 @@ def run(
     Parameters
     ----------
     campaign : Campaign
-        What is asked.
+        The cases.
     path : str or path
         Folder of the dataset, by habit named *.zarr; made where it is not there.
     on : Runner

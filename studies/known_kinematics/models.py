@@ -26,8 +26,8 @@ CONSTANT, ALONE, BOTH = "constant coefficients", "over airspeed", "over airspeed
 
 
 def structure(turbulent: bool = False) -> KinematicARX:
-    """Cubic in airspeed, quadratic in acceleration, of total degree 3; in turbulence, which leaves
-    less to be told, quadratic in airspeed alone.
+    """Cubic in airspeed, quadratic in acceleration, of total degree 3; in turbulence, where
+    less can be determined, quadratic in airspeed alone.
     """
     if turbulent:
         return KinematicARX(INPUTS, SCHEDULING[0], basis=Polynomial(2, 0.0, TOP))

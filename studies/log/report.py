@@ -262,15 +262,15 @@ def _horizons(result: AgainstConstant) -> list[str]:
         return []
     if not result.hold_p:
         return [f"{p} is taken as known ahead, as a command is"]
-    told = (
+    known = (
         f"; {100 * result.leak:.0f} % of what is new in it is in the outputs of the same instant:"
-        " free runs are told what they predict, and are not counted"
-        if result.told
+        " free runs know what they predict, and are not counted"
+        if result.known_from_p
         else ""
     )
     return [
         f"{p} is taken as measured: one step and 1 s hold it from the start of each prediction,"
-        f" free runs follow it{told}"
+        f" free runs follow it{known}"
     ]
 
 

@@ -54,7 +54,7 @@ class AxisModels:
 
 
 _kept: list[tuple[tuple[Any, ...], dict[str, Any]]] = []
-"""The models last asked for and what they are with the airspeed held: results are written after
+"""The models of the last call and what they are with the airspeed held: results are written after
 every stage, and most stages leave the models as they are.
 """
 

@@ -31,7 +31,7 @@ STILL = 1e-6
 @dataclass(frozen=True, kw_only=True, eq=False)
 class AtSpeed:
     """One airspeed: the trim, the least stable pole (rad/s), the rotor modes (rad/s) by name, and
-    margins and bandwidths; None where the model is none that they are told of.
+    margins and bandwidths; None where the model has no such axis.
     """
 
     trim: TrimPoint

@@ -41,8 +41,8 @@ def fly(
         The measured states, the flapping angles a1 b1 and rotor states (true), the four total
         inputs, the excitation as e_d_lon .., `airspeed` (true, of the air), `airspeed_command`,
         `acceleration_command`, and the trim it is held to as u_reference .. d_ped_reference; with
-        servos or a delay the inputs are the deflections reached, and d_lon_command .. what was
-        asked; with a changing wind also wind_n, wind_e, wind_d. `meta["plan"]` flies it again,
+        servos or a delay the inputs are the deflections reached, and d_lon_command .. the
+        commands; with a changing wind also wind_n, wind_e, wind_d. `meta["plan"]` flies it again,
         `meta["flown"]` says wind, mass, governor and servos.
 
     Raises

@@ -61,7 +61,7 @@ class FlightPlan:
         Sample period of the record, s; a whole multiple of the controller's.
     controller : object, optional
         An `Autopilot` (gains over airspeed), a LinearModel, an LPVStateSpace or a python-control
-        system (see `ScheduledController` for what their signals mean), or an object that is asked
+        system (see `ScheduledController` for what their signals mean), or an object that is called
         at every sample, with its state outside (`PureController`) or within, that is dt, reset()
         and step(measured, reference, p) (`StatefulController`). Default: an LQR designed at
         several airspeeds.

@@ -62,7 +62,7 @@ class TableController:
     integrates starts there and is then u(k) = u(k-1) + C x + D e within its limits, at which the
     integration stops. The parameter in use moves at the certified rate at most, whatever is read:
     see `ParameterMonitor`. `fly` provides the commanded airspeed and acceleration, and by `follow`
-    the readings; a table over anything else, as a Mach number, is told its parameter by `update`.
+    the readings; a table over anything else, as a Mach number, gets its parameter by `update`.
     What it keeps in flight is a `TableState`: `init` is the first, `update` and `step` return the
     next.
 

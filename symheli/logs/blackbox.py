@@ -305,8 +305,8 @@ _Rows = dict[str, array]
 
 
 def _frames(data: bytes, header: _Header, reached: Callable[[int], None]) -> tuple[_Rows, bool]:
-    """Frames of one log, I and P together under "I", and whether some were damaged; tells which
-    byte it has `reached`.
+    """Frames of one log, I and P together under "I", and whether some were damaged;
+    `reached` is called with the number of bytes read.
     """
     stream, kinds = _Bytes(data, header.body), header.kinds
     index = kinds["I"].names.index("time")

@@ -138,7 +138,7 @@ _Found = dict[str, dict[str, dict[str, Column]]]
 
 class _Clock:
     """The clock of a file in which it may begin again: s to add to the instants of messages, so
-    that each log is `GAP` behind the log before it, told by the messages of one kind, `name`.
+    that each log is `GAP` behind the log before it, as the messages of one kind, `name`, show.
 
     One instant far ahead of its neighbours is damage, and no new beginning.
     """

@@ -71,11 +71,10 @@ class _State(NamedTuple):
 
 
 def segments(columns: Mapping[str, Column], guesses: Mapping[str, Guess]) -> tuple[Segment, ...]:
-    """Told by the autopilot's messages where the log has them, and by the rates: a vehicle whose
-    rates do not move is at rest, one that turns faster than any helicopter and stops within
-    `AFTER_A_CRASH` has crashed. Holes, in
-    which no rate (of a log without rates, no column) has a sample, lie between segments. Empty
-    where no column has a clock.
+    """Return the segments by the autopilot's messages, where the log has them, and by the rates: a
+    vehicle whose rates do not move is at rest, one that turns faster than any helicopter and stops
+    within `AFTER_A_CRASH` has crashed. Between segments lie holes, in which no rate (of a log
+    without rates, no column) has a sample. Empty where no column has a clock.
     """
     rates = [
         Column(c.time, to_si(guesses[s].unit)[0] * c.values)

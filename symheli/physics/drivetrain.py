@@ -34,7 +34,7 @@ def pi_governor(
     shaft torque)/I_rot.
 
     `shaft_torque` = Q_mr + n_tr Q_tr (N m). The integrator om_i (rad) stops while the throttle is
-    on a stop and pushed further. Conservation of Izz r' + I_rot (Om' + r') asks for -r'; the
+    on a stop and pushed further. Conservation of Izz r' + I_rot (Om' + r') requires -r'; the
     printed + is the option "rotor_reaction".
     """
     error = name("e", par.nominal_speed - Om)

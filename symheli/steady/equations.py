@@ -173,7 +173,7 @@ def steady_equations(heli: Helicopter) -> SteadyEquations:
 
 def numeric(heli: Helicopter, name: Name) -> Numeric:
     """One of the functions with the numbers of this helicopter, in CasADi's virtual machine: for
-    one point nobody waits for a compiler.
+    one point compiling would take longer.
     """
     kept = vars(heli).setdefault("_steady", {})
     if name not in kept:

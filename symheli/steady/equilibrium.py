@@ -34,7 +34,7 @@ class TrimPoint(OperatingPoint):
     airspeed : float
         m/s.
     condition : FlightCondition
-        What was asked.
+        The required flight.
     residual : NamedVector
         Of every equation by state name, in the unit of its derivative.
     wind : NamedVector

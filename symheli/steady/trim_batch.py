@@ -38,7 +38,7 @@ class TrimBatch(OperatingPoints):
     Parameters
     ----------
     conditions : FlightConditions
-        What was asked.
+        The required flights.
     states, inputs, winds : tuple of Signal
         Names and units of what the arrays hold.
     x, u, xdot, residual, wind : array (N, nx), (N, 4), (N, nx), (N, nx), (N, 3)

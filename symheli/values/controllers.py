@@ -8,7 +8,7 @@ from typing import Any, Protocol, runtime_checkable
 from symheli.values.named_vector import NamedVector
 
 Answer = Callable[[NamedVector, NamedVector, NamedVector], Any]
-"""Commands from (measured, reference, p), asked sample after sample of one flight."""
+"""Commands from (measured, reference, p), called sample after sample of one flight."""
 
 
 @runtime_checkable
@@ -16,8 +16,8 @@ class StatefulController(Protocol):
     """A controller that keeps its own state: a sample period, a reset, and a command at every
     sample.
 
-    `fly` asks one flight after the other of such an object; to be flown from several threads at
-    once, each needs its own. A `PureController` needs no such care.
+    Such an object flies one flight after the other; to fly in several threads at once, each
+    thread needs its own. A `PureController` needs no such care.
 
     Examples
     --------
@@ -91,8 +91,8 @@ class PureController(Protocol):
     def step(
         self, state: Any, measured: NamedVector, reference: NamedVector, p: NamedVector
     ) -> tuple[Any, Any]:
-        """Blade pitch commands (4,), rad, at one sample, and the state for the next; what it is
-        told is as a `StatefulController` is.
+        """Blade pitch commands (4,), rad, at one sample, and the state for the next; its
+        arguments are those of a `StatefulController`.
         """
         ...
 

@@ -101,8 +101,8 @@ def output_feedback(
         In so many parts every range is cut at first where the inequalities are imposed; where they
         are violated between, points are added.
     impose : Grid, optional
-        The inequalities hold at these points and are asked for nowhere else, as published designs
-        were made: `promised` is then no bound between the points, `certify` tells.
+        The inequalities are imposed at these points alone, as in published designs: `promised`
+        is then no bound between the points; `certify` proves one.
 
     Returns
     -------

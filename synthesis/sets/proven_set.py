@@ -64,4 +64,4 @@ class ProvenSet(ABC):
     def __str__(self) -> str:
         if not self.proven:
             return f"no invariant set: {self.why}"
-        return self.statement.told(self.form)
+        return self.statement.summary(self.form)

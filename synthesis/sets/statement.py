@@ -1,4 +1,4 @@
-"""What an invariant set is asked to be: model, feedback, disturbances and limits."""
+"""The statement that an invariant set proves: model, feedback, disturbances and limits."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ class SetStatement:
             out.append(Limit(model.inputs[i], bound, 2, self.controls.index(name)))
         return tuple(out)
 
-    def told(self, what: str) -> str:
+    def summary(self, what: str) -> str:
         """What is proven, with the limits and hypotheses, in lines."""
         limited = ", ".join(f"|{limit.signal}| <= {limit.bound:g}" for limit in self.limits)
         lines = (f"- {line}" for line in self.hypotheses)
@@ -131,14 +131,14 @@ class SetStatement:
         """What the statement rests on, in sentences."""
         law = "u = K(p) x with all states known" if self.controls else "the loop as it is given"
         time = "continuous" if self.model.dt is None else "discrete"
-        told = [f"|{w}| <= {a:g}" for w, a in self.disturbance.items()]
+        each = [f"|{w}| <= {a:g}" for w, a in self.disturbance.items()]
         return (
             f"the LPV model, in {time} time; {law}",
             *(
                 motion(s, 0.0 if isinstance(s.rate, str) else s.limit)
                 for s in self.model.parameters
             ),
-            f"disturbances with any history: {', '.join(told)}" if told else "no disturbances",
+            f"disturbances with any history: {', '.join(each)}" if each else "no disturbances",
             *(drifting(self.model) if moves(self.model.parameters) else ()),
             "the state lies in the set at the start",
         )

@@ -1,4 +1,4 @@
-"""What a specification sheet asks of one axis of one frozen loop: a function for each measure, all
+"""Measures of a specification sheet for one axis of one frozen loop: a function for each, all
 on the same `AxisLoop`.
 """
 

@@ -66,11 +66,11 @@ class StructuredController(Controller):
     Attributes
     ----------
     structure : Structure
-        What was free.
+        The gains that were free.
     gains : mapping of str to (n,) array
         Coefficients of every gain in the basis of the structure.
     specifications : tuple of L2
-        What was asked.
+        The requirements.
     reached : tuple of float
         The largest frozen gain of each, as a ratio to its bound.
     stationarity : Stationarity

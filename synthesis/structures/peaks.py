@@ -28,12 +28,12 @@ SAME = 1e-9
 
 STEEP = 100.0
 """Slope of the penalty of a bound that is exceeded, in logarithms of the gain per unit of the gain
-of the structure: steeper than what was seen to be won by exceeding one.
+of the structure: steeper than the largest gain by exceeding one that was seen.
 """
 
 
 SLOW = 10.0
-"""The same of the decay, per unit of what is asked."""
+"""The same of the decay, per unit of the required one."""
 
 TINY = 1e-300
 """In place of a divisor that is zero."""
