@@ -56,9 +56,9 @@ def negative_definite_exactly(F: PolynomialMatrix, cells: int = MAX_BOXES) -> bo
         numbers = nearest(G)
         # a check in floating point that fails saves the exact one
         promising = bool(np.all(np.linalg.eigvalsh(_normalised(numbers))[..., 0] > 0))
-        if promising and all(map(positive_definite, G.reshape(-1, *F.shape))):
+        if promising and positive_definite(G):
             continue
-        if not all(map(positive_definite, G[_corners(G.shape[:m])].reshape(-1, *F.shape))):
+        if not positive_definite(G[_corners(G.shape[:m])]):
             return False
         curvature = _curvature(numbers[None], m)[0]
         if curvature.max() == 0.0:

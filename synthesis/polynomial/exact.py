@@ -8,7 +8,6 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-from scipy import linalg
 
 Array = np.ndarray
 Number = Callable[[float], Any]
@@ -29,15 +28,20 @@ def rational() -> Number:
 
 
 def positive_definite(M: Array) -> bool:
-    """Whether the symmetric matrix of integers or rationals is positive definite; only its lower
-    triangle is read.
+    """Whether the symmetric matrices (..., n, n) of integers or rationals are all positive
+    definite; only their lower triangles are read.
 
     Shown by a congruence with rounded numbers that leaves nearly the identity, where that is
     strictly dominant in its diagonal: a few products of integers. Else all pivots of an elimination
     decide, whose numbers grow with every row.
     """
-    own = _mirrored(integers(M))
-    return (len(own) > MAX_DIRECT_ROWS and _dominant(own)) or _pivots_are_positive(own)
+    own = _mirrored(integers(M).reshape(-1, *M.shape[-2:]))
+    if own.shape[-1] <= MAX_DIRECT_ROWS:
+        return all(map(_pivots_are_positive, own))
+    for each, R in zip(own, _congruences(own), strict=True):
+        if not ((R is not None and _dominant(each, R)) or _pivots_are_positive(each)):
+            return False
+    return True
 
 
 MAX_DIRECT_ROWS = 6
@@ -51,7 +55,7 @@ FLOAT_BITS = 900
 def integers(values: Array) -> Array:
     """Return integers or rationals (...) as integers, all times the same positive number."""
     flat = values.ravel().tolist()
-    if not all(isinstance(v, int) for v in flat):
+    if set(map(type, flat)) != {int}:
         parts = [(int(v.numerator), int(v.denominator)) for v in flat]
         common = math.lcm(*{below for _, below in parts})
         flat = [above * (common // below) for above, below in parts]
@@ -62,48 +66,49 @@ def integers(values: Array) -> Array:
 
 def nearest(whole: Array) -> Array:
     """Return integers as doubles, all times the same power of two where they are large."""
-    bits = max((abs(v).bit_length() for v in whole.ravel().tolist()), default=0)
+    flat = whole.ravel().tolist()
+    bits = max(max(flat).bit_length(), min(flat).bit_length()) if flat else 0
     unit = 1 << max(bits - FLOAT_BITS, 0)
-    return np.array([v / unit for v in whole.ravel().tolist()]).reshape(whole.shape)
+    return np.array([v / unit for v in flat], dtype=float).reshape(whole.shape)
 
 
 def _mirrored(M: Array) -> Array:
-    """Return the symmetric matrix of this lower triangle."""
+    """Return the symmetric matrices of these lower triangles."""
     out = M.copy()
-    rows, columns = np.tril_indices(len(M), -1)
-    out[columns, rows] = out[rows, columns]
+    rows, columns = np.tril_indices(M.shape[-1], -1)
+    out[..., columns, rows] = out[..., rows, columns]
     return out
 
 
-def _dominant(own: Array) -> bool:
-    """Whether R' M R is strictly diagonally dominant, R the rounded inverse of a Cholesky factor in
-    floating point: it is then positive definite, and R regular, so that M is too. Exact, of
-    integers.
+def _congruences(own: Array) -> list[Array | None]:
+    """Return for each symmetric matrix of integers the inverse of its Cholesky factor, transposed,
+    in floating point; None where there is none.
     """
     rounded = nearest(own)
-    size = np.diag(rounded).copy()
-    if not np.all(size > 0):
-        return False
-    size = 1.0 / np.sqrt(size)
+    size = np.diagonal(rounded, axis1=-2, axis2=-1)
     try:
-        factor = np.linalg.cholesky(rounded * size * size[:, None])
+        if not np.all(size > 0):
+            raise np.linalg.LinAlgError
+        size = 1.0 / np.sqrt(size)
+        factors = np.linalg.cholesky(rounded * size[:, None] * size[:, :, None])
     except np.linalg.LinAlgError:
-        return False
-    R = size[:, None] * linalg.solve_triangular(factor, np.eye(len(own)), lower=True).T
+        if len(own) == 1:
+            return [None]
+        return [found for each in own for found in _congruences(each[None])]
+    R = size[:, :, None] * np.swapaxes(np.linalg.inv(factors), -1, -2)
+    return [each if np.all(np.isfinite(each)) else None for each in R]
+
+
+def _dominant(own: Array, R: Array) -> bool:
+    """Whether R' M R is strictly diagonally dominant: M is then positive definite (and R regular).
+    Exact, of integers M and R rounded to `CONGRUENCE_BITS` bits.
+    """
     exponents = np.frexp(np.abs(R).max(axis=0))[1]
-    if not np.all(np.isfinite(R)):
-        return False
     # R is `whole` times a power of two a column
     whole = np.rint(np.ldexp(R, CONGRUENCE_BITS - exponents)).astype(np.int64).astype(object)
     Q = whole.T @ (own @ whole)
-    steps = [1 << int(e) for e in exponents - exponents.min()]
-    for i, row in enumerate(Q):
-        others = sum(
-            abs(q) * step for j, (q, step) in enumerate(zip(row, steps, strict=True)) if j != i
-        )
-        if not row[i] * steps[i] > others:
-            return False
-    return True
+    steps = np.array([1 << int(e) for e in exponents - exponents.min()], dtype=object)
+    return bool(np.all(2 * np.diagonal(Q) * steps > (np.abs(Q) * steps).sum(axis=1)))
 
 
 def _pivots_are_positive(own: Array) -> bool:
