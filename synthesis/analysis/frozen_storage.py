@@ -31,7 +31,7 @@ gain is proven: the closer to it, the more knots are needed.
 """
 MIN_SEGMENTS, MAX_SEGMENTS = 8, 1024
 """Least number of segments to begin with, and largest number."""
-MAX_STATES = 24
+MAX_STATES = 40
 """Number of states up to which the centres take less time than a program over the range."""
 MIN_FRACTION = 1e-4
 """Least width of a segment, as a fraction of the range."""
@@ -62,7 +62,7 @@ def of_frozen_models(problem: ScaledProblem, level: float) -> SplineLyapunov | N
     with task("storage functions of the frozen models") as progress:
         first = []
         for p in knots:
-            P = _any(_frozen(problem, p), level)
+            P = _any(_frozen(problem, p), level, problem.discrete)
             if P is None:
                 return None
             first.append(P)
@@ -106,10 +106,12 @@ def _too_fast(
     ends = [_central(problem, float(knots[j]), level, bound, [starts[j]]) for j in (k, k + 1)]
     if ends[0] is None or ends[1] is None:
         return True
-    drift = problem.scaled_rate * (ends[1] - ends[0]) / (knots[k + 1] - knots[k])
+    fastest = problem.scaled_rate if problem.lpv.dt is None else problem.step
+    drift = fastest * (ends[1] - ends[0]) / (knots[k + 1] - knots[k])
     for p, P in zip(knots[k : k + 2], (ends[0], ends[1]), strict=True):
         model = _frozen(problem, float(p))
-        if not all(_definite(_dissipation(model, P, level, nu)) for nu in (-drift, drift)):
+        moving = (_dissipation(model, P, level, problem.discrete, nu) for nu in (-drift, drift))
+        if not all(map(_definite, moving)):
             return True
     return False
 
@@ -118,9 +120,9 @@ def _frozen(problem: ScaledProblem, p: float) -> Matrices:
     return problem.units.of_model(problem.lpv.at(min(p, problem.lpv.scheduling.high)))
 
 
-def _any(model: Matrices, level: float) -> Array | None:
+def _any(model: Matrices, level: float, discrete: bool = False) -> Array | None:
     """Return a storage function of a frozen model, None where rounding leaves none."""
-    storage = strict_storage(*model, level, discrete=False)
+    storage = strict_storage(*model, level, discrete=discrete)
     if storage is None:
         return None
     back = linalg.inv(storage.T)
@@ -134,14 +136,33 @@ def central_dissipation(model: Matrices, level: float) -> Array:
     n, m = model.B.shape
     P = _any(model, level)
     if P is not None:
-        P = analytic_centre(*model, level, MAX_SIZE * float(linalg.eigvalsh(P)[-1]), P)
+        P = analytic_centre(model, level, MAX_SIZE * float(linalg.eigvalsh(P)[-1]), P)
     return np.zeros((n + m, n + m)) if P is None else _dissipation(model, P, level)
 
 
-def _dissipation(model: Matrices, P: Array, level: float, drift: Array | float = 0.0) -> Array:
-    A, B, C, D = model
-    top, side = P @ A + A.T @ P + C.T @ C + drift, P @ B + C.T @ D
-    return -np.block([[top, side], [side.T, D.T @ D - level**2 * np.eye(B.shape[1])]])
+def _dissipation(
+    model: Matrices, P: Array, level: float, discrete: bool = False, drift: Array | None = None
+) -> Array:
+    """Return the quadratic form of state and input that is dissipated while P changes by `drift`
+    per unit of time or sample.
+    """
+    out = np.hstack([model.C, model.D])
+    n, m = model.B.shape
+    supply = np.diag(np.r_[np.zeros(n), np.full(m, level**2)]) - out.T @ out
+    return supply - _change(model, P, discrete, drift)
+
+
+def _change(model: Matrices, P: Array, discrete: bool, drift: Array | None = None) -> Array:
+    """Return the change of V = x'Px per unit of time or sample as a quadratic form of state and
+    input, for one P or several (..., n, n) which change by `drift`.
+    """
+    n, m = model.B.shape
+    drift = np.zeros((n, n)) if drift is None else drift
+    now, into = np.eye(n, n + m), np.hstack([model.A, model.B])
+    if discrete:
+        return into.T @ (P + drift) @ into - now.T @ P @ now
+    half = now.T @ P @ into
+    return half + np.swapaxes(half, -1, -2) + now.T @ drift @ now
 
 
 def _central(
@@ -150,15 +171,15 @@ def _central(
     """Return the centre at p from the first of the `starts` that is a storage function here."""
     model = _frozen(problem, p)
     for start in starts:
-        P = analytic_centre(*model, level, bound, start)
+        P = analytic_centre(model, level, bound, start, problem.discrete)
         if P is not None:
             return P
-    start = _any(model, level)
-    return None if start is None else analytic_centre(*model, level, bound, start)
+    start = _any(model, level, problem.discrete)
+    return None if start is None else analytic_centre(model, level, bound, start, problem.discrete)
 
 
 def analytic_centre(
-    A: Array, B: Array, C: Array, D: Array, level: float, bound: float, start: Array
+    model: Matrices, level: float, bound: float, start: Array, discrete: bool = False
 ) -> Array | None:
     """Return the analytic centre of the P > 0 below `bound` that satisfy the bounded real lemma at
     this level; None where `start` is not inside.
@@ -166,14 +187,14 @@ def analytic_centre(
     It maximises the sum of log det of the three matrices by Newton's method with a line search
     (Boyd and Vandenberghe, "Convex Optimization", 2004, section 9.6).
     """
-    n, m = B.shape
+    n = len(model.A)
     E = basis(n)
-    of_supply = np.zeros((len(E), n + m, n + m))
-    of_supply[:, :n] = -np.concatenate([E @ A, E @ B], axis=2)
-    of_supply += np.swapaxes(of_supply, 1, 2)
-    out = np.hstack([C, D])
-    supply = np.diag(np.r_[np.zeros(n), np.full(m, level**2)]) - out.T @ out
-    terms = ((supply, of_supply), (np.zeros((n, n)), E), (bound * np.eye(n), -E))
+    supply = _dissipation(model, np.zeros((n, n)), level)
+    terms = (
+        (supply, -_change(model, E, discrete)),
+        (np.zeros((n, n)), E),
+        (bound * np.eye(n), -E),
+    )
 
     def roots(x: Array) -> list[Array] | None:
         try:
@@ -224,13 +245,12 @@ def _violated(problem: ScaledProblem, P: SplineLyapunov, level: float) -> tuple[
     n, at_knots, segments = P.coefficients.shape[-1], False, set()
     for form in lmi_polynomials(statement, float):
         F = form.block.coefficients.copy()
-        F[:, range(n, F.shape[1]), range(n, F.shape[1])] -= level**2
-        try:
-            np.linalg.cholesky(-F)
-        except np.linalg.LinAlgError:
-            ((low, high),) = form.block.box
+        F[..., range(n, F.shape[-1]), range(n, F.shape[-1])] -= level**2
+        if not _definite(-F):
+            low, high = form.block.box[0]
             segments.add(int(np.searchsorted(P.knots, 0.5 * (low + high))) - 1)
-            at_knots |= not _definite(-F[[0, -1]])
+            at = [F[end] for p, end in ((low, 0), (high, -1)) if p in P.knots]
+            at_knots |= not all(_definite(-corner) for corner in at)
     return at_knots, sorted(segments)
 
 

@@ -187,13 +187,13 @@ class OneParameter(Ladder):
         return len(self.scaled.lpv.states) > MANY_STATES
 
     def of_frozen_models(self, limit: float) -> Found:
-        """Return the gain proven by P linear between storage functions of frozen models; nothing in
-        discrete time, around a block, and where the user set the form of P.
+        """Return the gain proven by P linear between storage functions of frozen models; nothing
+        around a block, and where the user set the form of P.
         """
         form, scaled, best = self.problem.form, self.dissipating, Found(math.inf)
         tried = form.segments_tried(1)
         given = not isinstance(form, Spline) or form.degree == 0 or (tried and len(tried) == 1)
-        if given or scaled is None or scaled.lpv.dt is not None or math.isinf(scaled.rate):
+        if given or scaled is None or math.isinf(scaled.rate):
             return best
         start = time.perf_counter()
         for level in LEVELS:

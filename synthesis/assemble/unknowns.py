@@ -52,6 +52,11 @@ class ScaledProblem(NamedTuple):
     block: NormBounded | None = None
 
     @property
+    def discrete(self) -> bool:
+        """Whether time is counted in samples."""
+        return self.lpv.dt is not None
+
+    @property
     def scaled_rate(self) -> float:
         """Largest change of p per scaled unit of time."""
         return self.rate * self.units.time
@@ -158,7 +163,7 @@ class Quadratic(Unknown):
 
     def blocks(self, problem: ScaledProblem, extra: int) -> list[Blocks]:
         """One block per Bernstein coefficient, cell or strip, and sign of the rate."""
-        if problem.lpv.dt is None:
+        if not problem.discrete:
             rate = problem.scaled_rate if self.degree else 0.0
             regions = cells(problem.scaled, self.knots)
             return list(continuous_blocks(regions, self.knots, self.degree, rate, extra, self.by))
@@ -168,7 +173,7 @@ class Quadratic(Unknown):
         """Return the same blocks as products with P, with states of different rates equally
         weighted.
         """
-        if problem.lpv.dt is None:
+        if not problem.discrete:
             rate = problem.scaled_rate if self.degree else 0.0
             regions = cells(problem.scaled, self.knots)
             every = continuous_products(regions, self.knots, self.degree, rate, extra, self.by)
@@ -291,7 +296,7 @@ class Remembering(Unknown):
 
 def unknowns(problem: ScaledProblem, form: LyapunovForm) -> Iterator[Unknown]:
     """Yield the forms of V to try in turn, finer and finer."""
-    n, sampled = len(problem.lpv.states), problem.lpv.dt is not None
+    n, sampled = len(problem.lpv.states), problem.discrete
     many = isinstance(form, Spline) and n > MANY_STATES
     higher = isinstance(form, HigherOrder)
     remembers = isinstance(form, Memory) and 0 < problem.rate < math.inf
