@@ -1,5 +1,5 @@
 """`python -m evidence.tubes`: the largest gusts for which a tube is proven at held airspeeds, tubes
-along ranges of airspeed, beside the worst gusts found, of both packaged helicopters; gains on
+along ranges of airspeed, beside the worst gusts found, of the packaged helicopters; gains on
 tubes; the planar VTOL.
 """
 
@@ -24,7 +24,7 @@ from synthesis.tubes.reference import TUBE_SIZES, moving
 
 Array = np.ndarray
 
-VEHICLES = ("xcell60", "xcell_kahn_hudson")
+VEHICLES = ("xcell60", "xcell_kahn_hudson", "yamaha_r50")
 AIRSPEEDS = (0.0, 3.0, 6.0, 8.0, 10.0, 13.0)
 GUSTS = (0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.75, 1.0, 1.25, 1.5)
 """Amplitudes that are tried, m/s."""
@@ -35,6 +35,7 @@ TRANSITIONS = (
     ("xcell60", 8.0, 13.0, 0.2, 0.5, 0.5, 0.5),
     ("xcell_kahn_hudson", 3.0, 4.0, 0.25, 1.0, 1.0, 1.0),
     ("xcell_kahn_hudson", 3.0, 13.0, 0.25, 1.0, 1.0, 1.0),
+    ("yamaha_r50", 3.0, 13.0, 0.25, 1.0, 1.0, 1.0),
 )
 """Helicopter, range, m/s; gusts, m/s; largest acceleration, jerk and snap, m/s^2, m/s^3, m/s^4."""
 FLIGHTS, SECONDS = 10_000, 0.25

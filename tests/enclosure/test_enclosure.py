@@ -262,7 +262,7 @@ def test_two_roots_in_the_set_are_not_taken_for_one():
     assert far.finite
 
 
-@pytest.fixture(scope="module", params=["xcell60", "xcell_kahn_hudson"])
+@pytest.fixture(scope="module", params=["xcell60", "xcell_kahn_hudson", "yamaha_r50"])
 def heli(request):
     return Helicopter.load(request.param, governor="ideal")
 

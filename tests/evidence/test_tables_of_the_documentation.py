@@ -17,6 +17,7 @@ from evidence import (
     box_jenkins,
     gain_table,
     logs,
+    r50,
     responses,
     sets,
     specs,
@@ -230,6 +231,11 @@ def governed_flights():
     shown, found = ([int(n) for n in each.split(",")] for each in (without, today[1]))
     assert 18 <= found[0] <= shown[0]
     assert 18 <= found[1] <= shown[1]
+
+
+def hover_of_the_r50():
+    shown = KEPT["vehicles.md", "r50"].text.splitlines()
+    assert shown == r50.table().splitlines()
 
 
 def tube_in_hover():
@@ -458,6 +464,7 @@ ROWS = {
     ("structured.md", "static output feedback"): static_output_feedback_of_one_helicopter,
     ("structured.md", "gain table"): scheduled_lqr_beside_the_gain_table,
     ("sets.md", "jumps"): governed_flights,
+    ("vehicles.md", "r50"): hover_of_the_r50,
     ("tubes.md", "amplitudes"): tube_in_hover,
     ("tubes.md", "transitions"): tube_along_a_transition,
     ("tubes.md", "remainders"): remainder_of_one_cell,
