@@ -1,14 +1,14 @@
 """`python -m evidence.tubes`: the largest gusts for which a tube is proven at held airspeeds, tubes
-along ranges of airspeed, beside the worst gusts found, of both packaged helicopters; gains on
+along ranges of airspeed, beside the worst gusts found, of the packaged helicopters; gains on
 tubes; the planar VTOL.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
 from datetime import date
-from typing import Any
+from itertools import product
 
 import numpy as np
 
@@ -24,8 +24,9 @@ from synthesis.tubes.reference import TUBE_SIZES, moving
 
 Array = np.ndarray
 
-VEHICLES = ("xcell60", "xcell_kahn_hudson")
+VEHICLES = ("xcell60", "xcell_kahn_hudson", "yamaha_r50")
 AIRSPEEDS = (0.0, 3.0, 6.0, 8.0, 10.0, 13.0)
+QUICK = ("xcell60, 0", "xcell60, 8")
 GUSTS = (0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.75, 1.0, 1.25, 1.5)
 """Amplitudes that are tried, m/s."""
 TRANSITIONS = (
@@ -33,8 +34,13 @@ TRANSITIONS = (
     ("xcell60", 6.0, 7.0, 0.15, 1.0, 1.0, 1.0),
     ("xcell60", 9.0, 10.0, 0.25, 0.5, 0.5, 0.5),
     ("xcell60", 8.0, 13.0, 0.2, 0.5, 0.5, 0.5),
+    ("xcell60", 3.0, 13.0, 0.15, 0.5, 0.5, 0.5),
+    ("xcell60", 3.0, 13.0, 0.2, 0.5, 0.5, 0.5),
+    ("xcell60", 3.0, 13.0, 0.25, 0.5, 0.5, 0.5),
     ("xcell_kahn_hudson", 3.0, 4.0, 0.25, 1.0, 1.0, 1.0),
     ("xcell_kahn_hudson", 3.0, 13.0, 0.25, 1.0, 1.0, 1.0),
+    ("yamaha_r50", 3.0, 6.0, 0.25, 1.0, 1.0, 1.0),
+    ("yamaha_r50", 3.0, 13.0, 0.25, 0.5, 0.5, 0.5),
 )
 """Helicopter, range, m/s; gusts, m/s; largest acceleration, jerk and snap, m/s^2, m/s^3, m/s^4."""
 FLIGHTS, SECONDS = 10_000, 0.25
@@ -55,85 +61,80 @@ def largest(heli: Helicopter, airspeed: float) -> tuple[float, Tube | None]:
     return (GUSTS[low] if found else 0.0), found
 
 
-def table(vehicles: Sequence[str], airspeeds: Sequence[float]) -> str:
-    """The table in Markdown, a row for each vehicle and airspeed."""
-    rows = []
-    for name in vehicles:
-        heli = Helicopter.load(name, governor="ideal")
-        for airspeed in airspeeds:
-            gust, found = largest(heli, airspeed)
-            if found is None:
-                rows.append([name, f"{airspeed:g}", "none", "", "", ""])
-                continue
-            widths = [f"{w:.2g}" for w in found.half_widths[:8]]
-            rows.append(
-                [
-                    *(name, f"{airspeed:g}", f"{gust:g}"),
-                    *(" ".join(widths[:3]) + "; " + " ".join(widths[3:6]), " ".join(widths[6:])),
-                    f"{worst(found):.2f}",
-                ]
-            )
-            print(*rows[-1], flush=True)
-    head = [
-        "helicopter",
-        "airspeed, m/s",
-        "gusts, m/s",
-        "u v w, m/s; p q r, rad/s",
-        "phi theta, rad",
-    ]
-    return markdown([*head, "worst gust found"], rows)
-
-
-def transitions(
-    cases: Sequence[tuple[Any, ...]], count: int, seconds: float, shown: Sequence[Sequence[str]]
-) -> str:
-    """The table of tubes along ranges of airspeed in Markdown, a row for each of `TRANSITIONS`:
-    those of `cases` are found now, of the others the rows `shown` before stay.
+def renewed(
+    names: Sequence[Sequence[str]],
+    row: Callable[[int], list[str]],
+    chosen: Collection[int],
+    shown: Sequence[Sequence[str]],
+) -> list[list[str]]:
+    """A row for each of these cases: of those chosen the one found now, after the cells that name
+    the case and before the date; of the others the one `shown` before, where there is one.
     """
-    old = {tuple(row[:NAMED]): list(row) for row in shown}
-    rows = []
-    for case in TRANSITIONS:
-        if case in cases:
-            rows.append(_transition(case, count, seconds))
+    rows, count = [], len(names[0])
+    old = {tuple(cells[:count]): list(cells) for cells in shown}
+    for k, name in enumerate(names):
+        if k in chosen:
+            rows.append([*name, *row(k), f"{date.today():%d %B %Y}"])
             print(*rows[-1], flush=True)
-        elif tuple(_named(case)) in old:
-            rows.append(old[tuple(_named(case))])
-    head = ["helicopter", "airspeed, m/s", "gusts, m/s", "limits, m/s^2, m/s^3, m/s^4"]
-    head += ["u v w, m/s; p q r, rad/s", "phi theta, rad", "worst gust found", "furthest flight"]
-    return markdown([*head, "of"], rows)
+        elif tuple(name) in old:
+            rows.append(old[tuple(name)])
+    return rows
 
 
-NAMED = 4
-"""First cells of a row of transitions, which name its case."""
+def amplitudes(asked: Sequence[str], shown: Sequence[Sequence[str]]) -> str:
+    """The table of the largest gusts at held airspeeds in Markdown; rows asked for are found now,
+    of the others those `shown` before stay.
+    """
+    cases = list(product(VEHICLES, AIRSPEEDS))
+    names = [[name, f"{airspeed:g}"] for name, airspeed in cases]
+
+    def row(k: int) -> list[str]:
+        gust, found = largest(Helicopter.load(cases[k][0], governor="ideal"), cases[k][1])
+        if found is None:
+            return ["none", "", "", ""]
+        return [f"{gust:g}", *_widths(found), f"{worst(found):.2f}"]
+
+    head = ["helicopter", "airspeed, m/s", "gusts, m/s", *WIDTHS, "worst gust found", "of"]
+    return markdown(head, renewed(names, row, _chosen(asked, names), shown))
 
 
-def _named(case: tuple[Any, ...]) -> list[str]:
-    name, low, high, gust, *limits = case
-    return [name, f"{low:g} to {high:g}", f"{gust:g}", ", ".join(f"{limit:g}" for limit in limits)]
+def transitions(asked: Sequence[str], shown: Sequence[Sequence[str]]) -> str:
+    """The table of tubes along ranges of airspeed in Markdown, as `amplitudes`."""
+    names = [
+        [name, f"{low:g} to {high:g}", f"{gust:g}", ", ".join(f"{limit:g}" for limit in limits)]
+        for name, low, high, gust, *limits in TRANSITIONS
+    ]
+
+    def row(k: int) -> list[str]:
+        name, low, high, gust, acceleration, jerk, snap = TRANSITIONS[k]
+        heli = Helicopter.load(name, governor="ideal")
+        found = tube(heli, (low, high), gust=gust, acceleration=acceleration, jerk=jerk, snap=snap)
+        if not found.proven:
+            return [f"none: {found.why}", "", "", ""]
+        share = max(worst(found, p) for p in (low, high))
+        return [*_widths(found), f"{share:.2f}", f"{from_its_border(found, FLIGHTS, SECONDS):.3f}"]
+
+    head = ["helicopter", "airspeed, m/s", "gusts, m/s", "limits, m/s^2, m/s^3, m/s^4", *WIDTHS]
+    rows = renewed(names, row, _chosen(asked, [name[:3] for name in names]), shown)
+    return markdown([*head, "worst gust found", "furthest flight", "of"], rows)
 
 
-def _transition(case: tuple[Any, ...], count: int, seconds: float) -> list[str]:
-    """The row of a case."""
-    name, low, high, gust, acceleration, jerk, snap = case
-    heli = Helicopter.load(name, governor="ideal")
-    found = tube(heli, (low, high), gust=gust, acceleration=acceleration, jerk=jerk, snap=snap)
-    today = f"{date.today():%d %B %Y}"
-    if not found.proven:
-        return [*_named(case), f"none: {found.why}", "", "", "", today]
+WIDTHS = ("u v w, m/s; p q r, rad/s", "phi theta, rad")
+
+
+def _widths(found: Tube) -> list[str]:
+    """The half widths of u to theta in two cells."""
     widths = [f"{w:.2g}" for w in found.half_widths[:8]]
-    share = max(worst(found, float(p)) for p in (low, high))
-    border = from_its_border(found, count, seconds)
-    sizes = [" ".join(widths[:3]) + "; " + " ".join(widths[3:6]), " ".join(widths[6:])]
-    return [*_named(case), *sizes, f"{share:.2f}", f"{border:.3f}", today]
+    return [" ".join(widths[:3]) + "; " + " ".join(widths[3:6]), " ".join(widths[6:])]
 
 
-def _chosen(rows: Sequence[str]) -> list[tuple[Any, ...]]:
-    """The cases whose first cells are one of "helicopter, low to high, gust"; all without any."""
-    names = {", ".join(_named(case)[:3]): case for case in TRANSITIONS}
-    unknown = [row for row in rows if row not in names]
+def _chosen(asked: Sequence[str], names: Sequence[Sequence[str]]) -> set[int]:
+    """The cases whose names are asked for, "helicopter, airspeed, ..."; all without any."""
+    words = [", ".join(name) for name in names]
+    unknown = [row for row in asked if row not in words]
     if unknown:
-        raise InputError(f"no row {unknown[0]!r}; rows are {', '.join(map(repr, names))}")
-    return [case for name, case in names.items() if not rows or name in rows]
+        raise InputError(f"no row {unknown[0]!r}; rows are {', '.join(map(repr, words))}")
+    return {k for k, name in enumerate(words) if not asked or name in asked}
 
 
 def remainders(intervals: Sequence[float]) -> str:
@@ -175,18 +176,18 @@ def main() -> None:
         nargs="+",
         default=[],
         metavar="ROW",
-        help='of transitions, "helicopter, low to high, gust"; the page keeps the others',
+        help='of amplitudes, "helicopter, airspeed", and transitions, "helicopter, low to high,'
+        ' gust"; the page keeps the others',
     )
     given = parser.parse_args()
-    if given.rows and given.only != "transitions":
-        parser.error("--rows names rows of --only transitions")
+    if given.rows and given.only not in ("amplitudes", "transitions"):
+        parser.error("--rows names rows of --only amplitudes or transitions")
     if given.write and given.quick:
         parser.error("--write keeps whole tables: leave out --quick")
+    page = DOCS / "tubes.md"
     makers = {
-        "amplitudes": lambda: table(VEHICLES, AIRSPEEDS),
-        "transitions": lambda: transitions(
-            _chosen(given.rows), FLIGHTS, SECONDS, kept_rows(DOCS / "tubes.md", "transitions")
-        ),
+        "amplitudes": lambda: amplitudes(given.rows, kept_rows(page, "amplitudes")),
+        "transitions": lambda: transitions(given.rows, kept_rows(page, "transitions")),
         "remainders": lambda: remainders(INTERVALS),
         "gains": tube_gains.table,
         "loops": lambda: tube_loops.table(tube_loops.CASES),
@@ -194,7 +195,7 @@ def main() -> None:
         "vtol": planar_vtol.table,
     }
     if given.quick:
-        makers = {"amplitudes": lambda: table(VEHICLES[:1], (0.0, 8.0))}
+        makers = {"amplitudes": lambda: amplitudes(QUICK, [])}
     for name in [given.only] if given.only else makers:
         text = makers[name]()
         if given.write:

@@ -161,7 +161,7 @@ def vehicles() -> list[str]:
     Examples
     --------
     >>> symheli.vehicles()
-    ['xcell60', 'xcell_kahn_hudson']
+    ['xcell60', 'xcell_kahn_hudson', 'yamaha_r50']
     """
     files = [p.name for p in resources.files("symheli.airframe.vehicles").iterdir()]
     return sorted(

@@ -27,8 +27,8 @@ GROWTH = 4.0
 BRANCHED = 2
 """Number of kinks both of whose sides are enclosed."""
 WORTH = 0.2
-"""Share of the remainder from which on a kink is one of these: the equations of one side, taken at
-all points, may leave more than the hull of both sides.
+"""Share of a row's remainder from which on a kink is one of these: the equations of one side, taken
+at all points, may leave more than the hull of both sides.
 """
 FIRST_RADIUS = 1.5
 """First radius tried, in units of the remainder divided by the slope."""
@@ -235,21 +235,21 @@ def _branches(
     kinks = first.kinks
     own, count = symbols.own, len(domains[0].centre)
     reach = np.concatenate([np.abs(whole[i].generators).sum(axis=-1) for i in along], axis=-1)
-    found = (np.abs(j.slopes[..., own:]) * reach[:, None, :, None]).sum((1, 2))
+    found = (np.abs(j.slopes[..., own:]) * reach[:, None, :, None]).sum(axis=2)
     for both, partner in first.partners:
-        found[:, partner - own] += found[:, both - own]
-    used = np.any(found > 0, axis=0)
+        found[..., partner - own] += found[..., both - own]
+    used = np.any(found > 0, axis=(0, 1))
     kept = sorted({k for k, any_ in zip(_numbers(function, kinks), used, strict=True) if any_})
-    found = found[:, [kinks.index(k) for k in kept]]
-    largest = np.argsort(-found.max(axis=0, initial=0.0))[:BRANCHED]
-    left = np.where(np.isfinite(j.rest), j.rest, 0.0) * reach[:, None]
-    worth = WORTH * left.sum(axis=(1, 2))
-    chosen = [int(k) for k in largest if np.any((found[:, k] > 0) & (found[:, k] >= worth))]
+    found = found[..., [kinks.index(k) for k in kept]]
+    largest = np.argsort(-found.sum(axis=1).max(axis=0, initial=0.0))[:BRANCHED]
+    left = (np.where(np.isfinite(j.rest), j.rest, 0.0) * reach[:, None]).sum(axis=2)
+    worth = (found > 0) & (found >= WORTH * left[..., None])
+    chosen = [int(k) for k in largest if np.any(worth[..., k])]
     pairs = list(product((1, -1), repeat=len(chosen)))
     signs = np.array(pairs, int).reshape(len(pairs), len(chosen))
     # J of each pair of sides by the products of their signs (Walsh's functions)
     walsh = np.array([np.prod(signs[:, row < 0], axis=1) for row in signs]) / len(signs)
-    open_ = np.repeat(np.any(found[:, chosen] > 0, axis=1), pieces)
+    open_ = np.repeat(np.any(found[..., chosen] > 0, axis=(1, 2)), pieces)
     parts = []
     for sets, own_signs in ((~open_, signs[:1]), (open_, signs)):
         each = np.repeat(np.flatnonzero(sets), len(own_signs))

@@ -262,7 +262,25 @@ def test_two_roots_in_the_set_are_not_taken_for_one():
     assert far.finite
 
 
-@pytest.fixture(scope="module", params=["xcell60", "xcell_kahn_hudson"])
+def test_a_row_of_large_numbers_does_not_widen_the_others():
+    """Both sides of a kink were enclosed only where it was large beside the remainder of all rows,
+    of different units; the pitch rate's row held three times its remainder.
+    """
+    x = casadi.SX.sym("x", 2)
+    kinked = casadi.fmax(x[0], 0) * casadi.exp(3 * x[1])
+    large = 1e4 * casadi.exp(3 * x[0])
+    alone, beside = (
+        segment_averages(
+            casadi.Function("f", [x], [casadi.vertcat(*rows)]),
+            Domain.box([-0.3, -0.3], [0.3, 0.3]),
+            along=[0],
+        ).average.rest[0]
+        for rows in ([kinked], [kinked, large])
+    )
+    np.testing.assert_array_equal(alone, beside)
+
+
+@pytest.fixture(scope="module", params=["xcell60", "xcell_kahn_hudson", "yamaha_r50"])
 def heli(request):
     return Helicopter.load(request.param, governor="ideal")
 

@@ -17,6 +17,7 @@ from evidence import (
     box_jenkins,
     gain_table,
     logs,
+    r50,
     responses,
     sets,
     specs,
@@ -232,8 +233,13 @@ def governed_flights():
     assert 18 <= found[1] <= shown[1]
 
 
+def hover_of_the_r50():
+    shown = KEPT["vehicles.md", "r50"].text.splitlines()
+    assert shown == r50.table().splitlines()
+
+
 def tube_in_hover():
-    airspeed, gust, _, attitude, _ = KEPT["tubes.md", "amplitudes"].cells("xcell60")
+    airspeed, gust, _, attitude, *_ = KEPT["tubes.md", "amplitudes"].cells("xcell60")
     found = synthesis.tube(_xcell(), float(airspeed), gust=float(gust))
     assert found.proven
     assert attitude == " ".join(f"{w:.2g}" for w in found.half_widths[6:8])
@@ -458,6 +464,7 @@ ROWS = {
     ("structured.md", "static output feedback"): static_output_feedback_of_one_helicopter,
     ("structured.md", "gain table"): scheduled_lqr_beside_the_gain_table,
     ("sets.md", "jumps"): governed_flights,
+    ("vehicles.md", "r50"): hover_of_the_r50,
     ("tubes.md", "amplitudes"): tube_in_hover,
     ("tubes.md", "transitions"): tube_along_a_transition,
     ("tubes.md", "remainders"): remainder_of_one_cell,

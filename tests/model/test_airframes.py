@@ -5,12 +5,14 @@ literature.
 from __future__ import annotations
 
 import re
+import tomllib
 from importlib import resources
 
 import numpy as np
 import pytest
 
 import symheli
+from evidence import r50
 from symheli.airframe.vehicle import load_vehicle, vehicles
 from symheli.values.units import to_si
 
@@ -53,6 +55,39 @@ def test_kahn_hudson_values_are_the_source_values_converted():
     )
     assert vehicle.values("vertical_fin")["lift_slope"] == pytest.approx(1.4339 / 0.275, rel=1e-5)
     assert vehicle.values("main_rotor")["hub_stiffness"] == pytest.approx(stiffness, rel=1e-5)
+
+
+def test_r50_is_guessed_from_its_hover_model_and_the_scaled_x_cell():
+    """One entry is published; the others follow from where their source says; six digits are
+    written down.
+    """
+    vehicle, packaged = load_vehicle("yamaha_r50"), load_vehicle("xcell60")
+    assert set(vehicle.quantities) - set(vehicle.assumed) == {"main_rotor.radius"}
+    rotor, drive = vehicle.values("main_rotor"), vehicle.values("drivetrain")
+    scale = rotor["radius"] / packaged.values("main_rotor")["radius"]
+    copy = packaged.scaled(scale)
+    scaled = [n for n, q in vehicle.quantities.items() if q.source == "scaled"]
+    assert len(scaled) == 15
+    found = {n: vehicle.quantities[n].value for n in scaled}
+    assert found == pytest.approx({n: copy.quantities[n].value for n in scaled}, rel=5e-6)
+    given = {n: q["value"] for n, q in tomllib.loads(R50)["parameters"].items()}
+    tau = given["tau_f"] + (given["A_c"] + given["B_d"]) / 2 * given["tau_s"]
+    beta = 1.225 * rotor["lift_slope"] * rotor["chord"] * rotor["radius"] ** 4 / 16
+    beta *= given["tau_f"] * drive["nominal_speed"]
+    derived = {
+        "bar_lock_number": 16 / (tau * drive["nominal_speed"]),
+        "lateral_gain": 1 + given["B_d"] * given["D_lat"] / given["B_lat"],
+        "longitudinal_gain": 1 + given["A_c"] * given["C_lon"] / given["A_lon"],
+    }
+    assert {n: rotor[n] for n in derived} == pytest.approx(derived, rel=5e-6)
+    assert drive["inertia"] == pytest.approx(2.5 * beta, rel=5e-6)
+    hover = dict(zip(("identified", "guessed"), r50.models(), strict=True))
+    for row, columns in (("p", ("b", "b1")), ("q", ("a", "a1"))):
+        one, other = (
+            m.A[m.states.index(row), m.states.index(c)]
+            for m, c in zip(hover.values(), columns, strict=True)
+        )
+        assert other == pytest.approx(one, rel=2e-5)
 
 
 def test_more_blades_of_less_chord_are_the_same_rotor(ideal):

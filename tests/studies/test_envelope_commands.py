@@ -62,6 +62,7 @@ def test_vehicles_say_how_much_is_assumed(run):
     }
     assert assumed["xcell60"] == 0
     assert assumed["xcell_kahn_hudson"] == 12
+    assert assumed["yamaha_r50"] == 43
     assert assumed["r50_hover"] == 4
 
 

@@ -29,6 +29,7 @@ from synthesis.tubes.tube import _covers
 CASES = [
     ("xcell60", 0.0, {"gust": 0.5}),
     pytest.param(("xcell_kahn_hudson", 8.0, {"gust": 0.25}), marks=pytest.mark.slow),
+    pytest.param(("yamaha_r50", 8.0, {"gust": 0.25}), marks=pytest.mark.slow),
     pytest.param(
         ("xcell60", (4.0, 4.5), {"gust": 0.2, "acceleration": 0.5, "jerk": 0.5, "snap": 1.0}),
         marks=pytest.mark.slow,
