@@ -7,11 +7,12 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from datetime import date
 
 import numpy as np
 
 from evidence.seeds import by_name, parser_of
-from evidence.tables import DOCS, keep, markdown, parsed
+from evidence.tables import DOCS, keep, kept_rows, markdown, parsed
 from studies.known_kinematics.conditions import (
     ALL,
     CONDITIONS,
@@ -76,7 +77,7 @@ def row(name: str, marks: Sequence[Marks]) -> tuple[str, ...]:
         f"{worst.gap:.3f} ({worst.seed})",
         "met" if met else "MISSED",
         _found(condition, marks),
-        f"{len(marks)}",
+        f"{marks[0].seed} to {marks[-1].seed}, {date.today():%d %B %Y}",
     )
 
 
@@ -112,19 +113,23 @@ HEAD = (
     "worst (seed)",
     "",
     "found",
-    "seeds",
+    "seeds, day",
 )
 
 
-def table(truth: str, found: Mapping[str, Sequence[Marks]]) -> str:
-    """A row a condition."""
-    rows = [row(name, marks) for name, marks in found.items()]
+def table(
+    truth: str, found: Mapping[str, Sequence[Marks]], shown: Sequence[Sequence[str]] = ()
+) -> str:
+    """A row a condition; of those that were not flown now the rows `shown` before stay."""
+    rows = {each[0]: each for each in shown}
+    rows |= {CONDITIONS[name].about: row(name, marks) for name, marks in found.items()}
+    chosen = [rows[one.about] for one in CONDITIONS.values() if one.about in rows]
     return "\n".join(
         [
             f"Truth {truth}, instruments flown in {PAIRS[truth]}; worst nu-gap over airspeed, all"
             " axes.",
             "",
-            markdown(HEAD, rows),
+            markdown(HEAD, chosen),
         ]
     )
 
@@ -136,11 +141,11 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", choices=CONDITIONS, help="default: every condition")
     options = parsed(parser, "identified.md", timed=False)
     found = by_name(options, of_seed, options.only or list(CONDITIONS))
-    text = table(options.truth, found)
     plain = {name: [vars(m) for m in of_name] for name, of_name in found.items()}
-    print(as_json(plain) if options.json else text)
+    print(as_json(plain) if options.json else table(options.truth, found))
     if options.write:
-        keep(DOCS / "identified.md", f"{options.truth} under real conditions", text)
+        page, section = DOCS / "identified.md", f"{options.truth} under real conditions"
+        keep(page, section, table(options.truth, found, kept_rows(page, section)))
 
 
 if __name__ == "__main__":

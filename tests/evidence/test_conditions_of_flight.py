@@ -27,6 +27,13 @@ def test_a_row_says_whether_the_mark_is_met_and_the_delay_found():
     assert worse[4] == "MISSED"
 
 
+def test_rows_that_are_not_flown_now_stay_in_the_order_of_the_conditions():
+    shown = [("steady", "gone"), (conditions.CONDITIONS["delay"].about, "kept")]
+    text = conditions.table("xcell60", {"servos": [mark(0, 0.1)]}, shown)
+    rows = [line.split(" | ")[0].removeprefix("| ") for line in text.splitlines()[4:]]
+    assert rows == [conditions.CONDITIONS[name].about for name in ("servos", "delay")]
+
+
 def test_a_wind_is_held_against_the_one_that_blew():
     true = real.wind_of(3)
     assert np.hypot(*true) == pytest.approx(real.WIND)
