@@ -29,7 +29,7 @@ from symheli.errors import DataWarning, SymheliError
 EVERY = 2
 """Of the airspeeds of a truth, one in so many is judged at."""
 
-DRAWS = 60
+DRAWS = 40
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ CASES: Mapping[str, Case] = {
     "10 dB": Case(
         "10 dB of noise, half a flight", *2 * (replace(IDEAL, noise_db=10.0, longest=75.0),)
     ),
-    "short": Case("a flight of 25 s", *2 * (replace(IDEAL, longest=25.0),)),
+    "short": Case("a flight of 40 s", *2 * (replace(IDEAL, longest=40.0),)),
     "delay untold": Case(
         "commands 40 ms late, taken for deflections",
         CONDITIONS["delay"],

@@ -38,9 +38,6 @@ SHARE_OF_MARGIN = 1 / 3
 bias.
 """
 
-WITH_BIAS = ("unstable loops", "nu-gap over margin", "J", "TIC")
-"""The rows that decide where it is known."""
-
 GAIN = 0.25
 """Largest error of the static gain, as a share of it."""
 

@@ -14,7 +14,6 @@ from identification.judge.coefficient_covariance import drawn
 from identification.judge.criteria import (
     SET,
     SHARE_OF_MARGIN,
-    WITH_BIAS,
     Criterion,
     Verdict,
     certainty,
@@ -169,8 +168,8 @@ def fit_for_control(
     what the structure would make of this vehicle without noise is, plus what is between that and
     the truth. The first is in the 95 % set, the second is what the simulator shows of the
     structure, in these `scales`, its unstable poles counted as the nu-gap counts them; that the
-    size carries over from one vehicle to the other is assumed. With `bias` the rows of static
-    gain and derivatives inform, since what they are about is in the bound.
+    size carries over from one vehicle to the other is assumed. With `bias` there are no rows of
+    static gain and derivatives: what they are about is in the bound.
 
     Frozen plants say nothing of how fast the scheduling may move.
 
@@ -293,19 +292,15 @@ def fit_for_control(
         structure_gap=None if bias is None else _structure_gap(bias, at),
         true_gap=true_gap,
     )
+    whole = bias is not None
     criteria = (
         stability(at, true),
-        feedback(at, found.bound, second_gap, true_gap, SHARE_OF_MARGIN if bias is None else 1.0),
-        static_gain(at, true, in_loop=True),
-        static_gain(at, true, in_loop=False),
-        *certainty(at),
+        feedback(at, found.bound, second_gap, true_gap, 1.0 if whole else SHARE_OF_MARGIN),
+        *(() if whole else (static_gain(at, true, in_loop) for in_loop in (True, False))),
+        *(() if whole else certainty(at)),
         responses(plant, records, window, band),
         predictions(plant, records, scales, horizon),
     )
-    if bias is not None:
-        criteria = tuple(
-            replace(row, decides=row.decides and row.name in WITH_BIAS) for row in criteria
-        )
     return replace(found, criteria=criteria)
 
 
