@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from symheli.flight.flown_conditions import CONDITIONS
 from symheli.records import FlightRecord
+from symheli.records.flight_record import CONDITIONS
 
 UNKNOWN = "unknown"
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 from symheli.environment import Wind
 from symheli.flight.plan import FlightPlan
 from symheli.helicopter import Helicopter
+from symheli.records.flight_record import CONDITIONS
 
-CONDITIONS = ("wind", "mass", "governor", "servos")
-"""What `flown_conditions` says."""
 MASS = "body.mass"
 
 
