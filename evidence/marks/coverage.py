@@ -5,7 +5,7 @@ of the covariance alone, and with the bias that the simulator shows of the struc
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,8 +27,8 @@ from symheli.values import Signal
 FREQUENCIES = np.geomspace(0.3, 20.0, 8)
 """rad/s."""
 
-EVERY = 6
-"""Of the airspeeds of a truth, one in so many is looked at."""
+LOOKED_AT = range(0, len(SPEEDS), 6)
+"""Of the airspeeds of a truth."""
 
 LEAST, MOST, WIDEST = 0.93, 0.98, 2.0
 """Marks of the share and of the median width, in that of the covariance alone."""
@@ -71,14 +71,14 @@ def held(
 
 
 def at_points(
-    model: KinematicModel, exact: Sequence[LinearModel], every: int = EVERY
+    model: KinematicModel, exact: Sequence[LinearModel], chosen: Iterable[int] = LOOKED_AT
 ) -> dict[tuple[float, ...], LinearModel]:
     """Some of the exact models by point of the scheduling, with the inputs of the model."""
     out = {}
     names = {str(u).removesuffix("_command"): str(u) for u in model.inputs}
-    for speed, one in list(zip(SPEEDS, exact, strict=True))[::every]:
-        inputs = tuple(Signal(names[str(u)], u.unit) for u in one.inputs)
-        out[(float(speed), 0.0)[: len(model.parameters)]] = replace(one, inputs=inputs)
+    for k in chosen:
+        inputs = tuple(Signal(names[str(u)], u.unit) for u in exact[k].inputs)
+        out[(float(SPEEDS[k]), 0.0)[: len(model.parameters)]] = replace(exact[k], inputs=inputs)
     return out
 
 

@@ -26,10 +26,11 @@ from studies.transition.flights import TOP
 from symheli import FlightRecord, SimulatedFlight, Wind
 from symheli.errors import DataWarning, SymheliError
 
-EVERY = 2
-"""Of the airspeeds of a truth, one in so many is judged at."""
+JUDGED = (0, 2, 4, 8, 12, 16, 20, 26)
+"""Of the airspeeds of a truth those that are judged at: 0, 1, 2, 4, 6, 8, 10, 13 m/s."""
 
-DRAWS = 40
+DRAWS, HORIZON = 25, 2.0
+"""Of each verdict; seconds of its predictions."""
 
 
 @dataclass(frozen=True)
@@ -95,9 +96,12 @@ class Case:
         return replace(record, meta={**record.meta, "plan": plan})
 
 
+ALIKE = ("bandwidth", "airspeed")
+"""Conditions that are left out: what another one has, with one thing more or less to be found."""
+
 IDEAL, SERVOS = CONDITIONS["ideal"], CONDITIONS["servos"]
 CASES: Mapping[str, Case] = {
-    **{name: Case(one.about, one, one) for name, one in CONDITIONS.items()},
+    **{name: Case(one.about, one, one) for name, one in CONDITIONS.items() if name not in ALIKE},
     "degree 1": Case(
         "coefficients linear in airspeed, no acceleration",
         IDEAL,
@@ -214,7 +218,7 @@ def judged(name: str, seed: int, records: list[FlightRecord], truth: str) -> lis
     model = case.believed.identified(kin, records, source)
     inputs = {str(u).removesuffix("_command"): str(u) for u in model.inputs}
     exact, there = _exact(truth, name, False), _exact(other, name, True)
-    off = structure_bias(model, records, source, at_points(model, there.models[ALL], EVERY))
+    off = structure_bias(model, records, source, at_points(model, there.models[ALL], JUDGED))
     out = []
     for loop, one in LOOPS.items():
         own = one.named(inputs)
@@ -223,9 +227,10 @@ def judged(name: str, seed: int, records: list[FlightRecord], truth: str) -> lis
             records,
             own.gains,
             scales=own.sizes,
-            bias=replace(off, exact=at_points(model, there.models[one.axis], EVERY)),
-            truth=at_points(model, exact.models[one.axis], EVERY),
+            bias=replace(off, exact=at_points(model, there.models[one.axis], JUDGED)),
+            truth=at_points(model, exact.models[one.axis], JUDGED),
             draws=DRAWS,
+            horizon=HORIZON,
         )
         out.append(Outcome.of(seed, loop, found))
     return out
@@ -235,10 +240,17 @@ HEAD = (
     "flight, and what it is taken for",
     "unfit, called fit",
     "fit, called fit",
+    "farthest called fit (seed)",
     "bounds that hold, %",
     "bound over exact, median",
     "refused",
 )
+
+
+def farthest(some: Sequence[Outcome]) -> str:
+    """The largest exact nu-gap over the margin that is called fit, and its seed."""
+    last = max((o for o in some if o.said_fit), key=lambda o: o.true, default=None)
+    return "" if last is None else f"{last.true:.2f} ({last.seed})"
 
 
 def row(about: str, some: Sequence[Outcome]) -> tuple[str, ...]:
@@ -250,6 +262,7 @@ def row(about: str, some: Sequence[Outcome]) -> tuple[str, ...]:
     return (
         about,
         *called,
+        farthest(known),
         f"{100 * np.mean(bounds >= gaps):.1f}" if len(gaps) else "",
         f"{np.median(bounds / gaps):.2f}" if len(gaps) else "",
         str(len(some) - len(known)),

@@ -224,7 +224,7 @@ def responses(
     model = plant.model
     try:
         found = response_match(
-            records,
+            [plant.regression.prepared(record) for record in records],
             lambda p: model.at(*p),
             plant.outputs,
             [str(u) for u in model.inputs],
@@ -276,7 +276,7 @@ def predictions(
     measured, guessed, noise, started = [], [], 0.0, 0.0
     rng = np.random.default_rng(0)
     for record in records:
-        y = record.columns(plant.outputs) / size
+        y = plant.regression.prepared(record).columns(plant.outputs) / size
         guess = model.predict(record, steps)[:, columns] / size
         keep = np.isfinite(y).all(axis=1) & ~np.isnan(guess).any(axis=1)
         if not keep.any():

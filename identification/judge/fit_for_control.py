@@ -25,7 +25,7 @@ from identification.judge.criteria import (
     together,
 )
 from identification.judge.frozen_plant import AtPoint, FrozenPlant, Model, Point
-from identification.judge.response_regions import StructureBias
+from identification.judge.response_regions import StructureBias, with_neighbours
 from identification.model.kinematic_model import KinematicModel
 from identification.model.lpvarx_model import LEAST_SQUARES
 from identification.structure.regressors import as_records
@@ -60,8 +60,7 @@ class FitForControl:
     second_gap : array (K,)
         Largest nu-gap to another estimate; NaN without one.
     structure_gap : array (K,) or None
-        nu-gap that the structure leaves in a simulator, the largest of neighbouring points, where a
-        bias was given.
+        nu-gap that the structure leaves in a simulator, where a bias was given.
     true_gap : array (K,) or None
         nu-gap from the estimate to the truth, where it was given.
 
@@ -87,7 +86,9 @@ class FitForControl:
     def bound(self) -> Array:
         """Upper bound (K,) of the nu-gap to the truth, in [0, 1]: see `fit_for_control`."""
         within = np.fmax(self.gap, self.second_gap)
-        return np.minimum(within + (0.0 if self.structure_gap is None else self.structure_gap), 1.0)
+        if self.structure_gap is None:
+            return within
+        return np.minimum(within + np.sqrt(with_neighbours(self.structure_gap**2, 0)), 1.0)
 
     @property
     def verdict(self) -> Verdict:
@@ -167,8 +168,9 @@ def fit_for_control(
     The upper bound: the nu-gap is a metric, so that the truth is no farther from the estimate than
     what the structure would make of this vehicle without noise is, plus what is between that and
     the truth. The first is in the 95 % set, the second is what the simulator shows of the
-    structure, in these `scales`, its unstable poles counted as the nu-gap counts them; that the
-    size carries over from one vehicle to the other is assumed. With `bias` there are no rows of
+    structure, in these `scales`, its unstable poles counted as the nu-gap counts them, the root
+    mean square of neighbouring points; that the size carries over from one vehicle to the other is
+    assumed. With `bias` there are no rows of
     static gain and derivatives: what they are about is in the bound.
 
     Frozen plants say nothing of how fast the scheduling may move.
@@ -305,13 +307,11 @@ def fit_for_control(
 
 
 def _structure_gap(bias: StructureBias, at: Sequence[AtPoint]) -> Array:
-    """nu-gaps (K,) in the simulator, the largest of each point and its neighbours."""
+    """nu-gaps (K,) in the simulator."""
     plant = replace(at[0].plant, model=bias.model)
-    gap = np.array(
+    return np.array(
         [replace(a, plant=plant).gaps_to([_discrete(bias.exact[a.p], plant)])[0] for a in at]
     )
-    wide = np.pad(gap, 1, mode="edge")
-    return np.maximum(np.maximum(wide[:-2], wide[2:]), gap)
 
 
 def _points(

@@ -5,7 +5,7 @@ shows it.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,8 @@ from identification.estimators.estimate import fit
 from identification.estimators.instruments import FlightSource
 from identification.judge.coefficient_covariance import drawn
 from identification.judge.frozen_plant import FrozenPlant, Model, Point
+from identification.structure.kinematic_arx import KinematicARX
+from identification.structure.lpvarx import LPVARX
 from symheli.errors import InputError
 from symheli.lpv import LinearModel
 from symheli.records import FlightRecord
@@ -182,7 +184,7 @@ def response_regions(
                 f"bias: expected one at the points {chosen}, got {_chosen(bias.exact)}"
             )
         off = bias.responses(omega, plant.outputs, plant.inputs)
-        power = _with_neighbours(_with_neighbours(np.abs(off) ** 2, 0), 1)
+        power = with_neighbours(with_neighbours(np.abs(off) ** 2, 0), 1)
         covariance += 0.5 * power[..., None, None] * np.eye(2)
     return ResponseRegions(centre, covariance)
 
@@ -251,11 +253,16 @@ def structure_bias(
             f" {simulator!r:.80}"
         )
     given = [records] if isinstance(records, FlightRecord) else list(records)
-    own = fit(model.structure, [simulator.flown(record) for record in given])
+    own = fit(in_time(model.structure), [simulator.flown(record) for record in given])
     return StructureBias(own, exact)  # type: ignore[arg-type]
 
 
-def _with_neighbours(values: Array, axis: int) -> Array:
+def in_time(structure: LPVARX | KinematicARX) -> LPVARX | KinematicARX:
+    """The structure for a simulated flight, whose sensors are not late."""
+    return replace(structure, sensors=None) if isinstance(structure, KinematicARX) else structure
+
+
+def with_neighbours(values: Array, axis: int) -> Array:
     """The mean of each of three neighbours along an axis, ends twice."""
     ends = [(1, 1) if i == axis else (0, 0) for i in range(values.ndim)]
     wide = np.moveaxis(np.pad(values, ends, mode="edge"), axis, 0)

@@ -29,7 +29,7 @@ def test_the_table_counts_what_is_called_fit_beside_what_is():
     ]
     rows = table("xcell60", {"ideal": [some]}).splitlines()
     cells = [cell.strip() for cell in rows[-1].strip("|").split("|")]
-    assert cells == ["all", "1 of 2", "1 of 2", "50.0", "1.33", "1"]
+    assert cells == ["all", "1 of 2", "1 of 2", "1.20 (1)", "50.0", "1.33", "1"]
 
 
 def test_an_estimate_whose_own_loop_is_unstable_is_not_fit():

@@ -92,3 +92,29 @@ def test_what_is_missing_is_said(vehicle, record, model):
         idn.StructureBias(model, {3.0: replace(own, dt=2 * own.dt)})
     with pytest.raises(InputError, match="source of flights"):
         idn.structure_bias(model, record, record, {3.0: own})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_the_bound_of_the_nu_gap_holds_where_the_covariance_alone_does_not(seed):
+    """Coefficients that move with p, identified as constants; the simulator is another vehicle."""
+    own, other = (Vehicle(na=1, nb=1, seed=k) for k in (0, 1))
+    record = own.record(1500, seed=seed, process=1e-3)
+    still = idn.KinematicARX(
+        CONTROLS, "airspeed_command", na=1, nb=1, basis=idn.Polynomial(0, 0, 10)
+    )
+    model = idn.fit(still, record)
+    points = 1.0, 5.0, 9.0
+    there = exact(other, other.record(500, seed=1), *points)
+    found = idn.fit_for_control(
+        model,
+        record,
+        {("d_lat", "phi"): -0.5, ("d_lon", "theta"): -0.6},
+        scales={**dict.fromkeys(STATES, 1.0), **dict.fromkeys(CONTROLS, 0.1)},
+        covariance=model.covariance,
+        bias=idn.structure_bias(model, record, other.without_noise(seed=seed), there),
+        truth=exact(own, record, *points),
+        draws=40,
+    )
+    assert np.all(found.bound >= found.true_gap)
+    assert not np.all(found.gap >= found.true_gap)
