@@ -118,10 +118,14 @@ CASES: Mapping[str, Case] = {
     "10 dB": Case(
         "10 dB of noise, half a flight", *2 * (replace(IDEAL, noise_db=10.0, longest=75.0),)
     ),
-    "short": Case("a flight of 40 s", *2 * (replace(IDEAL, longest=40.0),)),
     "delay untold": Case(
         "commands 40 ms late, taken for deflections",
         CONDITIONS["delay"],
+        IDEAL,
+    ),
+    "20 ms untold": Case(
+        "commands 20 ms late, taken for deflections",
+        replace(CONDITIONS["delay"], late=1),
         IDEAL,
     ),
     "servos untold": Case(
