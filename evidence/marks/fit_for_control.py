@@ -100,6 +100,7 @@ ALIKE = ("bandwidth", "airspeed")
 """Conditions that are left out: what another one has, with one thing more or less to be found."""
 
 IDEAL, SERVOS = CONDITIONS["ideal"], CONDITIONS["servos"]
+NOISY = replace(IDEAL, noise_db=10.0, longest=75.0)
 CASES: Mapping[str, Case] = {
     **{name: Case(one.about, one, one) for name, one in CONDITIONS.items() if name not in ALIKE},
     "degree 1": Case(
@@ -115,9 +116,7 @@ CASES: Mapping[str, Case] = {
         partial(replace, scheduling=SCHEDULING[0], basis=Polynomial(0, 0.0, TOP)),
     ),
     "one lag": Case("one lag of every control", IDEAL, IDEAL, partial(replace, nb=1)),
-    "10 dB": Case(
-        "10 dB of noise, half a flight", *2 * (replace(IDEAL, noise_db=10.0, longest=75.0),)
-    ),
+    "10 dB": Case("10 dB of noise, half a flight", NOISY, NOISY),
     "delay untold": Case(
         "commands 40 ms late, taken for deflections",
         CONDITIONS["delay"],
@@ -170,17 +169,18 @@ class Outcome:
     def of(cls, seed: int, loop: str, found: FitForControl) -> Outcome:
         """What was found for one loop, with the truth beside."""
         row = found["nu-gap over margin"]
-        assert row.truth is not None
-        assert found.true_gap is not None
+        truth, gaps = row.truth, found.true_gap
+        assert truth is not None
+        assert gaps is not None
         return cls(
             seed=seed,
             loop=loop,
             verdict=found.verdict,
             rows={row.name: row.verdict for row in found.criteria if row.decides},
             said=row.value,
-            true=row.truth,
+            true=truth,
             bounds=tuple(map(float, found.bound)),
-            gaps=tuple(map(float, found.true_gap)),
+            gaps=tuple(map(float, gaps)),
         )
 
     @property
