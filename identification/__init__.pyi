@@ -81,6 +81,7 @@ from identification.judge.order_scan import order_scan as order_scan
 from identification.judge.residuals import residual_analysis as residual_analysis
 from identification.judge.residuals import theil as theil
 from identification.judge.response_regions import ResponseRegions as ResponseRegions
+from identification.judge.response_regions import StructureBias as StructureBias
 from identification.judge.response_regions import response_regions as response_regions
 from identification.judge.response_regions import structure_bias as structure_bias
 from identification.judge.scores import Scores as Scores

@@ -5,21 +5,19 @@ of the covariance alone, and with the bias that the simulator shows of the struc
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from evidence.marks.conditions import ALL, CONDITIONS, Instruments
 from evidence.seeds import by_name, parser_of
 from evidence.tables import DOCS, keep, markdown, parsed
 from identification import (
-    FilterError,
     KinematicModel,
-    fit,
     response_regions,
     structure_bias,
 )
+from studies.known_kinematics.conditions import ALL, CONDITIONS, Instruments
 from studies.known_kinematics.models import PAIRS
 from studies.known_kinematics.truth import AXES, SPEEDS, Truth
 from studies.output import as_json
@@ -29,8 +27,8 @@ from symheli.values import Signal
 FREQUENCIES = np.geomspace(0.3, 20.0, 8)
 """rad/s."""
 
-EVERY = 6
-"""Of the airspeeds of a truth, one in so many is looked at."""
+LOOKED_AT = range(0, len(SPEEDS), 6)
+"""Of the airspeeds of a truth."""
 
 LEAST, MOST, WIDEST = 0.93, 0.98, 2.0
 """Marks of the share and of the median width, in that of the covariance alone."""
@@ -61,9 +59,9 @@ def held(
     their widths. `simulated`: the exact models of the simulator's vehicle.
     """
     names = {str(u).removesuffix("_command"): str(u) for u in model.inputs}
-    own, others = (_at_points(model, of, axis, names) for of in (truth, simulated))
+    own, others = (at_points(model, of.models[axis]) for of in (truth, simulated))
     signals = AXES[axis].outputs, [names[u] for u in AXES[axis].inputs]
-    off = structure_bias(model, records, source, others, FREQUENCIES, *signals)
+    off = structure_bias(model, records, source, others)
     narrow, wide = (
         response_regions(model, own, FREQUENCIES, *signals, bias=bias) for bias in (None, off)
     )
@@ -72,16 +70,15 @@ def held(
     return nominal, covered, float(np.median(wide.width / narrow.width))
 
 
-def _at_points(
-    model: KinematicModel, truth: Truth, axis: str, names: Mapping[str, str]
+def at_points(
+    model: KinematicModel, exact: Sequence[LinearModel], chosen: Iterable[int] = LOOKED_AT
 ) -> dict[tuple[float, ...], LinearModel]:
     """Some of the exact models by point of the scheduling, with the inputs of the model."""
     out = {}
-    for k in range(0, len(SPEEDS), EVERY):
-        exact = truth.models[axis][k]
-        point = (float(SPEEDS[k]), 0.0)[: len(model.parameters)]
-        inputs = tuple(Signal(names[str(u)], u.unit) for u in exact.inputs)
-        out[point] = replace(exact, inputs=inputs)
+    names = {str(u).removesuffix("_command"): str(u) for u in model.inputs}
+    for k in chosen:
+        inputs = tuple(Signal(names[str(u)], u.unit) for u in exact[k].inputs)
+        out[(float(SPEEDS[k]), 0.0)[: len(model.parameters)]] = replace(exact[k], inputs=inputs)
     return out
 
 
@@ -90,13 +87,17 @@ def of_seed(name: str, seed: int, truth: str = "xcell60") -> Coverage:
     condition = CONDITIONS[name]
     heli, simulator = (condition.helicopter(vehicle) for vehicle in (truth, PAIRS[truth]))
     records = condition.flights(heli, seed)
-    source = Instruments(SimulatedFlight(simulator))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DataWarning)
-        method = FilterError(source, prior=condition.prior)
-        model = fit(condition.structure(records[0]), records, method=method)
+        source = Instruments(SimulatedFlight(simulator))
+        model = condition.identified(condition.structure(records[0]), records, source)
         nominal, covered, width = held(
-            model, records, source, condition.truth(heli), condition.truth(simulator), ALL
+            model,
+            records,
+            source,
+            condition.truth(heli),
+            condition.truth(simulator),
+            ALL,
         )
     return Coverage(seed=seed, nominal=nominal, covered=covered, width=width)
 

@@ -1,233 +1,299 @@
-"""How often the verdict "fit for control" is wrong: flights of many kinds, identified, judged from
-the flight alone, and compared with the exact linear models that the verdict has not seen.
+"""How often the verdict "fit for control" is wrong: flights under real conditions, identified
+rightly and with what users get wrong, judged from the flight alone for several loops, and compared
+with the exact linear models that the verdict has not seen.
 """
 
 from __future__ import annotations
 
-import json
 import warnings
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cache, partial
-from typing import Any
 
 import numpy as np
 
-import symheli
-from evidence.seeds import over_seeds, parser_of, seeds_of
-from identification import (
-    FilterError,
-    FitForControl,
-    InstrumentalVariables,
-    KinematicARX,
-    Polynomial,
-    fit,
-)
+from evidence.marks.coverage import at_points
+from evidence.seeds import by_name, parser_of
+from evidence.tables import DOCS, keep, markdown, parsed
+from identification import FitForControl, KinematicARX, Polynomial, structure_bias
 from identification import fit_for_control as judge
-from identification.judge.criteria import SHARE_OF_MARGIN
-from studies.known_kinematics.models import PAIRS
-from studies.loops.lateral import STATES
-from studies.loops.robust_lateral import FEEDBACK, INPUTS, SIZES
-from studies.output import progress
-from studies.transition.flights import ACCELERATIONS, AMPLITUDE, TOP, autopilot_for
-from symheli import (
-    AirspeedSchedule,
-    Excitation,
-    FlightRecord,
-    Helicopter,
-    LinearModel,
-    SimulatedFlight,
-)
+from studies.known_kinematics.conditions import ALL, CONDITIONS, Condition, Instruments
+from studies.known_kinematics.models import INPUTS, PAIRS, SCHEDULING
+from studies.known_kinematics.truth import SCALES, Truth
+from studies.loops.robust_lateral import FEEDBACK, SIZES
+from studies.output import as_json
+from studies.transition.flights import TOP
+from symheli import FlightRecord, SimulatedFlight, Wind
 from symheli.errors import DataWarning, SymheliError
-from symheli.flight import Autopilot
 
-SPEEDS = tuple(float(v) for v in np.linspace(0.0, TOP, 9))
+JUDGED = (0, 2, 4, 8, 12, 16, 20, 26)
+"""Of the airspeeds of a truth those that are judged at: 0, 1, 2, 4, 6, 8, 10, 13 m/s."""
 
-DEGREE = 2
-"""Of the coefficients in the airspeed."""
-
-METHODS = ("filter error", "iv", "ls")
+DRAWS, HORIZON = 25, 2.0
+"""Of each verdict; seconds of its predictions."""
 
 
 @dataclass(frozen=True)
-class Kind:
-    """A kind of flight: ramps between airspeeds (m/s^2), held for `hold` s between, with multisines
-    of `amplitude` times those of the study from `lowest` Hz on, and sensor noise (dB).
-    """
+class Loop:
+    """Gains that are asked about, the axis that is their plant, and sizes that count as 1."""
 
-    accelerations: tuple[float, ...]
-    hold: float = 1.5
-    noise_db: float = 30.0
-    amplitude: float = 1.0
-    lowest: float = 0.1
+    axis: str
+    gains: Mapping[tuple[str, str], float]
+    sizes: Mapping[str, float]
 
-    def fly(self, heli: Helicopter, autopilot: Autopilot, seed: int) -> FlightRecord:
-        """Between random airspeeds of the transition, other multisines and noise a seed."""
-        schedule = AirspeedSchedule.varied(0.0, TOP, self.accelerations, self.hold, seed=seed)
-        amplitudes = {name: self.amplitude * a for name, a in AMPLITUDE.items()}
-        return symheli.fly(
-            heli,
-            schedule,
-            dt=0.02,
-            excitation=Excitation(amplitudes, "multisine", (self.lowest, 5.0), seed),
-            noise_db=self.noise_db,
-            seed=seed,
-            controller=autopilot,
+    def named(self, inputs: Mapping[str, str]) -> Loop:
+        """The same with the inputs of a model in the place of the controls."""
+        gains = {(inputs[u], y): gain for (u, y), gain in self.gains.items()}
+        return replace(
+            self, gains=gains, sizes={inputs.get(name, name): s for name, s in self.sizes.items()}
         )
 
 
-KINDS = {
-    "long": Kind(ACCELERATIONS),
-    "short": Kind(ACCELERATIONS[:3]),
-    "noisy": Kind(ACCELERATIONS, noise_db=20.0),
-    "gentle": Kind((1.0,) * 8, hold=4.0, lowest=0.03),
-    "poor": Kind(ACCELERATIONS[:6], amplitude=0.1),
+LOOPS = {
+    "lateral": Loop("lateral", FEEDBACK, SIZES),
+    "all axes": Loop(
+        ALL,
+        {
+            ("d_lat", "v"): -0.006,
+            ("d_lat", "phi"): -0.045,
+            ("d_ped", "r"): -0.114,
+            ("d_lon", "u"): 0.0043,
+            ("d_lon", "theta"): -0.075,
+            ("d_col", "w"): -0.0002,
+        },
+        SCALES,
+    ),
+    "all axes, gentle": Loop(
+        ALL,
+        {**FEEDBACK, ("d_lon", "u"): 0.002, ("d_lon", "theta"): -0.03, ("d_col", "w"): -0.002},
+        SCALES,
+    ),
 }
+"""Their margins around the exact models are .33 to .45, .15 to .17 and .07 to .09, in sizes of
+their own.
+"""
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """One flight: the verdict, what the log says of d/b (by draws alone, and in all), and what is
-    true of it.
+class Case:
+    """What was flown, what its identification takes it for, and how it changes the structure."""
 
-    `true_ratio` is infinite where the estimate's own loop is unstable; `lost` says whether the loop
-    is unstable around the truth anywhere. A method that refuses the flight has the verdict
-    "refused" and no numbers.
+    about: str
+    flown: Condition
+    believed: Condition
+    changed: Callable[[KinematicARX], KinematicARX] = replace
+
+    def log(self, record: FlightRecord) -> FlightRecord:
+        """What is known of a flight: where servos, a delay or a wind are not believed in, neither
+        the plan nor the simulator has them, and commands stand for deflections.
+        """
+        if self.flown is self.believed:
+            return record
+        plan = replace(record.meta["plan"], servos=None, delay=0.0, wind=Wind())
+        if f"{INPUTS[0]}_command" in record.signals:
+            commands = {u: record[f"{u}_command"] for u in INPUTS}
+            record = record.with_signals(dict.fromkeys(INPUTS, "rad"), **commands)
+        return replace(record, meta={**record.meta, "plan": plan})
+
+
+ALIKE = ("bandwidth", "airspeed")
+"""Conditions that are left out: what another one has, with one thing more or less to be found."""
+
+IDEAL, SERVOS = CONDITIONS["ideal"], CONDITIONS["servos"]
+NOISY = replace(IDEAL, noise_db=10.0, longest=75.0)
+CASES: Mapping[str, Case] = {
+    **{name: Case(one.about, one, one) for name, one in CONDITIONS.items() if name not in ALIKE},
+    "degree 1": Case(
+        "coefficients linear in airspeed, no acceleration",
+        IDEAL,
+        IDEAL,
+        partial(replace, scheduling=SCHEDULING[0], basis=Polynomial(1, 0.0, TOP)),
+    ),
+    "constant": Case(
+        "constant coefficients",
+        IDEAL,
+        IDEAL,
+        partial(replace, scheduling=SCHEDULING[0], basis=Polynomial(0, 0.0, TOP)),
+    ),
+    "one lag": Case("one lag of every control", IDEAL, IDEAL, partial(replace, nb=1)),
+    "10 dB": Case("10 dB of noise, half a flight", NOISY, NOISY),
+    "delay untold": Case(
+        "commands 40 ms late, taken for deflections",
+        CONDITIONS["delay"],
+        IDEAL,
+    ),
+    "20 ms untold": Case(
+        "commands 20 ms late, taken for deflections",
+        replace(CONDITIONS["delay"], late=1),
+        IDEAL,
+    ),
+    "servos untold": Case(
+        "servos, 20 ms, governor; commands taken for deflections of an ideal helicopter",
+        SERVOS,
+        IDEAL,
+    ),
+    "no rotor speed": Case(
+        "the same; servos and delay known, rotor speed left out",
+        SERVOS,
+        SERVOS,
+        partial(replace, rotor_speed=None),
+    ),
+    "sensors untold": Case("rates and attitude 40 ms late, not said", CONDITIONS["sensors"], IDEAL),
+    "wind untold": Case("steady wind of 5 m/s, not said", CONDITIONS["wind"], IDEAL),
+    "turbulence untold": Case(
+        "a breeze and light turbulence, not said", CONDITIONS["turbulence"], IDEAL
+    ),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """One model and one loop: the verdict, its rows, and what is true.
+
+    `said`, `true`: upper bound of the nu-gap, and the exact one, over the margin, at the worst
+    airspeed; `bounds`, `gaps`: both at every airspeed. `true` is infinite where the estimate's own
+    loop is unstable. A structure that the flight does not determine has the verdict "refused" and
+    no numbers.
     """
 
-    vehicle: str
-    kind: str
-    method: str
     seed: int
+    loop: str
     verdict: str
     rows: dict[str, str]
-    drawn: float
-    ratio: float
-    true_ratio: float
-    lost: bool
+    said: float = np.nan
+    true: float = np.nan
+    bounds: tuple[float, ...] = ()
+    gaps: tuple[float, ...] = ()
 
     @classmethod
-    def of(cls, vehicle: str, kind: str, method: str, seed: int, found: FitForControl) -> Outcome:
-        """What was found of one flight, with the truth beside."""
-        feedback, loops = found["nu-gap over margin"], found["unstable loops"]
-        assert feedback.truth is not None
-        with np.errstate(divide="ignore"):
-            drawn = float((found.gap / found.margin).max())
+    def of(cls, seed: int, loop: str, found: FitForControl) -> Outcome:
+        """What was found for one loop, with the truth beside."""
+        row = found["nu-gap over margin"]
+        truth, gaps = row.truth, found.true_gap
+        assert truth is not None
+        assert gaps is not None
         return cls(
-            vehicle,
-            kind,
-            method,
-            seed,
-            found.verdict,
-            {row.name: row.verdict for row in found.criteria if row.decides},
-            drawn,
-            feedback.value,
-            feedback.truth,
-            bool(loops.truth),
+            seed=seed,
+            loop=loop,
+            verdict=found.verdict,
+            rows={row.name: row.verdict for row in found.criteria if row.decides},
+            said=row.value,
+            true=truth,
+            bounds=tuple(map(float, found.bound)),
+            gaps=tuple(map(float, gaps)),
         )
 
     @property
     def is_fit(self) -> bool:
-        """By the exact models: nu-gap at most a third of the margin, and stable, everywhere."""
-        return self.true_ratio <= SHARE_OF_MARGIN and not self.lost
+        """By the exact models: the nu-gap below the margin at every airspeed."""
+        return self.true < 1
 
     @property
-    def wrong(self) -> bool:
-        """Said to be fit and is not."""
-        return self.verdict == "fit" and not self.is_fit
+    def said_fit(self) -> bool:
+        """By the verdict."""
+        return self.verdict == "fit"
 
 
 @cache
-def _vehicle(name: str) -> tuple[Helicopter, Autopilot, dict[float, LinearModel]]:
-    heli = Helicopter.load(name, governor="ideal")
-    family = symheli.sweep(heli, SPEEDS, inputs=INPUTS).select(STATES, INPUTS)
-    return heli, autopilot_for(heli), dict(zip(SPEEDS, family.models, strict=True))
+def _exact(vehicle: str, name: str, believed: bool) -> Truth:
+    """Exact models of a vehicle as it is flown in a case, or as it is believed to be."""
+    condition = CASES[name].believed if believed else CASES[name].flown
+    return condition.truth(condition.helicopter(vehicle), ALL, "lateral")
 
 
-def outcome(vehicle: str, kind: str, method: str, seed: int) -> Outcome:
-    """Fly, identify with the other vehicle's simulator, judge; beside it a fit by instruments with
-    one degree more, which sees what the basis cannot hold.
-    """
-    heli, autopilot, truth = _vehicle(vehicle)
-    simulator = SimulatedFlight(_vehicle(PAIRS[vehicle])[0])
-    record = KINDS[kind].fly(heli, autopilot, seed)
-    structure, richer = (
-        KinematicARX(heli.inputs, "airspeed_command", basis=Polynomial(degree, 0.0, TOP))
-        for degree in (DEGREE, DEGREE + 1)
-    )
-    how: Any = {
-        "filter error": FilterError(simulator),
-        "iv": InstrumentalVariables(simulator),
-        "ls": "ls",
-    }[method]
+def of_seed(name: str, seed: int, truth: str = "xcell60") -> list[Outcome]:
+    """Fly, identify, judge for every loop."""
+    case = CASES[name]
+    flown = case.flown.flights(case.flown.helicopter(truth), seed)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DataWarning)
         try:
-            model = fit(structure, record, method=how)
-            second = fit(richer, record, method=InstrumentalVariables(simulator))
-            found = judge(model, record, FEEDBACK, scales=SIZES, second=second, truth=truth)
+            return judged(name, seed, list(map(case.log, flown)), truth)
         except (SymheliError, np.linalg.LinAlgError) as error:
             why = {"refused": f"{type(error).__name__}: {error}"}
-            nan = float("nan")
-            return Outcome(vehicle, kind, method, seed, "refused", why, nan, nan, nan, False)
-    return Outcome.of(vehicle, kind, method, seed, found)
+            return [Outcome(seed=seed, loop=loop, verdict="refused", rows=why) for loop in LOOPS]
 
 
-def campaign(seeds: Sequence[int], methods: Sequence[str] = METHODS[:1]) -> list[partial[Outcome]]:
-    """The call for every vehicle, kind and method with each of the seeds."""
-    return [
-        partial(outcome, vehicle, kind, method, seed)
-        for seed in seeds
-        for method in methods
-        for kind in KINDS
-        for vehicle in PAIRS
-    ]
-
-
-def table(outcomes: Sequence[Outcome]) -> str:
-    """A line a vehicle, kind and method: how often which verdict, how many are fit in truth, and
-    how many "fit" are wrong.
-    """
-    heads = ("fit", "not known", "not fit", "refused")
-    lines = [
-        f"{'vehicle':18s} {'flight':8s} {'method':13s}"
-        + "".join(f"{h:>10s}" for h in (*heads, "truly fit", "wrong"))
-        + f"{'d/b said':>10s}{'true':>7s}"
-    ]
-    groups = dict.fromkeys((o.vehicle, o.kind, o.method) for o in outcomes)
-    for group in [*groups, None]:
-        some = [o for o in outcomes if group in (None, (o.vehicle, o.kind, o.method))]
-        counts = [sum(o.verdict == h for o in some) for h in heads]
-        known = [o for o in some if o.verdict != "refused"]
-        said, true = (
-            np.median(v) if v else np.nan
-            for v in ([o.ratio for o in known], [o.true_ratio for o in known])
+def judged(name: str, seed: int, records: list[FlightRecord], truth: str) -> list[Outcome]:
+    """Identify as the case has it, judge for every loop."""
+    case, other = CASES[name], PAIRS[truth]
+    source = Instruments(SimulatedFlight(case.believed.helicopter(other)))
+    kin = case.changed(case.believed.structure(records[0]))
+    model = case.believed.identified(kin, records, source)
+    inputs = {str(u).removesuffix("_command"): str(u) for u in model.inputs}
+    exact, there = _exact(truth, name, False), _exact(other, name, True)
+    off = structure_bias(model, records, source, at_points(model, there.models[ALL], JUDGED))
+    out = []
+    for loop, one in LOOPS.items():
+        own = one.named(inputs)
+        found = judge(
+            model,
+            records,
+            own.gains,
+            scales=own.sizes,
+            bias=replace(off, exact=at_points(model, there.models[one.axis], JUDGED)),
+            truth=at_points(model, exact.models[one.axis], JUDGED),
+            draws=DRAWS,
+            horizon=HORIZON,
         )
-        names = group or (f"all {len(some)}", "", "")
-        lines.append(
-            f"{names[0]:18s} {names[1]:8s} {names[2]:13s}"
-            + "".join(
-                f"{n:10d}"
-                for n in (*counts, sum(o.is_fit for o in some), sum(o.wrong for o in some))
-            )
-            + f"{said:10.2f}{true:7.2f}"
-        )
-    return "\n".join([*lines, "d/b: medians, at the worst airspeed of each flight"])
+        out.append(Outcome.of(seed, loop, found))
+    return out
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """`python -m evidence.marks.fit_for_control`."""
-    parser = parser_of(__doc__, "1000-1009")
-    parser.add_argument("--methods", nargs="+", choices=METHODS, default=METHODS[:1])
-    given = parser.parse_args(arguments)
-    outcomes = []
-    for one in over_seeds(given, campaign(seeds_of(given), given.methods)):
-        outcomes.append(one)
-        progress(f"{len(outcomes)} {one.vehicle} {one.kind} {one.seed}: {one.verdict}")
-        if given.json:
-            print(json.dumps(asdict(one)), flush=True)
-    if not given.json:
-        print(table(outcomes))
+HEAD = (
+    "flight, and what it is taken for",
+    "unfit, called fit",
+    "fit, called fit",
+    "farthest called fit (seed)",
+    "bounds that hold, %",
+    "bound over exact, median",
+    "refused",
+)
+
+
+def farthest(some: Sequence[Outcome]) -> str:
+    """The largest exact nu-gap over the margin that is called fit, and its seed."""
+    last = max((o for o in some if o.said_fit), key=lambda o: o.true, default=None)
+    return "" if last is None else f"{last.true:.2f} ({last.seed})"
+
+
+def row(about: str, some: Sequence[Outcome]) -> tuple[str, ...]:
+    """Counts of one group."""
+    known = [o for o in some if o.verdict != "refused"]
+    fit, unfit = ([o for o in known if o.is_fit == which] for which in (True, False))
+    bounds, gaps = (np.array([v for o in known for v in getattr(o, k)]) for k in ("bounds", "gaps"))
+    called = [f"{sum(o.said_fit for o in group)} of {len(group)}" for group in (unfit, fit)]
+    return (
+        about,
+        *called,
+        farthest(known),
+        f"{100 * np.mean(bounds >= gaps):.1f}" if len(gaps) else "",
+        f"{np.median(bounds / gaps):.2f}" if len(gaps) else "",
+        str(len(some) - len(known)),
+    )
+
+
+def table(truth: str, found: Mapping[str, Sequence[Sequence[Outcome]]]) -> str:
+    """A row a case, one a loop, and one of all."""
+    flat = {name: [o for some in of_name for o in some] for name, of_name in found.items()}
+    every = [o for some in flat.values() for o in some]
+    rows = [row(CASES[name].about, some) for name, some in flat.items()]
+    rows += [row(f"loop: {loop}", [o for o in every if o.loop == loop]) for loop in LOOPS]
+    return markdown(HEAD, [*rows, row("all", every)])
+
+
+def main() -> None:
+    """Count, and keep the table in docs/identified.md."""
+    parser = parser_of(__doc__, "0-7")
+    parser.add_argument("--truth", default="xcell60", choices=sorted(PAIRS))
+    parser.add_argument("--only", nargs="+", choices=CASES, help="default: every case")
+    options = parsed(parser, "identified.md", timed=False)
+    found = by_name(options, of_seed, options.only or list(CASES))
+    text = table(options.truth, found)
+    plain = {name: [[vars(o) for o in some] for some in each] for name, each in found.items()}
+    print(as_json(plain) if options.json else text)
+    if options.write:
+        keep(DOCS / "identified.md", f"verdicts {options.truth}", text)
 
 
 if __name__ == "__main__":

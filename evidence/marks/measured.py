@@ -21,14 +21,8 @@ from studies.known_kinematics.predictions import HORIZON, OUTPUTS, fits_of, stat
 from studies.known_kinematics.truth import SPEEDS, Truth, frozen_axes
 from studies.output import as_json
 from studies.transition.comparison import along_the_command
-from studies.transition.flights import (
-    ABOVE_GROUND,
-    BREEZE,
-    BREEZE_AT_20FT,
-    TOP,
-    autopilot_for,
-)
-from symheli import Dryden, FlightRecord, Helicopter, Wind
+from studies.transition.flights import TOP, autopilot_for, light_turbulence
+from symheli import FlightRecord, Helicopter, Wind
 from symheli.values.arrays import Array
 
 CALLS = 50
@@ -68,9 +62,7 @@ class Setting:
 
     def air(self, seed: int) -> Wind | None:
         """The breeze and light turbulence of the study, where the air is to move."""
-        if not self.turbulent:
-            return None
-        return Wind(BREEZE, turbulence=Dryden(BREEZE_AT_20FT, ABOVE_GROUND), seed=seed)
+        return light_turbulence(seed) if self.turbulent else None
 
     def helicopters(self) -> tuple[Helicopter, Helicopter]:
         """Truth and simulator."""

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 import symheli
-from evidence.marks.conditions import CONDITIONS, Instruments
 from evidence.tables import markdown
 from identification import FilterError, KinematicModel, fit, unseen_flight
+from studies.known_kinematics.conditions import CONDITIONS, Instruments
 from studies.known_kinematics.flights import aggressive, transition
 from studies.known_kinematics.models import PAIRS, identified
 from studies.transition.flights import TOP, autopilot_for

@@ -34,7 +34,9 @@ HERE = "here"
 NO_COVARIANCE = "no covariance"
 
 SHARE_OF_MARGIN = 1 / 3
-"""Largest nu-gap, as a share of the stability margin."""
+"""Largest nu-gap, as a share of the stability margin, where nothing is known of the structure's
+bias.
+"""
 
 GAIN = 0.25
 """Largest error of the static gain, as a share of it."""
@@ -117,22 +119,27 @@ def stability(at: Sequence[AtPoint], true: Sequence[LinearModel | None]) -> Crit
 
 
 def feedback(
-    at: Sequence[AtPoint], gap: Array, second_gap: Array, margin: Array, true_gap: Array | None
+    at: Sequence[AtPoint],
+    bound: Array,
+    second_gap: Array,
+    true_gap: Array | None,
+    threshold: float,
 ) -> Criterion:
-    """The distance to the farthest draw or other estimate, as a share of the margin."""
+    """The distance that the truth may have, as a share of the margin."""
+    margin = np.array([a.margin for a in at])
     with np.errstate(divide="ignore"):
-        value, where = worst(np.fmax(gap, second_gap) / margin, at)
+        value, where = worst(bound / margin, at)
         truth = None if true_gap is None else float((true_gap / margin).max())
-        apart = np.any(second_gap / margin > SHARE_OF_MARGIN)
-    verdict = judged(value, SHARE_OF_MARGIN, "not known")
-    if np.isnan(gap).any():
+        apart = np.any(second_gap / margin > threshold)
+    verdict = judged(value, threshold, "not known")
+    if at[0].thetas is None:
         verdict, where = "not known", NO_COVARIANCE
     elif apart:
         where = f"{where}; another estimate is as far"
     return Criterion(
         name="nu-gap over margin",
         value=value,
-        threshold=SHARE_OF_MARGIN,
+        threshold=threshold,
         verdict=verdict,
         source=VINNICOMBE,
         where=where,
@@ -217,7 +224,7 @@ def responses(
     model = plant.model
     try:
         found = response_match(
-            records,
+            [plant.regression.prepared(record) for record in records],
             lambda p: model.at(*p),
             plant.outputs,
             [str(u) for u in model.inputs],
@@ -269,7 +276,7 @@ def predictions(
     measured, guessed, noise, started = [], [], 0.0, 0.0
     rng = np.random.default_rng(0)
     for record in records:
-        y = record.columns(plant.outputs) / size
+        y = plant.regression.prepared(record).columns(plant.outputs) / size
         guess = model.predict(record, steps)[:, columns] / size
         keep = np.isfinite(y).all(axis=1) & ~np.isnan(guess).any(axis=1)
         if not keep.any():

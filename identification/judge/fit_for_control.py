@@ -5,7 +5,7 @@ model to design on, if it is.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy as np
 from identification.judge.coefficient_covariance import drawn
 from identification.judge.criteria import (
     SET,
+    SHARE_OF_MARGIN,
     Criterion,
     Verdict,
     certainty,
@@ -24,6 +25,7 @@ from identification.judge.criteria import (
     together,
 )
 from identification.judge.frozen_plant import AtPoint, FrozenPlant, Model, Point
+from identification.judge.response_regions import StructureBias, with_neighbours
 from identification.model.kinematic_model import KinematicModel
 from identification.model.lpvarx_model import LEAST_SQUARES
 from identification.structure.regressors import as_records
@@ -57,6 +59,8 @@ class FitForControl:
         Largest nu-gap from the estimate to a draw; NaN without a covariance.
     second_gap : array (K,)
         Largest nu-gap to another estimate; NaN without one.
+    structure_gap : array (K,) or None
+        nu-gap that the structure leaves in a simulator, where a bias was given.
     true_gap : array (K,) or None
         nu-gap from the estimate to the truth, where it was given.
 
@@ -64,7 +68,7 @@ class FitForControl:
     --------
     >>> found = idn.fit_for_control(model, record, {("u", "y"): -0.1}, scales={"y": 1.0, "u": 1.0},
     ...     covariance=idn.uncertainty(model, record).covariance, window=8.0, horizon=1.0)
-    >>> found["nu-gap over margin"].verdict, found.gap.shape
+    >>> found["nu-gap over margin"].verdict, found.bound.shape
     ('fit', (9,))
     """
 
@@ -73,9 +77,18 @@ class FitForControl:
     margin: Array
     gap: Array
     second_gap: Array
+    structure_gap: Array | None = None
     true_gap: Array | None = None
 
     __repr__ = summarized
+
+    @property
+    def bound(self) -> Array:
+        """Upper bound (K,) of the nu-gap to the truth, in [0, 1]: see `fit_for_control`."""
+        within = np.fmax(self.gap, self.second_gap)
+        if self.structure_gap is None:
+            return within
+        return np.minimum(within + np.sqrt(with_neighbours(self.structure_gap**2, 0)), 1.0)
 
     @property
     def verdict(self) -> Verdict:
@@ -120,6 +133,7 @@ def fit_for_control(
     points: Sequence[Point] | None = None,
     covariance: Array | None = None,
     second: Model | Sequence[Model] = (),
+    bias: StructureBias | None = None,
     truth: Mapping[Any, LinearModel] | None = None,
     horizon: float | None = None,
     window: float | None = None,
@@ -135,7 +149,8 @@ def fit_for_control(
     this loop. Every frozen plant of the 95 % set is compared, in feedback, with the estimate:
 
     - closed loop stable: share of the draws, at the worst point;
-    - nu-gap over margin: d/b, d the largest nu-gap from the estimate to a draw or a second one;
+    - nu-gap over margin: d/b, d the largest nu-gap from the estimate to a draw or a second one,
+      at most a third; with `bias` an upper bound of the nu-gap to the truth, at most 1;
     - static gain in the loop, from the inputs to the outputs: what 95 % of the draws stay within,
       as a share of its largest singular value. That of the plant alone stands beside and decides
       nothing: where the plant nearly integrates no record of minutes knows it, and feedback does
@@ -149,6 +164,14 @@ def fit_for_control(
     - TIC: of predictions over `horizon`, deviations from the mean, all outputs in their scales;
       where it exceeds the threshold, without what noise of the sensors makes of the measurements
       and of the starts of the predictions.
+
+    The upper bound: the nu-gap is a metric, so that the truth is no farther from the estimate than
+    what the structure would make of this vehicle without noise is, plus what is between that and
+    the truth. The first is in the 95 % set, the second is what the simulator shows of the
+    structure, in these `scales`, its unstable poles counted as the nu-gap counts them, the root
+    mean square of neighbouring points; that the size carries over from one vehicle to the other is
+    assumed. With `bias` there are no rows of
+    static gain and derivatives: what they are about is in the bound.
 
     Frozen plants say nothing of how fast the scheduling may move.
 
@@ -165,7 +188,8 @@ def fit_for_control(
         A change of this size counts as 1 in gaps and margins; its signals, those of the model,
         are the plant.
     points : sequence, optional
-        Values of the scheduling; default nine over the range of one parameter, or those of `truth`.
+        Values of the scheduling; default those of `truth` or `bias`, or nine over the range of one
+        parameter.
     covariance : array (ny, n, ny, n), optional
         Of all coefficients together; default that of the model, but not that of least squares,
         which says nothing of the bias by noise in the regressors. Without it nothing is said to be
@@ -173,6 +197,8 @@ def fit_for_control(
     second : LPVARXModel, KinematicModel or sequence of them, optional
         Other estimates that ought to agree: fitted to a second flight, or with a richer basis. The
         covariance knows nothing of what the basis cannot hold; a fit with one degree more does.
+    bias : StructureBias, optional
+        From `structure_bias`, with exact models of the plant in the simulator at every point.
     truth : mapping, optional
         {point: LinearModel}, continuous or at the sample period. Stands beside and decides nothing.
     horizon : float, optional
@@ -194,7 +220,8 @@ def fit_for_control(
     Raises
     ------
     InputError
-        Scales that are not positive or name no output or no input; points that are missing; a
+        Scales that are not positive or name no output or no input; points that are missing, of the
+        bias and the truth too; a
         horizon or a window that is not positive or longer than every record; a covariance of
         another shape.
     UnknownNameError
@@ -233,7 +260,8 @@ def fit_for_control(
             "scales: name at least one output and one input of the model"
             f" ({', '.join(model.outputs)}; {', '.join(model.inputs)}), got {', '.join(scales)}"
         )
-    chosen = _points(model, points, truth)
+    known = {"truth": truth, "bias": None if bias is None else bias.exact}
+    chosen = _points(model, points, {k: v for k, v in known.items() if v is not None})
     if covariance is None and model.method not in LEAST_SQUARES:
         covariance = model.covariance
     if covariance is not None:
@@ -250,56 +278,67 @@ def fit_for_control(
         AtPoint(plant, p, loop(p) if callable(loop) else loop, scales, thetas, covariance, others)
         for p in chosen
     ]
-    true = [None if truth is None else _discrete(truth[p], model, outputs, inputs) for p in chosen]
+    true = [None if truth is None else _discrete(truth[p], plant) for p in chosen]
     gap = np.array([a.drawn_gaps.max() for a in at])
     second_gap = np.array([a.second_gap for a in at])
     margin = np.array([a.margin for a in at])
     true_gap = None
     if truth is not None:
         true_gap = np.array([a.gaps_to([t])[0] for a, t in zip(at, true, strict=True)])  # type: ignore[list-item]
-    criteria = (
-        stability(at, true),
-        feedback(at, gap, second_gap, margin, true_gap),
-        static_gain(at, true, in_loop=True),
-        static_gain(at, true, in_loop=False),
-        *certainty(at),
-        responses(plant, records, window, band),
-        predictions(plant, records, scales, horizon),
-    )
-    return FitForControl(
-        criteria=criteria,
+    found = FitForControl(
+        criteria=(),
         points=chosen,
         margin=margin,
         gap=gap,
         second_gap=second_gap,
+        structure_gap=None if bias is None else _structure_gap(bias, at),
         true_gap=true_gap,
+    )
+    whole = bias is not None
+    criteria = (
+        stability(at, true),
+        feedback(at, found.bound, second_gap, true_gap, 1.0 if whole else SHARE_OF_MARGIN),
+        *(() if whole else (static_gain(at, true, in_loop) for in_loop in (True, False))),
+        *(() if whole else certainty(at)),
+        responses(plant, records, window, band),
+        predictions(plant, records, scales, horizon),
+    )
+    return replace(found, criteria=criteria)
+
+
+def _structure_gap(bias: StructureBias, at: Sequence[AtPoint]) -> Array:
+    """nu-gaps (K,) in the simulator."""
+    plant = replace(at[0].plant, model=bias.model)
+    return np.array(
+        [replace(a, plant=plant).gaps_to([_discrete(bias.exact[a.p], plant)])[0] for a in at]
     )
 
 
 def _points(
-    model: Model, points: Sequence[Point] | None, truth: Mapping[Any, LinearModel] | None
+    model: Model,
+    points: Sequence[Point] | None,
+    exact: Mapping[str, Mapping[Any, LinearModel]],
 ) -> tuple[Point, ...]:
     basis = model.structure.basis
-    if points is None and truth is not None:
-        points = tuple(truth)
+    if points is None and exact:
+        points = tuple(next(iter(exact.values())))
     elif points is None and basis.dimension == 1:
         points = tuple(float(p) for p in np.linspace(*basis.ranges[0], POINTS))
     if points is None or not len(points):
         raise InputError(
             "points: with several scheduling parameters name at least one value of each"
         )
-    if truth is not None and any(p not in truth for p in points):
-        raise InputError(
-            f"truth: expected a model at every point {list(points)}, got {list(truth)}"
-        )
+    for name, models in exact.items():
+        if any(p not in models for p in points):
+            raise InputError(
+                f"{name}: expected a model at every point {list(points)}, got {list(models)}"
+            )
     return tuple(points)
 
 
-def _discrete(
-    model: LinearModel, of: Model, outputs: tuple[str, ...], inputs: tuple[str, ...]
-) -> LinearModel:
-    sampled = model if model.dt is not None else model.discretize(of.dt)
-    return sampled.select(inputs=inputs, outputs=outputs)
+def _discrete(model: LinearModel, plant: FrozenPlant) -> LinearModel:
+    sampled = model if model.dt is not None else model.discretize(plant.model.dt)
+    return sampled.select(inputs=plant.inputs, outputs=plant.outputs)
 
 
 def _number(value: float) -> str:

@@ -5,7 +5,7 @@ shows it.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,11 +15,14 @@ from identification.estimators.estimate import fit
 from identification.estimators.instruments import FlightSource
 from identification.judge.coefficient_covariance import drawn
 from identification.judge.frozen_plant import FrozenPlant, Model, Point
+from identification.structure.kinematic_arx import KinematicARX
+from identification.structure.lpvarx import LPVARX
 from symheli.errors import InputError
 from symheli.lpv import LinearModel
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array, frozen
 from symheli.values.numbers import whole
+from symheli.values.sample_period import same_period
 from symheli.values.summary import summarized
 
 
@@ -66,6 +69,51 @@ class ResponseRegions:
         return np.sqrt(np.trace(self.covariance, axis1=-2, axis2=-1))
 
 
+@dataclass(frozen=True, eq=False)
+class StructureBias:
+    """A structure as it was identified in a simulator without noise, beside the exact linear models
+    there: what they differ by is what the structure leaves out.
+
+    Parameters
+    ----------
+    model : LPVARXModel or KinematicModel
+        Identified in the simulator.
+    exact : mapping of point to LinearModel
+        Of the simulator's vehicle, at the period of the model.
+
+    Examples
+    --------
+    >>> off = idn.StructureBias(model, {0.0: model.at(0.0)})
+    >>> bool(np.abs(off.responses([0.1, 1.0], model.outputs, model.inputs)).max() < 1e-12)
+    True
+    """
+
+    model: Model
+    exact: Mapping[Any, LinearModel]
+
+    __repr__ = summarized
+
+    def __post_init__(self) -> None:
+        _chosen(self.exact)
+        for truth in self.exact.values():
+            if not same_period(truth.dt, self.model.dt):
+                raise InputError(
+                    f"exact: expected linear models sampled every {self.model.dt:g} s, got"
+                    f" {truth.dt}; use .discretize(dt)"
+                )
+
+    def responses(
+        self, frequencies: object, outputs: Sequence[str], inputs: Sequence[str]
+    ) -> Array:
+        """What frequency responses are off by, (K, w, ny, nu), at the points of `exact`."""
+        plant = FrozenPlant(self.model, tuple(map(str, outputs)), tuple(map(str, inputs)))
+        omega, off = frozen(frequencies, "frequencies", (None,)), []
+        for p, truth in zip(_chosen(self.exact), self.exact.values(), strict=True):
+            part = truth.select(inputs=plant.inputs, outputs=plant.outputs)
+            off.append(plant.at(*p).frequency_response(omega) - part.frequency_response(omega))
+        return np.stack(off)
+
+
 def response_regions(
     model: Model,
     points: Iterable[Point],
@@ -73,7 +121,7 @@ def response_regions(
     outputs: Sequence[str] | None = None,
     inputs: Sequence[str] | None = None,
     *,
-    bias: object = None,
+    bias: StructureBias | None = None,
     draws: int = 120,
     seed: int = 0,
 ) -> ResponseRegions:
@@ -90,9 +138,9 @@ def response_regions(
         rad/s.
     outputs, inputs : sequence of str, optional
         Only these.
-    bias : array (K, w, ny, nu), optional
-        What the structure is off besides, as from `structure_bias`: its size counts, its phase does
-        not, and its zeros do not: half the mean of |bias|^2 over neighbouring points and
+    bias : StructureBias, optional
+        From `structure_bias`, at the same points. Of what responses are off by the size counts, the
+        phase does not, and zeros do not: half the mean of |bias|^2 over neighbouring points and
         frequencies is added to the variance of both parts.
     draws, seed : int
         Of a normal distribution.
@@ -105,7 +153,7 @@ def response_regions(
     Raises
     ------
     InputError
-        No covariance, no points, a bias of another shape.
+        No covariance, no points, a bias at other points.
 
     Examples
     --------
@@ -122,7 +170,8 @@ def response_regions(
         model.theta, model.covariance, plant.regression.free, whole(draws, "draws", 3), seed
     )
     omega, centres, covariances = frozen(frequencies, "frequencies", (None,)), [], []
-    for p in _chosen(points):
+    chosen = _chosen(points)
+    for p in chosen:
         own = plant.at(*p).frequency_response(omega)
         spread = np.stack([m.frequency_response(omega) for m in plant.of_each(thetas, *p)]) - own
         parts = np.stack([np.real(spread), np.imag(spread)], axis=-1)
@@ -130,12 +179,12 @@ def response_regions(
         covariances.append(np.einsum("d...i,d...j->...ij", parts, parts) / len(thetas))
     centre, covariance = np.stack(centres), np.stack(covariances)
     if bias is not None:
-        off = np.asarray(bias)
-        if off.shape != centre.shape or not np.isfinite(off).all():
+        if _chosen(bias.exact) != chosen:
             raise InputError(
-                f"bias: expected finite numbers of shape {centre.shape}, got shape {off.shape}"
+                f"bias: expected one at the points {chosen}, got {_chosen(bias.exact)}"
             )
-        power = _with_neighbours(_with_neighbours(np.abs(off) ** 2, 0), 1)
+        off = bias.responses(omega, plant.outputs, plant.inputs)
+        power = with_neighbours(with_neighbours(np.abs(off) ** 2, 0), 1)
         covariance += 0.5 * power[..., None, None] * np.eye(2)
     return ResponseRegions(centre, covariance)
 
@@ -145,13 +194,10 @@ def structure_bias(
     records: FlightRecord | Sequence[FlightRecord],
     simulator: FlightSource,
     exact: Mapping[Any, LinearModel],
-    frequencies: object,
-    outputs: Sequence[str] | None = None,
-    inputs: Sequence[str] | None = None,
-) -> Array:
+) -> StructureBias:
     """Return how far the structure of a model is off on flights like these, as a simulator of known
     linear models shows it: the same flights in the simulator, without noise, identified in the
-    same structure by least squares, less its exact responses.
+    same structure by least squares, beside its exact linear models.
 
     No noise is in it, so that all of it is what the structure leaves out of a nonlinear vehicle in
     these manoeuvres. The simulator may be another vehicle: sizes of the bias carry over, phases
@@ -168,15 +214,11 @@ def structure_bias(
     exact : mapping of point to LinearModel
         Linear models of the simulator's vehicle at points of the scheduling, sampled at the period
         of the model, with its outputs and inputs.
-    frequencies : array (w,)
-        rad/s.
-    outputs, inputs : sequence of str, optional
-        Only these.
 
     Returns
     -------
-    array (K, w, ny, nu), complex
-        At the points of `exact`, in their order.
+    StructureBias
+        For `response_regions` and `fit_for_control`; `.responses(frequencies, outputs, inputs)`.
 
     Raises
     ------
@@ -201,8 +243,8 @@ def structure_bias(
     >>> wrong = symheli.Helicopter.load("xcell_kahn_hudson", governor="ideal")
     >>> there = {4.0: symheli.linearize(wrong, airspeed=4.0).discretize(0.02)}
     >>> off = idn.structure_bias(idn.fit(kin, flight), flight, symheli.SimulatedFlight(wrong),
-    ...     there, [1.0, 5.0], ["p"], ["d_lat"])
-    >>> off.shape
+    ...     there)
+    >>> off.responses([1.0, 5.0], ["p"], ["d_lat"]).shape
     (1, 2, 1, 1)
     """
     if not isinstance(simulator, FlightSource):
@@ -211,21 +253,16 @@ def structure_bias(
             f" {simulator!r:.80}"
         )
     given = [records] if isinstance(records, FlightRecord) else list(records)
-    own = fit(model.structure, [simulator.flown(record) for record in given])
-    plant = _plant(own, outputs, inputs)  # type: ignore[arg-type]
-    omega, off = frozen(frequencies, "frequencies", (None,)), []
-    for p, truth in zip(_chosen(exact), exact.values(), strict=True):
-        if truth.dt is None or not np.isclose(truth.dt, model.dt, rtol=1e-9):
-            raise InputError(
-                f"exact: expected linear models sampled every {model.dt:g} s, got {truth.dt}; use"
-                " .discretize(dt)"
-            )
-        part = truth.select(inputs=plant.inputs, outputs=plant.outputs)
-        off.append(plant.at(*p).frequency_response(omega) - part.frequency_response(omega))
-    return np.stack(off)
+    own = fit(in_time(model.structure), [simulator.flown(record) for record in given])
+    return StructureBias(own, exact)  # type: ignore[arg-type]
 
 
-def _with_neighbours(values: Array, axis: int) -> Array:
+def in_time(structure: LPVARX | KinematicARX) -> LPVARX | KinematicARX:
+    """The structure for a simulated flight, whose sensors are not late."""
+    return replace(structure, sensors=None) if isinstance(structure, KinematicARX) else structure
+
+
+def with_neighbours(values: Array, axis: int) -> Array:
     """The mean of each of three neighbours along an axis, ends twice."""
     ends = [(1, 1) if i == axis else (0, 0) for i in range(values.ndim)]
     wide = np.moveaxis(np.pad(values, ends, mode="edge"), axis, 0)

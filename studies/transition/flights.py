@@ -27,6 +27,11 @@ flown 20 m above ground.
 """
 
 
+def light_turbulence(seed: int) -> Wind:
+    """The breeze and the light turbulence of a seed."""
+    return Wind(BREEZE, turbulence=Dryden(BREEZE_AT_20FT, ABOVE_GROUND), seed=seed)
+
+
 @dataclass(frozen=True)
 class TransitionPlan:
     """Seed and lengths of the flights of the transition study; `noise_db` None flies without sensor
@@ -79,11 +84,7 @@ class TransitionPlan:
     ) -> FlightRecord:
         seed = offset + self.seed
         excitation = Excitation(AMPLITUDE, "multisine", (lowest, 5.0), seed)
-        wind = (
-            Wind(BREEZE, turbulence=Dryden(BREEZE_AT_20FT, ABOVE_GROUND), seed=seed)
-            if self.windy
-            else Wind()
-        )
+        wind = light_turbulence(seed) if self.windy else Wind()
         return fly(
             heli,
             schedule,

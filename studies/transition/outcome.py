@@ -17,6 +17,7 @@ from studies.transition.identified import Identification
 from studies.transition.known_kinematics import KnownKinematics
 from studies.transition.paper_experiment import PaperExperiments
 from studies.transition.proofs import GustProofs, LongitudinalProofs, RobustProofs, ServoProofs
+from studies.transition.real_conditions import RealConditions
 from studies.transition.recovery import Recoveries
 from symheli import Helicopter
 
@@ -40,6 +41,7 @@ class Outcome:
     identification: Identification | None = None
     comparison: Comparisons | None = None
     known_kinematics: KnownKinematics | None = None
+    real_conditions: RealConditions | None = None
     gust: GustProofs | None = None
     longitudinal: LongitudinalProofs | None = None
     servo: ServoProofs | None = None

@@ -34,10 +34,11 @@ if TYPE_CHECKING:
     from studies.transition.known_kinematics import KnownKinematics
     from studies.transition.outcome import Outcome
     from studies.transition.paper_experiment import OutputResult, PaperExperiment
+    from studies.transition.real_conditions import RealConditions
     from studies.transition.recovery import Recovery
     from symheli import Signal
 
-SCHEMA = "symheli study 7"
+SCHEMA = "symheli study 8"
 LIBRARIES = ("symheli", "casadi", "numpy", "scipy", "cvxpy", "clarabel")
 
 
@@ -67,6 +68,7 @@ def to_dict(study: Outcome) -> dict[str, Any]:
         "identification": study.identification and _identification(study.identification),
         "comparison": study.comparison and _comparison(study.comparison),
         "known_kinematics": study.known_kinematics and _known_kinematics(study.known_kinematics),
+        "real_conditions": study.real_conditions and _real_conditions(study.real_conditions),
         "guarantees": _guarantees(study),
         "controllers": controllers_to_dict(study),
         "held": held_to_dict(study),
@@ -309,6 +311,21 @@ def _known_kinematics(found: KnownKinematics) -> dict[str, Any]:
             for loop, margins in found.margins.items()
         ],
         "update_time": value(found.update_time, "s"),
+    }
+
+
+def _real_conditions(real: RealConditions) -> dict[str, Any]:
+    delay = {"true": value(real.delay, "s")}
+    if real.found is not None:
+        found, deviation = real.found
+        delay |= {"found": value(found, "s"), "deviation": value(deviation, "s")}
+    return {
+        "flight": real.about,
+        "simulator": real.simulator,
+        "airspeed": values(SPEEDS, "m/s"),
+        "nu_gap": values(() if real.gap is None else real.gap, "1"),
+        "delay": delay,
+        "reason": real.reason,
     }
 
 

@@ -25,6 +25,7 @@ from studies.transition.proofs import (
     robust_questions,
     servo_questions,
 )
+from studies.transition.real_conditions import identify_under_real_conditions
 from studies.transition.recovery import Recoveries, recover_at
 
 ENTRIES = frozenset(f.name for f in fields(Effort))
@@ -116,6 +117,12 @@ STAGES = (
         "Identifying with known kinematics",
         identify_with_known_kinematics,
         (60, 10),
+    ),
+    Stage(
+        "real_conditions",
+        "Identifying through servos, delay and governor",
+        identify_under_real_conditions,
+        (25, 12),
     ),
     Stage(
         "robust",

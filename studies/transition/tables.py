@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from studies.transition.identified import Identification
     from studies.transition.known_kinematics import KnownKinematics
     from studies.transition.outcome import Outcome
+    from studies.transition.real_conditions import RealConditions
     from synthesis import Margins
 
 
@@ -386,6 +387,28 @@ def known_kinematics(found: KnownKinematics) -> list[Table]:
         " A model is of use to a loop where its nu-gap is well below."
     )
     return [fits, held]
+
+
+def real_conditions(real: RealConditions) -> Table:
+    """Return what one flight under real conditions gave."""
+    table = Table(
+        "From the commands of one flight: worst nu-gap of all axes to the exact model, of 27"
+        " airspeeds held, and the delay",
+        ["flight", "nu-gap", "delay found, s", "true, s"],
+        name="real-conditions",
+        source="real_conditions",
+    )
+    if real.gap is None or real.found is None:
+        table.remarks.append(f"No model: {real.reason}")
+        return table
+    delays = " ± ".join(f"{seconds:.4f}" for seconds in real.found)
+    table.rows.append([real.about, f"{real.gap.max():.3f}", delays, f"{real.delay:.4f}"])
+    table.remarks.append(
+        f"Instruments flown in {real.simulator}. Other conditions (late commands and sensors,"
+        " 25 Hz, wind, turbulence, noise, half a flight) are counted over many seeds in"
+        " docs/identified.md: python -m evidence.marks.conditions."
+    )
+    return table
 
 
 def scheduling(found: KnownKinematics) -> Table:

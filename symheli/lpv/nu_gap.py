@@ -26,6 +26,11 @@ SCALE_LIMITS = 1e-60, 1e60
 AT_ONCE = 2_000_000
 """Entries of the pencils zI - A that are solved together."""
 
+FINER = 4
+"""How many times more frequencies a model is compared on where the winding number cannot be told on
+those of all; `nu_gap` adds more where the response turns.
+"""
+
 REFINED_FREQUENCIES = 12
 """Number of frequencies between the neighbours of the largest distance of each model."""
 
@@ -302,7 +307,9 @@ def nu_gaps(
         largest = np.maximum(distance.max(axis=1), closer.max(axis=1))
         out[rows] = np.where(same, np.minimum(largest, 1.0), 1.0)
         for k in np.flatnonzero(np.abs(turns).max(axis=1) > np.pi / 4):
-            out[rows[k]] = nu_gap(model, part[int(k)], input_scale=su, output_scale=sy)
+            out[rows[k]] = nu_gap(
+                model, part[int(k)], input_scale=su, output_scale=sy, points=FINER * points
+            )
     return out
 
 

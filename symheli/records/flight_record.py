@@ -34,15 +34,15 @@ if TYPE_CHECKING:
 
     from symheli.records.kinematic_check import KinematicCheck
 
+CONDITIONS = ("wind", "mass", "governor", "servos")
+"""What `meta["flown"]` of a record may say."""
+
 GAP = 1.5
 """Two samples further apart than this many median steps have a gap between them."""
 
 
 MAX_UPSAMPLING = 1e4
 """Largest number of samples `resample` may produce, relative to the record."""
-
-CONDITIONS = ("wind", "mass", "governor", "servos")
-"""What `meta["flown"]` of a record says in words of a simulated flight."""
 
 
 @dataclass(frozen=True, eq=False)

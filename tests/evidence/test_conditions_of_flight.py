@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from evidence.marks import conditions
+from studies.known_kinematics import conditions as real
 from symheli import FlightPlan, FlightRecord
 from symheli.flight import AirspeedSchedule
 
@@ -26,9 +27,16 @@ def test_a_row_says_whether_the_mark_is_met_and_the_delay_found():
     assert worse[4] == "MISSED"
 
 
+def test_rows_that_are_not_flown_now_stay_in_the_order_of_the_conditions():
+    shown = [("steady", "gone"), (conditions.CONDITIONS["delay"].about, "kept")]
+    text = conditions.table("xcell60", {"servos": [mark(0, 0.1)]}, shown)
+    rows = [line.split(" | ")[0].removeprefix("| ") for line in text.splitlines()[4:]]
+    assert rows == [conditions.CONDITIONS[name].about for name in ("servos", "delay")]
+
+
 def test_a_wind_is_held_against_the_one_that_blew():
-    true = conditions.wind_of(3)
-    assert np.hypot(*true) == pytest.approx(conditions.WIND)
+    true = real.wind_of(3)
+    assert np.hypot(*true) == pytest.approx(real.WIND)
     wind = {"north": (true[0] + 0.3, 0.2), "east": (true[1], 0.1)}
     assert conditions.row("wind", [mark(3, 0.1, wind=wind)])[5].startswith("wind off by 0.30")
 
@@ -44,8 +52,8 @@ def test_a_flight_begun_northwards_is_turned_with_the_wind_that_it_met():
         airspeed_command=np.full(50, 8.0),
     )
     record = replace(logged, meta={"plan": plan})
-    turned = conditions.with_heading(record, conditions.into_the_wind(7))
-    psi, towards = turned["psi"][0], conditions.wind_of(7)
+    turned = real.with_heading(record, real.into_the_wind(7))
+    psi, towards = turned["psi"][0], real.wind_of(7)
     ahead = towards @ [np.cos(psi), np.sin(psi)]
-    assert ahead == pytest.approx(-conditions.WIND)
-    np.testing.assert_allclose(turned[conditions.OVER_GROUND], 8.0 + ahead)
+    assert ahead == pytest.approx(-real.WIND)
+    np.testing.assert_allclose(turned[real.OVER_GROUND], 8.0 + ahead)

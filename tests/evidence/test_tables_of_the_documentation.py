@@ -35,6 +35,7 @@ from evidence.marks import (
     calibrated,
     conditions,
     coverage,
+    fit_for_control,
     guarantee,
     measured,
     spanning,
@@ -140,6 +141,12 @@ def regions_of_the_first_seed():
     cell = KEPT["identified.md", "regions xcell60"].cells(conditions.CONDITIONS["ideal"].about)[1]
     least, most = map(float, re.findall(r"[\d.]+", cell)[1:])
     assert least - 0.06 <= 100 * coverage.of_seed("ideal", 0).covered <= most + 0.06
+
+
+def verdict_of_the_farthest_model_that_is_called_fit():
+    about = fit_for_control.CASES["delay"].about
+    shown, seed = worst(KEPT["identified.md", "verdicts xcell60"].cells(about)[2])
+    assert fit_for_control.farthest(fit_for_control.of_seed("delay", seed)) == f"{shown} ({seed})"
 
 
 def calibrated_vehicle_of_the_worst_seed():
@@ -485,6 +492,7 @@ ROWS = {
     ("identified.md", "two masses in wind xcell60"): exact_loop_in_the_most_head_wind,
     ("identified.md", "regions xcell60"): regions_of_the_first_seed,
     ("identified.md", "xcell60 under real conditions"): flight_with_servos_of_the_worst_seed,
+    ("identified.md", "verdicts xcell60"): verdict_of_the_farthest_model_that_is_called_fit,
     ("identified.md", "xcell60 calibrated"): calibrated_vehicle_of_the_worst_seed,
     ("identification.md", "Box-Jenkins system"): coefficient_of_the_box_jenkins_system,
     ("identified.md", "frequency responses"): bands_of_ten_seeds,

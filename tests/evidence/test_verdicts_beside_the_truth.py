@@ -2,46 +2,53 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from evidence.marks.fit_for_control import KINDS, Outcome, campaign, outcome, table
+from evidence.marks.fit_for_control import CASES, LOOPS, Outcome, of_seed, table
 
-FIT = Outcome("a", "long", "filter error", 1, "fit", {"J": "fit"}, 0.2, 0.25, 0.1, False)
+FIT = Outcome(
+    seed=1,
+    loop="lateral",
+    verdict="fit",
+    rows={"J": "fit"},
+    said=0.5,
+    true=0.2,
+    bounds=(0.1, 0.2),
+    gaps=(0.05, 0.3),
+)
 
 
-def test_only_what_is_said_to_be_fit_and_is_not_is_wrong():
-    assert not FIT.wrong
-    assert replace(FIT, true_ratio=0.4).wrong
-    assert replace(FIT, lost=True).wrong
-    assert not replace(FIT, true_ratio=0.4, verdict="not known").wrong
-    assert not replace(FIT, true_ratio=float("nan"), verdict="refused").is_fit
-
-
-def test_the_table_counts_every_flight_once():
+def test_the_table_counts_what_is_called_fit_beside_what_is():
     some = [
         FIT,
-        replace(FIT, true_ratio=0.4),
+        replace(FIT, true=1.2),
         replace(FIT, verdict="not known"),
-        replace(FIT, kind="short", verdict="refused", ratio=float("nan"), true_ratio=float("nan")),
+        replace(FIT, true=1.2, verdict="not known"),
+        Outcome(seed=2, loop="lateral", verdict="refused", rows={}),
     ]
-    rows = [line.split() for line in table(some).splitlines()]
-    # fit, not known, not fit, refused, truly fit, wrong, d/b said, true
-    assert rows[1][-8:] == ["2", "1", "0", "0", "2", "1", "0.25", "0.10"]
-    assert rows[2][-8:] == ["0", "0", "0", "1", "0", "0", "nan", "nan"]
-    assert rows[3] == ["all", "4", "2", "1", "0", "1", "2", "1", "0.25", "0.10"]
+    rows = table("xcell60", {"ideal": [some]}).splitlines()
+    cells = [cell.strip() for cell in rows[-1].strip("|").split("|")]
+    assert cells == ["all", "1 of 2", "1 of 2", "1.20 (1)", "50.0", "1.33", "1"]
+
+
+def test_an_estimate_whose_own_loop_is_unstable_is_not_fit():
+    assert not replace(FIT, true=np.inf).is_fit
+
+
+def test_what_is_not_said_is_not_in_the_log():
+    """Commands stand where deflections would, and the plan has neither servos nor delay."""
+    case = CASES["servos untold"]
+    record = case.flown.flights(case.flown.helicopter("xcell60"), 1000)[0].between(0.0, 10.0)
+    log = case.log(record)
+    assert np.array_equal(log["d_lat"], record["d_lat_command"])
+    assert (log.meta["plan"].servos, log.meta["plan"].delay) == (None, 0.0)
+    assert CASES["servos"].log(record) is record
 
 
 @pytest.mark.slow
-def test_least_squares_never_says_that_a_model_is_fit():
-    found = outcome("xcell60", "short", "ls", 1)
-    assert found.verdict in ("not known", "not fit")
-    assert found.rows["nu-gap over margin"] == "not known"
-    assert found.true_ratio > 1 / 3  # and rightly: noise biases it
-
-
-@pytest.mark.slow
-def test_no_flight_of_a_small_campaign_is_wrongly_called_fit():
-    found = [call() for call in campaign([1000])]
-    assert len(found) == 2 * len(KINDS)
-    assert not any(o.wrong for o in found)
-    assert any(o.verdict == "fit" for o in found)  # saying nothing would be no art
+def test_a_delay_that_is_not_said_makes_no_model_fit_that_is_not():
+    found = of_seed("delay untold", 1000)
+    assert [o.loop for o in found] == list(LOOPS)
+    assert not any(o.said_fit and not o.is_fit for o in found)
+    assert not all(o.is_fit for o in found)

@@ -258,6 +258,26 @@ def test_a_second_estimate_that_disagrees_is_heard(noisy):
 
 
 @pytest.mark.slow
+def test_the_bias_of_the_structure_is_added_and_the_whole_margin_counts(noisy):
+    """Gains a and b are |a - b| / sqrt((1 + a^2)(1 + b^2)) apart, behind a delay too."""
+    model, joint = fitted(noisy)
+    there = LinearModel([[0.0]], [[1.0]], [[2.0]], [[0.0]], ["x"], ["u"], ["y"], dt=DT)
+    bias = idn.StructureBias(with_gain(model, 2.5 / float(model.theta[0, 0])), {0.0: there})
+    options = {"scales": SCALES, "covariance": joint, **SHORT}
+    alone = idn.fit_for_control(model, noisy, LOOP, **options)
+    found = idn.fit_for_control(model, noisy, LOOP, bias=bias, **options)
+    assert found.structure_gap[0] == pytest.approx(0.5 / np.sqrt(5.0 * 7.25), rel=1e-6)
+    assert found.bound == pytest.approx(alone.gap + found.structure_gap)
+    row = found["nu-gap over margin"]
+    assert (row.value, row.threshold) == (pytest.approx(found.bound[0] / found.margin[0]), 1.0)
+    assert [r.name for r in found.criteria] == ["unstable loops", row.name, "J", "TIC"]
+    far = idn.StructureBias(with_gain(model, -0.3 / float(model.theta[0, 0])), {0.0: there})
+    assert idn.fit_for_control(model, noisy, LOOP, bias=far, **options).verdict == "not known"
+    with pytest.raises(InputError, match="bias: expected a model at every point"):
+        idn.fit_for_control(model, noisy, LOOP, bias=bias, **{**options, "points": [0.5]})
+
+
+@pytest.mark.slow
 def test_a_loop_that_the_estimate_does_not_survive_is_not_fit(noisy):
     model, joint = fitted(noisy)
     found = idn.fit_for_control(

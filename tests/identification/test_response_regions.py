@@ -1,5 +1,7 @@
 """Regions of frequency responses, and the bias of a structure in them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from known_vehicles import CONTROLS, STATES, Vehicle
@@ -35,7 +37,8 @@ def test_a_vehicle_of_the_structure_has_no_bias(vehicle, record, model):
     models is that of another flight, and is what is left.
     """
     there = exact(vehicle, vehicle.record(500, seed=1), 3.0, 7.0)
-    off = idn.structure_bias(model, record, vehicle.without_noise(seed=1), there, OMEGA)
+    off = idn.structure_bias(model, record, vehicle.without_noise(seed=1), there)
+    off = off.responses(OMEGA, STATES, CONTROLS)
     size = np.abs(np.stack([m.frequency_response(OMEGA) for m in there.values()])).max()
     assert np.abs(off).max() < 1e-6 * size
 
@@ -48,9 +51,8 @@ def test_a_structure_of_too_low_a_degree_has_one(record):
     )
     model = idn.fit(still, record)
     there = exact(vehicle, record, 1.0)
-    off = idn.structure_bias(
-        model, record, vehicle.without_noise(seed=1), there, OMEGA, ["p"], ["d_lat"]
-    )
+    off = idn.structure_bias(model, record, vehicle.without_noise(seed=1), there)
+    off = off.responses(OMEGA, ["p"], ["d_lat"])
     own = there[1.0].select(inputs=["d_lat"], outputs=["p"]).frequency_response(OMEGA)
     assert np.abs(off[0] / own).min() > 0.02
 
@@ -58,11 +60,12 @@ def test_a_structure_of_too_low_a_degree_has_one(record):
 def test_bias_widens_regions_by_its_power_and_moves_no_centre(model):
     points = [2.0, 5.0, 8.0]
     plain = idn.response_regions(model, points, OMEGA, ["p"], ["d_lat"], draws=20)
-    off = np.full(plain.centre.shape, 0.3 + 0.4j)
+    there = {p: model.at(p, outputs=["p"], inputs=["d_lat"]) for p in points}
+    off = idn.StructureBias(model, {p: replace(one, D=one.D + 0.5) for p, one in there.items()})
     wide = idn.response_regions(model, points, OMEGA, ["p"], ["d_lat"], bias=off, draws=20)
     assert np.array_equal(wide.centre, plain.centre)
     assert wide.width**2 == pytest.approx(plain.width**2 + 0.25)
-    assert wide.contains(wide.centre + off).all()
+    assert wide.contains(wide.centre + 0.4 + 0.3j).all()
 
 
 def test_regions_hold_draws_as_often_as_they_say(vehicle, model):
@@ -82,7 +85,36 @@ def test_what_is_missing_is_said(vehicle, record, model):
         idn.response_regions(model.with_theta(model.theta), [5.0], OMEGA)
     with pytest.raises(InputError, match="at least one value"):
         idn.response_regions(model, [], OMEGA)
+    own = model.at(3.0)
     with pytest.raises(InputError, match="bias: expected"):
-        idn.response_regions(model, [5.0], OMEGA, bias=np.zeros(3))
+        idn.response_regions(model, [5.0], OMEGA, bias=idn.StructureBias(model, {3.0: own}))
+    with pytest.raises(InputError, match="sampled every"):
+        idn.StructureBias(model, {3.0: replace(own, dt=2 * own.dt)})
     with pytest.raises(InputError, match="source of flights"):
-        idn.structure_bias(model, record, record, {}, OMEGA)
+        idn.structure_bias(model, record, record, {3.0: own})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_the_bound_of_the_nu_gap_holds_where_the_covariance_alone_does_not(seed):
+    """Coefficients that move with p, identified as constants; the simulator is another vehicle."""
+    own, other = (Vehicle(na=1, nb=1, seed=k) for k in (0, 1))
+    record = own.record(1500, seed=seed, process=1e-3)
+    still = idn.KinematicARX(
+        CONTROLS, "airspeed_command", na=1, nb=1, basis=idn.Polynomial(0, 0, 10)
+    )
+    model = idn.fit(still, record)
+    points = 1.0, 5.0, 9.0
+    there = exact(other, other.record(500, seed=1), *points)
+    found = idn.fit_for_control(
+        model,
+        record,
+        {("d_lat", "phi"): -0.5, ("d_lon", "theta"): -0.6},
+        scales={**dict.fromkeys(STATES, 1.0), **dict.fromkeys(CONTROLS, 0.1)},
+        covariance=model.covariance,
+        bias=idn.structure_bias(model, record, other.without_noise(seed=seed), there),
+        truth=exact(own, record, *points),
+        draws=40,
+    )
+    assert np.all(found.bound >= found.true_gap)
+    assert not np.all(found.gap >= found.true_gap)

@@ -49,6 +49,7 @@ def every_table(study):
     yield tables.modes(study)
     yield from map(tables.comparison, study.comparison.predictions)
     yield from tables.known_kinematics(study.known_kinematics)
+    yield tables.real_conditions(study.real_conditions)
     yield from gain_tables.every(study.bounds)
     yield from (t for t in controllers.every(study) if t.name != "ranking")
 

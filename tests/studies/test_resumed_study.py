@@ -206,6 +206,7 @@ AFTER_KINEMATICS = {"robust", "controllers", "flown_controllers", "certified_con
         ({"robust_form": Spline(segments=(9,))}, {"robust"}),
         ({"controller_seeds": 21}, {"flown_controllers"}),
         ({"design_points": 13}, AFTER_KINEMATICS - {"robust"}),
+        ({"aggressive": 100.0}, {"known_kinematics", "real_conditions"} | AFTER_KINEMATICS),
         ({"gentle_flight": False}, {"known_kinematics"} | AFTER_KINEMATICS),
         ({"ramps": 11}, {"flights", "identification", "comparison", "servo"}),
         ({"thorough": False}, {"gust", "servo", "robust"}),
