@@ -36,7 +36,7 @@ def mode(model: LinearModel, rate: str) -> complex:
     """The pole of the lightly damped oscillation in which this rate, p or q, is largest, 1/s."""
     poles, shapes = np.linalg.eig(model.A)
     share = np.abs(shapes[model.states.index(rate)]) / np.linalg.norm(shapes, axis=0)
-    return complex(poles[np.argmax(share * (poles.imag > 2 * np.abs(poles.real)))])
+    return complex(poles[np.argmax(share * (np.imag(poles) > 2 * np.abs(np.real(poles))))])
 
 
 def table() -> str:

@@ -35,12 +35,9 @@ TRANSITIONS = (
     ("xcell60", 9.0, 10.0, 0.25, 0.5, 0.5, 0.5),
     ("xcell60", 8.0, 13.0, 0.2, 0.5, 0.5, 0.5),
     ("xcell60", 3.0, 13.0, 0.15, 0.5, 0.5, 0.5),
-    ("xcell60", 3.0, 13.0, 0.2, 0.5, 0.5, 0.5),
-    ("xcell60", 3.0, 13.0, 0.25, 0.5, 0.5, 0.5),
     ("xcell_kahn_hudson", 3.0, 4.0, 0.25, 1.0, 1.0, 1.0),
     ("xcell_kahn_hudson", 3.0, 13.0, 0.25, 1.0, 1.0, 1.0),
     ("yamaha_r50", 3.0, 6.0, 0.25, 1.0, 1.0, 1.0),
-    ("yamaha_r50", 3.0, 13.0, 0.25, 0.5, 0.5, 0.5),
 )
 """Helicopter, range, m/s; gusts, m/s; largest acceleration, jerk and snap, m/s^2, m/s^3, m/s^4."""
 FLIGHTS, SECONDS = 10_000, 0.25
