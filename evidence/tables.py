@@ -10,7 +10,7 @@ import re
 import shlex
 import sys
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from datetime import date
 from pathlib import Path
 
@@ -62,6 +62,35 @@ def kept_rows(page: Path, section: str) -> list[list[str]]:
     _, _, rest = document.partition(begin)
     lines = [line for line in rest.partition(end)[0].splitlines() if line.startswith("|")]
     return [[cell.strip() for cell in line.strip().strip("|").split("|")] for line in lines[2:]]
+
+
+def renewed(
+    names: Sequence[Sequence[str]],
+    row: Callable[[int], list[str]],
+    chosen: Collection[int],
+    shown: Sequence[Sequence[str]],
+) -> list[list[str]]:
+    """A row for each of these cases: of those chosen the one found now, after the cells that name
+    the case and before the date; of the others the one `shown` before, where there is one.
+    """
+    rows, count = [], len(names[0])
+    old = {tuple(cells[:count]): list(cells) for cells in shown}
+    for k, name in enumerate(names):
+        if k in chosen:
+            rows.append([*name, *row(k), f"{date.today():%d %B %Y}"])
+            print(*rows[-1], flush=True)
+        elif tuple(name) in old:
+            rows.append(old[tuple(name)])
+    return rows
+
+
+def chosen(asked: Sequence[str], names: Sequence[Sequence[str]]) -> set[int]:
+    """The cases whose names are asked for, "helicopter, airspeed, ..."; all without any."""
+    words = [", ".join(name) for name in names]
+    unknown = [row for row in asked if row not in words]
+    if unknown:
+        raise InputError(f"no row {unknown[0]!r}; rows are {', '.join(map(repr, words))}")
+    return {k for k, name in enumerate(words) if not asked or name in asked}
 
 
 def own_command() -> str:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from evidence.tables import markdown
+from evidence.tables import chosen, markdown, renewed
 from evidence.tube_flights import from_its_border, worst
 from symheli import Helicopter
 from symheli.dynamics import Governor
@@ -65,28 +65,28 @@ GOVERNED = (Case("eight states, observer", "xcell_kahn_hudson", "pi", 3.0, 0.25,
 
 
 def row(case: Case) -> list[str]:
-    """Its row of the table."""
-    found, p = case.found(), case.airspeed
-    cells = [
-        *(case.vehicle, case.governor, case.words),
-        f"{p:g}" if np.ndim(p) == 0 else f"{p[0]:g} to {p[1]:g}",
-        f"{case.gust:g}",
-        str(len(found.deviations.states)),
-    ]
+    """What its row of the table says after its name."""
+    found = case.found()
+    states = str(len(found.deviations.states))
     if not found.proven:
-        return [*cells, f"none: {found.why}", "", "", ""]
+        return [states, f"none: {found.why}", "", "", ""]
     widths = [f"{w:.2g}" for w in found.half_widths[:8]]
     share, furthest = worst(found), from_its_border(found, FLIGHTS, SECONDS)
-    cells += [" ".join(widths[:3]) + "; " + " ".join(widths[3:6]), " ".join(widths[6:])]
-    return [*cells, f"{share:.2f}", f"{furthest:.3f}"]
+    sizes = [" ".join(widths[:3]) + "; " + " ".join(widths[3:6]), " ".join(widths[6:])]
+    return [states, *sizes, f"{share:.2f}", f"{furthest:.3f}"]
 
 
-def table(cases: Sequence[Case]) -> str:
-    """The table in Markdown, a row for each loop."""
-    rows = []
-    for case in cases:
-        rows.append(row(case))
-        print(*rows[-1], flush=True)
+def table(cases: Sequence[Case], asked: Sequence[str], shown: Sequence[Sequence[str]]) -> str:
+    """The table in Markdown, a row for each loop; rows asked for are found now, of the others those
+    `shown` before stay.
+    """
+    names = [[c.vehicle, c.governor, c.words, _airspeed(c.airspeed), f"{c.gust:g}"] for c in cases]
     head = ["helicopter", "governor", "the controller knows", "airspeed, m/s", "gusts, m/s"]
     head += ["states", "u v w, m/s; p q r, rad/s", "phi theta, rad"]
-    return markdown([*head, "worst gust found", "furthest flight"], rows)
+    run = chosen(asked, [name[:3] for name in names])
+    rows = renewed(names, lambda k: row(cases[k]), run, shown)
+    return markdown([*head, "worst gust found", "furthest flight", "of"], rows)
+
+
+def _airspeed(p: Any) -> str:
+    return f"{p:g}" if np.ndim(p) == 0 else f"{p[0]:g} to {p[1]:g}"

@@ -6,15 +6,14 @@ tubes; the planar VTOL.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Collection, Sequence
-from datetime import date
+from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
 
 from evidence import tube_gains, tube_loops
 from evidence.planar_vtol import tubes as planar_vtol
-from evidence.tables import DOCS, keep, kept_rows, markdown
+from evidence.tables import DOCS, chosen, keep, kept_rows, markdown, renewed
 from evidence.tube_flights import from_its_border, worst
 from symheli import Helicopter
 from symheli.errors import InputError
@@ -58,26 +57,6 @@ def largest(heli: Helicopter, airspeed: float) -> tuple[float, Tube | None]:
     return (GUSTS[low] if found else 0.0), found
 
 
-def renewed(
-    names: Sequence[Sequence[str]],
-    row: Callable[[int], list[str]],
-    chosen: Collection[int],
-    shown: Sequence[Sequence[str]],
-) -> list[list[str]]:
-    """A row for each of these cases: of those chosen the one found now, after the cells that name
-    the case and before the date; of the others the one `shown` before, where there is one.
-    """
-    rows, count = [], len(names[0])
-    old = {tuple(cells[:count]): list(cells) for cells in shown}
-    for k, name in enumerate(names):
-        if k in chosen:
-            rows.append([*name, *row(k), f"{date.today():%d %B %Y}"])
-            print(*rows[-1], flush=True)
-        elif tuple(name) in old:
-            rows.append(old[tuple(name)])
-    return rows
-
-
 def amplitudes(asked: Sequence[str], shown: Sequence[Sequence[str]]) -> str:
     """The table of the largest gusts at held airspeeds in Markdown; rows asked for are found now,
     of the others those `shown` before stay.
@@ -92,7 +71,7 @@ def amplitudes(asked: Sequence[str], shown: Sequence[Sequence[str]]) -> str:
         return [f"{gust:g}", *_widths(found), f"{worst(found):.2f}"]
 
     head = ["helicopter", "airspeed, m/s", "gusts, m/s", *WIDTHS, "worst gust found", "of"]
-    return markdown(head, renewed(names, row, _chosen(asked, names), shown))
+    return markdown(head, renewed(names, row, chosen(asked, names), shown))
 
 
 def transitions(asked: Sequence[str], shown: Sequence[Sequence[str]]) -> str:
@@ -112,7 +91,7 @@ def transitions(asked: Sequence[str], shown: Sequence[Sequence[str]]) -> str:
         return [*_widths(found), f"{share:.2f}", f"{from_its_border(found, FLIGHTS, SECONDS):.3f}"]
 
     head = ["helicopter", "airspeed, m/s", "gusts, m/s", "limits, m/s^2, m/s^3, m/s^4", *WIDTHS]
-    rows = renewed(names, row, _chosen(asked, [name[:3] for name in names]), shown)
+    rows = renewed(names, row, chosen(asked, [name[:3] for name in names]), shown)
     return markdown([*head, "worst gust found", "furthest flight", "of"], rows)
 
 
@@ -123,15 +102,6 @@ def _widths(found: Tube) -> list[str]:
     """The half widths of u to theta in two cells."""
     widths = [f"{w:.2g}" for w in found.half_widths[:8]]
     return [" ".join(widths[:3]) + "; " + " ".join(widths[3:6]), " ".join(widths[6:])]
-
-
-def _chosen(asked: Sequence[str], names: Sequence[Sequence[str]]) -> set[int]:
-    """The cases whose names are asked for, "helicopter, airspeed, ..."; all without any."""
-    words = [", ".join(name) for name in names]
-    unknown = [row for row in asked if row not in words]
-    if unknown:
-        raise InputError(f"no row {unknown[0]!r}; rows are {', '.join(map(repr, words))}")
-    return {k for k, name in enumerate(words) if not asked or name in asked}
 
 
 def remainders(intervals: Sequence[float]) -> str:
@@ -173,12 +143,12 @@ def main() -> None:
         nargs="+",
         default=[],
         metavar="ROW",
-        help='of amplitudes, "helicopter, airspeed", and transitions, "helicopter, low to high,'
-        ' gust"; the page keeps the others',
+        help='of amplitudes, "helicopter, airspeed", transitions, "helicopter, low to high, gust",'
+        ' or loops, "helicopter, governor, parts"; the page keeps the others',
     )
     given = parser.parse_args()
-    if given.rows and given.only not in ("amplitudes", "transitions"):
-        parser.error("--rows names rows of --only amplitudes or transitions")
+    if given.rows and given.only not in ("amplitudes", "transitions", "loops"):
+        parser.error("--rows names rows of --only amplitudes, transitions or loops")
     if given.write and given.quick:
         parser.error("--write keeps whole tables: leave out --quick")
     page = DOCS / "tubes.md"
@@ -187,8 +157,8 @@ def main() -> None:
         "transitions": lambda: transitions(given.rows, kept_rows(page, "transitions")),
         "remainders": lambda: remainders(INTERVALS),
         "gains": tube_gains.table,
-        "loops": lambda: tube_loops.table(tube_loops.CASES),
-        "governed": lambda: tube_loops.table(tube_loops.GOVERNED),
+        "loops": lambda: tube_loops.table(tube_loops.CASES, given.rows, kept_rows(page, "loops")),
+        "governed": lambda: tube_loops.table(tube_loops.GOVERNED, given.rows, []),
         "vtol": planar_vtol.table,
     }
     if given.quick:

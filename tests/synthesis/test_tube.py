@@ -13,8 +13,8 @@ from evidence.planar_vtol.model import over_ground
 from evidence.planar_vtol.tubes import CASES as VTOL
 from evidence.planar_vtol.tubes import motions, sizes
 from evidence.planar_vtol.tubes import proven as vtol_tube
+from evidence.tables import chosen, renewed
 from evidence.tube_flights import from_its_border, worst
-from evidence.tubes import _chosen, renewed
 from studies.cli import main
 from symheli import Helicopter
 from symheli.enclosure import AffineForm, SegmentAverages, equations
@@ -301,12 +301,12 @@ def test_a_jump_between_the_parts_of_a_cell_is_one_number_times_a_matrix():
 def test_rows_that_are_not_run_stay_as_the_page_has_them():
     names = [["one", "3"], ["other", "3"], ["other", "8"]]
     shown = [["one", "3", "0.5", "the day before"], ["other", "3", "0.6", "the day before"]]
-    kept, found = renewed(names, lambda k: [f"found {k}"], _chosen(["other, 3"], names), shown)
+    kept, found = renewed(names, lambda k: [f"found {k}"], chosen(["other, 3"], names), shown)
     assert kept == shown[0]
     assert found[:3] == ["other", "3", "found 1"]
-    assert _chosen([], names) == {0, 1, 2}
+    assert chosen([], names) == {0, 1, 2}
     with pytest.raises(InputError, match="no row 'other'; rows are"):
-        _chosen(["other"], names)
+        chosen(["other"], names)
 
 
 @pytest.mark.slow
