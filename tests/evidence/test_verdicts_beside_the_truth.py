@@ -47,6 +47,7 @@ def test_what_is_not_said_is_not_in_the_log():
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::symheli.errors.ConvergenceWarning")  # the user is told, too
 def test_a_delay_that_is_not_said_makes_no_model_fit_that_is_not():
     """Of 20 ms: by the bound alone the model is fit for all axes, and is not."""
     found = of_seed("20 ms untold", 2)
