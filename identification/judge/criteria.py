@@ -12,9 +12,11 @@ import numpy as np
 
 from identification.estimators.filter_error import noise_variance
 from identification.judge.derivatives import Certainty, Derivatives
-from identification.judge.frozen_plant import AtPoint, FrozenPlant, text, worst
+from identification.judge.frozen_plant import AtPoint, FrozenPlant, Model, text, worst
 from identification.judge.residuals import theil
 from identification.judge.response_match import KNOWN, response_match
+from identification.judge.unseen_flight import unseen_flight
+from identification.model.kinematic_model import KinematicModel
 from identification.model.prediction import LARGEST
 from symheli.errors import ExcitationError
 from symheli.lpv import LinearModel, nu_gaps
@@ -43,6 +45,9 @@ GAIN = 0.25
 
 BOUND, INSENSITIVITY, CORRELATION = 0.2, 0.1, 0.9
 """Largest Cramer-Rao bound and insensitivity of a derivative, as shares of it, and correlation."""
+
+EXPLAINED = 1.0
+"""Largest residual power, as a share of its expectation."""
 
 COST, INEQUALITY = 50.0, 0.25
 """Largest mismatch cost J of the frequency responses, and inequality coefficient (TIC) of the
@@ -260,6 +265,27 @@ def responses(
         verdict=verdict,  # type: ignore[arg-type]
         source=TISCHLER,
         where=where,
+    )
+
+
+def left(model: Model, records: Sequence[FlightRecord]) -> tuple[Criterion, ...]:
+    """The residual power on the flights that a model is judged by, of what noise of the sensors,
+    the structure and errors of the coefficients explain; no row where the method does not say how
+    large they are.
+    """
+    if not isinstance(model, KinematicModel) or "sensor_noise" not in model.details:
+        return ()
+    powers = [unseen_flight(model, record).power for record in records]
+    value = float(max(powers))
+    return (
+        Criterion(
+            name="residual power",
+            value=value,
+            threshold=EXPLAINED,
+            verdict=judged(value, EXPLAINED, "not known"),
+            source=HERE,
+            where=f"flight {powers.index(value) + 1} of {len(powers)}",
+        ),
     )
 
 

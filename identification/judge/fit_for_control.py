@@ -18,6 +18,7 @@ from identification.judge.criteria import (
     Verdict,
     certainty,
     feedback,
+    left,
     predictions,
     responses,
     stability,
@@ -171,7 +172,9 @@ def fit_for_control(
     structure, in these `scales`, its unstable poles counted as the nu-gap counts them, the root
     mean square of neighbouring points; that the size carries over from one vehicle to the other is
     assumed. With `bias` there are no rows of
-    static gain and derivatives: what they are about is in the bound.
+    static gain and derivatives: what they are about is in the bound. For a model by `FilterError`
+    there is one of the residual power instead, as a share of what noise of the sensors explains, at
+    most 1: what the simulator does not show, such as a delay that nobody mentioned, is in it.
 
     Frozen plants say nothing of how fast the scheduling may move.
 
@@ -300,6 +303,7 @@ def fit_for_control(
         feedback(at, found.bound, second_gap, true_gap, 1.0 if whole else SHARE_OF_MARGIN),
         *(() if whole else (static_gain(at, true, in_loop) for in_loop in (True, False))),
         *(() if whole else certainty(at)),
+        *(left(model, records) if whole else ()),
         responses(plant, records, window, band),
         predictions(plant, records, scales, horizon),
     )
