@@ -21,6 +21,23 @@ GUST = 2.0
 
 PAIRS = {"xcell60": "xcell_kahn_hudson", "xcell_kahn_hudson": "xcell60"}
 """Vehicle whose simulator flies the instruments, by the vehicle that is identified."""
+STANDARD = "xcell60"
+"""Vehicle that stands for any other one, scaled to its rotor."""
+RADIUS = "main_rotor.radius"
+
+
+def simulator_of(vehicle: str, heli: Helicopter) -> tuple[str, Helicopter]:
+    """Return name and helicopter whose simulator flies the instruments of `vehicle`, with the
+    governor of `heli`: of a packaged X-Cell the other one, of any other vehicle the X-Cell .60,
+    scaled by Froude's rule to the radius of its rotor.
+    """
+    name = PAIRS.get(vehicle, STANDARD)
+    simulator = Helicopter.load(name, governor=heli.governor)
+    if vehicle in PAIRS:
+        return name, simulator
+    factor = float(heli.parameters[RADIUS]) / float(simulator.parameters[RADIUS])
+    return f"{name} scaled by {factor:.2f}", simulator.scaled(factor)
+
 
 CONSTANT, ALONE, BOTH = "constant coefficients", "over airspeed", "over airspeed and acceleration"
 

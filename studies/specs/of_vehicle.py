@@ -177,7 +177,7 @@ class OfVehicle:
     def _identified(self) -> Any:
         """The design from a flight: the aggressive one of the study, its model identified."""
         record = symheli.fly(self.heli, flights.aggressive(self.seed, autopilot_for(self.heli)))
-        simulator = Helicopter.load(models.PAIRS.get(self.name, "xcell60"), governor="ideal")
+        _, simulator = models.simulator_of(self.name, self.heli)
         return from_data(models.identified([record], simulator))()
 
 

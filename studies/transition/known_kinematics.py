@@ -93,8 +93,7 @@ def identify_with_known_kinematics(
     if gentle_flight:
         training.append(symheli.fly(heli, flights.gentle(seed, autopilot)))
     test = symheli.fly(heli, flights.transition(seed, autopilot))
-    chosen = models.PAIRS.get(vehicle, "xcell60")
-    simulator = Helicopter.load(chosen, governor="ideal")
+    chosen, simulator = models.simulator_of(vehicle, heli)
     truth, clean = Truth.of(heli), states_of(heli, test)
 
     def rival(name: str, guess: Array | None, own: FrozenAxes) -> Rival:

@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from studies.known_kinematics.conditions import CONDITIONS, Instruments, frozen_all
-from studies.known_kinematics.models import PAIRS
+from studies.known_kinematics.models import simulator_of
 from studies.transition.guarantees import PERIOD
 from symheli import SimulatedFlight
 from symheli.errors import SymheliError
@@ -39,10 +39,11 @@ def identify_under_real_conditions(vehicle: str, seed: int, aggressive: float) -
     flight is lost, has no result.
     """
     condition = replace(CONDITIONS[CONDITION], longest=aggressive)
-    chosen = PAIRS.get(vehicle, "xcell60")
-    out = RealConditions(about=condition.about, simulator=chosen, delay=condition.late * PERIOD)
+    out = RealConditions(about=condition.about, simulator="", delay=condition.late * PERIOD)
     try:
-        heli, simulator = condition.helicopter(vehicle), condition.helicopter(chosen)
+        heli = condition.helicopter(vehicle)
+        chosen, simulator = simulator_of(vehicle, heli)
+        out = replace(out, simulator=chosen)
         records = condition.flights(heli, seed)
         source = Instruments(SimulatedFlight(simulator))
         model = condition.identified(condition.structure(records[0]), records, source)

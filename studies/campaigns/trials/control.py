@@ -109,7 +109,7 @@ def identified(vehicle: str, seed: int) -> KinematicModel:
     records = [
         symheli.fly(heli, make(seed, pilot)) for make in (training.aggressive, training.gentle)
     ]
-    return models.identified(records, helicopter(models.PAIRS.get(vehicle, "xcell60")))
+    return models.identified(records, models.simulator_of(vehicle, heli)[1])
 
 
 TRIAL = Trial(
