@@ -184,3 +184,13 @@ def _random_gusts(size: float, count: int, rng: np.random.Generator) -> Callable
         return w.copy()
 
     return gust
+
+
+WIDTHS = ("u v w, m/s; p q r, rad/s", "phi theta, rad")
+"""Heads of the cells of `widths`."""
+
+
+def widths(found: Tube) -> list[str]:
+    """The half widths of u to theta in two cells."""
+    each = [f"{w:.2g}" for w in found.half_widths[:8]]
+    return [" ".join(each[:3]) + "; " + " ".join(each[3:6]), " ".join(each[6:])]

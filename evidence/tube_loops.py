@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from evidence.tables import chosen, markdown, renewed
-from evidence.tube_flights import from_its_border, worst
+from evidence.tube_flights import WIDTHS, from_its_border, widths, worst
 from symheli import Helicopter
 from symheli.dynamics import Governor
 from symheli.flight import XCELL_SERVOS
@@ -70,10 +70,8 @@ def row(case: Case) -> list[str]:
     states = str(len(found.deviations.states))
     if not found.proven:
         return [states, f"none: {found.why}", "", "", ""]
-    widths = [f"{w:.2g}" for w in found.half_widths[:8]]
     share, furthest = worst(found), from_its_border(found, FLIGHTS, SECONDS)
-    sizes = [" ".join(widths[:3]) + "; " + " ".join(widths[3:6]), " ".join(widths[6:])]
-    return [states, *sizes, f"{share:.2f}", f"{furthest:.3f}"]
+    return [states, *widths(found), f"{share:.2f}", f"{furthest:.3f}"]
 
 
 def table(cases: Sequence[Case], asked: Sequence[str], shown: Sequence[Sequence[str]]) -> str:
@@ -82,7 +80,7 @@ def table(cases: Sequence[Case], asked: Sequence[str], shown: Sequence[Sequence[
     """
     names = [[c.vehicle, c.governor, c.words, _airspeed(c.airspeed), f"{c.gust:g}"] for c in cases]
     head = ["helicopter", "governor", "the controller knows", "airspeed, m/s", "gusts, m/s"]
-    head += ["states", "u v w, m/s; p q r, rad/s", "phi theta, rad"]
+    head += ["states", *WIDTHS]
     run = chosen(asked, [name[:3] for name in names])
     rows = renewed(names, lambda k: row(cases[k]), run, shown)
     return markdown([*head, "worst gust found", "furthest flight", "of"], rows)

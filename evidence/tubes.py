@@ -14,7 +14,7 @@ import numpy as np
 from evidence import tube_gains, tube_loops
 from evidence.planar_vtol import tubes as planar_vtol
 from evidence.tables import DOCS, chosen, keep, kept_rows, markdown, renewed
-from evidence.tube_flights import from_its_border, worst
+from evidence.tube_flights import WIDTHS, from_its_border, widths, worst
 from symheli import Helicopter
 from symheli.errors import InputError
 from synthesis import Tube, tube
@@ -68,7 +68,7 @@ def amplitudes(asked: Sequence[str], shown: Sequence[Sequence[str]]) -> str:
         gust, found = largest(Helicopter.load(cases[k][0], governor="ideal"), cases[k][1])
         if found is None:
             return ["none", "", "", ""]
-        return [f"{gust:g}", *_widths(found), f"{worst(found):.2f}"]
+        return [f"{gust:g}", *widths(found), f"{worst(found):.2f}"]
 
     head = ["helicopter", "airspeed, m/s", "gusts, m/s", *WIDTHS, "worst gust found", "of"]
     return markdown(head, renewed(names, row, chosen(asked, names), shown))
@@ -88,20 +88,11 @@ def transitions(asked: Sequence[str], shown: Sequence[Sequence[str]]) -> str:
         if not found.proven:
             return [f"none: {found.why}", "", "", ""]
         share = max(worst(found, p) for p in (low, high))
-        return [*_widths(found), f"{share:.2f}", f"{from_its_border(found, FLIGHTS, SECONDS):.3f}"]
+        return [*widths(found), f"{share:.2f}", f"{from_its_border(found, FLIGHTS, SECONDS):.3f}"]
 
     head = ["helicopter", "airspeed, m/s", "gusts, m/s", "limits, m/s^2, m/s^3, m/s^4", *WIDTHS]
     rows = renewed(names, row, chosen(asked, [name[:3] for name in names]), shown)
     return markdown([*head, "worst gust found", "furthest flight", "of"], rows)
-
-
-WIDTHS = ("u v w, m/s; p q r, rad/s", "phi theta, rad")
-
-
-def _widths(found: Tube) -> list[str]:
-    """The half widths of u to theta in two cells."""
-    widths = [f"{w:.2g}" for w in found.half_widths[:8]]
-    return [" ".join(widths[:3]) + "; " + " ".join(widths[3:6]), " ".join(widths[6:])]
 
 
 def remainders(intervals: Sequence[float]) -> str:

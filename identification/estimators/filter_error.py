@@ -57,7 +57,7 @@ SLOWER = 4
 DIFFERENCE = 1e-3
 """Step of central differences by an unknown of actuators or wind, in its prior deviation."""
 
-WIND_TOLD = 0.5
+WIND_DETERMINED = 0.5
 """Largest standard deviation of a wind that counts as determined by the flights, m/s."""
 
 FARTHEST = 4.0
@@ -586,7 +586,7 @@ class SmoothedStretch:
 def _unknown_wind(wind: Mapping[str, tuple[float, float]]) -> tuple[Warning, ...]:
     """The remark on a wind that the flights do not tell."""
     wide = [f"{name} {value:.1f} +- {size:.1f}" for name, (value, size) in wind.items()]
-    if all(size <= WIND_TOLD for _, size in wind.values()):
+    if all(size <= WIND_DETERMINED for _, size in wind.values()):
         return ()
     return (
         DataWarning(

@@ -268,7 +268,7 @@ def responses(
     )
 
 
-def left(model: Model, records: Sequence[FlightRecord]) -> tuple[Criterion, ...]:
+def residual_power(model: Model, records: Sequence[FlightRecord]) -> tuple[Criterion, ...]:
     """The residual power on the flights that a model is judged by, of what noise of the sensors,
     the structure and errors of the coefficients explain; no row where the method does not say how
     large they are.

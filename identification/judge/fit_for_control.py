@@ -18,8 +18,8 @@ from identification.judge.criteria import (
     Verdict,
     certainty,
     feedback,
-    left,
     predictions,
+    residual_power,
     responses,
     stability,
     static_gain,
@@ -171,10 +171,10 @@ def fit_for_control(
     the truth. The first is in the 95 % set, the second is what the simulator shows of the
     structure, in these `scales`, its unstable poles counted as the nu-gap counts them, the root
     mean square of neighbouring points; that the size carries over from one vehicle to the other is
-    assumed. With `bias` there are no rows of
-    static gain and derivatives: what they are about is in the bound. For a model by `FilterError`
-    there is one of the residual power instead, as a share of what noise of the sensors explains, at
-    most 1: what the simulator does not show, such as a delay that nobody mentioned, is in it.
+    assumed. With `bias` there are no rows of static gain and derivatives: what they are about is in
+    the bound. For a model by `FilterError` there is one of the residual power instead, as a share
+    of what noise of the sensors explains, at most 1: what the simulator does not show, such as a
+    delay that nobody mentioned, is in it.
 
     Frozen plants say nothing of how fast the scheduling may move.
 
@@ -224,9 +224,8 @@ def fit_for_control(
     ------
     InputError
         Scales that are not positive or name no output or no input; points that are missing, of the
-        bias and the truth too; a
-        horizon or a window that is not positive or longer than every record; a covariance of
-        another shape.
+        bias and the truth too; a horizon or a window that is not positive or longer than every
+        record; a covariance of another shape.
     UnknownNameError
         A signal of the loop that is not in the plant.
 
@@ -303,7 +302,7 @@ def fit_for_control(
         feedback(at, found.bound, second_gap, true_gap, 1.0 if whole else SHARE_OF_MARGIN),
         *(() if whole else (static_gain(at, true, in_loop) for in_loop in (True, False))),
         *(() if whole else certainty(at)),
-        *(left(model, records) if whole else ()),
+        *(residual_power(model, records) if whole else ()),
         responses(plant, records, window, band),
         predictions(plant, records, scales, horizon),
     )

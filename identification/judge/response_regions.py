@@ -253,11 +253,11 @@ def structure_bias(
             f" {simulator!r:.80}"
         )
     given = [records] if isinstance(records, FlightRecord) else list(records)
-    own = fit(in_time(model.structure), [simulator.flown(record) for record in given])
+    own = fit(_in_time(model.structure), [simulator.flown(record) for record in given])
     return StructureBias(own, exact)  # type: ignore[arg-type]
 
 
-def in_time(structure: LPVARX | KinematicARX) -> LPVARX | KinematicARX:
+def _in_time(structure: LPVARX | KinematicARX) -> LPVARX | KinematicARX:
     """The structure for a simulated flight, whose sensors are not late."""
     return replace(structure, sensors=None) if isinstance(structure, KinematicARX) else structure
 

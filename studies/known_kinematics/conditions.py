@@ -48,7 +48,7 @@ would pass for a delay.
 
 @dataclass(frozen=True)
 class Condition:
-    """One kind of flight, what its identification is told, and the largest nu-gap asked for.
+    """One kind of flight, what its identification knows, and the largest permitted nu-gap.
 
     Parameters
     ----------
@@ -64,8 +64,8 @@ class Condition:
         Of so many samples one is logged.
     noise_db, longest : float
         Of the sensors; of the flight, s.
-    told : Actuators, optional
-        What is known of them.
+    actuators : Actuators, optional
+        What is known of servos and delay.
     sensors : LateSensors, optional
         What is known of sensors that are 40 ms late.
     headings : tuple of float
@@ -85,7 +85,7 @@ class Condition:
     decimated: int = 1
     noise_db: float = NOISE_DB
     longest: float = 150.0
-    told: Actuators | None = None
+    actuators: Actuators | None = None
     sensors: LateSensors | None = None
     headings: tuple[float, ...] = ()
     over_ground: bool = True
@@ -161,7 +161,7 @@ class Condition:
         """
         if self.turbulent:
             return structure(turbulent=True)
-        commanded = self.told is not None and f"{INPUTS[0]}_command" in record.signals
+        commanded = self.actuators is not None and f"{INPUTS[0]}_command" in record.signals
         names = {u: f"{u}_command" if commanded else u for u in INPUTS}
         ground = OVER_GROUND if self.headings and self.over_ground else None
         first = SCHEDULING[0] if ground is None else ground
@@ -174,7 +174,7 @@ class Condition:
             ),
             nb={names[u]: n for u, n in LAGS.items()},
             offset_rate=False,
-            actuators=self.told,
+            actuators=self.actuators,
             rotor_speed="Om" if self.servos else None,
             wind=SteadyWind(deviation=WIND, over_ground=ground) if self.headings else None,
             sensors=self.sensors,
@@ -249,8 +249,8 @@ class Instruments:
 
 
 FASTER = 1.2
-"""Bandwidth of the servos that the identification is told, of the true one, where it is to find
-it.
+"""Bandwidth of the servos from which the identification starts, as a multiple of the true one,
+where it is to find it.
 """
 
 WRONG_SERVOS = {
@@ -271,21 +271,21 @@ CONDITIONS: Mapping[str, Condition] = {
         0.12,
         True,
         1,
-        told=NOT_QUITE(XCELL_SERVOS),
+        actuators=NOT_QUITE(XCELL_SERVOS),
     ),
     "bandwidth": Condition(
         "the same; bandwidth and delay found",
         0.12,
         True,
         1,
-        told=NOT_QUITE(WRONG_SERVOS, bandwidth_deviation=0.2),
+        actuators=NOT_QUITE(WRONG_SERVOS, bandwidth_deviation=0.2),
     ),
-    "delay": Condition("commands 40 ms late, delay found", 0.12, late=2, told=NOT_QUITE()),
+    "delay": Condition("commands 40 ms late, delay found", 0.12, late=2, actuators=NOT_QUITE()),
     "25 Hz": Condition(
         "logged at 25 Hz, commanded at 50 Hz, said so",
         0.10,
         decimated=2,
-        told=Actuators(period=PERIOD),
+        actuators=Actuators(period=PERIOD),
     ),
     "25 Hz, untold": Condition("logged at 25 Hz, commanded at 50 Hz, not said", 0.10, decimated=2),
     "sensors": Condition(

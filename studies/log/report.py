@@ -264,7 +264,7 @@ def _horizons(result: AgainstConstant) -> list[str]:
         return [f"{p} is taken as known ahead, as a command is"]
     known = (
         f"; {100 * result.leak:.0f} % of what is new in it is in the outputs of the same instant:"
-        " free runs know what they predict, and are not counted"
+        " free runs are told what they predict, and are not counted"
         if result.known_from_p
         else ""
     )

@@ -106,7 +106,7 @@ def _too_fast(
     ends = [_central(problem, float(knots[j]), level, bound, [starts[j]]) for j in (k, k + 1)]
     if ends[0] is None or ends[1] is None:
         return True
-    fastest = problem.scaled_rate if problem.lpv.dt is None else problem.step
+    fastest = problem.step if problem.discrete else problem.scaled_rate
     drift = fastest * (ends[1] - ends[0]) / (knots[k + 1] - knots[k])
     for p, P in zip(knots[k : k + 2], (ends[0], ends[1]), strict=True):
         model = _frozen(problem, float(p))

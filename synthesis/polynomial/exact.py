@@ -35,7 +35,7 @@ def positive_definite(M: Array) -> bool:
     strictly dominant in its diagonal: a few products of integers. Else all pivots of an elimination
     decide, whose numbers grow with every row.
     """
-    own = _mirrored(integers(M).reshape(-1, *M.shape[-2:]))
+    own = _mirrored(integers(M).reshape(math.prod(M.shape[:-2]), *M.shape[-2:]))
     if own.shape[-1] <= MAX_DIRECT_ROWS:
         return all(map(_pivots_are_positive, own))
     for each, R in zip(own, _congruences(own), strict=True):

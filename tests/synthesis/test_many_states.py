@@ -421,6 +421,11 @@ def test_only_the_lower_triangle_is_read(number):
     assert exact.positive_definite(torn)
 
 
+@pytest.mark.parametrize("shape", [(0, 0), (3, 0, 0), (0, 8, 8)])
+def test_of_nothing_all_are_positive_definite(shape):
+    assert exact.positive_definite(np.empty(shape, dtype=object))
+
+
 def test_numbers_beyond_the_doubles_are_left_to_the_pivots():
     M = rational(np.eye(8))
     M[0, 0] = Fraction(10) ** 700
