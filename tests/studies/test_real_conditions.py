@@ -15,6 +15,7 @@ def test_a_minute_of_flight_finds_the_delay():
     assert found.delay == pytest.approx(0.02)
     assert found.found is not None
     assert found.found[0] == pytest.approx(found.delay, abs=0.002)  # what counts as found
+    assert found.gap is not None
     assert 0 < found.gap.max() < 0.5
 
 
