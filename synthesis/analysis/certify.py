@@ -28,9 +28,8 @@ from synthesis.polynomial.pieces import Pieces, pieces
 from synthesis.worst.box import (
     Worst,
     growing,
-    measure,
     unstable_at,
-    worst_frozen,
+    worst_by,
     worst_moving,
 )
 from synthesis.worst.budget import search_hypothesis
@@ -128,9 +127,9 @@ class _LoopAndWorst(NamedTuple):
 
 
 def _worst_member(problem: BoundProblem) -> _LoopAndWorst:
-    unc, size = problem.uncertain, measure(problem.demand, problem.model.dt)
+    unc = problem.uncertain
     if unc is None:
-        return _LoopAndWorst(problem.model, worst_frozen(problem.model, size))
+        return _LoopAndWorst(problem.model, worst_by(problem.demand, problem.model))
     found = worst_perturbation(unc, gains=problem.gains)
     try:
         model = pieces(unc.perturbed(found.delta))
@@ -139,7 +138,7 @@ def _worst_member(problem: BoundProblem) -> _LoopAndWorst:
         return _LoopAndWorst(
             problem.model, Worst(found.value, at), found.delta, at if found.unstable else None
         )
-    return _LoopAndWorst(model, worst_frozen(model, size), found.delta)
+    return _LoopAndWorst(model, worst_by(problem.demand, model), found.delta)
 
 
 def route(problem: BoundProblem) -> Ladder:

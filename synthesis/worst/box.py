@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +20,7 @@ from synthesis.polynomial.pieces import Pieces
 from synthesis.program.scaling import balance
 from synthesis.proof.inequalities import Demand
 from synthesis.worst.budget import Budget
-from synthesis.worst.frozen import FrozenGain, norm, stable, to_continuous
+from synthesis.worst.frozen import FrozenGain, gain_at_poles, norm, stable, to_continuous
 from synthesis.worst.lines import Line, alone, directions, growing_on, shared
 from synthesis.worst.lower_bound import Search, lower_bound
 from synthesis.worst.over_box import grid_of, worst_over
@@ -92,9 +93,16 @@ def _size(covariance: Array, kind: Kind) -> float:
     return max(float(np.linalg.eigvalsh(0.5 * (covariance + covariance.T)).max(initial=0.0)), 0.0)
 
 
-def worst_frozen(model: Pieces, size: Measure) -> Worst:
-    """Return the worst frozen model over the box."""
+def worst_by(demand: Demand, model: Pieces) -> Worst:
+    """Return the worst frozen model by the measure of the inequality."""
+    rough = partial(gain_at_poles, dt=model.dt) if demand.kind == "l2 gain" else None
+    return worst_frozen(model, measure(demand, model.dt), rough)
 
+
+def worst_frozen(model: Pieces, size: Measure, rough: Callable[..., Array] | None = None) -> Worst:
+    """Return the worst frozen model over the box; the searches start from the highest peaks of
+    `rough` on a grid, the measure of a stack of matrices or something close to it, or of `size`.
+    """
     axes = _axes(model)
     free = [i for i, axis in enumerate(axes) if len(axis) > 1]
 
@@ -106,7 +114,8 @@ def worst_frozen(model: Pieces, size: Measure) -> Worst:
     def at(q: Array) -> float:
         return size(*(M[0] for M in model.at(whole(q)[None])))
 
-    value, q = worst_over(at, [axes[i] for i in free])
+    values = None if rough is None else rough(*model.at(grid_of(axes)))
+    value, q = worst_over(at, [axes[i] for i in free], values)
     return Worst(value, tuple(map(float, whole(q))))
 
 

@@ -5,6 +5,7 @@ model.
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -81,7 +82,7 @@ def frozen_gain(
     def size(p: Array) -> float:
         return norm(*lpv.matrices(float(p[0])), lpv.dt, tolerance)[0]
 
-    gamma, at = worst_over(size, [grid])
+    gamma, at = worst_over(size, [grid], gain_at_poles(*lpv.matrices(grid), lpv.dt))
     p = float(at[0])
     return FrozenGain(gamma, p, norm(*lpv.matrices(p), lpv.dt, tolerance)[1])
 
@@ -90,12 +91,12 @@ def _over_a_box(lpv: LPVStateSpace, tolerance: float) -> FrozenGain:
     from synthesis.polynomial.pieces import pieces
     from synthesis.worst.box import worst_frozen
 
-    def at(A: Array, B: Array, C: Array, D: Array) -> tuple[float, float]:
-        return norm(A, B, C, D, lpv.dt, tolerance)
+    def size(A: Array, B: Array, C: Array, D: Array) -> float:
+        return norm(A, B, C, D, lpv.dt, tolerance)[0]
 
-    gamma, p, _ = worst_frozen(pieces(lpv), lambda A, B, C, D: at(A, B, C, D)[0])
+    gamma, p, _ = worst_frozen(pieces(lpv), size, partial(gain_at_poles, dt=lpv.dt))
     m = lpv.at(*(p or ()))
-    omega = math.nan if math.isinf(gamma) else at(m.A, m.B, m.C, m.D)[1]
+    omega = math.nan if math.isinf(gamma) else norm(m.A, m.B, m.C, m.D, lpv.dt, tolerance)[1]
     return FrozenGain(gamma, p, omega)
 
 
@@ -132,15 +133,7 @@ def norm(
         else to_continuous(balanced, response.B, response.C, D)
     )
     poles = np.linalg.eigvals(A)
-    start = np.concatenate(
-        [
-            [0.0],
-            np.abs(poles),
-            np.abs(poles.imag),
-            np.sqrt(np.maximum(poles.imag**2 - poles.real**2, 0.0)),
-        ]
-    )
-    peak = _Peak(float(np.linalg.norm(D, 2)), math.inf).or_higher(response, start)
+    peak = _Peak(float(np.linalg.norm(D, 2)), math.inf).or_higher(response, _of_poles(poles))
     if peak.gain == 0.0:
         return 0.0, 0.0
     # the response in units in which it is about 1, whose squares are within the range of numbers
@@ -165,6 +158,41 @@ def norm(
     if dt is not None:
         omega = 2.0 * math.atan(omega) / dt if math.isfinite(omega) else math.pi / dt
     return math.ldexp(peak.gain, size), omega
+
+
+def gain_at_poles(A: Array, B: Array, C: Array, D: Array, dt: float | None = None) -> Array:
+    """Return for each of K models the largest gain (K,) at rest, at infinite frequency and at the
+    natural, damped and resonance frequencies of its poles, a lower bound of its norm; inf where it
+    is not stable, and then 0 elsewhere.
+    """
+    poles = np.linalg.eigvals(A)
+    good = stable(poles, dt)
+    if not good.all():
+        return np.where(good, 0.0, math.inf)
+    if min(B.shape[-1], C.shape[-2]) == 0:
+        return np.zeros(len(A))
+    if dt is not None:
+        A, B, C, D = to_continuous(A, B, C, D)
+        poles = np.linalg.eigvals(A)
+    omega = _of_poles(poles)
+    parts = -(-omega.size * A[0].size // 1_000_000)  # of at most 16 MB each
+    found = []
+    for k in np.array_split(np.arange(len(A)), max(parts, 1)):
+        pencil = 1j * omega[k, :, None, None] * np.eye(A.shape[-1]) - A[k, None]
+        with np.errstate(over="ignore", invalid="ignore"):
+            response = C[k, None] @ np.linalg.solve(pencil, B[k, None]) + D[k, None]
+        found.append(np.linalg.norm(np.nan_to_num(response), 2, axis=(-2, -1)).max(axis=1))
+    return np.maximum(np.concatenate(found), np.linalg.norm(D, 2, axis=(-2, -1)))
+
+
+def _of_poles(poles: Array) -> Array:
+    """Return 0, and the natural, damped and resonance frequencies of poles (.., n), (.., 3 n + 1),
+    rad/s.
+    """
+    real, imaginary = np.real(poles), np.imag(poles)
+    resonance = np.sqrt(np.maximum(imaginary**2 - real**2, 0.0))
+    rest = np.zeros((*poles.shape[:-1], 1))
+    return np.concatenate([rest, np.abs(poles), np.abs(imaginary), resonance], axis=-1)
 
 
 def stable(poles: Array, dt: float | None) -> Array:
@@ -210,17 +238,18 @@ class _Response(NamedTuple):
         B, C = of_one_size(self.B, self.C, power)
         return self._replace(B=B, C=C, D=np.ldexp(self.D, power))
 
-    def gain(self, omega: Array) -> Array:
-        """Return the gain at each omega (k,), refined once with residuals in extended precision:
+    def gain(self, omega: Array, refined: bool = True) -> Array:
+        """Return the gain at each omega (k,), `refined` once with residuals in extended precision:
         with light damping rounding is magnified by its inverse.
         """
-        omega = omega.astype(np.longdouble)
+        omega = omega.astype(np.longdouble if refined else float)
         points = (1 + 1j * omega) / (1 - 1j * omega) if self.discrete else 1j * omega
         exact = points[:, None, None] * np.eye(len(self.A)) - self.A
         pencil = exact.astype(complex)
         X = np.linalg.solve(pencil, np.broadcast_to(self.B, (len(omega), *self.B.shape)))
         with np.errstate(over="ignore", invalid="ignore"):
-            X = X + np.linalg.solve(pencil, (self.B - exact @ X).astype(complex))
+            if refined:
+                X = X + np.linalg.solve(pencil, (self.B - exact @ X).astype(complex))
             found = self.C @ X + self.D
         if not np.isfinite(found).all():
             raise AccuracyError(
@@ -242,23 +271,24 @@ class _Peak(NamedTuple):
 
     def climbed(self, response: _Response, poles: Array) -> _Peak:
         """Return the nearest maximum, by parabolas through ever narrower windows: the distance of
-        the nearest pole is the width of a peak.
+        the nearest pole is the width of a peak. Rounding moves a maximum, and its value by the
+        square of that, so that only the value at its top is refined.
         """
         if not math.isfinite(self.omega):
             return self
-        best, centre, reach = self, self.omega, float(np.abs(1j * self.omega - poles).min())
+        top, centre, reach = self, self.omega, float(np.abs(1j * self.omega - poles).min())
         end = 1e-6 * reach
         for _ in range(40):
             omega = np.abs(centre + reach * WINDOW)
-            gains = response.gain(omega)
+            gains = response.gain(omega, refined=False)
             k = int(gains.argmax())
-            if gains[k] > best.gain:
-                best = _Peak(float(gains[k]), float(omega[k]))
+            if gains[k] > top.gain:
+                top = _Peak(float(gains[k]), float(omega[k]))
             if k in (0, len(omega) - 1):  # still uphill
                 centre = float(omega[k])
                 continue
-            left, top, right = gains[k - 1 : k + 2]
-            bend = left - 2 * top + right
+            left, middle, right = gains[k - 1 : k + 2]
+            bend = left - 2 * middle + right
             spacing = reach * (WINDOW[1] - WINDOW[0])
             centre = float(omega[k]) + (
                 0.5 * spacing * float((left - right) / bend) if bend < 0 else 0.0
@@ -266,7 +296,7 @@ class _Peak(NamedTuple):
             reach = 0.25 * spacing
             if reach < end:
                 break
-        return best
+        return self.or_higher(response, np.array([top.omega]))
 
 
 WINDOW = np.linspace(-1.0, 1.0, 9)
@@ -312,8 +342,7 @@ def crossings(A: Array, B: Array, C: Array, D: Array, level: float) -> Array:
 
 
 def to_continuous(A: Array, B: Array, C: Array, D: Array) -> tuple[Array, Array, Array, Array]:
-    """Return the continuous model with the same norm: z = (1 + s)/(1 - s)."""
-    n = len(A)
-    inverse = np.linalg.inv(A + np.eye(n))
-    root = math.sqrt(2.0)
-    return inverse @ (A - np.eye(n)), root * inverse @ B, root * C @ inverse, D - C @ inverse @ B
+    """Return the continuous model, or stack of them, with the same norm: z = (1 + s)/(1 - s)."""
+    unit, root = np.eye(A.shape[-1]), math.sqrt(2.0)
+    inverse = np.linalg.inv(A + unit)
+    return inverse @ (A - unit), root * inverse @ B, root * C @ inverse, D - C @ inverse @ B

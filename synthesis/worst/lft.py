@@ -13,7 +13,7 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.lpv import LFT, Scheduling
 from symheli.lpv.lft import Block
-from synthesis.worst.frozen import FrozenGain, norm, stable
+from synthesis.worst.frozen import FrozenGain, gain_at_poles, norm
 from synthesis.worst.lines import Line, alone, directions, growing_on, shared
 from synthesis.worst.lower_bound import LowerBound, Search, lower_bound
 from synthesis.worst.over_box import grid_of, worst_over
@@ -72,40 +72,9 @@ def frozen_box_gain(lft: LFT, *, tolerance: float = 1e-8) -> BoxGain:
 
 
 def _at_poles(lft: LFT, grid: Array) -> Array:
-    """Return for each delta (K, m) the largest gain at the frequencies of the model's own poles, at
-    rest and of D; inf where unstable.
-    """
+    """Return `gain_at_poles` for each delta (K, m)."""
     M, x = lft.matrix(grid), len(lft.states)
-    A, B, C, D = M[:, :x, :x], M[:, :x, x:], M[:, x:, :x], M[:, x:, x:]
-    poles = np.linalg.eigvals(A)
-    good = stable(poles, lft.dt)
-    if not good.all():
-        return np.where(good, 0.0, math.inf)
-    if min(B.shape[2], C.shape[1]) == 0:
-        return np.zeros(len(grid))
-    if lft.dt is None:
-        s = 1j * np.concatenate(
-            [np.zeros((len(grid), 1)), np.abs(poles), np.abs(poles.imag)], axis=1
-        )
-    else:
-        s = np.exp(
-            1j
-            * np.concatenate(
-                [
-                    np.zeros((len(grid), 1)),
-                    np.abs(np.angle(poles)),
-                    np.full((len(grid), 1), math.pi),
-                ],
-                axis=1,
-            )
-        )
-    pencil = s[:, :, None, None] * np.eye(x) - A[:, None]
-    response = (
-        C[:, None] @ np.linalg.solve(pencil, np.broadcast_to(B[:, None], (*s.shape, *B.shape[1:])))
-        + D[:, None]
-    )
-    gains = np.linalg.svd(response, compute_uv=False)[..., 0].max(axis=1)
-    return np.maximum(gains, np.linalg.svd(D, compute_uv=False)[..., 0])
+    return gain_at_poles(M[:, :x, :x], M[:, :x, x:], M[:, x:, :x], M[:, x:, x:], lft.dt)
 
 
 def box_lower_bound(lft: LFT, frozen: BoxGain, search: Search | None) -> LowerBound:

@@ -16,7 +16,7 @@ import numpy as np
 
 from symheli.lpv import Matrices, UncertainStateSpace
 from symheli.values.signal import indices
-from synthesis.worst.frozen import norm
+from synthesis.worst.frozen import gain_at_poles, norm
 from synthesis.worst.over_box import worst_over
 from synthesis.worst.spectrum import surely_unstable
 
@@ -63,7 +63,9 @@ def worst_perturbation(unc: UncertainStateSpace, *, gains: bool) -> Perturbed:
     for start in starts:
         delta = start
         for _ in range(MAX_ROUNDS):
-            value, at = worst_over(lambda p, d=delta: frozen.value(d, float(p[0])), [grid])
+            value, at = worst_over(
+                lambda p, d=delta: frozen.value(d, float(p[0])), [grid], frozen.rough(delta, grid)
+            )
             p = float(at[0])
             if value > best.value:
                 best = Perturbed(delta, value, p)
@@ -103,10 +105,10 @@ class _FrozenModels(NamedTuple):
             gains,
         )
 
-    def closed(self, delta: Array, p: float) -> Matrices:
-        """Return the frozen model with d = delta v + the input d."""
+    def closed(self, delta: Array, p: float | Array) -> Matrices:
+        """Return the frozen models with d = delta v + the input d."""
         A, B, C, D = self.unc.model.matrices(p)
-        K = np.zeros((B.shape[1], C.shape[0]))
+        K = np.zeros((B.shape[-1], C.shape[-2]))
         K[np.ix_(self.d, self.v)] = delta
         N = np.linalg.inv(np.eye(len(K)) - K @ D)
         return Matrices(A + B @ N @ K @ C, B @ N, C + D @ N @ K @ C, D @ N)
@@ -115,17 +117,26 @@ class _FrozenModels(NamedTuple):
         """Return the objective of the ascent."""
         return self._value(self.closed(delta, p))
 
+    def rough(self, delta: Array, p: Array) -> Array:
+        """Return the objective at each p (k,), of gains a lower bound near it."""
+        at = self.closed(delta, p)
+        return gain_at_poles(*self._between(at), self.unc.dt) if self.gains else self._growth(at.A)
+
     def _value(self, at: Matrices) -> float:
         if self.gains:
-            return norm(
-                at.A, at.B[:, self.u], at.C[self.y], at.D[np.ix_(self.y, self.u)], self.unc.dt
-            )[0]
-        return self._growth(np.linalg.eigvals(at.A))
+            return norm(*self._between(at), self.unc.dt)[0]
+        return float(self._growth(at.A))
 
-    def _growth(self, poles: Array) -> float:
+    def _between(self, at: Matrices) -> Matrices:
+        """The channels from u to y."""
+        B, C = at.B[..., self.u], at.C[..., self.y, :]
+        return Matrices(at.A, B, C, at.D[..., self.y, :][..., self.u])
+
+    def _growth(self, A: Array) -> Array:
+        poles = np.linalg.eigvals(A)
         if self.unc.dt is None:
-            return float(np.real(poles).max())
-        return math.log(max(float(np.abs(poles).max()), 1e-300)) / self.unc.dt
+            return np.real(poles).max(axis=-1)
+        return np.log(np.maximum(np.abs(poles).max(axis=-1), 1e-300)) / self.unc.dt
 
     def slope(self, at: Matrices) -> Array:
         """Return the derivative of the value by Delta, (nd, nv), up to a positive factor."""
@@ -138,7 +149,7 @@ class _FrozenModels(NamedTuple):
             turn = 1.0 if self.unc.dt is None else np.conj(poles[k]) / max(abs(poles[k]), 1e-300)
             return np.real(np.outer(turn * (left @ E), G @ right[:, k]))
         u, y = self.u, self.y
-        _, omega = norm(A, B[:, u], C[y], D[np.ix_(y, u)], self.unc.dt)
+        _, omega = norm(*self._between(at), self.unc.dt)
         if math.isinf(omega):
             into, received, out = D[np.ix_(y, self.d)], D[np.ix_(self.v, u)], D[np.ix_(y, u)]
         else:

@@ -250,7 +250,7 @@ def test_tampered_proofs_fail_in_either_arithmetic():
 def test_in_discrete_time_a_memory_or_an_order_is_refused_before_any_work(
     form, said, rate, monkeypatch
 ):
-    monkeypatch.setattr("synthesis.analysis.certify.worst_frozen", None)
+    monkeypatch.setattr("synthesis.analysis.certify.worst_by", None)
     sampled = spring().discretize(0.1)
     for analysis in (l2_gain, stability):
         with pytest.raises(
