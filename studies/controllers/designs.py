@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 import symheli
-from identification import FitForControl, KinematicModel, fit_for_control
+from identification import FitForControl, KinematicModel, fit_for_control, structure_bias
 from studies.controllers.design_choices import (
     BACK_OFF,
     BACK_OFFS,
@@ -25,10 +25,11 @@ from studies.controllers.identified_plant import identified_model
 from studies.controllers.in_airspeed import of_degree
 from studies.controllers.plant import baseline, closed, design_plant, flown_plant
 from studies.known_kinematics import flights
+from studies.known_kinematics.models import simulator_of
 from studies.transition.flights import autopilot_for
 from studies.transition.known_kinematics import KnownKinematics
 from studies.transition.proofs import Questions
-from symheli import FlightRecord, Helicopter, LPVStateSpace
+from symheli import FlightRecord, Helicopter, LPVStateSpace, SimulatedFlight, linearize
 from symheli.errors import (
     AccuracyError,
     CertificateError,
@@ -113,6 +114,7 @@ class Designs:
 
 def design_questions(
     heli: Helicopter,
+    vehicle: str,
     known_kinematics: KnownKinematics,
     seed: int,
     certified_controllers: bool,
@@ -126,7 +128,8 @@ def design_questions(
     flown, record = flown_plant(base), None
     if certified_controllers:
         record = symheli.fly(heli, flights.aggressive(seed, autopilot_for(heli)))
-    last = partial(from_flights, from_data(identified), flown, identified, record)
+    simulator = simulator_of(vehicle, heli)[1]
+    last = partial(from_flights, from_data(identified), flown, identified, record, simulator)
     ways = from_equations(heli, base, design_points)
     calls = [partial(design, name, make, flown) for name, make in ways.items()]
     return Questions([*calls, last], lambda designs: Designs(designs=designs, plant=flown), [last])
@@ -170,14 +173,15 @@ def from_flights(
     plant: Plant,
     identified: KinematicModel,
     record: FlightRecord | None,
+    simulator: Helicopter,
 ) -> list[Design]:
     """The design from the identified model, with the verdict on that where there is a record to
-    judge it by.
+    judge it by; what the structure leaves out is measured in the `simulator`.
     """
     (found,) = design(IDENTIFIED, make, plant)
     if record is None or found.controller is None:
         return [found]
-    return [replace(found, remark=verdict(identified, found.controller, record))]
+    return [replace(found, remark=verdict(identified, found.controller, record, simulator))]
 
 
 def design(name: str, make: Callable[[], Controller | LPVStateSpace], plant: Plant) -> list[Design]:
@@ -205,17 +209,27 @@ def design(name: str, make: Callable[[], Controller | LPVStateSpace], plant: Pla
     ]
 
 
-def verdict(identified: KinematicModel, controller: LPVStateSpace, record: FlightRecord) -> str:
+def verdict(
+    identified: KinematicModel,
+    controller: LPVStateSpace,
+    record: FlightRecord,
+    simulator: Helicopter,
+) -> str:
     """Decide whether the identified model is fit for a loop with this controller, by its
-    identification flight, and return the objections in a sentence.
+    identification flight and a simulator of another helicopter, and return the objections in a
+    sentence.
     """
     rest = (0.0,) * (len(identified.parameters) - 1)
+    exact = {
+        (v, *rest) if rest else v: linearize(simulator, airspeed=v).discretize(PERIOD)
+        for v in JUDGED_AT
+    }
     found = fit_for_control(
         identified,
         record,
         lambda p: controller.at(p[0] if rest else p),
         scales=SIZES,
-        points=[(v, *rest) if rest else v for v in JUDGED_AT],
+        bias=structure_bias(identified, record, SimulatedFlight(simulator), exact),
         draws=DRAWS,
     )
     return verdict_in_words(found)
