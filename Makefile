@@ -23,6 +23,8 @@ study: $(STAMP)
 quick: $(STAMP)
 	$(BIN)/symheli study --quick
 
+# what one process has compiled, the others and the programs that tests start read, whatever the environment says
+test slow: export PYTHONDONTWRITEBYTECODE :=
 test: $(STAMP)
 	$(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadfile
 

@@ -15,8 +15,14 @@ import pytest  # noqa: E402
 import symheli  # noqa: E402
 
 TOGETHER = {
-    f"tests/studies/test_{name}.py": "the report"
-    for name in ("report", "report_numbers", "report_in_browser", "what_stages_read")
+    **{
+        f"tests/studies/test_{name}.py": "the report"
+        for name in ("report", "report_numbers", "report_in_browser", "what_stages_read")
+    },
+    **{
+        f"tests/synthesis/design/test_{name}.py": "the controller of the spring"
+        for name in ("sampling", "reduction")
+    },
 }
 """Files that need the same long computation: one process does it once."""
 

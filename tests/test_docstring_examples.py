@@ -79,6 +79,8 @@ def start():
 
 
 LONG = (
+    "identification-StateSpaceModel",
+    "identification-structure_bias",
     "synthesis-Certificate",
     "synthesis-Controller",
     "synthesis-Estimator",

@@ -39,7 +39,7 @@ def test_a_size_that_an_lqr_cannot_have_is_named(ideal, sizes, said):
         gain_scheduled_lqr(ideal, 5.0, 6.0, 0.02, 2, sizes=sizes)
 
 
-@pytest.mark.slow(only=("ideal-table", "pi-table"))
+@pytest.mark.slow(only=("ideal-table", "pi-table", "pi-lpv"))
 @pytest.mark.parametrize("make", ["table", "lpv", "reading"])
 def test_machine_code_and_python_ask_the_same(heli, make):
     controller = {

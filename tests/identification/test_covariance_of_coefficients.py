@@ -144,6 +144,7 @@ def test_without_a_sample_to_spare_nothing_is_known_of_the_residuals():
     assert idn.fit(SAME, record).covariance is None
 
 
+@pytest.mark.slow
 def test_known_kinematics_have_that_of_their_regression_and_it_is_no_proof_by_least_squares():
     """Noise of the sensors biases least squares, and its covariance does not know."""
     vehicle, sensors = Vehicle(na=1, nb=1), np.array([0.02] * 3 + [0.005] * 3 + [0.002] * 2)

@@ -77,6 +77,7 @@ def test_refined_instruments_with_white_noise_are_the_output_error_estimate():
     np.testing.assert_allclose(refined.theta, closest.theta, atol=2e-3)
 
 
+@pytest.mark.slow
 def test_a_noise_model_finds_the_colour_and_narrows_the_scatter():
     white, coloured = (
         errors("riv", (0, 1, 2), 0.9),

@@ -82,6 +82,7 @@ def test_certify_brackets_the_gain_of_a_frozen_loop(answer):
     assert got["lower"] <= got["gamma"] * (1 + 1e-6)
 
 
+@pytest.mark.slow
 def test_certify_takes_a_memory_and_a_degree(answer, run):
     loop = ("certify", "--stability", "--rate", 2, "--airspeeds", 6, 9, "--rigorous")
     assert answer(*loop, "--memory", 0.5, "--segments", 2, "--across", 1, 1)["exact"]

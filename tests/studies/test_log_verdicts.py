@@ -214,6 +214,7 @@ def identify(tmp_path, capsys):
     return call
 
 
+@pytest.mark.slow
 def test_a_moving_trim_is_tried_and_kept_where_it_predicts_better(identify):
     data, text = identify(about_a_trim(), "--commanded")
     assert data["judged"] == ["LPV, degree 2, moving trim", "LTI, moving trim"]

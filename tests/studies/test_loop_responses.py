@@ -76,6 +76,7 @@ def test_the_closed_loops_are_those_of_a_simulation(ideal, loops):
     assert found.values[:, 0, 3] == pytest.approx(-found.values[:, 0, 0], abs=1e-10)
 
 
+@pytest.mark.slow
 def test_bands_shrink_with_the_spread_of_the_helicopters(ideal, loops):
     """Parameters drawn a tenth as widely leave bands about a tenth as wide, down to the least."""
     rng = np.random.default_rng(0)

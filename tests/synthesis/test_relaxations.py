@@ -336,6 +336,7 @@ def test_wrong_input_gets_a_sentence():
         l2_gain(lag(), form=Spline(degree=2, segments=2, total_degree=2), search=None)
 
 
+@pytest.mark.slow
 def test_a_program_too_large_for_the_memory_is_left_alone_and_says_so():
     """Sums of squares in p, q and their next values, of degree two: the process once was ended by
     the operating system.

@@ -71,6 +71,7 @@ def test_the_multiplier_is_what_it_must_be(odd):
     assert odd or np.all(weights >= 0)
 
 
+@pytest.mark.slow
 def test_a_loop_of_the_proven_slope_decays():
     """A dead zone, a saturation and a soft stop, each of that slope at its steepest."""
     model = resonant()

@@ -207,6 +207,7 @@ def test_the_reference_is_smooth_and_its_rate_that_of_the_state(accelerating):
     np.testing.assert_allclose(numeric, at(0.0)[1], atol=1e-4)
 
 
+@pytest.mark.slow
 def test_the_drift_enclosed_holds_that_of_every_command(accelerating):
     heli, reference = accelerating
     loop = Deviations(heli, reference, 0.1)

@@ -1,11 +1,13 @@
 """Scheduled plants whose least gain is known, and small ones."""
 
+from functools import cache
+
 import numpy as np
 from design_plants import first_order
 
 from symheli import LinearModel, LPVStateSpace, Scheduling
 from symheli.lpv.bases.polynomials import interpolation_points, polynomials
-from synthesis import Plant
+from synthesis import Plant, output_feedback
 
 RATE = 0.5
 """Of p of the spring, per second."""
@@ -75,6 +77,12 @@ def spring(rate=RATE, noise=0.1, states=False, price=0.3):
         outputs=["z", "z_u", *(["x", "v"] if states else ["y"])],
     )
     return of(model, ["u"], ["x", "v"] if states else ["y"])
+
+
+@cache
+def spring_controller():
+    """Output feedback of `spring`, made once a process."""
+    return output_feedback(spring())
 
 
 def frozen(plant, *p):

@@ -90,6 +90,7 @@ def test_the_target_is_reached(integral, roll_off):
         )
 
 
+@pytest.mark.slow
 def test_roll_of_a_helicopter_flies():
     heli = symheli.Helicopter.load("xcell60", governor="ideal")
     hover = symheli.sweep(heli, [2.0, 3.0], inputs=("d_lat", "v_w"))[0].select(("p", "phi", "b1"))

@@ -76,6 +76,7 @@ def test_output_feedback_takes_the_grid_and_the_functions():
     assert rich.certify(search=None).verified
 
 
+@pytest.mark.slow
 def test_an_estimator_of_a_part_of_the_points_promises_no_more():
     plant, basis = in_functions_of_its_own()
     # of 5 points the 3 of the coarser grid are a part: it asks for less

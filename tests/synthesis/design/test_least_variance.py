@@ -51,6 +51,7 @@ def slow():
     return multiobjective(unstable_lag(0.2), H2())
 
 
+@pytest.mark.slow
 def test_of_one_model_it_is_the_h2_optimum():
     plant = unstable_lag(0.0, high=1e-6)
     made = multiobjective(plant, H2(), X=0, Y=0)

@@ -56,6 +56,7 @@ def test_printed_optima():
     assert 9.508085 <= fast.optimum <= 9.508085 * (1 + 2e-4)
 
 
+@pytest.mark.slow
 def test_h2_is_that_of_two_riccati_equations():
     plant = spring()
     model = plant.model.at(0.3)

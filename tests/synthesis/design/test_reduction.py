@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scheduled_plants import frozen, spring
+from scheduled_plants import frozen, spring, spring_controller
 
 from symheli import LinearModel, LPVStateSpace
 from symheli.errors import InputError, SynthesisError
@@ -16,7 +16,7 @@ from synthesis.worst.frozen import norm
 
 @pytest.fixture(scope="module")
 def made():
-    return output_feedback(spring())
+    return spring_controller()
 
 
 def extended(made, turned):

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scheduled_plants import spring
+from scheduled_plants import spring_controller
 from scipy.linalg import expm
 
 import symheli
@@ -19,7 +19,7 @@ from synthesis.worst.frozen import norm
 
 @pytest.fixture(scope="module")
 def made():
-    return output_feedback(spring())
+    return spring_controller()
 
 
 @pytest.mark.slow

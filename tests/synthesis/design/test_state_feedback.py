@@ -47,6 +47,7 @@ def test_the_exact_least_gain_is_met_and_never_undercut(rate):
     assert exact * (1 - DIGITS) <= proof.gamma <= made.promised * (1 + 1e-6)
 
 
+@pytest.mark.slow
 def test_a_richer_storage_function_is_never_worse():
     """Least gains with Y of degree 1 and 3 at a rate of 1 rad/s, computed on dense grids of t:
     the inequalities are imposed at points that leave 1e-4.

@@ -19,6 +19,7 @@ PUBLISHED = [[[0.0, 1.0], [-10.0, -1.0]], [[0.0, 1.0], [-0.1, -0.5]]]
 TRIPLED = {(0, 1): [[3.0]], (1, 0): [[3.0]]}
 
 
+@pytest.mark.slow
 def test_a_state_that_triples_at_every_switch_must_fall_by_as_much():
     """x' = -x: ln 3 seconds, as a minimum and as an average; with -x and -2x in turn ln(3)/3."""
     exact = math.log(3)
@@ -155,6 +156,7 @@ def load_factor(record):
     return w / 9.81 - np.cos(record["phi"]) * np.cos(record["theta"])
 
 
+@pytest.mark.slow
 def test_designs_switch_without_a_step_of_the_command_and_with_hysteresis(heli, made):
     there = symheli.AirspeedSchedule.transition(4.0, 9.0, acceleration=1.0, hold=0.5)
     watched = Watched(made)
