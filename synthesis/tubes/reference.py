@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -241,7 +241,7 @@ def moving(
     acceleration stays the same, with the rates of its attitude; to first order also in a jerk that
     stays the same, where it may not jump.
     """
-    choice = choice or Choice()
+    choice = replace(choice or Choice(), moving=True)
     acceleration, k, powers = limits[0], len(airspeeds), POWERS
     a = acceleration * np.cos(np.pi * (np.arange(powers) + 0.5) / powers)
     p, accelerations = np.repeat(airspeeds, powers), np.tile(a, k)
