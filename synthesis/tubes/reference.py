@@ -61,10 +61,6 @@ class Reference:
 
     __repr__ = summarized
 
-    jacobian_parts = (4, 4)
-    """Parts of a cell along airspeed and acceleration over which the Jacobian is enclosed,"""
-    drift_parts = (16, 16)
-    """and the drift of the reference."""
     drifts = True
     """Whether the reference may miss the equations."""
 
@@ -77,6 +73,16 @@ class Reference:
     def sampled(self) -> bool:
         """Whether the scheduling command is the time since the last sample, s, at one airspeed."""
         return self.equipment.period > 0
+
+    @property
+    def jacobian_parts(self) -> tuple[int, int]:
+        """Parts of a cell along airspeed and acceleration over which the Jacobian is enclosed,"""
+        return (1, 1) if self.sampled else (4, 4)
+
+    @property
+    def drift_parts(self) -> tuple[int, int]:
+        """and the drift of the reference; the clock changes neither."""
+        return (1, 1) if self.sampled else (16, 16)
 
     @cached_property
     def nodes(self) -> Array:
