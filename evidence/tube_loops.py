@@ -28,6 +28,7 @@ FINE = {name: replace(servo, steps=None) for name, servo in XCELL_SERVOS.items()
 """The servos of the X-Cell without the steps of their commands."""
 PERIOD = 0.02
 """s"""
+ALL_PARTS = {"known": EIGHT, "servos": FINE, "period": PERIOD, "delay": 1}
 FLIGHTS, SECONDS = 500, 0.25
 """From the border of a tube, and how long each lasts: what leaves it leaves at once."""
 
@@ -58,6 +59,7 @@ CASES = (
     Case("ten states, servos with steps", "xcell60", "ideal", 3.0, 0.25, {"servos": XCELL_SERVOS}),
     Case("ten states, 50 Hz", "xcell60", "ideal", 3.0, 0.25, {"period": PERIOD}),
     Case("ten states, 50 Hz, delay", "xcell60", "ideal", 3.0, 0.25, {"period": PERIOD, "delay": 1}),
+    Case("eight states, observer, servos, 50 Hz, delay", "xcell60", "pi", 3.0, 0.1, ALL_PARTS),
 )
 """Delay: one period from the sample to the command."""
 GOVERNED = (Case("eight states, observer", "xcell_kahn_hudson", "pi", 3.0, 0.25, {"known": EIGHT}),)

@@ -24,12 +24,18 @@ STATE_SIZES = (1.0, 1.0, 1.0, 0.5, 0.5, 0.5, 0.2, 0.2, 0.1, 0.1, 10.0, 10.0)
 """Deviations of equal weight in the default feedback: m/s, rad/s, rad; rotor speed, rad/s, and the
 governor's integral, rad.
 """
-CONTROL_SIZE = 0.1
-"""Control of the weight of these, rad."""
+CONTROL_SIZES = (0.1, 0.1, 0.1, 0.1)
+"""Controls of the weight of these, rad."""
+MOVING_SIZES = (0.5, *STATE_SIZES[1:])
+"""The same along a range of airspeeds,"""
+MOVING_CONTROLS = (0.3, 0.1, 0.05, 0.1)
+"""and the controls, rad: the collective turns the flow at the tail, whose share of the pitching
+moment jumps with the wake and the stall, and the longitudinal cyclic makes up for it.
+"""
 SLOW_SIZES = (1.0, 1.0, 1.0, 2.0, 2.0, 0.5, 0.2, 0.2, 1.0, 1.0, 10.0, 10.0)
 """The same where servos or a sample period limit how fast feedback may be,"""
-SLOW_CONTROL = 0.02
-"""and the control, rad."""
+SLOW_CONTROLS = (0.02, 0.02, 0.02, 0.02)
+"""and the controls, rad."""
 RATE_ERROR = 5.0
 """Of the rates of known states in the design of the observer, in units of their sizes per second,
 """
@@ -43,13 +49,15 @@ class Choice:
 
     gain: array (4, n) or (nodes, 4, n), a `LinearModel` or LPV controller from deviations to
     commands by name, or None, a regulator of the states `known` (None: the ten of the ideal
-    governor). period: s, 0 in continuous time. slow: servos or sampling limit its speed.
+    governor). period: s, 0 in continuous time. slow: servos or sampling limit its speed. moving:
+    along a range of airspeeds.
     """
 
     gain: Any = None
     known: Sequence[str] | None = None
     period: float = 0.0
     slow: bool = False
+    moving: bool = False
 
     def __post_init__(self) -> None:
         if self.gain is not None and self.known is not None:
@@ -84,8 +92,11 @@ class Choice:
     def regulator(self, heli: Helicopter, x: Array, u: Array) -> Array:
         """K (4, n) of the linear-quadratic regulator."""
         A, B, _ = (np.asarray(m) for m in heli.jacobian(x, u, np.zeros(3)))
-        states, control = (SLOW_SIZES, SLOW_CONTROL) if self.slow else (STATE_SIZES, CONTROL_SIZE)
-        Q, R = np.diag(1 / np.array(states[: len(x)]) ** 2), np.eye(4) / control**2
+        states, controls = STATE_SIZES, CONTROL_SIZES
+        if self.slow or self.moving:
+            slow, moving = (SLOW_SIZES, SLOW_CONTROLS), (MOVING_SIZES, MOVING_CONTROLS)
+            states, controls = slow if self.slow else moving
+        Q, R = (np.diag(np.array(sizes) ** -2.0) for sizes in (states[: len(x)], controls))
         return -np.linalg.solve(R, B.T @ solve_continuous_are(A, B, Q, R))
 
     def _estimating(self, heli: Helicopter, x: Array, u: Array) -> LinearModel:

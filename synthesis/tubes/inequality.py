@@ -11,6 +11,7 @@ scheduling command, as the commanded airspeed, whose rate adds dP/dt.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -166,7 +167,7 @@ def conditions(
 
     For each end of the cell, with its shares X: [X_tube, P o; o'P, S], [X_gust, P o; o'P, T] and
     [X_terms, P l; l'P, r]. For each corner of the cell, as Bernstein coefficients of degree 2 in
-    the scheduling command, minus
+    the scheduling command, of degree 1 where P or F does not change with it, minus
 
         [P A + A'P + alpha P + dP/dt, P E, P d; ., 0, 0; ., ., 0] + supply
         + sum of H'S H and H'T H over the symbols + sum of r times weights
@@ -187,9 +188,9 @@ def conditions(
         known = fixed if P.rate is None else fixed + _in_corner(a * P.rate, fixed.shape[-2:])
         for k in range(over.corners.shape[2]):
             F = over.corners[:, min(i, over.corners.shape[1] - 1), k]
-            pairs = [(0, 0)] if len(P.ends) == len(F) == 1 else [(0, 0), (0, -1), (-1, 0), (-1, -1)]
+            pairs = list(product(range(len(P.ends)), range(len(F))))
             M = [-(known + _motion(P.ends[e], F[f], by.decay) + taken[e]) for e, f in pairs]
-            falls += M if len(M) == 1 else [M[0], (M[1] + M[2]) * number(0.5), M[3]]
+            falls += [M[0], (M[1] + M[2]) * number(0.5), M[3]] if len(M) == 4 else M
     return bounds, falls
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -61,10 +61,6 @@ class Reference:
 
     __repr__ = summarized
 
-    jacobian_parts = (4, 4)
-    """Parts of a cell along airspeed and acceleration over which the Jacobian is enclosed,"""
-    drift_parts = (16, 16)
-    """and the drift of the reference."""
     drifts = True
     """Whether the reference may miss the equations."""
 
@@ -77,6 +73,16 @@ class Reference:
     def sampled(self) -> bool:
         """Whether the scheduling command is the time since the last sample, s, at one airspeed."""
         return self.equipment.period > 0
+
+    @property
+    def jacobian_parts(self) -> tuple[int, int]:
+        """Parts of a cell along airspeed and acceleration over which the Jacobian is enclosed,"""
+        return (1, 1) if self.sampled else (4, 4)
+
+    @property
+    def drift_parts(self) -> tuple[int, int]:
+        """and the drift of the reference; the clock changes neither."""
+        return (1, 1) if self.sampled else (16, 16)
 
     @cached_property
     def nodes(self) -> Array:
@@ -241,7 +247,7 @@ def moving(
     acceleration stays the same, with the rates of its attitude; to first order also in a jerk that
     stays the same, where it may not jump.
     """
-    choice = choice or Choice()
+    choice = replace(choice or Choice(), moving=True)
     acceleration, k, powers = limits[0], len(airspeeds), POWERS
     a = acceleration * np.cos(np.pi * (np.arange(powers) + 0.5) / powers)
     p, accelerations = np.repeat(airspeeds, powers), np.tile(a, k)

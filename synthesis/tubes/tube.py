@@ -596,13 +596,12 @@ def _grown(
     linear = _enclosed(loop, cells, factors, drifts, FIRST_SHARE)
     if linear is None or not np.all(np.isfinite(drifts)):
         return None, (), P, "the equations have no bounds near the reference"
-    decay, jump = _decay(loop, cells, linear, sizes, solver), loop.reference.jump
-    found = None if decay is None else smallest(linear, roots, sizes, decay, SPARE, solver, jump)
-    if decay is None or found is None:
+    found = _of_linear_loop(loop, cells, linear, roots, sizes, solver)
+    if found is None:
         return None, (), P, "the linear loop has no invariant ellipsoid"
     made: Grown = (None, (), P, "")
     for first, growth in GROWTHS:
-        made = _from_below(loop, cells, sizes, drifts, (decay, first, growth), found.P, solver)
+        made = _from_below(loop, cells, sizes, drifts, (found[1], first, growth), found[0], solver)
         if made[0] is not None:
             break
         progress.step(made[3])
@@ -642,23 +641,23 @@ def _from_below(
     return None, over, P, f"the tube still grew after {ROUNDS} rounds"
 
 
-def _decay(
+def _of_linear_loop(
     loop: Deviations,
     cells: Sequence[CommandCell],
-    linear: list[Enclosed],
+    linear: Sequence[Enclosed],
+    roots: Array,
     sizes: Array,
     solver: Solver,
-) -> float | None:
-    """The rate alpha of the smallest ellipsoids of the linear loop, by the cells of one interval in
-    the middle, of a sampled loop by all; None: there are none.
+) -> tuple[Array, float] | None:
+    """P of the smallest ellipsoids of the linear loop and their rate alpha, that of the smallest
+    ones of one interval in the middle, of a sampled loop of all; None: there are none.
     """
     middle, jump = cells[len(cells) // 2].interval, loop.reference.jump
-    count = len(loop.reference.nodes)
+    some, own_roots = list(linear), roots
     if jump is None:
-        linear = [o for o in linear if o.cell.interval == middle]
-        count = len(linear[0].nodes)
-        linear = [o._replace(nodes=tuple(range(count))) for o in linear]
-    roots = np.broadcast_to(linear[0].factor, (count, *linear[0].factor.shape))
+        some = [o for o in linear if o.cell.interval == middle]
+        own_roots = roots[: len(some[0].nodes)]
+        some = [o._replace(nodes=tuple(range(len(own_roots)))) for o in some]
     rates: tuple[float, ...] = DECAYS if isinstance(loop.model, Helicopter) else MORE_DECAYS
     if jump is not None:  # each try is long: that of the slowest mode of the linear loop
         A, period = linear[0].over.corners[0, 0, 0][:, : len(jump)], loop.reference.nodes[-1]
@@ -666,11 +665,14 @@ def _decay(
         rates = (float(max(-np.log(np.abs(modes).max()) / period, DECAYS[0])),)
     for own in (rates, SLOW_DECAYS) if isinstance(loop.model, Helicopter) else (rates,):
         tries = [
-            (smallest(linear, roots, sizes, decay, SPARE, solver, jump), decay) for decay in own
+            (smallest(some, own_roots, sizes, decay, SPARE, solver, jump), decay) for decay in own
         ]
-        found = min(((f.size, decay) for f, decay in tries if f is not None), default=None)
-        if found is not None:
-            return found[1]
+        made = [(f, decay) for f, decay in tries if f is not None]
+        if made:
+            found, decay = min(made, key=lambda each: each[0].size)
+            if len(some) < len(linear):
+                found = smallest(linear, roots, sizes, decay, SPARE, solver, jump)
+            return None if found is None else (found.P, decay)
     return None
 
 
