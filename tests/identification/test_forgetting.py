@@ -118,7 +118,7 @@ def errors(way, *, noise=0.02, jump=1.0, louder=1.0, after=250):
     return np.array(out)
 
 
-@pytest.mark.slow(only=("constant-0.01-0.03", "variable-0.01-0.03"))
+@pytest.mark.slow(only=("constant-0.01-0.03", "variable-0.01-0.03", "directional-0.2-0.6"))
 @pytest.mark.parametrize(
     ("way", "median", "worst"),
     [

@@ -346,7 +346,7 @@ def test_a_method_that_is_stopped_says_so_and_proves_nothing_it_has_not_reached(
     assert not late.verified
 
 
-@pytest.mark.slow(only=("12", "30"))
+@pytest.mark.slow(but="16")
 @pytest.mark.parametrize("states", LOOPS)
 def test_the_loops_of_the_benchmark_have_the_states_they_name_and_are_stable_when_frozen(states):
     loop = closed_loop(states)

@@ -104,7 +104,7 @@ def changed(content, path, value):
 JUNK = (None, "P", -1, 1e300, 10**400, [], {}, True, {"float": "nan"}, {"type": "Certificate"})
 
 
-@pytest.mark.slow(only=("sampled", "memory"))
+@pytest.mark.slow(only=("sampled", "memory", "uncertain, sampled"))
 @pytest.mark.parametrize("form", FORMS)
 @QUICK
 @given(data=st.data())

@@ -125,6 +125,14 @@ def test_a_jump_is_seen_to_fall_or_to_rise():
     assert not falls_in(1.5 * R, P, P)  # diag(1.125, 2.25)
 
 
+def test_the_clock_changes_nothing_of_the_equations(at_3):
+    loop = Deviations(at_3[0], held(at_3[0], 3.0, Choice(slow=True, period=PERIOD)), 0.2)
+    e, w = 1e-2 * np.random.default_rng(0).normal(size=len(loop.states)), np.ones(3)
+    rates = [loop.rate(e, w, [s, 1.0, 0.0, 0.0], loop.reference.data[0]) for s in (0.0, 0.3, 1.0)]
+    assert np.ptp(np.array(rates), axis=0).max() == 0
+    assert np.abs(np.array(rates[0])).max() > 0
+
+
 @pytest.fixture(scope="module")
 def enclosed():
     heli = Helicopter.load("xcell60", governor="ideal")
