@@ -179,10 +179,10 @@ def fit_for_control(
     poles counted as the nu-gap counts them, the root mean square of neighbouring points. They add
     as errors of correlation one half, sqrt(d^2 + d s + s^2): by the triangle inequality alone, d +
     s, they would have to point the same way everywhere. That the size of s carries over from one
-    vehicle to the other is assumed. With `bias` there are no rows of static gain and derivatives: what they are about is in
-    the bound. For a model by `FilterError` there is one of the residual power instead, as a share
-    of what noise of the sensors explains, at most 1: what the simulator does not show, such as a
-    delay that nobody mentioned, is in it.
+    vehicle to the other is assumed. With `bias` there are no rows of static gain and derivatives:
+    what they are about is in the bound. For a model by `FilterError` there is one of the residual
+    power instead, as a share of what noise of the sensors explains, at most 1: what the simulator
+    does not show, such as a delay that nobody mentioned, is in it.
 
     Frozen plants say nothing of how fast the scheduling may move.
 
