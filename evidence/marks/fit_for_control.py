@@ -151,7 +151,8 @@ class Outcome:
     """One model and one loop: the verdict, its rows, and what is true.
 
     `said`, `true`: upper bound of the nu-gap, and the exact one, over the margin, at the worst
-    airspeed; `bounds`, `gaps`: both at every airspeed. `true` is infinite where the estimate's own
+    airspeed; `bounds`, `gaps`: both at every airspeed, `margins` too, and what the bound is made
+    of, `within` the set and `left` by the structure. `true` is infinite where the estimate's own
     loop is unstable. A structure that the flight does not determine has the verdict "refused" and
     no numbers.
     """
@@ -164,6 +165,9 @@ class Outcome:
     true: float = np.nan
     bounds: tuple[float, ...] = ()
     gaps: tuple[float, ...] = ()
+    within: tuple[float, ...] = ()
+    left: tuple[float, ...] = ()
+    margins: tuple[float, ...] = ()
 
     @classmethod
     def of(cls, seed: int, loop: str, found: FitForControl) -> Outcome:
@@ -181,6 +185,9 @@ class Outcome:
             true=truth,
             bounds=tuple(map(float, found.bound)),
             gaps=tuple(map(float, gaps)),
+            within=tuple(map(float, np.fmax(found.gap, found.second_gap))),
+            left=tuple(map(float, found.structure_gap)),
+            margins=tuple(map(float, found.margin)),
         )
 
     @property

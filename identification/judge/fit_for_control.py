@@ -40,6 +40,11 @@ from symheli.values.summary import summarized
 HORIZON, WINDOW = 5.0, 8.0
 """Seconds that a model is judged over, and windows of its spectra, unless told otherwise."""
 
+CORRELATION = 0.5
+"""Of the nu-gaps by noise and by the structure, where they are added: 1 would be the triangle
+inequality, 0 independent errors.
+"""
+
 POINTS = 9
 """Values of one scheduling parameter at which a model is judged unless told otherwise."""
 
@@ -89,7 +94,9 @@ class FitForControl:
         within = np.fmax(self.gap, self.second_gap)
         if self.structure_gap is None:
             return within
-        return np.minimum(within + np.sqrt(with_neighbours(self.structure_gap**2, 0)), 1.0)
+        structure = np.sqrt(with_neighbours(self.structure_gap**2, 0))
+        both = within**2 + structure**2 + 2.0 * CORRELATION * within * structure
+        return np.minimum(np.sqrt(both), 1.0)
 
     @property
     def verdict(self) -> Verdict:
@@ -166,15 +173,16 @@ def fit_for_control(
       where it exceeds the threshold, without what noise of the sensors makes of the measurements
       and of the starts of the predictions.
 
-    The upper bound: the nu-gap is a metric, so that the truth is no farther from the estimate than
-    what the structure would make of this vehicle without noise is, plus what is between that and
-    the truth. The first is in the 95 % set, the second is what the simulator shows of the
-    structure, in these `scales`, its unstable poles counted as the nu-gap counts them, the root
-    mean square of neighbouring points; that the size carries over from one vehicle to the other is
-    assumed. With `bias` there are no rows of static gain and derivatives: what they are about is in
-    the bound. For a model by `FilterError` there is one of the residual power instead, as a share
-    of what noise of the sensors explains, at most 1: what the simulator does not show, such as a
-    delay that nobody mentioned, is in it.
+    The upper bound: between the estimate and the truth lies what the structure would make of this
+    vehicle without noise. From the estimate to that it is the gap d of the 95 % set; from that to
+    the truth it is what the simulator shows of the structure, s, in these `scales`, its unstable
+    poles counted as the nu-gap counts them, the root mean square of neighbouring points. They add
+    as errors of correlation one half, sqrt(d^2 + d s + s^2): by the triangle inequality alone, d +
+    s, they would have to point the same way everywhere. That the size of s carries over from one
+    vehicle to the other is assumed. With `bias` there are no rows of static gain and derivatives:
+    what they are about is in the bound. For a model by `FilterError` there is one of the residual
+    power instead, as a share of what noise of the sensors explains, at most 1: what the simulator
+    does not show, such as a delay that nobody mentioned, is in it.
 
     Frozen plants say nothing of how fast the scheduling may move.
 
