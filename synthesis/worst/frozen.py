@@ -189,10 +189,10 @@ def _of_poles(poles: Array) -> Array:
     """Return 0, and the natural, damped and resonance frequencies of poles (.., n), (.., 3 n + 1),
     rad/s.
     """
-    real, imaginary = np.real(poles), np.imag(poles)
-    resonance = np.sqrt(np.maximum(imaginary**2 - real**2, 0.0))
+    real, imaginary = np.abs(np.real(poles)), np.abs(np.imag(poles))
+    resonance = np.sqrt(np.maximum(imaginary - real, 0.0)) * np.sqrt(imaginary + real)
     rest = np.zeros((*poles.shape[:-1], 1))
-    return np.concatenate([rest, np.abs(poles), np.abs(imaginary), resonance], axis=-1)
+    return np.concatenate([rest, np.abs(poles), imaginary, resonance], axis=-1)
 
 
 def stable(poles: Array, dt: float | None) -> Array:
