@@ -17,8 +17,8 @@ from studies.known_kinematics.conditions import (
     ALL,
     CONDITIONS,
     SENSORS_LATE,
-    Condition,
     Instruments,
+    RealCondition,
     frozen_all,
     wind_of,
 )
@@ -81,7 +81,7 @@ def row(name: str, marks: Sequence[Marks]) -> tuple[str, ...]:
     )
 
 
-def _found(condition: Condition, marks: Sequence[Marks]) -> str:
+def _found(condition: RealCondition, marks: Sequence[Marks]) -> str:
     """How far the delays, and the winds, that were found are from the true ones."""
     late = SENSORS_LATE if condition.sensors else condition.late * PERIOD
     delays = [m.found[part]["delay"][0] for m in marks for part in PARTS[:2] if part in m.found]

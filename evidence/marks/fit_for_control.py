@@ -17,7 +17,7 @@ from evidence.seeds import by_name, parser_of
 from evidence.tables import DOCS, keep, markdown, parsed
 from identification import FitForControl, KinematicARX, Polynomial, structure_bias
 from identification import fit_for_control as judge
-from studies.known_kinematics.conditions import ALL, CONDITIONS, Condition, Instruments
+from studies.known_kinematics.conditions import ALL, CONDITIONS, Instruments, RealCondition
 from studies.known_kinematics.models import INPUTS, PAIRS, SCHEDULING
 from studies.known_kinematics.truth import SCALES, Truth
 from studies.loops.robust_lateral import FEEDBACK, SIZES
@@ -79,8 +79,8 @@ class Case:
     """What was flown, what its identification takes it for, and how it changes the structure."""
 
     about: str
-    flown: Condition
-    believed: Condition
+    flown: RealCondition
+    believed: RealCondition
     changed: Callable[[KinematicARX], KinematicARX] = replace
 
     def log(self, record: FlightRecord) -> FlightRecord:
@@ -173,9 +173,10 @@ class Outcome:
     def of(cls, seed: int, loop: str, found: FitForControl) -> Outcome:
         """What was found for one loop, with the truth beside."""
         row = found["nu-gap over margin"]
-        truth, gaps = row.truth, found.true_gap
+        truth, gaps, left = row.truth, found.true_gap, found.structure_gap
         assert truth is not None
         assert gaps is not None
+        assert left is not None
         return cls(
             seed=seed,
             loop=loop,
@@ -186,7 +187,7 @@ class Outcome:
             bounds=tuple(map(float, found.bound)),
             gaps=tuple(map(float, gaps)),
             within=tuple(map(float, np.fmax(found.gap, found.second_gap))),
-            left=tuple(map(float, found.structure_gap)),
+            left=tuple(map(float, left)),
             margins=tuple(map(float, found.margin)),
         )
 

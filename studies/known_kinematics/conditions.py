@@ -47,7 +47,7 @@ would pass for a delay.
 
 
 @dataclass(frozen=True)
-class Condition:
+class RealCondition:
     """One kind of flight, what its identification knows, and the largest permitted nu-gap.
 
     Parameters
@@ -264,44 +264,46 @@ WRONG_SERVOS = {
 }
 NOT_QUITE = partial(Actuators, delay=ASSUMED, delay_deviation=UNSURE)
 
-CONDITIONS: Mapping[str, Condition] = {
-    "ideal": Condition("nothing in between, 50 Hz, 30 dB", 0.10),
-    "servos": Condition(
+CONDITIONS: Mapping[str, RealCondition] = {
+    "ideal": RealCondition("nothing in between, 50 Hz, 30 dB", 0.10),
+    "servos": RealCondition(
         "servos, 20 ms, governor; servos known, delay found",
         0.12,
         True,
         1,
         actuators=NOT_QUITE(XCELL_SERVOS),
     ),
-    "bandwidth": Condition(
+    "bandwidth": RealCondition(
         "the same; bandwidth and delay found",
         0.12,
         True,
         1,
         actuators=NOT_QUITE(WRONG_SERVOS, bandwidth_deviation=0.2),
     ),
-    "delay": Condition("commands 40 ms late, delay found", 0.12, late=2, actuators=NOT_QUITE()),
-    "25 Hz": Condition(
+    "delay": RealCondition("commands 40 ms late, delay found", 0.12, late=2, actuators=NOT_QUITE()),
+    "25 Hz": RealCondition(
         "logged at 25 Hz, commanded at 50 Hz, said so",
         0.10,
         decimated=2,
         actuators=Actuators(period=PERIOD),
     ),
-    "25 Hz, untold": Condition("logged at 25 Hz, commanded at 50 Hz, not said", 0.10, decimated=2),
-    "sensors": Condition(
+    "25 Hz, untold": RealCondition(
+        "logged at 25 Hz, commanded at 50 Hz, not said", 0.10, decimated=2
+    ),
+    "sensors": RealCondition(
         "rates and attitude 40 ms late, found", 0.12, sensors=LateSensors(deviation=ASSUMED)
     ),
-    "wind": Condition(
+    "wind": RealCondition(
         "steady wind of 5 m/s, two headings, no air data; wind found", 0.12, headings=(-50.0, 50.0)
     ),
-    "airspeed": Condition(
+    "airspeed": RealCondition(
         "the same, airspeed known", 0.08, headings=(-50.0, 50.0), over_ground=False
     ),
-    "turbulence": Condition(
+    "turbulence": RealCondition(
         "a breeze and light turbulence; the gust a hidden state", 0.15, turbulent=True
     ),
-    "20 dB": Condition("20 dB of noise; simulator as prior", 0.12, noise_db=20.0, prior=True),
-    "half": Condition("half a flight; simulator as prior", 0.10, longest=HALF, prior=True),
+    "20 dB": RealCondition("20 dB of noise; simulator as prior", 0.12, noise_db=20.0, prior=True),
+    "half": RealCondition("half a flight; simulator as prior", 0.10, longest=HALF, prior=True),
 }
 
 
