@@ -340,7 +340,7 @@ def test_along_a_range_the_feedback_spares_the_pitching_moment_of_the_tail():
 def test_the_set_of_a_cell_with_two_kinks_holds_the_jacobians_in_it():
     heli, n, count = Helicopter.load("xcell60", governor="ideal"), 10, 4000
     loop = Deviations(heli, moving(heli, np.array([9.0, 10.0]), (1.0, 1.0, 1.0)), 0.15)
-    cell, factor = CommandCell(0, (0.0, 1.0), (0.0, 0.5)), np.diag(0.2 * np.array(TUBE_SIZES))
+    cell, factor = CommandCell(0, (0.0, 1.0), (0.0, 0.5)), np.diag(0.2 * np.array(TUBE_SIZES[:n]))
     drifts = np.zeros((1, 4, n))
     (over,) = loop.enclosed([cell], factor[None], drifts)
     e, w, c, data = (
