@@ -29,6 +29,7 @@ FINE = {name: replace(servo, steps=None) for name, servo in XCELL_SERVOS.items()
 PERIOD = 0.02
 """s"""
 ALL_PARTS = {"known": EIGHT, "servos": FINE, "period": PERIOD, "delay": 1}
+"""Observer, servos, sampling and delay together."""
 FLIGHTS, SECONDS = 500, 0.25
 """From the border of a tube, and how long each lasts: what leaves it leaves at once."""
 

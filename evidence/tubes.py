@@ -112,7 +112,7 @@ def remainders(intervals: Sequence[float]) -> str:
 
 
 def _rates(heli: Helicopter, nodes: Array, choice: Choice) -> list[str]:
-    """Of the largest kink and of the remainders."""
+    """Rates (1/s) of the largest kink, and of the remainders of p, q and r, as two cells."""
     sizes = np.array(TUBE_SIZES[:10])
     units = np.concatenate([SMALL_TUBE * sizes, np.ones(4)])
     loop = Deviations(heli, moving(heli, nodes, (1.0, 1.0, 1.0), choice), 0.0)

@@ -17,6 +17,7 @@ from evidence.seeds import by_name, parser_of
 from evidence.tables import DOCS, keep, markdown, parsed
 from identification import FitForControl, KinematicARX, Polynomial, structure_bias
 from identification import fit_for_control as judge
+from identification.judge.fit_for_control import added
 from studies.known_kinematics.conditions import ALL, CONDITIONS, Instruments, RealCondition
 from studies.known_kinematics.models import INPUTS, PAIRS, SCHEDULING
 from studies.known_kinematics.truth import SCALES, Truth
@@ -191,6 +192,13 @@ class Outcome:
             margins=tuple(map(float, found.margin)),
         )
 
+    def with_bound(self, bound: np.ndarray) -> Outcome:
+        """The same judged by another bound of the nu-gap, the other rows as they are."""
+        said = float(np.max(bound / np.array(self.margins)))
+        rows = {**self.rows, "nu-gap over margin": "fit" if said <= 1 else "not known"}
+        verdict = "fit" if set(rows.values()) == {"fit"} else "not known"
+        return replace(self, bounds=tuple(map(float, bound)), said=said, rows=rows, verdict=verdict)
+
     @property
     def is_fit(self) -> bool:
         """By the exact models: the nu-gap below the margin at every airspeed."""
@@ -281,6 +289,43 @@ def row(about: str, some: Sequence[Outcome]) -> tuple[str, ...]:
     )
 
 
+RIGHT = tuple(name for name in CONDITIONS if name not in (*ALIKE, "25 Hz, untold"))
+"""Cases that are identified as they should be."""
+CORRELATIONS = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""Of the gaps by noise and by the structure; see `added`."""
+
+
+def by_correlation(found: Mapping[str, Sequence[Sequence[Outcome]]]) -> str:
+    """What the verdicts would be if the two gaps added with other correlations."""
+    known = [
+        (name, o)
+        for name, of_name in found.items()
+        for some in of_name
+        for o in some
+        if o.verdict != "refused"
+    ]
+    right = [o for name, o in known if name in RIGHT]
+    rows = []
+    for correlation in CORRELATIONS:
+
+        def bound(o: Outcome, correlation: float = correlation) -> np.ndarray:
+            return added(np.array(o.within), np.array(o.left), correlation)
+
+        fit = [o.with_bound(bound(o)) for _, o in known]
+        counts = [[o.said_fit for o in fit if o.is_fit == which] for which in (False, True)]
+        holds = np.concatenate([bound(o) >= o.gaps for o in right]) if right else np.zeros(0)
+        rows.append(
+            [
+                f"{correlation:g}",
+                *(f"{sum(each)} of {len(each)}" for each in counts),
+                f"{100 * holds.mean():.1f}" if len(holds) else "",
+            ]
+        )
+    return markdown(
+        ["correlation", *HEAD[1:3], "bounds that hold where identified rightly, %"], rows
+    )
+
+
 def table(truth: str, found: Mapping[str, Sequence[Sequence[Outcome]]]) -> str:
     """A row a case, one a loop, and one of all."""
     flat = {name: [o for some in of_name for o in some] for name, of_name in found.items()}
@@ -299,7 +344,7 @@ def main() -> None:
     found = by_name(options, of_seed, options.only or list(CASES))
     text = table(options.truth, found)
     plain = {name: [[vars(o) for o in some] for some in each] for name, each in found.items()}
-    print(as_json(plain) if options.json else text)
+    print(as_json(plain) if options.json else f"{text}\n\n{by_correlation(found)}")
     if options.write:
         keep(DOCS / "identified.md", f"verdicts {options.truth}", text)
 

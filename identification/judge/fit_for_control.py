@@ -41,7 +41,7 @@ HORIZON, WINDOW = 5.0, 8.0
 """Seconds that a model is judged over, and windows of its spectra, unless told otherwise."""
 
 CORRELATION = 0.5
-"""Of the nu-gaps by noise and by the structure, where they are added: 1 would be the triangle
+"""Correlation with which the nu-gaps by noise and by the structure add: 1 is the triangle
 inequality, 0 independent errors.
 """
 
@@ -94,9 +94,7 @@ class FitForControl:
         within = np.fmax(self.gap, self.second_gap)
         if self.structure_gap is None:
             return within
-        structure = np.sqrt(with_neighbours(self.structure_gap**2, 0))
-        both = within**2 + structure**2 + 2.0 * CORRELATION * within * structure
-        return np.minimum(np.sqrt(both), 1.0)
+        return added(within, self.structure_gap)
 
     @property
     def verdict(self) -> Verdict:
@@ -130,6 +128,14 @@ class FitForControl:
             for row in (head, *rows)
         ]
         return "\n".join([*lines, f"verdict: {self.verdict}"])
+
+
+def added(noise: Array, structure: Array, correlation: float = CORRELATION) -> Array:
+    """Return the nu-gaps (K,) by noise and by the structure together, at most 1; of the structure
+    the root mean square over neighbouring points counts.
+    """
+    s = np.sqrt(with_neighbours(structure**2, 0))
+    return np.minimum(np.sqrt(noise**2 + s**2 + 2.0 * correlation * noise * s), 1.0)
 
 
 def fit_for_control(

@@ -25,17 +25,18 @@ STATE_SIZES = (1.0, 1.0, 1.0, 0.5, 0.5, 0.5, 0.2, 0.2, 0.1, 0.1, 10.0, 10.0)
 governor's integral, rad.
 """
 CONTROL_SIZES = (0.1, 0.1, 0.1, 0.1)
-"""Controls of the weight of these, rad."""
+"""Controls of the same weight as these deviations, rad."""
 MOVING_SIZES = (0.5, *STATE_SIZES[1:])
-"""The same along a range of airspeeds,"""
+"""Deviations of equal weight along a range of airspeeds, in the units of `STATE_SIZES`."""
 MOVING_CONTROLS = (0.3, 0.1, 0.05, 0.1)
-"""and the controls, rad: the collective turns the flow at the tail, whose share of the pitching
-moment jumps with the wake and the stall, and the longitudinal cyclic makes up for it.
+"""Controls of the same weight along a range, rad: the collective turns the flow at the tail, whose
+share of the pitching moment jumps with the wake and the stall, and the longitudinal cyclic makes up
+for it.
 """
 SLOW_SIZES = (1.0, 1.0, 1.0, 2.0, 2.0, 0.5, 0.2, 0.2, 1.0, 1.0, 10.0, 10.0)
-"""The same where servos or a sample period limit how fast feedback may be,"""
+"""Deviations of equal weight where servos or a sample period limit how fast feedback may be."""
 SLOW_CONTROLS = (0.02, 0.02, 0.02, 0.02)
-"""and the controls, rad."""
+"""Controls of the same weight there, rad."""
 RATE_ERROR = 5.0
 """Of the rates of known states in the design of the observer, in units of their sizes per second,
 """

@@ -5,7 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from evidence.marks.fit_for_control import CASES, LOOPS, Outcome, of_seed, table
+from evidence.marks.fit_for_control import (
+    CASES,
+    LOOPS,
+    Outcome,
+    by_correlation,
+    of_seed,
+    table,
+)
 
 FIT = Outcome(
     seed=1,
@@ -30,6 +37,25 @@ def test_the_table_counts_what_is_called_fit_beside_what_is():
     rows = table("xcell60", {"ideal": [some]}).splitlines()
     cells = [cell.strip() for cell in rows[-1].strip("|").split("|")]
     assert cells == ["all", "1 of 2", "1 of 2", "1.20 (1)", "50.0", "1.33", "1"]
+
+
+def test_verdicts_are_counted_again_for_other_correlations():
+    """Gaps of .3 and .4 at two points, margin .6: .5, .61 and .7 with correlations 0, .5 and 1."""
+    close = replace(
+        FIT,
+        rows={"nu-gap over margin": "not known", "J": "fit"},
+        gaps=(0.55, 0.65),
+        within=(0.3, 0.3),
+        left=(0.4, 0.4),
+        margins=(0.6, 0.6),
+    )
+    noisy = replace(close, rows={**close.rows, "J": "not known"}, true=1.2)
+    some = [close, replace(close, true=1.2), noisy]
+    rows = by_correlation({"ideal": [some]}).splitlines()[2:]
+    cells = [[cell.strip() for cell in row.strip("|").split("|")] for row in rows]
+    assert cells[0] == ["0", "1 of 2", "1 of 1", "0.0"]
+    assert cells[2] == ["0.5", "0 of 2", "0 of 1", "50.0"]
+    assert cells[4] == ["1", "0 of 2", "0 of 1", "100.0"]
 
 
 def test_an_estimate_whose_own_loop_is_unstable_is_not_fit():

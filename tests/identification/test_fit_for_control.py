@@ -15,6 +15,7 @@ import identification as idn
 from identification.judge.coefficient_covariance import drawn
 from identification.judge.criteria import together
 from identification.judge.derivatives import Certainty, Derivatives
+from identification.judge.fit_for_control import added
 from identification.judge.frozen_plant import FrozenPlant
 from symheli import FlightRecord, LinearModel
 from symheli.errors import InputError, UnknownNameError
@@ -267,7 +268,8 @@ def test_the_bias_of_the_structure_is_added_and_the_whole_margin_counts(noisy):
     alone = idn.fit_for_control(model, noisy, LOOP, **options)
     found = idn.fit_for_control(model, noisy, LOOP, bias=bias, **options)
     assert found.structure_gap[0] == pytest.approx(0.5 / np.sqrt(5.0 * 7.25), rel=1e-6)
-    assert found.bound == pytest.approx(alone.gap + found.structure_gap)
+    d, s = alone.gap[0], found.structure_gap[0]
+    assert found.bound == pytest.approx([np.sqrt(d**2 + d * s + s**2)])
     row = found["nu-gap over margin"]
     assert (row.value, row.threshold) == (pytest.approx(found.bound[0] / found.margin[0]), 1.0)
     assert [r.name for r in found.criteria] == ["unstable loops", row.name, "J", "TIC"]
@@ -275,6 +277,17 @@ def test_the_bias_of_the_structure_is_added_and_the_whole_margin_counts(noisy):
     assert idn.fit_for_control(model, noisy, LOOP, bias=far, **options).verdict == "not known"
     with pytest.raises(InputError, match="bias: expected a model at every point"):
         idn.fit_for_control(model, noisy, LOOP, bias=bias, **{**options, "points": [0.5]})
+
+
+def test_gaps_add_between_the_triangle_and_independence_and_never_beyond_one():
+    noise, structure = np.array([0.03, 0.05, 0.9]), np.array([0.04, 0.04, 0.04])
+    np.testing.assert_allclose(added(noise, structure, 1.0), [0.07, 0.09, 0.94])
+    np.testing.assert_allclose(added(noise, structure, 0.0), np.hypot(noise, structure))
+    np.testing.assert_allclose(added(noise, structure) ** 2, noise**2 + 0.04 * noise + 0.04**2)
+    # root mean squares of three neighbours, the ends counted twice
+    apart = added(np.zeros(4), np.array([0.3, 0.0, 0.0, 0.0]), 1.0)
+    np.testing.assert_allclose(apart, [0.3 * np.sqrt(2 / 3), 0.3 * np.sqrt(1 / 3), 0.0, 0.0])
+    assert added(np.array([0.9]), np.array([0.9]))[0] == 1.0
 
 
 @pytest.mark.slow

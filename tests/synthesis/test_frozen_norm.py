@@ -10,7 +10,7 @@ from scipy.linalg import block_diag
 
 from symheli import LPVStateSpace, Scheduling
 from synthesis import frozen_gain, l2_gain
-from synthesis.worst.frozen import norm
+from synthesis.worst.frozen import gain_at_poles, norm
 
 
 def lightly_damped(seed, decades=0.7, least=-3.5):
@@ -154,6 +154,30 @@ def test_a_gain_that_is_loose_for_its_sample_period_says_so(box):
         said = any("the bound may be loose for that alone" in line for line in proven.hypotheses)
         assert said or proven.gamma <= 1.01 * proven.lower
         assert not (said and dt > 0.01)
+
+
+@pytest.mark.parametrize("dt", [None, 0.1])
+def test_gains_at_poles_are_below_the_norm_and_meet_it_at_a_light_damping(dt):
+    stack = [random_stable(seed, dt=dt).matrices(0.5) for seed in range(8)]
+    rough = gain_at_poles(*(np.stack(M) for M in zip(*stack, strict=True)), dt)
+    exact = np.array([norm(*each, dt)[0] for each in stack])
+    assert np.all(rough <= exact * (1 + 1e-9))
+    assert np.all(rough >= 0.3 * exact)
+    # x'' + 2 d x' + x = u has a peak of 1/(2 d sqrt(1 - d^2)) at its resonance
+    d = 1e-3
+    one = LPVStateSpace.polynomial(
+        [[[0.0, 1.0], [-1.0, -2 * d]]],
+        [[[0.0], [1.0]]],
+        [[[1.0, 0.0]]],
+        [[[0.0]]],
+        Scheduling("p", "1", 0.0, 1.0),
+    )
+    assert gain_at_poles(*one.matrices([0.5]))[0] == pytest.approx(
+        1 / (2 * d * math.sqrt(1 - d**2)), rel=1e-9
+    )
+    unstable = np.array([[[-1.0]], [[0.1]]])
+    some = np.ones((2, 1, 1))
+    assert gain_at_poles(unstable, some, some, some).tolist() == [0.0, math.inf]
 
 
 def test_the_frozen_gain_over_a_box_is_the_worst_corner():
