@@ -30,10 +30,10 @@ QUICK = ("xcell60, 0", "xcell60, 8")
 GUSTS = (0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.75, 1.0, 1.25, 1.5)
 """Amplitudes that are tried, m/s."""
 TRANSITIONS = (
-    ("xcell60", 3.0, 13.0, 0.25, 1.0, 1.0, 1.0),
-    ("xcell_kahn_hudson", 3.0, 4.0, 0.25, 1.0, 1.0, 1.0),
-    ("xcell_kahn_hudson", 3.0, 13.0, 0.25, 1.0, 1.0, 1.0),
-    ("yamaha_r50", 3.0, 13.0, 0.25, 1.0, 1.0, 1.0),
+    ("xcell60", 0.0, 13.0, 0.25, 1.0, 1.0, 1.0),
+    ("xcell60", 0.0, 7.0, 0.5, 1.0, 1.0, 1.0),
+    ("xcell_kahn_hudson", 0.0, 13.0, 0.25, 1.0, 1.0, 1.0),
+    ("yamaha_r50", 0.0, 13.0, 0.25, 1.0, 1.0, 1.0),
 )
 """Helicopter, range, m/s; gusts, m/s; largest acceleration, jerk and snap, m/s^2, m/s^3, m/s^4."""
 FLIGHTS, SECONDS = 10_000, 0.25
