@@ -74,7 +74,7 @@ def transitions(asked: Sequence[str], shown: Sequence[Sequence[str]]) -> str:
         found = tube(heli, (low, high), gust=gust, acceleration=acceleration, jerk=jerk, snap=snap)
         if not found.proven:
             return [f"none: {found.why}", "", "", ""]
-        share = max(worst(found, p) for p in (low, high))
+        share = max(worst(found, p) for p in found.nodes)
         return [*widths(found), f"{share:.2f}", f"{from_its_border(found, FLIGHTS, SECONDS):.3f}"]
 
     head = ["helicopter", "airspeed, m/s", "gusts, m/s", "limits, m/s^2, m/s^3, m/s^4", *WIDTHS]
