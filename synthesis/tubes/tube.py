@@ -228,7 +228,7 @@ class Tube:
         if self.deviations.reference.jump is not None:
             raise InputError("gains are of loops in continuous time: the tube's is sampled")
         d, own = self.deviations, solver or Solver(tolerance=TOLERANCE)
-        cells = _enclosed(d, self.cells, self.factors, d.drifts(self.cells))
+        cells = enclosed_cells(d, self.cells, self.factors, d.drifts(self.cells))
         found = least(cells or [], self.P, d.states, outputs, energy, d.gust, own)
         if (
             (cells is None)
@@ -260,7 +260,11 @@ class Tube:
         parts = list(zip(self.cells, self.factors, self.multipliers, strict=True))
         sets = []
         for k, (cell, factor, by) in enumerate(tracked("verifying cells", parts)):
-            made = [over[k]] if over else _enclosed(loop, [cell], factor[None], loop.drifts([cell]))
+            made = (
+                [over[k]]
+                if over
+                else enclosed_cells(loop, [cell], factor[None], loop.drifts([cell]))
+            )
             if (
                 made is None
                 or not self._holds(made[0], by)
@@ -593,7 +597,7 @@ def _grown(
     factors = np.broadcast_to(roots[0], (len(cells), *roots[0].shape))
     P = np.broadcast_to(np.diag(sizes**-2), roots.shape)
     drifts = loop.drifts(cells)
-    linear = _enclosed(loop, cells, factors, drifts, FIRST_SHARE)
+    linear = enclosed_cells(loop, cells, factors, drifts, FIRST_SHARE)
     if linear is None or not np.all(np.isfinite(drifts)):
         return None, (), P, "the equations have no bounds near the reference"
     found = _of_linear_loop(loop, cells, linear, roots, sizes, solver)
@@ -622,8 +626,8 @@ def _from_below(
     for _ in range(ROUNDS):
         P, growth = P / growth**2, later
         roots = np.linalg.inv(np.swapaxes(np.linalg.cholesky(P), 1, 2))
-        factors = np.array([_around(_ends(P, cell)) for cell in cells])
-        over = _enclosed(loop, cells, factors, drifts)
+        factors = np.array([around(ends_of(P, cell)) for cell in cells])
+        over = enclosed_cells(loop, cells, factors, drifts)
         if over is None:
             return None, (), P, "the equations have no bounds over a tube of the size needed"
         found = smallest(over, roots, sizes, decay, SPARE, solver, loop.reference.jump)
@@ -633,7 +637,7 @@ def _from_below(
         least = min(
             np.linalg.eigvalsh(L.T @ end @ L)[0]
             for cell, L in zip(cells, factors, strict=True)
-            for end in _ends(found.P, cell)
+            for end in ends_of(found.P, cell)
         )
         if least * INSIDE > 1:
             return found, over, found.P, ""
@@ -676,7 +680,7 @@ def _of_linear_loop(
     return None
 
 
-def _enclosed(
+def enclosed_cells(
     loop: Deviations,
     cells: Sequence[CommandCell],
     factors: Array,
@@ -695,13 +699,13 @@ def _enclosed(
     return out
 
 
-def _ends(P: Array, cell: CommandCell) -> list[Array]:
+def ends_of(P: Array, cell: CommandCell) -> list[Array]:
     """P at the ends of a cell in airspeed."""
     own = P[list(_nodes(cell, len(P)))]
     return [own[0] + s * (own[-1] - own[0]) for s in cell.s]
 
 
-def _around(ends: Sequence[Array]) -> Array:
+def around(ends: Sequence[Array]) -> Array:
     """The factor L of an ellipsoid e = L z that holds those of all P."""
     mean = sum(ends) / len(ends)
     least = min(eigh(P, mean, eigvals_only=True)[0] for P in ends)

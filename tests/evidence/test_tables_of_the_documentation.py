@@ -45,7 +45,8 @@ from evidence.planar_vtol import tubes as planar_vtol
 from evidence.public_files import fetched
 from evidence.reach.measured import gains
 from evidence.tables import DOCS
-from evidence.tubes import TRANSITIONS, remainders
+from evidence.tube_terms import HELD_AGAINST, held_against, remainders
+from evidence.tubes import TRANSITIONS, VEHICLES
 from studies.controllers.designs import LQR, design, lqr_schedule
 from studies.controllers.flown import WINDS
 from studies.controllers.plant import baseline, flown_plant
@@ -263,8 +264,15 @@ def tube_of_a_loop(section, case):
 
 
 def remainder_of_one_cell():
-    *_, row = remainders([3.0]).splitlines()
+    *_, row = remainders(VEHICLES[0], [3.0]).splitlines()
     shown = KEPT["tubes.md", "remainders"].cells("3 to 4")
+    assert shown == [cell.strip() for cell in row.strip("| ").split("|")][1:]
+
+
+def terms_of_one_interval():
+    low, gust = HELD_AGAINST[0]
+    *_, row = held_against(VEHICLES[0], [(low, gust)]).splitlines()
+    shown = KEPT["tubes.md", "terms"].cells(f"{low:g} to {low + 1:g}")
     assert shown == [cell.strip() for cell in row.strip("| ").split("|")][1:]
 
 
@@ -475,6 +483,7 @@ ROWS = {
     ("tubes.md", "amplitudes"): tube_in_hover,
     ("tubes.md", "transitions"): tube_along_a_transition,
     ("tubes.md", "remainders"): remainder_of_one_cell,
+    ("tubes.md", "terms"): terms_of_one_interval,
     ("tubes.md", "gains"): gains_on_one_tube,
     ("tubes.md", "loops"): lambda: tube_of_a_loop("loops", tube_loops.CASES[0]),
     ("tubes.md", "governed"): lambda: tube_of_a_loop("governed", tube_loops.GOVERNED[0]),
