@@ -17,16 +17,16 @@ from synthesis.tubes.controllers import Choice
 from synthesis.tubes.deviations import CommandCell, Deviations
 from synthesis.tubes.inequality import MatrixSet
 from synthesis.tubes.reference import TUBE_SIZES, moving
-from synthesis.tubes.search import Enclosed, TubeSolution, smallest
+from synthesis.tubes.search import smallest
 from synthesis.tubes.tube import (
-    DECAYS,
     FIRST_SHARE,
     FIRST_SIZE,
     SPARE,
     TOLERANCE,
-    around,
+    coordinates,
     enclosed_cells,
-    ends_of,
+    inside,
+    of_linear_loop,
 )
 
 Array = np.ndarray
@@ -85,23 +85,27 @@ def _rates(heli: Helicopter, nodes: Array, choice: Choice) -> list[str]:
 
 
 def _remainder(over: MatrixSet) -> Array:
-    """Which terms are the remainder of one row each; the others are kinks, and what the reference
-    misses with the jerk.
-    """
+    """Which terms are the remainder of one row each, that of what the reference misses included."""
     return (over.left != 0).sum(axis=1) == 1
 
 
+def _kinks(over: MatrixSet) -> Array:
+    """Which terms are kinks: the others move the deviation where it is 0 too."""
+    return ~_remainder(over) & (over.weights[:, -1, -1] == 0)
+
+
 def held_against(vehicle: str, cases: Sequence[tuple[float, float]]) -> str:
-    """How many times the half widths enclosed are needed, in the state where it is worst, in
-    Markdown: with all terms, and without one kind of them. With 1 or less there is a proof.
+    """How many times larger than the deviations enclosed the ones needed are, in the direction
+    where it is worst, in Markdown: with all terms, and without one kind of them. Below 1 the search
+    ends with a tube.
     """
     heli = Helicopter.load(vehicle, governor="ideal")
     kinds = {
         "all terms": lambda over: over,
         "the reference misses nothing": _consistent,
-        "no kinks": lambda over: _without(over, ~_remainder(over)),
+        "no kinks": lambda over: _without(over, _kinks(over)),
         "no remainder": lambda over: _without(over, _remainder(over)),
-        "nothing turns with the deviations": lambda over: over._replace(
+        "no part linear in the deviations": lambda over: over._replace(
             tube=GONE * over.tube, gust=GONE * over.gust
         ),
     }
@@ -115,7 +119,7 @@ def held_against(vehicle: str, cases: Sequence[tuple[float, float]]) -> str:
 def _needed(
     heli: Helicopter, low: float, gust: float, kinds: Sequence[Callable[[MatrixSet], MatrixSet]]
 ) -> list[str]:
-    """For each kind of terms the half widths needed over those enclosed, the largest of the ten."""
+    """For each kind of terms the deviations needed over those enclosed, at most."""
     nodes = np.array([low, low + 1])
     loop = Deviations(heli, moving(heli, nodes, LIMITS), gust)
     cells = [CommandCell(0, (0.0, 1.0), ends) for ends in pairwise(ACCELERATIONS.tolist())]
@@ -123,27 +127,22 @@ def _needed(
     linear = enclosed_cells(loop, cells, np.stack([root] * len(cells)), drifts, FIRST_SHARE)
     if linear is None:
         raise InputError(f"no bounds from {low:g} to {low + 1:g} m/s")
-    tries = [(_smallest(linear, np.stack([root] * 2), decay), decay) for decay in DECAYS]
-    found, decay = min(((f, d) for f, d in tries if f is not None), key=lambda own: own[0].size)
-    P = found.P / BEYOND**2
-    factors = np.array([around(ends_of(P, cell)) for cell in cells])
+    solver = Solver(tolerance=TOLERANCE)
+    found = of_linear_loop(loop, cells, linear, np.stack([root] * 2), SIZES, solver)
+    if found is None:
+        return ["no ellipsoid"] * len(kinds)
+    P, decay = found
+    roots, factors = coordinates(P / BEYOND**2, cells)
     over = enclosed_cells(loop, cells, factors, drifts)
     if over is None:
         return ["no bounds"] * len(kinds)
-    roots, out = np.linalg.inv(np.swapaxes(np.linalg.cholesky(P), 1, 2)), []
+    out = []
     for kind in kinds:
-        own = _smallest([cell._replace(over=kind(cell.over)) for cell in over], roots, decay)
-        out.append("no ellipsoid" if own is None else f"{(_widths(own.P) / _widths(P)).max():.2f}")
+        some = [cell._replace(over=kind(cell.over)) for cell in over]
+        own = smallest(some, roots, SIZES, decay, SPARE, solver)
+        needed = None if own is None else inside(own.P, cells, factors) ** -0.5
+        out.append("no ellipsoid" if needed is None else f"{needed:.2f}")
     return out
-
-
-def _smallest(cells: Sequence[Enclosed], roots: Array, decay: float) -> TubeSolution | None:
-    return smallest(cells, roots, SIZES, decay, SPARE, Solver(tolerance=TOLERANCE))
-
-
-def _widths(P: Array) -> Array:
-    """Half widths (nodes, n)."""
-    return np.sqrt(np.diagonal(np.linalg.inv(P), axis1=1, axis2=2))
 
 
 def _consistent(over: MatrixSet) -> MatrixSet:

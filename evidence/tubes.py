@@ -102,11 +102,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--write", action="store_true", help="keep the tables in docs/tubes.md")
     parser.add_argument("--quick", action="store_true", help="one helicopter at 0 and 8 m/s")
-    parser.add_argument(
-        "--only",
-        choices=tuple(_tables([])),
-        help="one of the tables",
-    )
+    parser.add_argument("--only", choices=tuple(_tables([])), help="one of the tables")
     parser.add_argument(
         "--rows",
         nargs="+",

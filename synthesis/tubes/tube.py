@@ -600,7 +600,7 @@ def _grown(
     linear = enclosed_cells(loop, cells, factors, drifts, FIRST_SHARE)
     if linear is None or not np.all(np.isfinite(drifts)):
         return None, (), P, "the equations have no bounds near the reference"
-    found = _of_linear_loop(loop, cells, linear, roots, sizes, solver)
+    found = of_linear_loop(loop, cells, linear, roots, sizes, solver)
     if found is None:
         return None, (), P, "the linear loop has no invariant ellipsoid"
     made: Grown = (None, (), P, "")
@@ -625,8 +625,7 @@ def _from_below(
     decay, growth, later = numbers
     for _ in range(ROUNDS):
         P, growth = P / growth**2, later
-        roots = np.linalg.inv(np.swapaxes(np.linalg.cholesky(P), 1, 2))
-        factors = np.array([around(ends_of(P, cell)) for cell in cells])
+        roots, factors = coordinates(P, cells)
         over = enclosed_cells(loop, cells, factors, drifts)
         if over is None:
             return None, (), P, "the equations have no bounds over a tube of the size needed"
@@ -634,18 +633,13 @@ def _from_below(
         if found is None:
             why = "no ellipsoid satisfies the inequality: the gusts are too large"
             return None, over, P, why
-        least = min(
-            np.linalg.eigvalsh(L.T @ end @ L)[0]
-            for cell, L in zip(cells, factors, strict=True)
-            for end in ends_of(found.P, cell)
-        )
-        if least * INSIDE > 1:
+        if inside(found.P, cells, factors) * INSIDE > 1:
             return found, over, found.P, ""
         P = found.P
     return None, over, P, f"the tube still grew after {ROUNDS} rounds"
 
 
-def _of_linear_loop(
+def of_linear_loop(
     loop: Deviations,
     cells: Sequence[CommandCell],
     linear: Sequence[Enclosed],
@@ -699,13 +693,32 @@ def enclosed_cells(
     return out
 
 
-def ends_of(P: Array, cell: CommandCell) -> list[Array]:
+def coordinates(P: Array, cells: Sequence[CommandCell]) -> tuple[Array, Array]:
+    """Roots (nodes, n, n) of the ellipsoids of P, e = root z, and factors (cells, n, n) of an
+    ellipsoid around those of each cell.
+    """
+    roots = np.linalg.inv(np.swapaxes(np.linalg.cholesky(P), 1, 2))
+    return roots, np.array([_around(_ends(P, cell)) for cell in cells])
+
+
+def inside(P: Array, cells: Sequence[CommandCell], factors: Array) -> float:
+    """The least e'P e on the borders of the ellipsoids of the factors: above 1 those of P lie
+    inside them.
+    """
+    return min(
+        np.linalg.eigvalsh(L.T @ end @ L)[0]
+        for cell, L in zip(cells, factors, strict=True)
+        for end in _ends(P, cell)
+    )
+
+
+def _ends(P: Array, cell: CommandCell) -> list[Array]:
     """P at the ends of a cell in airspeed."""
     own = P[list(_nodes(cell, len(P)))]
     return [own[0] + s * (own[-1] - own[0]) for s in cell.s]
 
 
-def around(ends: Sequence[Array]) -> Array:
+def _around(ends: Sequence[Array]) -> Array:
     """The factor L of an ellipsoid e = L z that holds those of all P."""
     mean = sum(ends) / len(ends)
     least = min(eigh(P, mean, eigvals_only=True)[0] for P in ends)
