@@ -101,6 +101,18 @@ def flown(
     return most
 
 
+def cells_of(found: Tube, count: int, seconds: float) -> list[str]:
+    """What a row of a table says of a tube: half widths, the share that the worst gusts found fill
+    from any airspeed of its nodes, and the furthest of `count` flights from its border; or why
+    there is none.
+    """
+    if not found.proven:
+        return [f"none: {found.why}", "", "", ""]
+    sampled = found.deviations.reference.jump is not None
+    share = max(worst(found, p) for p in ([None] if sampled else found.nodes))
+    return [*widths(found), f"{share:.2f}", f"{from_its_border(found, count, seconds):.3f}"]
+
+
 def from_its_border(found: Tube, count: int, seconds: float) -> float:
     """The largest sqrt(e'P e) of flights that start on the border of the tube, in gusts of full
     size that change at random, slowly and fast, along commands as large as allowed; of a sampled

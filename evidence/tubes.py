@@ -12,7 +12,7 @@ from itertools import product
 from evidence import tube_gains, tube_loops
 from evidence.planar_vtol import tubes as planar_vtol
 from evidence.tables import DOCS, chosen, keep, kept_rows, markdown, renewed
-from evidence.tube_flights import WIDTHS, from_its_border, widths, worst
+from evidence.tube_flights import WIDTHS, cells_of, widths, worst
 from evidence.tube_terms import HELD_AGAINST, INTERVALS, held_against, remainders
 from symheli import Helicopter
 from synthesis import Tube, tube
@@ -72,10 +72,7 @@ def transitions(asked: Sequence[str], shown: Sequence[Sequence[str]]) -> str:
         name, low, high, gust, acceleration, jerk, snap = TRANSITIONS[k]
         heli = Helicopter.load(name, governor="ideal")
         found = tube(heli, (low, high), gust=gust, acceleration=acceleration, jerk=jerk, snap=snap)
-        if not found.proven:
-            return [f"none: {found.why}", "", "", ""]
-        share = max(worst(found, p) for p in found.nodes)
-        return [*widths(found), f"{share:.2f}", f"{from_its_border(found, FLIGHTS, SECONDS):.3f}"]
+        return cells_of(found, FLIGHTS, SECONDS)
 
     head = ["helicopter", "airspeed, m/s", "gusts, m/s", "limits, m/s^2, m/s^3, m/s^4", *WIDTHS]
     rows = renewed(names, row, chosen(asked, [name[:3] for name in names]), shown)

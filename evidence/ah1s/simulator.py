@@ -17,6 +17,9 @@ STICKS = tuple(Signal(name, "1") for name in ("d_lon", "d_lat", "d_col", "d_ped"
 DEFLECTIONS = tuple(Signal(f"{name}_reached", "rad") for name in STICKS)
 """What rotors and tail rotor are set to: sticks through gains, mixing and lags."""
 
+LAGS = (20.0, 20.0, 10.0, 20.0)
+"""From sticks to deflections, 1/s, in the file of the aircraft; behind them they are mixed."""
+
 DT = 0.02
 """Sample period, s."""
 
