@@ -34,6 +34,7 @@ from studies.transition.comparison import SCALES
 from symheli.flight import AirspeedSchedule, Excitation, Servo
 from symheli.lpv import FunctionSpace, LinearModel
 from symheli.records import FlightRecord
+from symheli.values.arrays import Array
 
 KNOT = 1852 / 3600
 SPEEDS = {
@@ -151,14 +152,15 @@ def phugoid(model: LinearModel) -> complex:
 
 @dataclass(frozen=True, kw_only=True)
 class Judged:
-    """One structure fitted to one flight: nu-gaps, phugoids and the true ones over the airspeeds,
-    fits 1 s ahead with moving and with constant coefficients by output, in percent.
+    """One structure fitted to one flight: over the airspeeds nu-gaps, how fast the phugoid grows
+    and truly grows (1/s, NaN where there is none); fits 1 s ahead with moving and with constant
+    coefficients by output, in percent.
     """
 
     seed: int
     gaps: tuple[float, ...]
-    phugoids: tuple[complex, ...]
-    true: tuple[complex, ...]
+    growth: tuple[float, ...]
+    true: tuple[float, ...]
     moving: dict[str, float]
     constant: dict[str, float]
 
@@ -183,8 +185,8 @@ def of_seed(structure: str, ramps: str, knots: int, method: str, seed: int) -> J
     return Judged(
         seed=seed,
         gaps=tuple(beside["model"].gap.tolist()),
-        phugoids=tuple(map(phugoid, held)),
-        true=tuple(map(phugoid, exact)),
+        growth=tuple(phugoid(one).real for one in held),
+        true=tuple(phugoid(one).real for one in exact),
         moving=_fits(model, test),
         constant=_fits(constant, test),
     )
@@ -197,14 +199,15 @@ def _fits(model: KinematicModel, test: FlightRecord) -> dict[str, float]:
 def tables(knots: int, found: Sequence[Judged]) -> str:
     """Nu-gaps and phugoids by airspeed, and what scheduling pays by output, in Markdown."""
     gaps = np.array([one.gaps for one in found])
-    worst, rates = gaps.max(axis=1), np.real([one.phugoids for one in found])
+    true, growth = (np.array([getattr(one, name) for one in found]) for name in ("true", "growth"))
+    worst = gaps.max(axis=1)
     reached = np.median(worst) <= MARK and worst.max() <= 2 * MARK
     right, unstable = _called(found)
     by_airspeed = [
         ["nu-gap, median", *(f"{g:.2f}" for g in np.median(gaps, axis=0))],
         ["nu-gap, worst", *(f"{g:.2f}" for g in gaps.max(axis=0))],
-        ["phugoid, 1/s", *(_pole(s.real) for s in found[0].true)],
-        ["identified, median", *map(_pole, np.nanmedian(rates, axis=0))],
+        ["phugoid, 1/s", *map(_rate, true.T)],
+        ["identified, median", *map(_rate, growth.T)],
     ]
     by_output = [
         [label, *(f"{fit:.0f}" for fit in np.median(fits, axis=0))]
@@ -225,16 +228,18 @@ def tables(knots: int, found: Sequence[Judged]) -> str:
     )
 
 
-def _pole(rate: float) -> str:
-    return "none" if np.isnan(rate) else f"{rate:+.3f}"
+def _rate(rates: Array) -> str:
+    """The median of those there are."""
+    found = rates[np.isfinite(rates)]
+    return f"{np.median(found):+.3f}" if len(found) else "none"
 
 
 def _called(found: Sequence[Judged]) -> tuple[str, str]:
     """How often stability of the phugoid is called right, and called unstable where it is."""
     pairs = [
-        (pole.real > 0, identified.real > 0)
+        (true > 0, growth > 0)
         for one in found
-        for pole, identified in zip(one.true, one.phugoids, strict=True)
+        for true, growth in zip(one.true, one.growth, strict=True)
     ]
     unstable = [called for is_so, called in pairs if is_so]
     right = sum(is_so == called for is_so, called in pairs)

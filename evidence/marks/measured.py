@@ -15,7 +15,7 @@ import symheli
 from evidence.seeds import over_seeds, parser_of, seeds_of
 from evidence.tables import DOCS, keep, parsed
 from identification import KinematicModel, frozen_stability
-from studies.known_kinematics.flights import aggressive, transition
+from studies.known_kinematics.flights import aggressive, gentle, transition
 from studies.known_kinematics.models import PAIRS, identified
 from studies.known_kinematics.predictions import HORIZON, OUTPUTS, fits_of, states_of
 from studies.known_kinematics.truth import SPEEDS, Truth, frozen_axes
@@ -59,6 +59,8 @@ class Setting:
     truth: str = "xcell60"
     simulator: str = PAIRS["xcell60"]
     turbulent: bool = False
+    gentle: bool = False
+    """Whether a gentle flight is identified besides."""
 
     def air(self, seed: int) -> Wind | None:
         """The breeze and light turbulence of the study, where the air is to move."""
@@ -76,8 +78,10 @@ def of_seed(setting: Setting, seed: int) -> Marks:
     """Fly, identify, judge."""
     heli, simulator = setting.helicopters()
     autopilot = autopilot_for(heli)
-    plan = aggressive(seed, autopilot, wind=setting.air(seed))
-    training = symheli.fly(heli, plan)
+    flights = (aggressive, gentle) if setting.gentle else (aggressive,)
+    training = [
+        symheli.fly(heli, plan(seed, autopilot, wind=setting.air(seed))) for plan in flights
+    ]
     model = identified(training, simulator, setting.turbulent)
     test = symheli.fly(heli, transition(seed, autopilot))
     truth = Truth.of(heli)
@@ -121,7 +125,8 @@ def table(setting: Setting, marks: Sequence[Marks], simulator_gaps: dict[str, fl
     lines = [
         f"Truth {setting.truth}, simulator {setting.simulator} (its own worst nu-gap:"
         f" {', '.join(f'{k} {v:.2f}' for k, v in simulator_gaps.items())}),"
-        f" {len(marks)} seeds from {marks[0].seed} to {marks[-1].seed}.",
+        f" {len(marks)} seeds from {marks[0].seed} to {marks[-1].seed}"
+        f"{', a gentle flight besides' * setting.gentle}.",
         "",
         "| | mark | median | worst (seed) | |",
         "|---|---|---|---|---|",
@@ -189,18 +194,22 @@ def main() -> None:
     parser.add_argument("--truth", default="xcell60", choices=sorted(PAIRS))
     parser.add_argument("--simulator", help="default: the other vehicle")
     parser.add_argument("--turbulent", action="store_true", help="breeze and light turbulence")
+    parser.add_argument("--gentle", action="store_true", help="a gentle flight besides, of 230 s")
     options = parsed(parser, "identified.md", timed=False)
     setting = Setting(
         options.truth,
         options.simulator or PAIRS[options.truth],
         options.turbulent,
+        options.gentle,
     )
     calls = [partial(of_seed, setting, s) for s in seeds_of(options)]
     marks = list(over_seeds(options, calls))
     text = table(setting, marks, simulators_gaps(setting))
     print(as_json(_plain(marks)) if options.json else text)
     if options.write:
-        section = setting.truth + (" in turbulence" if setting.turbulent else "")
+        section = (
+            setting.truth + " in turbulence" * setting.turbulent + ", two flights" * setting.gentle
+        )
         keep(DOCS / "identified.md", section, text)
 
 

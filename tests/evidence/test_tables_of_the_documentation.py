@@ -27,6 +27,7 @@ from evidence import (
     tuning,
     two_bands,
 )
+from evidence.ah1s import compared
 from evidence.bracket.measured import GAINS, bracket
 from evidence.flown import campaign, designs
 from evidence.flown import tuning as sizes
@@ -106,10 +107,18 @@ def worst(cell):
     return found[1], int(found[2])
 
 
-def marks_of_the_worst_seed(section, truth="xcell60", turbulent=False):
+def marks_of_the_worst_seed(section, truth="xcell60", turbulent=False, gentle=False):
     shown, seed = worst(KEPT["identified.md", section].cells("worst nu-gap, lateral")[2])
-    setting = measured.Setting(truth, measured.PAIRS[truth], False, turbulent)
+    setting = measured.Setting(truth, measured.PAIRS[truth], turbulent, gentle)
     assert same(shown, measured.of_seed(setting, seed).gaps["lateral"][0])
+
+
+def ah1s_of_the_worst_seed(structure, ramps, knots):
+    pytest.importorskip("jsbsim", reason="needs jsbsim: pip install 'symheli[jsbsim]'")
+    section = KEPT["identified.md", f"AH-1S {structure} {ramps} {knots} kt"]
+    (shown, seed), *_ = re.findall(r"worst ([\d.]+) \(seed (\d+)\)", section.text)
+    found = compared.of_seed(structure, ramps, knots, "filter error", int(seed))
+    assert same(shown, max(found.gaps))
 
 
 def guarantee_of_the_worst_seed():
@@ -492,6 +501,24 @@ ROWS = {
     ("identified.md", "xcell60"): lambda: marks_of_the_worst_seed("xcell60"),
     ("identified.md", "xcell_kahn_hudson"): lambda: marks_of_the_worst_seed(
         "xcell_kahn_hudson", "xcell_kahn_hudson"
+    ),
+    ("identified.md", "xcell60, two flights"): lambda: marks_of_the_worst_seed(
+        "xcell60, two flights", gentle=True
+    ),
+    ("identified.md", "xcell_kahn_hudson, two flights"): lambda: marks_of_the_worst_seed(
+        "xcell_kahn_hudson, two flights", "xcell_kahn_hudson", gentle=True
+    ),
+    ("identified.md", "AH-1S known lags slow 60 kt"): lambda: ah1s_of_the_worst_seed(
+        "known lags", "slow", 60
+    ),
+    ("identified.md", "AH-1S as the X-Cell slow 60 kt"): lambda: ah1s_of_the_worst_seed(
+        "as the X-Cell", "slow", 60
+    ),
+    ("identified.md", "AH-1S known lags fast 60 kt"): lambda: ah1s_of_the_worst_seed(
+        "known lags", "fast", 60
+    ),
+    ("identified.md", "AH-1S known lags slow 100 kt"): lambda: ah1s_of_the_worst_seed(
+        "known lags", "slow", 100
     ),
     ("identified.md", "xcell60 in turbulence"): lambda: marks_of_the_worst_seed(
         "xcell60 in turbulence", turbulent=True
