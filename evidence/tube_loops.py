@@ -30,7 +30,7 @@ PERIOD = 0.02
 """s"""
 ALL_PARTS = {"known": EIGHT, "servos": FINE, "period": PERIOD, "delay": 1}
 """Observer, servos, sampling and delay together."""
-LIMITS = dict.fromkeys(("acceleration", "jerk", "snap"), 1.0)
+LIMITS: Mapping[str, Any] = {"acceleration": 1.0, "jerk": 1.0, "snap": 1.0}
 """Of commands along a range, m/s^2, m/s^3, m/s^4."""
 FLIGHTS, SECONDS = 500, 0.25
 """From the border of a tube, and how long each lasts: what leaves it leaves at once."""
@@ -56,6 +56,7 @@ class Case:
 CASES = (
     Case("ten states", "xcell60", "pi", 3.0, 0.25),
     Case("twelve states", "xcell60", "pi", 3.0, 0.25, {"known": TWELVE}),
+    Case("ten states", "xcell60", "pi", (3.0, 4.0), 0.25, LIMITS),
     Case("eight states, observer", "xcell60", "ideal", 3.0, 0.25, {"known": EIGHT}),
     Case("eight states, observer", "xcell60", "pi", 3.0, 0.25, {"known": EIGHT}),
     Case(
