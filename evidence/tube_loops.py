@@ -32,13 +32,15 @@ ALL_PARTS = {"known": EIGHT, "servos": FINE, "period": PERIOD, "delay": 1}
 """Observer, servos, sampling and delay together."""
 LIMITS: Mapping[str, Any] = {"acceleration": 1.0, "jerk": 1.0, "snap": 1.0}
 """Of commands along a range, m/s^2, m/s^3, m/s^4."""
-FLIGHTS, SECONDS = 500, 0.25
-"""From the border of a tube, and how long each lasts: what leaves it leaves at once."""
+SECONDS = 0.25
+"""How long each flight from the border lasts: what leaves it leaves at once."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """A loop: words, vehicle, governor, airspeed or range, gusts in m/s, arguments of `tube`."""
+    """A loop: words, vehicle, governor, airspeed or range, gusts in m/s, arguments of `tube`, and
+    how many flights are flown from the border of its tube.
+    """
 
     words: str
     vehicle: str
@@ -46,6 +48,7 @@ class Case:
     airspeed: Any
     gust: float
     given: Mapping[str, Any] = field(default_factory=dict)
+    flights: int = 500
 
     def found(self) -> Tube:
         """The tube."""
@@ -60,7 +63,13 @@ CASES = (
     Case("eight states, observer", "xcell60", "ideal", 3.0, 0.25, {"known": EIGHT}),
     Case("eight states, observer", "xcell60", "pi", 3.0, 0.25, {"known": EIGHT}),
     Case(
-        "eight states, observer", "xcell60", "ideal", (0.0, 13.0), 0.25, {"known": EIGHT, **LIMITS}
+        "eight states, observer",
+        "xcell60",
+        "ideal",
+        (0.0, 13.0),
+        0.25,
+        {"known": EIGHT, **LIMITS},
+        10_000,
     ),
     Case("ten states, servos", "xcell60", "ideal", 3.0, 0.25, {"servos": FINE}),
     Case("ten states, servos with steps", "xcell60", "ideal", 3.0, 0.25, {"servos": XCELL_SERVOS}),
@@ -76,7 +85,7 @@ GOVERNED = (Case("eight states, observer", "xcell_kahn_hudson", "pi", 3.0, 0.25,
 def row(case: Case) -> list[str]:
     """What its row of the table says after its name."""
     found = case.found()
-    return [str(len(found.deviations.states)), *cells_of(found, FLIGHTS, SECONDS)]
+    return [str(len(found.deviations.states)), *cells_of(found, case.flights, SECONDS)]
 
 
 def table(cases: Sequence[Case], asked: Sequence[str], shown: Sequence[Sequence[str]]) -> str:
