@@ -49,6 +49,9 @@ FASTEST = {60: 34.0, 100: 52.0}
 RAMPS = {"slow": (0.4,) * 4, "fast": (0.8, 1.6, 1.6, 0.8)}
 """Accelerations of the four ramps of a flight, m/s^2."""
 
+INNER = (10.0, 20.0, 27.0)
+"""Breakpoints of the splines between the ends, m/s."""
+
 AMPLITUDE = {"d_lon": 0.10, "d_lat": 0.15, "d_col": 0.06, "d_ped": 0.10}
 BAND = (0.05, 2.5)
 """Excitation, parts of the sticks' travel and Hz."""
@@ -96,9 +99,6 @@ def _known_lags(high: float, constant: bool) -> KinematicARX:
         actuators=Actuators(lags),
     )
 
-
-INNER = (10.0, 20.0, 27.0)
-"""Breakpoints of the splines between the ends, m/s."""
 
 STRUCTURES: dict[str, Callable[[float, bool], KinematicARX]] = {
     "as the X-Cell": _as_the_xcell,
