@@ -13,7 +13,7 @@ from scipy import linalg
 from symheli.errors import SymheliError
 from symheli.lpv import LinearModel, LPVStateSpace, Matrices, Scheduling
 from synthesis import mixed_sensitivity
-from synthesis.worst.frozen import norm
+from synthesis.numerics.linear.norm import norm
 
 Array = np.ndarray
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from symheli.lpv import LPVStateSpace, Scheduling
 from synthesis import Plant
-from synthesis.lti.hinf import optimum_above
-from synthesis.plant.generalized import Generalized
+from synthesis.design.lti.hinf import optimum_above
+from synthesis.design.plant.generalized import Generalized
 
 Array = np.ndarray
 

@@ -23,8 +23,8 @@ import numpy as np
 from symheli.lpv import LPVStateSpace, Scheduling
 from symheli.lpv.exponential import expm
 from synthesis import Solver, Spline, SumOfSquares, l2_gain, lft_gain, stability
-from synthesis.analysis.certify import route as searching
-from synthesis.analysis.problem import pose
+from synthesis.certify.questions.certify import route as searching
+from synthesis.certify.questions.problem import pose
 
 ROUTES = (
     "stability by splines",

@@ -13,7 +13,7 @@ import symheli
 from evidence.designed_lateral import ACCELERATION, DT, designed, sampled_plant
 from symheli import LPVStateSpace, TableController
 from synthesis import Plant, Spline, l2_gain, proven_around, stability, with_wrong_parameter
-from synthesis.loops.frozen_reading import largest
+from synthesis.design.loops.frozen_reading import largest
 
 KNOTS = 3
 """Of the table: as few as cost the frozen gain nothing."""

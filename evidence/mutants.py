@@ -33,28 +33,28 @@ class Mutant(NamedTuple):
 MUTANTS = (
     Mutant(
         "pieces narrower than 1e-9 of the range are left out",
-        "synthesis/polynomial/pieces.py",
+        "synthesis/numerics/polynomial/pieces.py",
         "        if not a < b:\n",
         "        if not b - a > 1e-9 * (high - low):\n",
         "tests/synthesis/test_no_false_proof.py",
     ),
     Mutant(
         "slopes below 1e-12 of the whole controller are left out",
-        "synthesis/loops/wrong_parameter.py",
+        "synthesis/design/loops/wrong_parameter.py",
         "moves = spread > 0\n",
         "moves = spread > 1e-12 * np.abs(hull).max()\n",
         "tests/synthesis/design/test_wrong_parameter.py",
     ),
     Mutant(
         "a jump is judged beside the largest entry",
-        "synthesis/loops/wrong_parameter.py",
+        "synthesis/design/loops/wrong_parameter.py",
         "> ROUNDING * (first[1] + end[1])",
         "> 1e-9 * np.max(first[1] + end[1])",
         "tests/synthesis/design/test_wrong_parameter.py",
     ),
     Mutant(
         "a misfit of the performance below 1e-10 is left out, whatever its unit",
-        "synthesis/loops/sampled_loop.py",
+        "synthesis/design/loops/sampled_loop.py",
         "> ROUNDING * np.tensordot(functions, np.abs(of), axes=1)",
         "> 1e-10",
         "tests/synthesis/design/test_sampled_loop.py",

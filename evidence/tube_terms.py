@@ -12,7 +12,7 @@ import numpy as np
 from evidence.tables import markdown
 from symheli import Helicopter, trim
 from symheli.errors import InputError
-from synthesis.program.cone_program import Solver
+from synthesis.numerics.program.cone_program import Solver
 from synthesis.tubes.controllers import Choice
 from synthesis.tubes.deviations import CommandCell, Deviations
 from synthesis.tubes.inequality import MatrixSet

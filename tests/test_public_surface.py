@@ -49,7 +49,7 @@ SHARED = (
 NONLINEAR = (
     "symheli.Helicopter",
     "symheli.trim",
-    "symheli.enclosure",
+    "synthesis.tubes.enclosure",
     "symheli.airframe.vehicle.load_vehicle",
     "symheli.airframe.written.as_toml",
     "symheli.dynamics.INPUTS",

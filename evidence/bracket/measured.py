@@ -28,7 +28,7 @@ from symheli import Helicopter, LPVStateSpace, UncertainStateSpace
 from symheli.lpv.bases import Polynomial
 from symheli.values.arrays import Array
 from synthesis import GainCurve, HigherOrder, Memory, Search, Solver, Spline
-from synthesis.forms import LyapunovForm
+from synthesis.certify.statement.forms import LyapunovForm
 
 SLOW = Memory(1.2, segments=12, grading=1.5, across_segments=4, across_degree=2)
 FAST = Memory(0.6, segments=12, grading=1.5, across_segments=4, across_degree=3)

@@ -22,8 +22,8 @@ import casadi
 import numpy as np
 
 from evidence.planar_vtol.model import LIMITS, published
-from symheli.enclosure import AffineForm, Domain, enclose
-from synthesis.polynomial.exact import exact, positive_definite, rational
+from synthesis.numerics.polynomial.exact import exact, positive_definite, rational
+from synthesis.tubes.enclosure import AffineForm, Domain, enclose
 
 Array = np.ndarray
 

@@ -17,7 +17,7 @@ from symheli.errors import InputError
 if TYPE_CHECKING:
     from symheli import LPVStateSpace
     from synthesis import Certificate
-    from synthesis.forms import LyapunovForm
+    from synthesis.certify.statement.forms import LyapunovForm
 
 HELP = "proven gain and stability of the lateral loop, or of any model, for a rate of airspeed"
 

@@ -24,7 +24,7 @@ from symheli import Servo
 from symheli.errors import InputError
 from symheli.flight import XCELL_SERVOS
 from symheli.values.whole_files import write_text
-from synthesis.plant.parts import DISTURBANCE
+from synthesis.design.plant.parts import DISTURBANCE
 
 TOP, RATE = 13.0, 3.0
 """Highest airspeed, m/s, and largest acceleration, m/s^2."""

@@ -38,12 +38,12 @@ from symheli.errors import (
 )
 from symheli.flight import XCELL_SERVOS, gain_scheduled_lqr
 from synthesis import Plant
-from synthesis.loops.controller import Controller
-from synthesis.loops.reduction import fewest
-from synthesis.lpv.linear_quadratic import lqg, lqr
-from synthesis.lpv.output_feedback import lft_feedback, output_feedback
-from synthesis.lpv.point_schedule import hinf_at, hinf_schedule
-from synthesis.worst.frozen import norm
+from synthesis.design.loops.controller import Controller
+from synthesis.design.loops.reduction import fewest
+from synthesis.design.lpv.linear_quadratic import lqg, lqr
+from synthesis.design.lpv.output_feedback import lft_feedback, output_feedback
+from synthesis.design.lpv.point_schedule import hinf_at, hinf_schedule
+from synthesis.numerics.linear.norm import norm
 
 LQR, HINF, LFT = "LQR schedule", "H-infinity schedule", "LFT"
 BASELINE, IDENTIFIED = "LPV from the baseline", "LPV from the identified model"

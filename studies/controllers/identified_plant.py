@@ -12,7 +12,7 @@ from studies.controllers.in_airspeed import of_degree
 from symheli import LPVStateSpace, Scheduling
 from symheli.values.arrays import Array
 from symheli.values.signal import Signal, indices
-from synthesis.plant.sampling import resampled
+from synthesis.design.plant.sampling import resampled
 
 VELOCITIES = MEASUREMENTS[:3]
 ACCELERATION = "acceleration_command"

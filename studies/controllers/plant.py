@@ -15,7 +15,7 @@ from symheli import Helicopter, LinearFamily, LinearModel, LPVStateSpace
 from symheli.flight import Servo
 from symheli.values.signal import Signal, indices, signals
 from synthesis import Plant
-from synthesis.plant import parts
+from synthesis.design.plant import parts
 
 STUDY = DesignChoices()
 

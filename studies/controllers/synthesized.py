@@ -62,9 +62,9 @@ from symheli.values.named_vector import NamedVector
 from symheli.values.signal import indices
 from symheli.values.units import ratio
 from synthesis import Plant
-from synthesis.loops.reduction import fewest
-from synthesis.loops.sampled_loop import SampledLoop
-from synthesis.worst.frozen import norm
+from synthesis.design.loops.reduction import fewest
+from synthesis.design.loops.sampled_loop import SampledLoop
+from synthesis.numerics.linear.norm import norm
 
 KNOTS = (2, 3, 5, 9, 17, 33)
 """Numbers of airspeeds of the table, tried in turn."""

@@ -17,7 +17,7 @@ from symheli.flight import HelicopterLoops
 from symheli.progress import task, tracked
 from symheli.values.arrays import Array
 from synthesis import Certificate
-from synthesis.loops.actuated import actuated
+from synthesis.design.loops.actuated import actuated
 
 APART = 2.0
 """Largest distance (m/s) of the airspeeds between which the plant is taken as straight."""

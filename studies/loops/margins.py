@@ -14,7 +14,7 @@ from symheli.flight import XCELL_SERVOS
 from symheli.lpv import pade_delay
 from symheli.progress import tracked
 from synthesis import Margins
-from synthesis.loops.handling_qualities import Bandwidth
+from synthesis.design.loops.handling_qualities import Bandwidth
 
 DELAY = 0.02
 """From measurement to command, s."""

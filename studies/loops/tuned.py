@@ -19,8 +19,8 @@ from symheli.flight import HelicopterLoops
 from symheli.flight.ardupilot import AXES, COMMANDS
 from symheli.progress import tracked
 from symheli.values.arrays import Array
-from synthesis.loops.actuated import actuated
-from synthesis.loops.margins import loop, margins
+from synthesis.design.loops.actuated import actuated
+from synthesis.design.loops.margins import loop, margins
 
 CONTROLS = tuple(control for _, _, control in AXES.values())
 

@@ -24,7 +24,7 @@ from symheli import (
 )
 from symheli.lpv.bases import Polynomial
 from synthesis import Certificate, GainCurve, Memory, Search, Spline
-from synthesis.worst.frozen import norm
+from synthesis.numerics.linear.norm import norm
 
 SIZES = {"d_lat": 0.01, "d_ped": 0.02, "r": 0.1, "phi": 0.1}
 """A disturbance of this size (rad) and an output of this size (rad/s, rad) count as 1 on the servo

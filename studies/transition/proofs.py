@@ -20,7 +20,7 @@ from studies.transition.identified import Identification
 from studies.transition.known_kinematics import KnownKinematics
 from symheli import Helicopter
 from synthesis import Search, Spline, frozen_gain
-from synthesis.worst.frozen import FrozenGain
+from synthesis.certify.lower_bounds.frozen import FrozenGain
 
 
 @dataclass(frozen=True, kw_only=True)

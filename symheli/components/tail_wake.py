@@ -26,7 +26,7 @@ def evaluate(
 
     Without smoothing 1.5 (chi - g_i)/(g_f - g_i) V_imr is written w_p, with chi V_imr = u_a (1 +
     w_a/(V_imr - w_a)): a product of chi and V_imr, which vary against each other, would widen
-    bounds of it over a set of flights (`symheli.enclosure`).
+    bounds of it over a set of flights (`synthesis.tubes.enclosure`).
 
     Source: G15, wake intensity factor. `smoothing` rounds both corners (in units of K_lam).
     """

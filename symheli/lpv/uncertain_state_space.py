@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -220,41 +221,15 @@ class UncertainStateSpace:
         blocks: Sequence[Any],
         source: str = "blocks of bounded gain",
     ) -> UncertainStateSpace:
-        """Return the set of all loops of a model around several `synthesis.DynamicBlock`, each any
-        causal dynamics within its bound (and weight), at rest at the start; beside the block that
-        the model has where it is an uncertain one.
-
-        Each bound becomes a unit of the outputs of its block, weights become states. `perturbed`
-        has constant matrices for the dynamics. Raises as `synthesis.robust_margin` for blocks that
-        are none, or not of the model.
-
-        Examples
-        --------
-        A lag that moves, behind dynamics of gain .4 and beside a pole known to .5:
-
-        >>> import symheli, synthesis
-        >>> from synthesis import DynamicBlock
-        >>> p = symheli.Scheduling("p", "1", low=1.0, high=2.0, rate=1.0)
-        >>> lag = symheli.LPVStateSpace.polynomial(
-        ...     [[[-1.0]], [[-1.0]]], [[[1.0, 1.0, 1.0]]], [[[1.0], [1.0], [0.0]]],
-        ...     [[[0, 0, 0], [0, 0, 0], [1, 0, 0]]], p,
-        ...     inputs=["u", "a", "b"], outputs=["y", "v", "w"])
-        >>> loops = symheli.UncertainStateSpace.of_blocks(
-        ...     lag, [DynamicBlock("a", "v", 0.5), DynamicBlock("b", "w", 0.4)])
-        >>> cert = synthesis.l2_gain(loops, search=None)  # 1.4/(2 - .5)
-        >>> print(f"{cert.lower:.3f} <= gain <= {cert.gamma:.3f}")
-        0.933 <= gain <= 0.933
-        """
-        from synthesis.robust.structure import opened
-
-        if isinstance(model, UncertainStateSpace):
-            wide, d, v, parts = opened(model.model, blocks)
-            sized = wide.scaled(outputs=dict.fromkeys(model.perturbation_outputs, 1 / model.bound))
-            d, v = (*model.perturbation_inputs, *d), (*model.perturbation_outputs, *v)
-            whole, source = (*model.every_part, *parts), f"{model.source}; {source}"
-            return cls(sized, d, v, 1.0, model.probability, source, whole)
-        wide, d, v, parts = opened(model, blocks)
-        return cls(wide, signals(d), signals(v), 1.0, 1.0, source, parts)
+        """Return `synthesis.robust.uncertain(model, blocks, source)`, which takes its place."""
+        warnings.warn(
+            "UncertainStateSpace.of_blocks: write synthesis.robust.uncertain(model, blocks)",
+            FutureWarning,
+            stacklevel=2,
+        )
+        if not (blocks and hasattr(blocks[0], "around")):
+            raise InputError("blocks: expected one or more synthesis.robust.DynamicBlock")
+        return blocks[0].around(model, blocks, source)
 
     @property
     def every_part(self) -> tuple[DeltaPart, ...]:

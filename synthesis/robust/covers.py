@@ -24,8 +24,8 @@ from scipy import optimize
 from symheli.errors import InputError
 from symheli.lpv import LinearModel
 from symheli.values.signal import Signal
-from synthesis.polynomial.definite import negative_definite
-from synthesis.polynomial.matrix import PolynomialMatrix
+from synthesis.numerics.polynomial.definite import negative_definite
+from synthesis.numerics.polynomial.matrix import PolynomialMatrix
 
 Array = np.ndarray
 

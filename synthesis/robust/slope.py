@@ -25,7 +25,7 @@ from symheli.lpv import LinearModel
 from symheli.threads import with_one_thread
 from symheli.values.signal import indices
 from symheli.values.summary import summarized
-from synthesis.lti.point_design import as_model
+from synthesis.numerics.linear.model import as_model
 
 Array = np.ndarray
 

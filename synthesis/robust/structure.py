@@ -12,14 +12,13 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.lpv import LFT, LinearModel, LPVStateSpace, UncertainStateSpace
 from symheli.lpv.lft.model import parts as slices
-from symheli.lpv.uncertain_state_space import DeltaPart
 from symheli.values.sample_period import same_period
 from symheli.values.signal import Signal, indices
-from synthesis.lti.weights import as_weight
-from synthesis.plant import parts
-from synthesis.program.scaling import balance
+from synthesis.design.lti.weights import as_weight
+from synthesis.design.plant import parts
+from synthesis.numerics.linear.balance import balance
+from synthesis.numerics.linear.norm import stable, to_continuous
 from synthesis.robust import covers
-from synthesis.worst.frozen import stable, to_continuous
 
 Array = np.ndarray
 
@@ -40,6 +39,15 @@ class DynamicBlock(NamedTuple):
     outputs: Sequence[str]
     bound: float = 1.0
     weight: Any = None
+
+    @staticmethod
+    def around(
+        model: LPVStateSpace | UncertainStateSpace, blocks: Sequence[DynamicBlock], source: str
+    ) -> UncertainStateSpace:
+        """Return `synthesis.robust.uncertain`, for `UncertainStateSpace.of_blocks`."""
+        from synthesis.robust.uncertain import uncertain
+
+        return uncertain(model, blocks, source)
 
     @classmethod
     def of_delay(
@@ -324,29 +332,6 @@ def channels_of(
         if len({*chain(*group)}) < len(list(chain(*group))):
             raise InputError("blocks: an input or an output belongs to one block only")
     return columns, rows
-
-
-def opened(
-    model: LPVStateSpace, blocks: Sequence[DynamicBlock]
-) -> tuple[LPVStateSpace, list[Signal], list[Signal], tuple[DeltaPart, ...]]:
-    """Return the model with each block of gain 1 and no weight, the inputs and outputs of all, and
-    the parts of Delta; raise as `loop_of`.
-    """
-    if not isinstance(model, LPVStateSpace):
-        raise InputError(f"model: expected an LPVStateSpace, got {type(model).__name__}")
-    if not blocks:
-        raise InputError("blocks: expected one or more")
-    columns, rows = channels_of(model, blocks)
-    d = [model.inputs[i] for i in chain(*columns)]
-    v = [model.outputs[i] for i in chain(*rows)]
-    parts = tuple(DeltaPart(len(a), len(b), True) for a, b in zip(columns, rows, strict=True))
-    for block, own in zip(blocks, rows, strict=True):
-        names = [str(model.outputs[i]) for i in own]
-        weight = stable_weight(block, model.dt)
-        if weight is not None:
-            model = model.filtered_by(dict.fromkeys(names, weight))
-        model = model.scaled(outputs=dict.fromkeys(names, 1 / block.bound))
-    return model, d, v, parts
 
 
 def stable_weight(block: DynamicBlock, dt: float | None) -> LinearModel | None:

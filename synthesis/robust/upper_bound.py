@@ -24,8 +24,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
-from synthesis.polynomial.symmetric import svec
-from synthesis.program.cone_program import Answer, ConeProgram, Solver, solve
+from synthesis.numerics.polynomial.symmetric import svec
+from synthesis.numerics.program.cone_program import Answer, ConeProgram, Solver, solve
 from synthesis.robust.structure import BlockLoop
 
 Array = np.ndarray

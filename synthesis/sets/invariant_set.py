@@ -18,13 +18,13 @@ from symheli.values.arrays import Array, frozen
 from symheli.values.numbers import positive
 from symheli.values.signal import indices
 from symheli.values.summary import summarized
-from synthesis.lpv.bases import dependence
-from synthesis.program.cone_program import Solver, general_solver
+from synthesis.certify.lower_bounds.rates import Rate
+from synthesis.numerics.program.bases import dependence
+from synthesis.numerics.program.cone_program import Solver, general_solver
 from synthesis.sets.proof import holds
 from synthesis.sets.proven_set import ProvenSet
 from synthesis.sets.search import SPARE, SetSearch, SetSolution
 from synthesis.sets.statement import Limit, SetStatement, stated
-from synthesis.worst.rates import Rate
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

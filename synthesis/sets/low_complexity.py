@@ -26,7 +26,7 @@ from symheli.errors import InputError
 from symheli.lpv import LinearModel, LPVStateSpace
 from symheli.values.arrays import Array, frozen
 from symheli.values.summary import summarized
-from synthesis.polynomial.exact import Number, exact, rational
+from synthesis.numerics.polynomial.exact import Number, exact, rational
 from synthesis.sets.proof import closed_pieces
 from synthesis.sets.proven_set import ProvenSet
 from synthesis.sets.statement import SetStatement, stated

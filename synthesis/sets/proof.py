@@ -12,13 +12,13 @@ import numpy as np
 from symheli.lpv import LPVStateSpace
 from symheli.progress import tracked
 from symheli.values.arrays import Array
-from synthesis.polynomial.definite import negative_definite, negative_definite_exactly
-from synthesis.polynomial.exact import Number, exact, rational
-from synthesis.polynomial.matrix import PolynomialMatrix, block
-from synthesis.polynomial.motion import Motion
-from synthesis.polynomial.pieces import pieces
-from synthesis.polynomial.regions import Region, convert, model_on, regions
-from synthesis.proof.inequalities import slope_along
+from synthesis.certify.proof.inequalities import slope_along
+from synthesis.numerics.polynomial.definite import negative_definite, negative_definite_exactly
+from synthesis.numerics.polynomial.exact import Number, exact, rational
+from synthesis.numerics.polynomial.matrix import PolynomialMatrix, block
+from synthesis.numerics.polynomial.motion import Motion
+from synthesis.numerics.polynomial.pieces import pieces
+from synthesis.numerics.polynomial.regions import Region, convert, model_on, regions
 from synthesis.sets.inequality import Lower, decrease, decrease_sampled, within
 from synthesis.sets.statement import SetStatement
 

@@ -9,10 +9,15 @@ import numpy as np
 from symheli.lpv import FunctionSpace
 from symheli.lpv.bases.polynomials import factors_of, lobatto_points, polynomials
 from symheli.values.arrays import Array
-from synthesis.lpv.affine_program import AffineProgram, BernsteinCell, cells, from_lower
-from synthesis.polynomial.motion import Motion
-from synthesis.polynomial.pieces import pieces
-from synthesis.program.cone_program import Answer, Solver
+from synthesis.numerics.polynomial.motion import Motion
+from synthesis.numerics.polynomial.pieces import pieces
+from synthesis.numerics.program.affine_program import (
+    AffineProgram,
+    BernsteinCell,
+    cells,
+    from_lower,
+)
+from synthesis.numerics.program.cone_program import Answer, Solver
 from synthesis.sets.inequality import decrease, decrease_sampled, within
 from synthesis.sets.statement import SetStatement
 

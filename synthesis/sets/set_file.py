@@ -13,7 +13,7 @@ from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace
 from symheli.values.arrays import frozen
 from symheli.values.whole_files import write_text
-from synthesis.certificate_file import DAMAGED, content_of, decoded, encoded
+from synthesis.certify.questions.certificate_file import DAMAGED, content_of, decoded, encoded
 from synthesis.sets.proven_set import ProvenSet
 from synthesis.sets.statement import SetStatement
 

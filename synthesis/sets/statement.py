@@ -15,10 +15,10 @@ from symheli.lpv import LinearModel, LPVStateSpace
 from symheli.values.arrays import Array
 from symheli.values.signal import Signal, indices
 from symheli.values.summary import summarized
-from synthesis.analysis.hypotheses import drifting, motion
-from synthesis.lpv.bases import moves
-from synthesis.plant.as_controller import as_controller
-from synthesis.worst.rates import Rate, limits
+from synthesis.certify.lower_bounds.rates import Rate, limits
+from synthesis.certify.questions.hypotheses import drifting, motion
+from synthesis.design.plant.as_controller import as_controller
+from synthesis.numerics.program.bases import moves
 
 
 class Limit(NamedTuple):

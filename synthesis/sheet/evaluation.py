@@ -19,8 +19,8 @@ from symheli.values.arrays import Array
 from symheli.values.labelled import frame
 from symheli.values.signal import Signal
 from symheli.values.summary import as_table, summarized
-from synthesis.loops.actuated import actuated
-from synthesis.plant.as_controller import as_controller
+from synthesis.design.loops.actuated import actuated
+from synthesis.design.plant.as_controller import as_controller
 from synthesis.sheet.measures import MEASURES, AxisLoop
 from synthesis.sheet.probed import is_asked, probed
 from synthesis.sheet.proven import Proven

@@ -18,10 +18,10 @@ from symheli.errors import InputError
 from symheli.lpv import LinearModel, connect
 from symheli.values.arrays import Array
 from symheli.values.signal import indices, signals
-from synthesis.loops.handling_qualities import Bandwidth, bandwidth
-from synthesis.loops.margins import Margins, loop, margins
+from synthesis.design.loops.handling_qualities import Bandwidth, bandwidth
+from synthesis.design.loops.margins import Margins, loop, margins
+from synthesis.numerics.linear.norm import crossings, norm, to_continuous
 from synthesis.sheet.sheet import ControlAxis, Specification
-from synthesis.worst.frozen import crossings, norm, to_continuous
 
 SHARE = 0.05
 """A mode belongs to an axis if it is this much of the response to a step of its command."""

@@ -15,11 +15,11 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.lpv import LinearModel, LPVStateSpace
 from symheli.values.summary import summarized
-from synthesis.analysis.questions import l2_gain
-from synthesis.certificate import Certificate
-from synthesis.loops.margins import Margins
-from synthesis.plant.parts import DISTURBANCE
-from synthesis.plant.plant import Plant
+from synthesis.certify.questions.certificate import Certificate
+from synthesis.certify.questions.questions import l2_gain
+from synthesis.design.loops.margins import Margins
+from synthesis.design.plant.parts import DISTURBANCE
+from synthesis.design.plant.plant import Plant
 from synthesis.sheet.sheet import ControlAxis, Sheet, Specification
 
 PROVABLE = {

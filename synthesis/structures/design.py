@@ -18,18 +18,18 @@ from symheli.progress import task
 from symheli.threads import with_one_thread
 from symheli.values.numbers import whole
 from symheli.values.summary import summarized
-from synthesis.loops.controller import Controller
-from synthesis.lpv.objectives import L2
-from synthesis.lpv.point_schedule import hinf_at
-from synthesis.lpv.search import check_points
-from synthesis.lpv.worst_optimum import worst_optimum
-from synthesis.plant.diagnosis import modes_out_of_reach, unpriced
-from synthesis.plant.plant import Plant, require_plant
-from synthesis.plant.refusals import conditions, require_channels
+from synthesis.design.loops.controller import Controller
+from synthesis.design.lpv.objectives import L2
+from synthesis.design.lpv.point_schedule import hinf_at
+from synthesis.design.lpv.search import check_points
+from synthesis.design.lpv.worst_optimum import worst_optimum
+from synthesis.design.plant.diagnosis import modes_out_of_reach, unpriced
+from synthesis.design.plant.plant import Plant, require_plant
+from synthesis.design.plant.refusals import conditions, require_channels
+from synthesis.numerics.linear.norm import norm
 from synthesis.structures.descent import STANDSTILL, Point, Stationarity, bfgs, sampled_descent
 from synthesis.structures.peaks import Active, StructureLoops, Value
 from synthesis.structures.structure import Structure
-from synthesis.worst.frozen import norm
 
 Array = np.ndarray
 

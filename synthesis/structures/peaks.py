@@ -13,13 +13,13 @@ import numpy as np
 
 from symheli.errors import AccuracyError, InputError
 from symheli.values.signal import indices
-from synthesis.plant.generalized import Generalized, blocks
+from synthesis.design.plant.generalized import Generalized, blocks
+from synthesis.numerics.linear.norm import below, norm
 from synthesis.structures.structure import Structure
-from synthesis.worst.frozen import below, norm
 
 if TYPE_CHECKING:
-    from synthesis.lpv.objectives import L2
-    from synthesis.plant.plant import Plant
+    from synthesis.design.lpv.objectives import L2
+    from synthesis.design.plant.plant import Plant
 
 Array = np.ndarray
 

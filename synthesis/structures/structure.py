@@ -13,10 +13,10 @@ from symheli.errors import InputError, UnknownNameError
 from symheli.lpv import FunctionSpace, LinearModel, LPVStateSpace, Scheduling, lower_feedback
 from symheli.values.signal import Signal, indices, signals
 from symheli.values.summary import summarized
-from synthesis.plant.parts import positive
+from synthesis.design.plant.parts import positive
 
 if TYPE_CHECKING:
-    from synthesis.plant.plant import Plant
+    from synthesis.design.plant.plant import Plant
 
 Array = np.ndarray
 

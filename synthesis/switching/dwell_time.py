@@ -17,9 +17,9 @@ from symheli.values.arrays import Array, frozen
 from symheli.values.numbers import positive, whole
 from symheli.values.signal import Signal
 from symheli.values.summary import summarized
-from synthesis.lpv.affine_program import AffineProgram, BernsteinCell
-from synthesis.polynomial.pieces import pieces
-from synthesis.program.cone_program import Answer, Solver, general_solver
+from synthesis.numerics.polynomial.pieces import pieces
+from synthesis.numerics.program.affine_program import AffineProgram, BernsteinCell
+from synthesis.numerics.program.cone_program import Answer, Solver, general_solver
 from synthesis.switching.inequality import Modes, holds
 
 POINT = BernsteinCell(np.zeros((1, 1)), np.ones((1, 1)))

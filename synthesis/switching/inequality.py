@@ -20,10 +20,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from symheli.values.arrays import Array
-from synthesis.polynomial.definite import negative_definite_exactly
-from synthesis.polynomial.exact import exact, positive_definite, rational
-from synthesis.polynomial.matrix import PolynomialMatrix
-from synthesis.polynomial.regions import convert
+from synthesis.numerics.polynomial.definite import negative_definite_exactly
+from synthesis.numerics.polynomial.exact import exact, positive_definite, rational
+from synthesis.numerics.polynomial.matrix import PolynomialMatrix
+from synthesis.numerics.polynomial.regions import convert
 
 DEGREE = 3
 """Of P between two knots of continuous time."""

@@ -21,8 +21,8 @@ from symheli.values.named_vector import NamedVector
 from symheli.values.numbers import positive
 from symheli.values.signal import Signal
 from symheli.values.summary import summarized
-from synthesis.loops.controller import Controller
-from synthesis.plant.plant import Plant, require_plant
+from synthesis.design.loops.controller import Controller
+from synthesis.design.plant.plant import Plant, require_plant
 from synthesis.switching.dwell_time import DwellTime, dwell_time
 
 

@@ -11,9 +11,9 @@ import casadi
 import numpy as np
 
 from symheli import Helicopter
-from symheli.enclosure import AffineForm, Domain, SegmentAverages, enclose, segment_averages
-from symheli.enclosure.form import EPS
 from symheli.values.summary import summarized
+from synthesis.tubes.enclosure import AffineForm, Domain, SegmentAverages, enclose, segment_averages
+from synthesis.tubes.enclosure.form import EPS
 from synthesis.tubes.inequality import ROUNDED, ROUNDED_UP, MatrixSet, elementwise, rank_one
 from synthesis.tubes.motions import Motions
 from synthesis.tubes.reference import Reference

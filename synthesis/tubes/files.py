@@ -12,8 +12,8 @@ import numpy as np
 from symheli import Helicopter
 from symheli.airframe.vehicle import load_vehicle
 from symheli.airframe.written import as_toml
-from symheli.enclosure import equations
 from synthesis.tubes.deviations import Deviations
+from synthesis.tubes.enclosure import equations
 from synthesis.tubes.equipment import LoopEquipment
 from synthesis.tubes.inequality import Multipliers
 from synthesis.tubes.motions import Motions

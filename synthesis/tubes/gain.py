@@ -10,7 +10,7 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.values.summary import summarized
-from synthesis.program.cone_program import Solver
+from synthesis.numerics.program.cone_program import Solver
 from synthesis.tubes.files import numbers, read_multipliers, written_multipliers
 from synthesis.tubes.inequality import Multipliers
 from synthesis.tubes.proof import is_above, is_bounded

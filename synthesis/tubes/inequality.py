@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from synthesis.lpv.affine_program import from_lower
-from synthesis.polynomial.exact import Number
+from synthesis.numerics.polynomial.exact import Number
+from synthesis.numerics.program.affine_program import from_lower
 
 Array = np.ndarray
 

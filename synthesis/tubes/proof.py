@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from synthesis.polynomial.exact import Number, exact, positive_definite, rational
+from synthesis.numerics.polynomial.exact import Number, exact, positive_definite, rational
 from synthesis.tubes.deviations import CommandCell
 from synthesis.tubes.inequality import (
     MatrixSet,

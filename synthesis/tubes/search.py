@@ -10,8 +10,13 @@ import numpy as np
 from scipy import sparse
 
 from symheli.lpv import Polynomial
-from synthesis.lpv.affine_program import AffineProgram, BernsteinCell, MatrixVariable, from_lower
-from synthesis.program.cone_program import Answer, ConeProgram, Solver, solve
+from synthesis.numerics.program.affine_program import (
+    AffineProgram,
+    BernsteinCell,
+    MatrixVariable,
+    from_lower,
+)
+from synthesis.numerics.program.cone_program import Answer, ConeProgram, Solver, solve
 from synthesis.tubes.deviations import CommandCell
 from synthesis.tubes.inequality import (
     MatrixSet,

@@ -10,8 +10,8 @@ import casadi
 import numpy as np
 
 from symheli import Helicopter
-from symheli.enclosure import enclose
 from synthesis.tubes.deviations import CommandCell, Deviations
+from synthesis.tubes.enclosure import enclose
 from synthesis.tubes.inequality import MatrixSet
 from synthesis.tubes.proof import is_within
 from synthesis.tubes.reference import Reference

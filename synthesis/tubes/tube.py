@@ -22,8 +22,8 @@ from symheli.flight import Servo
 from symheli.progress import Task, task, tracked
 from symheli.values.summary import summarized
 from symheli.values.whole_files import write_text
-from synthesis.certificate_file import DAMAGED, content_of
-from synthesis.program.cone_program import Solver
+from synthesis.certify.questions.certificate_file import DAMAGED, content_of
+from synthesis.numerics.program.cone_program import Solver
 from synthesis.tubes.controllers import Choice
 from synthesis.tubes.deviations import CommandCell, Deviations
 from synthesis.tubes.files import (
@@ -357,14 +357,14 @@ def tube(
     and servos where there are any, stays in e'P e <= 1 for every gust history of the amplitude, and
     every history of the commands within their limits. The difference of the nonlinear equations
     from those of the reference is an average of their Jacobian times (e, w); the Jacobian is
-    enclosed over the whole tube (`symheli.enclosure`), and a matrix inequality is checked for all
-    enclosed matrices in rational arithmetic. So is that controls stay within their travel.
+    enclosed over the whole tube (`synthesis.tubes.enclosure`), and a matrix inequality is checked
+    for all enclosed matrices in rational arithmetic. So is that controls stay within their travel.
 
     Parameters
     ----------
     model : Helicopter or casadi.Function
         With either governor: ten or twelve states. Or (x, u, w) -> dx/dt, of dense columns and of
-        the operations that `symheli.enclosure.enclose` knows.
+        the operations that `synthesis.tubes.enclosure.enclose` knows.
     reference : float, (float, float) or Motions
         Of a helicopter the airspeed held, or the range of its command, m/s. Of another model its
         motions and the feedback about them.

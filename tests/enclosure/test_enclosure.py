@@ -8,10 +8,10 @@ import pytest
 from symheli import Helicopter, trim
 from symheli.codegen.evaluate import evaluate
 from symheli.codegen.translation import operations
-from symheli.enclosure import Domain, enclose, interval, segment_averages
-from symheli.enclosure.form import AffineForm
-from symheli.enclosure.interval import Interval
 from symheli.errors import InputError
+from synthesis.tubes.enclosure import Domain, enclose, interval, segment_averages
+from synthesis.tubes.enclosure.form import AffineForm
+from synthesis.tubes.enclosure.interval import Interval
 
 RNG = np.random.default_rng(0)
 

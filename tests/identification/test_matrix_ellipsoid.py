@@ -9,7 +9,7 @@ import pytest
 from identification import matrix_ellipsoid
 from identification.judge.matrix_ellipsoid import spectral_radius
 from symheli.errors import InputError
-from synthesis.polynomial.exact import exact, positive_definite
+from synthesis.numerics.polynomial.exact import exact, positive_definite
 
 SIZES = [(12, 3), (6, 2), (5, 1)]
 

@@ -12,7 +12,7 @@ from symheli.errors import UnknownNameError
 from symheli.lpv import nu_gap, stability_margin
 from symheli.lpv.stability_margin import as_controller, closed_loop
 from symheli.values import signals
-from synthesis.worst.frozen import norm
+from synthesis.numerics.linear.norm import norm
 
 
 def model(A, B, C, D, dt=0.1, inputs=("u",), outputs=("y",)):
@@ -43,7 +43,7 @@ def test_two_static_graphs_stand_at_their_angle(k, c):
 
 
 def test_it_is_the_norm_that_level_sets_find():
-    """By Hamiltonian level sets, without a grid: `synthesis.worst.frozen.norm`."""
+    """By Hamiltonian level sets, without a grid: `synthesis.numerics.linear.norm.norm`."""
     plant = two_by_two(0)
     K = np.diag([0.02, -0.03])
     # from (v, w) in y = P (u + w) + v, u = K (y) to (y, u): [P; I] (I - K P)^-1 [-K, I] up to signs

@@ -24,9 +24,9 @@ from symheli.errors import (
 from symheli.lpv import LinearModel, LinearModels
 from symheli.values import plain_file
 from symheli.values.text_file import text_of
-from synthesis.plant.refusals import levels_above
-from synthesis.program.interruptible import no_panic
-from synthesis.worst.frozen import norm
+from synthesis.design.plant.refusals import levels_above
+from synthesis.numerics.linear.norm import norm
+from synthesis.numerics.program.interruptible import no_panic
 
 T = np.arange(0.0, 4.0, 0.02)
 RNG = np.random.default_rng(0)

@@ -66,9 +66,9 @@ from symheli import (
 )
 from symheli.errors import SynthesisError
 from symheli.flight import XCELL_SERVOS
-from synthesis.lpv.point_schedule import hinf_schedule
-from synthesis.plant.sampling import tustin
-from synthesis.worst.frozen import norm
+from synthesis.design.lpv.point_schedule import hinf_schedule
+from synthesis.design.plant.sampling import tustin
+from synthesis.numerics.linear.norm import norm
 
 
 @pytest.fixture(scope="module")

@@ -24,7 +24,7 @@ from studies.controllers.synthesized import (
 )
 from studies.controllers.synthesized_report import TABLE, gains, text
 from symheli.errors import InputError, SynthesisError
-from synthesis.worst.frozen import norm
+from synthesis.numerics.linear.norm import norm
 
 SMALL = """
 vehicle = ""

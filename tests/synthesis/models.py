@@ -7,8 +7,8 @@ import numpy as np
 from scipy.optimize import brentq
 
 from symheli.lpv import LPVStateSpace, Scheduling, UncertainStateSpace
-from synthesis.analysis.certify import route
-from synthesis.analysis.problem import pose
+from synthesis.certify.questions.certify import route
+from synthesis.certify.questions.problem import pose
 
 
 def lag(rate=1.0):

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from models import lag, random_stable
 
-from synthesis.lyapunov.spline import SplineLyapunov, graded_knots
-from synthesis.polynomial.bernstein import blossom, composition, restriction
-from synthesis.polynomial.cells import strips
-from synthesis.polynomial.matrix import PolynomialMatrix
-from synthesis.polynomial.pieces import ModelPiece, model_pieces, pieces
-from synthesis.polynomial.symmetric import smat, svec
-from synthesis.proof.inequalities import Statement, lmi_polynomials
+from synthesis.certify.proof.inequalities import Statement, lmi_polynomials
+from synthesis.certify.statement.spline import SplineLyapunov, graded_knots
+from synthesis.numerics.polynomial.bernstein import blossom, composition, restriction
+from synthesis.numerics.polynomial.cells import strips
+from synthesis.numerics.polynomial.matrix import PolynomialMatrix
+from synthesis.numerics.polynomial.pieces import ModelPiece, model_pieces, pieces
+from synthesis.numerics.polynomial.symmetric import smat, svec
 
 
 def value(F, x, s=0.0):

@@ -7,7 +7,7 @@ from scipy import linalg
 from benchmarks.loops_over_decades import loop
 from symheli.lpv import LPVStateSpace, Scheduling
 from synthesis import l2_gain
-from synthesis.worst.frozen import norm
+from synthesis.numerics.linear.norm import norm
 
 CLOSE = 1.01
 SPRING = (

@@ -10,7 +10,7 @@ from scipy.linalg import block_diag
 
 from symheli import LPVStateSpace, Scheduling
 from synthesis import frozen_gain, l2_gain
-from synthesis.worst.frozen import gain_at_poles, norm
+from synthesis.numerics.linear.norm import gain_at_poles, norm
 
 
 def lightly_damped(seed, decades=0.7, least=-3.5):

@@ -10,8 +10,8 @@ from benchmarks.loops_over_decades import loop
 from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace, Scheduling
 from synthesis import Certificate, Spline, l2_gain
-from synthesis.analysis.apart import apart
-from synthesis.program.cone_program import Answer
+from synthesis.certify.questions.apart import apart
+from synthesis.numerics.program.cone_program import Answer
 
 RATE = 0.1
 CLOSE = 1.01

@@ -8,7 +8,7 @@ from scipy import linalg
 
 from symheli import InputError, LPVStateSpace, Scheduling
 from synthesis import Certificate, Spline, generalized_h2, h2_gain
-from synthesis.lti.h2 import h2_norm
+from synthesis.design.lti.h2 import h2_norm
 
 p = Scheduling("p", "1", 0.0, 1.0, rate=0.3)
 

@@ -13,15 +13,15 @@ import pytest
 from scipy import sparse
 
 from symheli.errors import InputError, SolverError
-from synthesis.program import cone_program
-from synthesis.program.interruptible import in_process, in_thread
+from synthesis.numerics.program import cone_program
+from synthesis.numerics.program.interruptible import in_process, in_thread
 
 SOLVE = """
 import sys
 import numpy as np
 from scipy import sparse
-from synthesis.program.cone_program import ConeProgram, Solver, solve
-from synthesis.polynomial.symmetric import length
+from synthesis.numerics.program.cone_program import ConeProgram, Solver, solve
+from synthesis.numerics.polynomial.symmetric import length
 
 name, n, m = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
 rng, diagonal = np.random.default_rng(0), np.cumsum(np.arange(1, n + 1)) - 1

@@ -26,7 +26,7 @@ from synthesis import (
     lft_stability,
     lower_bound,
 )
-from synthesis.lft.multipliers import Multiplier
+from synthesis.certify.lft.multipliers import Multiplier
 
 QUICK = Search(levels=4, dwells=7, evaluations=8, steps=60)
 CLOSE = 1e-5

@@ -14,7 +14,7 @@ from models import constant, random_stable, random_uncertain, searched, spring
 
 sys.path.append(str(Path(__file__).resolve().parents[2]))  # benchmarks/ is not installed
 
-import synthesis.program.interior_point as method
+import synthesis.numerics.program.interior_point as method
 from benchmarks.closed_loops import DELAY, GUSTS, LOOPS, closed_loop, sampled_loop
 from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace, Scheduling
@@ -33,15 +33,15 @@ from synthesis import (
     lft_gain,
     stability,
 )
-from synthesis.analysis.problem import pose
-from synthesis.assemble.bounded_real import BlockMultipliers
-from synthesis.assemble.unknowns import Quadratic, scaled_problem
-from synthesis.lyapunov.spline import graded_knots
-from synthesis.polynomial import exact
-from synthesis.polynomial.symmetric import basis, length, svec, symmetrized
-from synthesis.program.block_cholesky import BlockCholesky
-from synthesis.program.cone_program import LYAPUNOV, Answer
-from synthesis.program.lyapunov_program import LyapunovBlocks, LyapunovProgram, Sizes
+from synthesis.certify.assemble.bounded_real import BlockMultipliers
+from synthesis.certify.assemble.unknowns import Quadratic, scaled_problem
+from synthesis.certify.questions.problem import pose
+from synthesis.certify.statement.spline import graded_knots
+from synthesis.numerics.polynomial import exact
+from synthesis.numerics.polynomial.symmetric import basis, length, svec, symmetrized
+from synthesis.numerics.program.block_cholesky import BlockCholesky
+from synthesis.numerics.program.cone_program import LYAPUNOV, Answer
+from synthesis.numerics.program.lyapunov_program import LyapunovBlocks, LyapunovProgram, Sizes
 
 FORM = Spline(segments=2, degree=2)
 

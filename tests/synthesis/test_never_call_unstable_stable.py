@@ -14,7 +14,7 @@ import synthesis
 from symheli.errors import InputError, SolverError
 from symheli.lpv import LPVStateSpace, Scheduling
 from synthesis import Solver, Spline, Status, installed_solvers, l2_gain, stability
-from synthesis.lyapunov.spline import SplineLyapunov
+from synthesis.certify.statement.spline import SplineLyapunov
 
 COARSE = Spline(segments=2, degree=2)
 EVERY = (*installed_solvers(), "LYAPUNOV")
@@ -112,10 +112,10 @@ def test_exact_arithmetic_confirms_a_good_certificate_and_rejects_a_tampered_one
 def test_the_fractions_of_the_standard_library_prove_the_same(monkeypatch):
     from fractions import Fraction
 
-    import synthesis.proof.one_parameter
+    import synthesis.certify.proof.one_parameter
 
     cert = l2_gain(lag(), form=COARSE, search=None)
-    monkeypatch.setattr(synthesis.proof.one_parameter, "rational", lambda: Fraction)
+    monkeypatch.setattr(synthesis.certify.proof.one_parameter, "rational", lambda: Fraction)
     assert cert.verify(rigorous=True)
     assert not replace(cert, gamma=0.9, frozen=0.0, lower=0.0).verify(rigorous=True)
 

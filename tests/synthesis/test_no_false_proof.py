@@ -12,14 +12,14 @@ from symheli.errors import CertificateError, InputError
 from symheli.lpv import LPVStateSpace, Patches, PiecewiseLinear, Polynomial, Product, Scheduling
 from symheli.lpv.bases.spaces import product_space, sum_space
 from synthesis import Certificate, Spline, SumOfSquares, l2_gain, stability
-from synthesis.assemble.unknowns import scaled_problem
-from synthesis.lyapunov.box import BoxLyapunov
-from synthesis.lyapunov.spline import SplineLyapunov
-from synthesis.polynomial.motion import Motion
-from synthesis.polynomial.pieces import model_pieces, pieces
-from synthesis.program.scaling import Scaling
-from synthesis.proof import box, one_parameter
-from synthesis.proof.inequalities import Demand
+from synthesis.certify.assemble.unknowns import scaled_problem
+from synthesis.certify.proof import box, one_parameter
+from synthesis.certify.statement.box import BoxLyapunov
+from synthesis.certify.statement.demand import Demand
+from synthesis.certify.statement.scaling import Scaling
+from synthesis.certify.statement.spline import SplineLyapunov
+from synthesis.numerics.polynomial.motion import Motion
+from synthesis.numerics.polynomial.pieces import model_pieces, pieces
 
 PLACE = 0.5123
 """Of the narrow piece: no point of a usual grid."""

@@ -10,6 +10,7 @@ import sympy
 from symheli import LPVStateSpace, Scheduling, UncertainStateSpace
 from symheli.lpv import Polynomial
 from synthesis import DynamicBlock, Search, l2_gain
+from synthesis.robust.uncertain import uncertain
 
 DEGREE = 10
 """Of the polynomials in place of roots and quotients."""
@@ -65,7 +66,7 @@ def test_the_bound_is_below_what_the_page_prints(rate, printed, known):
 def test_the_bound_for_dynamics_beside_what_the_page_prints(rate, printed, known):
     """The page has multipliers that depend on frequency, on a grid: less than one number at .1."""
     given = loop()
-    dynamics = UncertainStateSpace.of_blocks(given.model, [DynamicBlock("d", "u", 0.1)])
+    dynamics = uncertain(given.model, [DynamicBlock("d", "u", 0.1)])
     cert = l2_gain(dynamics, rate, search=None)
     assert cert.verified
     assert cert.gamma == pytest.approx(known, rel=5e-3)

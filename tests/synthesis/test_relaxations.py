@@ -27,9 +27,9 @@ from synthesis import (
     l2_gain,
     stability,
 )
-from synthesis.analysis.finer import ABOVE_FROZEN
-from synthesis.polynomial.pieces import pieces
-from synthesis.proof.inequalities import Demand
+from synthesis.certify.questions.finer import ABOVE_FROZEN
+from synthesis.certify.statement.demand import Demand
+from synthesis.numerics.polynomial.pieces import pieces
 
 PROOFS = {"bernstein": Bernstein(), "sos": SumOfSquares(), "vertices": Vertices()}
 QUICK = Spline(degree=1)
@@ -353,10 +353,10 @@ def test_a_next_value_that_may_be_anywhere_costs_no_degree_in_p():
     """P(p(k+1)) does not depend on p(k) where p jumps: its degree in p is that of A'A alone, two,
     and not two more.
     """
-    from synthesis.assemble.box import Shape, _pair
-    from synthesis.polynomial.motion import Motion
-    from synthesis.polynomial.regions import regions
-    from synthesis.proof.inequalities import decrease
+    from synthesis.certify.assemble.box import Shape, _pair
+    from synthesis.certify.proof.inequalities import decrease
+    from synthesis.numerics.polynomial.motion import Motion
+    from synthesis.numerics.polynomial.regions import regions
 
     model, shape = pieces(mass_spring(dt=0.1)), Shape((np.array([-1.0, 1]),) * 2, (2, 2))
     degrees = {}

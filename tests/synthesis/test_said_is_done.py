@@ -22,7 +22,7 @@ from synthesis import (
     lft_stability,
     stability,
 )
-from synthesis.program import cone_program
+from synthesis.numerics.program import cone_program
 
 COARSE = Spline(segments=2, degree=2)
 SOS = {"form": Spline(degree=1, segments=1), "impose": SumOfSquares()}

@@ -22,12 +22,12 @@ from synthesis import (
     l2_gain,
     stability,
 )
-from synthesis.assemble import box as program
-from synthesis.assemble import unknowns as forms
-from synthesis.polynomial import pieces, regions
-from synthesis.proof import box as proof
-from synthesis.proof import inequalities
-from synthesis.proof import one_parameter as verify
+from synthesis.certify.assemble import box as program
+from synthesis.certify.assemble import unknowns as forms
+from synthesis.certify.proof import box as proof
+from synthesis.certify.proof import inequalities
+from synthesis.certify.proof import one_parameter as verify
+from synthesis.numerics.polynomial import pieces, regions
 
 COARSE = Spline(segments=4, degree=2, grading=1.0)
 BOX = {"form": Spline(segments=4, degree=2, grading=1.0), "impose": SumOfSquares()}

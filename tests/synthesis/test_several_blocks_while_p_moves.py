@@ -12,6 +12,7 @@ from symheli import InputError, LinearModel, LPVStateSpace, Scheduling, Uncertai
 from symheli.lpv import connect
 from symheli.lpv.uncertain_state_space import DeltaPart
 from synthesis import DynamicBlock, Spline, frozen_gain, l2_gain, robust_margin, stability
+from synthesis.robust.uncertain import uncertain
 
 QUICK = {"search": None, "form": Spline(degree=1, segments=2)}
 
@@ -41,7 +42,7 @@ BLOCKS = [DynamicBlock("a", "v", 0.05), DynamicBlock(["b1", "b2"], "w", 0.2)]
 def test_a_ring_of_two_in_closed_form(a, b):
     """mu = sqrt(a b) = 1, with D at its optimum; one full block would be lost at 1/max(a, b)."""
     for share, proven in ((0.998, True), (1.002, False)):
-        loops = UncertainStateSpace.of_blocks(two_lags(a, b), RING).with_bound(share)
+        loops = uncertain(two_lags(a, b), RING).with_bound(share)
         assert stability(loops, 1.0, **QUICK).verified is proven
 
 
@@ -72,7 +73,7 @@ def test_what_is_borne_while_p_moves_is_less_than_frozen_and_more_than_in_jumps(
     assert lower == sorted(lower, reverse=True)
     assert 0 < lower[-1] < 0.99 * lower[0]
     assert all(found.lower <= found.upper for found in margins)
-    one = replace(UncertainStateSpace.of_blocks(loop(), BLOCKS), parts=())
+    one = replace(uncertain(loop(), BLOCKS), parts=())
     assert robust_margin(one, rate=0.5).lower < 0.9 * lower[1]  # one full block covers both
 
 
@@ -80,7 +81,7 @@ def test_what_is_borne_while_p_moves_is_less_than_frozen_and_more_than_in_jumps(
 def test_no_member_has_more_than_the_gain_of_the_set():
     """Constant matrices, and an all-pass lag in place of a block of dynamics, along p(t)."""
     model = loop()
-    unc = UncertainStateSpace.of_blocks(model, BLOCKS).with_bound(0.6)
+    unc = uncertain(model, BLOCKS).with_bound(0.6)
     cert = l2_gain(unc, search=None)
     assert cert.verified
     assert cert.verify(rigorous=True)
@@ -91,12 +92,12 @@ def test_no_member_has_more_than_the_gain_of_the_set():
     late = replace(all_pass, outputs=("a_out",))
     closed = connect(model, late, inputs=["b1", "b2", "u"], outputs=["w", "y"], sums=into)
     assert abs(late.frequency_response([3.0]).item()) == pytest.approx(1.0)
-    rest = UncertainStateSpace.of_blocks(closed, BLOCKS[1:]).with_bound(0.6)
+    rest = uncertain(closed, BLOCKS[1:]).with_bound(0.6)
     assert l2_gain(rest, search=None).lower <= cert.gamma
 
 
 def test_a_multiplier_of_dynamics_that_moves_proves_nothing():
-    unc = UncertainStateSpace.of_blocks(two_lags(2.0, 0.25), RING)
+    unc = uncertain(two_lags(2.0, 0.25), RING)
     cert = stability(unc, **QUICK)
     assert cert.verified
     assert np.ptp(cert.proof.lyapunov.multiplier, axis=0).max() == 0
@@ -119,8 +120,8 @@ def test_functions_in_sectors_have_a_multiplier_each():
 
 
 def test_a_block_beside_one_that_the_model_has():
-    first = UncertainStateSpace.of_blocks(two_lags(4.0, 0.25), RING[:1], "a promise")
-    both = UncertainStateSpace.of_blocks(first.with_bound(0.5), RING[1:])
+    first = uncertain(two_lags(4.0, 0.25), RING[:1], "a promise")
+    both = uncertain(first.with_bound(0.5), RING[1:])
     assert both.bound == 1.0
     assert both.source.startswith("a promise; ")
     # the first counts half: mu = sqrt(1/2)
@@ -137,13 +138,13 @@ def test_a_block_beside_one_that_the_model_has():
     [(((1, 1),), "make a Delta of"), (((2, 1), (0, 1)), "at least 1 x 1")],
 )
 def test_parts_that_are_not_those_of_delta_are_refused(parts, words):
-    unc = UncertainStateSpace.of_blocks(two_lags(1.0, 1.0), RING)
+    unc = uncertain(two_lags(1.0, 1.0), RING)
     with pytest.raises(InputError, match=words):
         replace(unc, parts=parts)
 
 
 def test_blocks_of_no_lpv_model_are_refused():
     with pytest.raises(InputError, match="expected an LPVStateSpace"):
-        UncertainStateSpace.of_blocks(two_lags(1.0, 1.0).to_lft(), RING)
+        uncertain(two_lags(1.0, 1.0).to_lft(), RING)
     with pytest.raises(InputError, match="expected one or more"):
-        UncertainStateSpace.of_blocks(two_lags(1.0, 1.0), [])
+        uncertain(two_lags(1.0, 1.0), [])

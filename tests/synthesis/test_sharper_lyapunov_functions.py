@@ -26,10 +26,11 @@ from synthesis import (
     lower_bound,
     stability,
 )
-from synthesis.lyapunov.lag import LagRegion
-from synthesis.lyapunov.spline import MemoryLyapunov
-from synthesis.polynomial.pieces import pieces
-from synthesis.polynomial.symmetric_power import (
+from synthesis.certify.proof.inequalities import Statement, lmi_polynomials
+from synthesis.certify.statement.lag import LagRegion
+from synthesis.certify.statement.spline import MemoryLyapunov
+from synthesis.numerics.polynomial.pieces import pieces
+from synthesis.numerics.polynomial.symmetric_power import (
     generator,
     monomials,
     null_matrix,
@@ -37,7 +38,6 @@ from synthesis.polynomial.symmetric_power import (
     null_weights,
     power,
 )
-from synthesis.proof.inequalities import Statement, lmi_polynomials
 
 MEMORY = Memory(1.5, segments=8, degree=2, grading=1.0, across_segments=2)
 QUARTIC = HigherOrder(2, segments=4)
@@ -250,7 +250,7 @@ def test_tampered_proofs_fail_in_either_arithmetic():
 def test_in_discrete_time_a_memory_or_an_order_is_refused_before_any_work(
     form, said, rate, monkeypatch
 ):
-    monkeypatch.setattr("synthesis.analysis.certify.worst_by", None)
+    monkeypatch.setattr("synthesis.certify.questions.certify.worst_by", None)
     sampled = spring().discretize(0.1)
     for analysis in (l2_gain, stability):
         with pytest.raises(

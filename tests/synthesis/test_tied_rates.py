@@ -10,10 +10,10 @@ import pytest
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv import LPVStateSpace, Scheduling, simulate
 from synthesis import Bernstein, Search, Spline, Status, generalized_h2, l2_gain, stability
-from synthesis.certificate import Certificate
-from synthesis.polynomial.motion import Motion
-from synthesis.worst.tied import Smooth
-from synthesis.worst.waves import Wave
+from synthesis.certify.lower_bounds.tied import Smooth
+from synthesis.certify.lower_bounds.waves import Wave
+from synthesis.certify.questions.certificate import Certificate
+from synthesis.numerics.polynomial.motion import Motion
 
 TOP = 0.3
 JERKS = (math.inf, 10.0, 1.0, 0.3, 0.1)

@@ -17,11 +17,11 @@ from evidence.tables import chosen, renewed
 from evidence.tube_flights import from_its_border, worst
 from studies.cli import main
 from symheli import Helicopter, trim, trim_batch
-from symheli.enclosure import AffineForm, SegmentAverages, equations
 from symheli.errors import InputError
 from synthesis import Motions, Tube, tube
 from synthesis.tubes.controllers import Choice
 from synthesis.tubes.deviations import CommandCell, Deviations, _covered
+from synthesis.tubes.enclosure import AffineForm, SegmentAverages, equations
 from synthesis.tubes.inequality import elementwise, rank_one
 from synthesis.tubes.reference import TUBE_SIZES, moving
 from synthesis.tubes.tube import _covers

@@ -27,9 +27,9 @@ from synthesis import (
     l2_gain,
     stability,
 )
-from synthesis.assemble import bounded_real
-from synthesis.proof import inequalities, one_parameter
-from synthesis.worst.frozen import norm
+from synthesis.certify.assemble import bounded_real
+from synthesis.certify.proof import inequalities, one_parameter
+from synthesis.numerics.linear.norm import norm
 
 COARSE = Spline(segments=2, degree=2)
 # the solver's tolerance on a squared gain and the room left for rounding are of order 1e-6

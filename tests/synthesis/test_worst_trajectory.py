@@ -8,11 +8,17 @@ import numpy as np
 import pytest
 from models import fastest_growth, lateral, random_stable, spring
 
-from synthesis.worst.ascent import GAIN, GROWTH, _gradient, ascend, on_nodes
-from synthesis.worst.corners import Corners, climb, gradient
-from synthesis.worst.periodic import Lifted, gain, growth, ratio_from_rest, worst_input
-from synthesis.worst.trajectory import SchedulingTrajectory
-from synthesis.worst.waves import Wave, steps
+from synthesis.certify.lower_bounds.ascent import GAIN, GROWTH, _gradient, ascend, on_nodes
+from synthesis.certify.lower_bounds.corners import Corners, climb, gradient
+from synthesis.certify.lower_bounds.periodic import (
+    Lifted,
+    gain,
+    growth,
+    ratio_from_rest,
+    worst_input,
+)
+from synthesis.certify.lower_bounds.trajectory import SchedulingTrajectory
+from synthesis.certify.lower_bounds.waves import Wave, steps
 
 
 def bumpy(lpv, period=4.0, nodes=24):
@@ -119,7 +125,7 @@ def test_the_ascent_keeps_range_and_rate_and_never_loses(dt):
 @pytest.mark.slow
 def test_the_search_finds_more_than_the_waves_it_starts_from():
     from synthesis import Search, lower_bound
-    from synthesis.worst.lower_bound import _TrajectorySearch
+    from synthesis.certify.lower_bounds.lower_bound import _TrajectorySearch
 
     search = Search(
         levels=6, dwells=5, starts=1, nodes=40, evaluations=15, steps=80, samples=20_000

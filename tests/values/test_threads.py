@@ -74,7 +74,7 @@ def test_the_environment_decides(monkeypatch):
 @pytest.mark.usefixtures("two_threads")
 def test_a_certificate_takes_one(monkeypatch):
     seen = []
-    module = importlib.import_module("synthesis.analysis.questions")
+    module = importlib.import_module("synthesis.certify.questions.questions")
     certify = module.certify
 
     def looked(*arguments, **options):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from symheli.lpv.bases.polynomials import polynomials
-from synthesis.lpv.affine_program import AffineProgram, cells, from_lower
-from synthesis.program.cone_program import Solver
+from synthesis.numerics.program.affine_program import AffineProgram, cells, from_lower
+from synthesis.numerics.program.cone_program import Solver
 
 BOX = [(0.0, 2.0)]
 SOLVER = Solver("CLARABEL")

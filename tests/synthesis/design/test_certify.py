@@ -12,9 +12,9 @@ from symheli import Scheduling
 from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace
 from synthesis import Memory, Search, Spline, l2_gain, lower_bound, output_feedback
-from synthesis.analysis.adjoint import ADJOINT, FAR_ABOVE, backwards
-from synthesis.analysis.problem import pose
-from synthesis.lyapunov.spline import MemoryLyapunov
+from synthesis.certify.questions.adjoint import ADJOINT, FAR_ABOVE, backwards
+from synthesis.certify.questions.problem import pose
+from synthesis.certify.statement.spline import MemoryLyapunov
 
 GLANCE = Search(levels=6, dwells=5, starts=1, nodes=30, evaluations=8, samples=5000)
 
@@ -77,7 +77,7 @@ def test_a_gain_far_above_the_frozen_one_is_looked_for_of_the_adjoint_too(monkey
     alone = l2_gain(wandering(), search=None)
     assert alone.gamma < FAR_ABOVE * alone.frozen
     assert ADJOINT not in alone.hypotheses
-    monkeypatch.setattr("synthesis.analysis.certify.FAR_ABOVE", 1.0)
+    monkeypatch.setattr("synthesis.certify.questions.certify.FAR_ABOVE", 1.0)
     both = l2_gain(wandering(), search=None)
     # the lower of two proven gains, and the programs of both
     assert both.gamma <= alone.gamma

@@ -9,7 +9,7 @@ import symheli
 import synthesis
 from symheli import LinearModel
 from symheli.errors import InputError
-from synthesis.lti.coefficient_diagram import target
+from synthesis.design.lti.coefficient_diagram import target
 
 
 def of(numerator, denominator):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from synthesis.lpv.recovery import contraction
+from synthesis.design.lpv.recovery import contraction
 
 
 def problem(seed, shape=(4, 5), k=2, l=2):

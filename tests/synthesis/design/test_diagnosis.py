@@ -8,9 +8,9 @@ from design_plants import first_order, named, random_plant
 from symheli import LinearModel
 from symheli.errors import InputError
 from synthesis import DesignStatus, h2, hinf, mixed_sensitivity, ncf
-from synthesis.plant.diagnosis import reasons
-from synthesis.plant.generalized import Channels, Generalized
-from synthesis.plant.unreachable import unreachable_gain
+from synthesis.design.plant.diagnosis import reasons
+from synthesis.design.plant.generalized import Channels, Generalized
+from synthesis.design.plant.unreachable import unreachable_gain
 
 
 def said(model, controls, measurements, **how):

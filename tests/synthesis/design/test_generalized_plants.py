@@ -6,7 +6,7 @@ import pytest
 from design_plants import random_plant
 
 from symheli.errors import InputError, UnknownNameError
-from synthesis.plant.generalized import Channels, Generalized
+from synthesis.design.plant.generalized import Channels, Generalized
 
 
 def controller(rng, nu, ny, order=2):

@@ -10,8 +10,8 @@ from scipy import linalg
 
 from symheli import LinearModel
 from synthesis import DesignStatus, h2
-from synthesis.lti.h2 import h2_norm
-from synthesis.plant.generalized import Generalized
+from synthesis.design.lti.h2 import h2_norm
+from synthesis.design.plant.generalized import Generalized
 
 SEEDS = [pytest.param(k, marks=() if k % 2 else pytest.mark.slow) for k in range(10)]
 

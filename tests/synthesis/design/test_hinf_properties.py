@@ -10,8 +10,8 @@ from scipy import linalg
 
 from symheli import LinearModel
 from synthesis import hinf
-from synthesis.plant.generalized import Generalized, continuous_plant, sampled_controller
-from synthesis.worst.frozen import norm, to_continuous
+from synthesis.design.plant.generalized import Generalized, continuous_plant, sampled_controller
+from synthesis.numerics.linear.norm import norm, to_continuous
 
 SEEDS = [pytest.param(k, marks=() if k % 2 else pytest.mark.slow) for k in range(12)]
 

@@ -11,7 +11,7 @@ from scipy import linalg
 
 from symheli import InputError, LPVStateSpace, Scheduling
 from synthesis import H2, Plant, h2, h2_gain, multiobjective
-from synthesis.lti.h2 import h2_norm
+from synthesis.design.lti.h2 import h2_norm
 
 
 def unstable_lag(rate, high=1.0):

@@ -13,7 +13,7 @@ from symheli.errors import InputError, SynthesisError
 from symheli.export import write_controller
 from symheli.flight.autopilot import SCALE, UNMEASURED, gain_scheduled_lqr
 from symheli.steady.airspeed_sweep import design_family
-from synthesis.lti.h2 import h2_norm
+from synthesis.design.lti.h2 import h2_norm
 
 CONTROLS = ("d_lon", "d_lat", "d_col", "d_ped")
 

@@ -8,8 +8,8 @@ from symheli import LinearModel
 from symheli.errors import InputError
 from symheli.lpv import stability_margin
 from synthesis import hinf, mixed_sensitivity, ncf
-from synthesis.plant.generalized import Generalized
-from synthesis.worst.frozen import norm
+from synthesis.design.plant.generalized import Generalized
+from synthesis.numerics.linear.norm import norm
 
 
 def plant(seed, dt=None):

@@ -9,7 +9,7 @@ from scheduled_plants import lag, of, spring
 
 from symheli.errors import InputError, SynthesisError
 from synthesis import H2, L2, EnergyToPeak, PoleRegion, h2, hinf, multiobjective, output_feedback
-from synthesis.worst.frozen import norm
+from synthesis.numerics.linear.norm import norm
 
 PROVEN = 1 + 1e-5
 """Gains beside the bounds of inequalities solved to 1e-8."""

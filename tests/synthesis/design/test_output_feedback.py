@@ -238,7 +238,7 @@ def test_both_sides_move_where_that_is_asked_and_the_rate_is_neglected():
 
 @pytest.mark.slow
 def test_where_neglecting_the_rate_keeps_no_gamma_it_is_said_what_to_write(monkeypatch):
-    monkeypatch.setattr("synthesis.lpv.search.MAX_RATE_LOSS", 0.5)
+    monkeypatch.setattr("synthesis.design.lpv.search.MAX_RATE_LOSS", 0.5)
     with pytest.raises(
         SynthesisError, match=r"without a measurement of its rate .* X=0, or .*plant\.lagged"
     ):

@@ -9,7 +9,7 @@ from published_plants import DEGREE, grid_to_lft, lft_tutorial, spinning_disks, 
 from scheduled_plants import frozen
 
 from synthesis import hinf, l2_gain, output_feedback
-from synthesis.analysis.adjoint import ADJOINT
+from synthesis.certify.questions.adjoint import ADJOINT
 
 
 def test_the_worst_frozen_optimum_of_the_disks_is_what_was_found_by_other_means():

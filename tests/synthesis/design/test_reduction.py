@@ -10,8 +10,8 @@ from scheduled_plants import frozen, spring, spring_controller
 from symheli import LinearModel, LPVStateSpace
 from symheli.errors import InputError, SynthesisError
 from synthesis import hinf, output_feedback
-from synthesis.loops.reduction import frozen_gain
-from synthesis.worst.frozen import norm
+from synthesis.design.loops.reduction import frozen_gain
+from synthesis.numerics.linear.norm import norm
 
 
 @pytest.fixture(scope="module")

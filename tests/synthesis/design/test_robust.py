@@ -8,7 +8,8 @@ from scheduled_plants import RATE, spring
 
 from symheli import LPVStateSpace, Scheduling, UncertainStateSpace
 from synthesis import DynamicBlock, Plant, l2_gain, output_feedback
-from synthesis.worst.frozen import norm
+from synthesis.numerics.linear.norm import norm
+from synthesis.robust.uncertain import uncertain as around
 
 BACK_OFF = 1.02
 
@@ -79,9 +80,7 @@ def two_blocks():
         outputs=["z", "z_u", "y", "v_d", "v_e"],
     )
     blocks = [DynamicBlock("d", "v_d", 0.05), DynamicBlock("e", "v_e", 0.1)]
-    return Plant(
-        UncertainStateSpace.of_blocks(model, blocks), ["w", "n"], ["z", "z_u"], ["u"], ["y"]
-    )
+    return Plant(around(model, blocks), ["w", "n"], ["z", "z_u"], ["u"], ["y"])
 
 
 @pytest.mark.slow

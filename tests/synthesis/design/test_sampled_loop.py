@@ -140,7 +140,7 @@ def test_a_designed_controller_is_proven_on_exact_linearizations_that_it_never_s
     )
     from studies.loops.exact_lateral import INPUTS, STATES
     from symheli.flight import XCELL_SERVOS
-    from synthesis.worst.frozen import norm
+    from synthesis.numerics.linear.norm import norm
 
     low, high = 8.0, 10.0
     controller = designed(ideal, low, high)

@@ -12,9 +12,9 @@ from symheli.errors import InputError
 from symheli.flight.controller import SCHEDULING
 from symheli.values.named_vector import NamedVector
 from synthesis import Plant, output_feedback, state_feedback
-from synthesis.loops.controller import SAMPLED
-from synthesis.plant.sampling import tustin
-from synthesis.worst.frozen import norm
+from synthesis.design.loops.controller import SAMPLED
+from synthesis.design.plant.sampling import tustin
+from synthesis.numerics.linear.norm import norm
 
 
 @pytest.fixture(scope="module")

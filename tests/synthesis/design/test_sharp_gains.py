@@ -8,10 +8,10 @@ import pytest
 from benchmarks.random_plants import random_plant
 from symheli.lpv import BSpline, Scheduling
 from synthesis import output_feedback
-from synthesis.certificate import Attempt
-from synthesis.lpv.at_rest import at_rest
-from synthesis.lpv.fitted import cut_to_serve
-from synthesis.lpv.worst_optimum import worst_optimum
+from synthesis.certify.statement.outcome import Attempt
+from synthesis.design.lpv.at_rest import at_rest
+from synthesis.design.lpv.fitted import cut_to_serve
+from synthesis.design.lpv.worst_optimum import worst_optimum
 
 P = Scheduling("p", "1", -1.0, 1.0, rate=0.0)
 WIDTH = 0.01

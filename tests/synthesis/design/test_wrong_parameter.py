@@ -10,9 +10,9 @@ from symheli import UncertainStateSpace
 from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace, Patches, PiecewiseLinear, Polynomial, Scheduling
 from synthesis import Plant, Spline, frozen_gain, l2_gain, proven_around, with_wrong_parameter
-from synthesis.loops.balanced_block import balanced
-from synthesis.loops.frozen_reading import largest
-from synthesis.loops.wrong_parameter import _reached, _slopes
+from synthesis.design.loops.balanced_block import balanced
+from synthesis.design.loops.frozen_reading import largest
+from synthesis.design.loops.wrong_parameter import _reached, _slopes
 
 P = Scheduling("p", "1", 0.0, 1.0, rate=0.1)
 CLOSE = 1e-4

@@ -1,0 +1,1 @@
+"""What is claimed about a model, how it is found, and how it is proven."""

@@ -1,0 +1,306 @@
+"""Certificates as JSON files that are sufficient to verify them again.
+
+A file has a schema and its version, the statement, and the proof: model, units and Lyapunov
+function. Every value is a number, a text or a list, an array with its shape, or a value of one of
+the `TYPES` by its name and fields. Doubles are written with all their digits. The polynomial pieces
+are derived from the model. Reading trusts no value: each is checked where it is made, and the proof
+again in floating point.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from symheli.errors import CertificateError, InputError
+from symheli.lpv import LFT, LPVStateSpace, Scheduling, bases
+from symheli.lpv.lft import Block
+from symheli.values import Signal
+from symheli.values.whole_files import write_text
+from synthesis.certify.lft import proof as lft_proof
+from synthesis.certify.lft.coordinates import Coordinates
+from synthesis.certify.lft.multipliers import Multiplier
+from synthesis.certify.lower_bounds.trajectory import SchedulingTrajectory
+from synthesis.certify.proof import box, one_parameter
+from synthesis.certify.questions.certificate import Certificate, Proof
+from synthesis.certify.questions.hypotheses import motion
+from synthesis.certify.statement.box import BoxLyapunov
+from synthesis.certify.statement.demand import Demand
+from synthesis.certify.statement.lag import LagRegion
+from synthesis.certify.statement.norm_bounded import NormBounded
+from synthesis.certify.statement.outcome import Attempt, Seconds, Status
+from synthesis.certify.statement.scaling import Scaling
+from synthesis.certify.statement.spline import MemoryLyapunov, SplineLyapunov
+from synthesis.numerics.polynomial.matrix import PolynomialMatrix
+from synthesis.numerics.polynomial.motion import Motion
+from synthesis.numerics.polynomial.pieces import model_pieces, pieces
+
+SCHEMA = "symheli certificate"
+VERSION = 1
+
+
+def _former_units(
+    left: Any, right: Any, inputs: Any, outputs: Any, time: Any, storage: Any, weight: Any
+) -> Scaling:
+    """Return the scaling of an older file, which holds units of inputs, outputs and V: that of V is
+    the square of the channel's, or 1 where V is compared with the energy of inputs.
+    """
+    return Scaling(left, right, outputs if storage == 1.0 else math.sqrt(storage), time, weight)
+
+
+TYPES: dict[str, Any] = {
+    kind.__name__: kind
+    for kind in (
+        *(Attempt, Seconds, Scheduling, Block, LFT, LPVStateSpace),
+        *(PolynomialMatrix, Motion, Scaling, Demand, Coordinates, NormBounded),
+        *(SplineLyapunov, MemoryLyapunov, LagRegion, BoxLyapunov),
+        Multiplier,
+        *(
+            bases.Polynomial,
+            bases.BSpline,
+            bases.PiecewiseLinear,
+            bases.Product,
+            bases.Patches,
+        ),
+    )
+} | {
+    "Quadratic": lft_proof.QuadraticStorage,
+    "Spline": bases.CubicSpline,
+    "Trajectory": SchedulingTrajectory,
+    "Units": _former_units,
+}
+"""Types that a file may contain, by their name in the file, which does not change with the name of
+the class.
+"""
+WORDS = {kind: word for word, kind in TYPES.items()}
+
+LEFT_OUT = {LPVStateSpace: ("trim", "residuals")}
+"""Fields of a model that a proof does not need."""
+
+LATER = ("perturbation",)
+"""Fields that files of this version may lack: they were written before the field existed."""
+
+ROUTES = {
+    "one parameter": one_parameter.IntervalEvidence,
+    "box": box.BoxEvidence,
+    "lft": lft_proof.LFTEvidence,
+}
+DERIVED = {"pieces", "model"}
+
+
+def written(cert: Certificate, path: str | os.PathLike[str]) -> Path:
+    """Write the certificate; see `Certificate.save`."""
+    statement = {f.name: getattr(cert, f.name) for f in fields(cert) if f.name != "proof"}
+    content = {
+        "schema": SCHEMA,
+        "version": VERSION,
+        **encoded({**statement, "status": cert.status.name}),
+        "proof": None if cert.proof is None else _encoded_proof(cert.proof),
+    }
+    return write_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
+
+
+def read(path: str | os.PathLike[str]) -> Certificate:
+    """Read a certificate; see `Certificate.load`."""
+    content = content_of(path, SCHEMA, VERSION, "a certificate", "Certificate.save")
+    try:
+        with np.errstate(all="ignore"):
+            cert = _certificate(content)
+    except CertificateError as error:
+        raise CertificateError(f"{path}: {error}") from None
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    except DAMAGED as error:
+        raise InputError(f"{path}: damaged, a value is invalid ({error})") from None
+    if cert.verified and not cert.verify():
+        why = cert.fault or "the inequalities do not hold with this bound"
+        raise CertificateError(f"{path}: the proof does not establish the certified bound: {why}")
+    return cert
+
+
+DAMAGED = (
+    *(TypeError, ValueError, AttributeError, LookupError),
+    *(ArithmeticError, RecursionError, np.linalg.LinAlgError),
+)
+"""What values of a damaged file raise."""
+
+
+def content_of(
+    path: str | os.PathLike[str], schema: str, version: int, what: str, writer: str
+) -> dict[str, Any]:
+    """Read a JSON file of this schema and version, which `writer` writes; raise `InputError` for
+    any other.
+    """
+    try:
+        content = json.loads(Path(path).read_text(encoding="utf-8"), parse_constant=_refused)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
+    except (ValueError, RecursionError) as error:
+        raise InputError(
+            f"{path}: expected {what} as JSON, got another or a damaged file ({error});"
+            f" write it again with {writer}"
+        ) from None
+    if not isinstance(content, dict) or content.get("schema") != schema:
+        raise InputError(
+            f"{path}: expected the schema {schema!r}; this file was not written by {writer}"
+        )
+    if content.get("version") != version or isinstance(content.get("version"), bool):
+        raise InputError(
+            f"{path}: expected version {version} of the schema, got {content.get('version')!r:.60};"
+            " read it with the version of symheli that wrote it"
+        )
+    return content
+
+
+def _certificate(content: Mapping[str, Any]) -> Certificate:
+    names = {f.name for f in fields(Certificate)}
+    content = {**dict.fromkeys(LATER), **content}
+    missing, foreign = names - content.keys(), content.keys() - names - {"schema", "version"}
+    if missing or foreign:
+        raise InputError(
+            f"expected the fields of a certificate; missing: {', '.join(sorted(missing)) or 'none'}"
+            f"; unknown: {', '.join(sorted(foreign)) or 'none'}"
+        )
+    statement = {name: decoded(content[name]) for name in names if name != "proof"}
+    if statement["status"] not in Status.__members__:
+        raise InputError(f"expected the name of a status, got {statement['status']!r:.60}")
+    statement["status"] = Status[statement["status"]]
+    if not isinstance(statement["verified"], bool):
+        raise InputError(f"verified must be true or false, got {statement['verified']!r:.60}")
+    for name, kind in (
+        ("seconds", Seconds),
+        ("worst", SchedulingTrajectory | None),
+        ("perturbation", np.ndarray | None),
+    ):
+        if not isinstance(statement[name], kind):
+            raise InputError(f"{name} is invalid: {statement[name]!r:.60}")
+    for name, kind in (("hypotheses", str), ("attempts", Attempt)):
+        values = statement[name]
+        if not isinstance(values, tuple) or not all(isinstance(v, kind) for v in values):
+            raise InputError(f"{name} are invalid: {values!r:.60}")
+    if not isinstance(statement["method"], str) or not isinstance(statement["solver"], str):
+        raise InputError("method and solver must be texts")
+    proof = content["proof"]
+    cert = Certificate(**statement, proof=None if proof is None else _decoded_proof(proof))
+    if cert.proof is not None:
+        for s, rate in zip(cert.proof.evidence.parameters, cert.rates, strict=True):
+            if motion(s, rate) not in cert.hypotheses:
+                raise CertificateError(
+                    "the hypotheses do not say for which range and rate of"
+                    f" {s.name} the proof holds: {motion(s, rate)}"
+                )
+        for sentence in getattr(cert.proof.evidence, "sentences", ()):
+            if sentence not in cert.hypotheses:
+                raise CertificateError(
+                    f"the hypotheses do not say for which perturbations the proof holds: {sentence}"
+                )
+    return cert
+
+
+def _encoded_proof(proof: Proof) -> dict[str, Any]:
+    evidence = proof.evidence
+    route = next(name for name, kind in ROUTES.items() if isinstance(evidence, kind))
+    own = {
+        name: value
+        for name, value in evidence._asdict().items()  # type: ignore[attr-defined]
+        if name not in DERIVED
+    }
+    if isinstance(evidence, box.BoxEvidence):
+        own["source"] = evidence.model.source
+    return {"route": route, **encoded(own), "lyapunov": encoded(proof.lyapunov)}
+
+
+def _decoded_proof(content: Any) -> Proof:
+    if not isinstance(content, dict) or content.get("route") not in ROUTES:
+        raise InputError(f"expected a proof by one of the routes {', '.join(ROUTES)}")
+    route = content["route"]
+    own = {name: decoded(v) for name, v in content.items() if name not in ("route", "lyapunov")}
+    if route == "one parameter":
+        own["pieces"] = model_pieces(_a(LPVStateSpace, own["lpv"]))
+    elif route == "box":
+        own["model"] = pieces(_a(LPVStateSpace, own.pop("source")))
+    else:
+        _a(LFT, own["lft"])
+    for name, kind in (
+        ("units", Scaling),
+        ("demand", Demand),
+        ("coordinates", Coordinates),
+    ):
+        if name in own:
+            _a(kind, own[name])
+    if own.get("block") is not None:
+        _a(NormBounded, own["block"])
+    return Proof(ROUTES[route](**own), decoded(content["lyapunov"]))
+
+
+def _a(kind: Any, value: Any) -> Any:
+    if not isinstance(value, kind):
+        raise InputError(f"expected {getattr(kind, '__name__', kind)}, got {value!r:.60}")
+    return value
+
+
+def encoded(value: Any) -> Any:
+    """Return a value as JSON holds it; raise `InputError` for a type that is not in `TYPES`."""
+    if isinstance(value, Signal):
+        return {"signal": str(value), "unit": value.unit}
+    if value is None or isinstance(value, str | bool | int):
+        return value
+    if isinstance(value, float | np.floating):
+        return float(value) if math.isfinite(value) else {"float": repr(float(value))}
+    if isinstance(value, np.integer):
+        return int(value)
+    if isinstance(value, np.ndarray):
+        numbers = [encoded(v) for v in value.ravel().tolist()]
+        return {"shape": list(value.shape), "array": numbers}
+    if isinstance(value, dict):
+        return {name: encoded(v) for name, v in value.items()}
+    if type(value) in WORDS:
+        left_out = LEFT_OUT.get(type(value), ())
+        names = (
+            [f.name for f in fields(value) if f.init]
+            if is_dataclass(value)
+            else list(value._fields)
+        )
+        own = {name: encoded(getattr(value, name)) for name in names if name not in left_out}
+        return {"type": WORDS[type(value)], **own}
+    if isinstance(value, tuple | list):
+        return [encoded(v) for v in value]
+    raise InputError(
+        f"a {type(value).__name__} cannot be written to a file; fit the model to a polynomial or"
+        " spline basis first, or keep the certificate in memory"
+    )
+
+
+def decoded(value: Any) -> Any:
+    """Return the value that `encoded` wrote; raise `InputError` for anything else."""
+    if isinstance(value, list):
+        return tuple(map(decoded, value))
+    if not isinstance(value, dict):
+        return value
+    if value.keys() == {"float"}:
+        number = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}.get(value["float"])
+        if number is None:
+            raise InputError(f"expected nan, inf or -inf, got {value['float']!r:.60}")
+        return number
+    if value.keys() == {"signal", "unit"}:
+        return Signal(_a(str, value["signal"]), _a(str, value["unit"]))
+    if value.keys() == {"shape", "array"}:
+        numbers = [decoded(v) for v in _a(list, value["array"])]
+        if not all(isinstance(v, float | int) and not isinstance(v, bool) for v in numbers):
+            raise InputError("expected an array of numbers")
+        return np.array(numbers, dtype=float).reshape(_a(list, value["shape"]))
+    kind = TYPES.get(value.get("type", ""))
+    if kind is None:
+        raise InputError(f"unknown kind of value {value.get('type')!r:.60}")
+    return kind(**{name: decoded(v) for name, v in value.items() if name != "type"})
+
+
+def _refused(constant: str) -> None:
+    raise ValueError(f"{constant} is not JSON")

@@ -1,0 +1,34 @@
+"""A second search over several parameters, with P of a higher degree."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from synthesis.certify.questions.problem import BoundProblem
+from synthesis.certify.statement.impose import SumOfSquares
+from synthesis.numerics.program.cone_program import LYAPUNOV, Solver
+from synthesis.numerics.program.lyapunov_program import MAX_STATES_GENERAL
+
+ABOVE_FROZEN = 1.05
+"""Ratio of a proven gain to the worst frozen one beyond which P of a higher degree is tried."""
+DEGREE = 4
+"""Of that P in each parameter."""
+MAX_ROWS = 6
+"""Number of states and inputs up to which sums of squares in two parameters take seconds."""
+
+
+def finer(problem: BoundProblem) -> BoundProblem | None:
+    """Return the same problem with P of degree `DEGREE`: by sums of squares where they are small,
+    else by points; None for options that the user chose, many states, one parameter, other bounds
+    than a gain, in discrete time, and where p may jump.
+    """
+    states, inputs, _ = problem.model.sizes
+    moving = any(math.isfinite(rate) for rate in problem.demand.rates)
+    apt = problem.usual and problem.points_serve and moving and states <= MAX_STATES_GENERAL
+    if not apt:
+        return None
+    form = replace(problem.form, degree=DEGREE)
+    if states + inputs <= MAX_ROWS and len(problem.model.parameters) == 2:
+        return problem._replace(form=form, impose=SumOfSquares())
+    return problem._replace(form=form, solver=Solver(LYAPUNOV))

@@ -1,0 +1,144 @@
+"""The hypotheses of a certificate, as sentences: the misfit of the model and the code that is
+trusted.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from symheli.lpv import LPVStateSpace, Scheduling, UncertainStateSpace
+from symheli.lpv.bases.function_space import tensor_grid
+from symheli.lpv.trim_drift import PREFIX
+from synthesis.certify.statement.kind import Kind
+from synthesis.certify.statement.norm_bounded import open_block
+
+Array = np.ndarray
+
+NEGLIGIBLE_ENTRY = 1e-12
+"""Entries below this fraction of both their row's and their column's largest entry are rounding,
+and so is their misfit.
+"""
+
+VERIFIED = (
+    "verified in floating point: {what}; verify(rigorous=True) proves it in exact arithmetic, and"
+    " looks at some p once more through the model's own matrices: {shared} are shared by the search"
+    " for P and the proof"
+)
+
+
+MEANING: dict[Kind, str] = {
+    "l2 gain": (
+        "the gain is from zero initial state, |y|_2 < gamma |u|_2, all inputs to all outputs"
+        " together"
+    ),
+    "energy-to-peak gain": (
+        "the gain is from zero initial state, max_t |y(t)| < gamma |u|_2, the Euclidean norm of"
+        " all outputs"
+    ),
+    "h2 gain": (
+        "the variance of all outputs together, E|y(t)|^2 at every t from zero initial state, is"
+        " below gamma^2 for white noise of unit intensity at all inputs"
+    ),
+    "decay rate": "|x(t)| <= c exp(-alpha t) |x(0)| for some c, along every admissible p(t)",
+}
+
+
+def hypotheses(
+    kind: Kind,
+    parameters: Sequence[Scheduling],
+    rates: Sequence[float],
+    model: object,
+    found: Sequence[str],
+) -> tuple[str, ...]:
+    """Return sentences on how p may move, the misfit of the model, how the proof was `found`, and
+    the meaning of the bound.
+    """
+    moving = tuple(motion(s, rate) for s, rate in zip(parameters, rates, strict=True))
+    meaning = (MEANING[kind],) if kind in MEANING else ()
+    return (*moving, *perturbed(model), *fitted(model), *drifting(model), *found, *meaning)
+
+
+def perturbed(model: object) -> tuple[str, ...]:
+    """Return for which perturbations a statement on a set of models holds, and what its bound
+    means.
+    """
+    if not isinstance(model, UncertainStateSpace):
+        return ()
+    _, block = open_block(model, channels=False)
+    promise = (
+        "the bound on Delta holds"
+        if model.probability == 1.0
+        else f"the bound on Delta holds with probability {model.probability:g}"
+    )
+    return (block.sentence, f"{promise}: {model.source}")
+
+
+def motion(s: Scheduling, rate: float) -> str:
+    """The range and the rate of one parameter."""
+    unit = "" if s.unit == "1" else f" {s.unit}"
+    if isinstance(s.rate, str):
+        return (
+            f"{s.name} is in [{s.low:g}, {s.high:g}]{unit}, d{s.name}/dt is {s.rate}, which keeps"
+            f" to what lets {s.name} stay in that range"
+        )
+    speed = (
+        "arbitrarily fast"
+        if math.isinf(rate)
+        else "constant"
+        if rate == 0
+        else f"|d{s.name}/dt| <= {rate:g}{unit} per second"
+    )
+    return f"{s.name} is exogenous, in [{s.low:g}, {s.high:g}]{unit}, {speed}"
+
+
+def drifting(model: object) -> tuple[str, ...]:
+    """Return the neglected terms of a model about a moving trim, as a sentence."""
+    model = model.model if isinstance(model, UncertainStateSpace) else model
+    if not isinstance(model, LPVStateSpace):
+        return ()
+    if declared := [str(u) for u in model.inputs if u.startswith(PREFIX)]:
+        return (f"the drift of the moving trim is a declared disturbance: {', '.join(declared)}",)
+    if model.trim is None:
+        return ()
+    return (
+        "the drift of a moving trim, -x0'(p) dp/dt, is left out: it acts as a further disturbance",
+    )
+
+
+def fitted(model: object) -> tuple[str, ...]:
+    """Return the misfit of an interpolated or sampled model as a hypothesis; nothing for a model
+    without one.
+    """
+    model = model.model if isinstance(model, UncertainStateSpace) else model
+    if not isinstance(model, LPVStateSpace) or model.residuals is None:
+        return ()
+    count = {1: 41, 2: 13}.get(len(model.parameters), 5)
+    axes = [np.linspace(s.low, s.high, count) for s in model.parameters]
+    matrices = model.matrices(axes[0] if len(axes) == 1 else tensor_grid(axes))
+    worst, place = 0.0, ""
+    for name, own, residual in zip("ABCD", matrices, model.residuals.matrices, strict=True):
+        if not residual.size:
+            continue
+        size, off = np.abs(own).max(axis=0), np.abs(residual).max(axis=0)
+        size = np.maximum(size, off)
+        real = size > NEGLIGIBLE_ENTRY * np.minimum(
+            size.max(axis=0, keepdims=True), size.max(axis=1, keepdims=True)
+        )
+        ratio = np.where(real & (size > 0), off / np.where(size > 0, size, 1.0), 0.0)
+        if ratio.max() > worst:
+            worst, (i, j) = float(ratio.max()), np.unravel_index(int(ratio.argmax()), ratio.shape)
+            place = f", in {name}[{i + 1}, {j + 1}]"
+    what = (
+        "the interpolated model"
+        if model.dt is None
+        else f"the sampled model (p held over each {model.dt:g} s, entries fitted in p)"
+    )
+    return (
+        (
+            f"of {what}: an entry differs from what it was fitted to by at most {100 * worst:.2g} %"
+            f" of its largest value{place}"
+        ),
+    )

@@ -1,0 +1,119 @@
+"""The margins of a loop at values of its scheduling parameters, as a table."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from symheli.lpv import LinearModel, LPVStateSpace
+from symheli.lpv.frozen_plots import Model, frozen_at, parameters_of
+from symheli.values.drawing import label
+from symheli.values.labelled import frame
+from symheli.values.signal import Signal
+from synthesis.design.loops.margins import Margins, loop, margins
+
+if TYPE_CHECKING:
+    import pandas
+
+COLUMNS = (
+    Signal("gain down", "dB"),
+    Signal("gain up", "dB"),
+    Signal("phase", "deg"),
+    Signal("delay", "s"),
+    Signal("disk gain", "dB"),
+    Signal("disk phase", "deg"),
+    Signal("crossover", "rad/s"),
+)
+
+
+@dataclass(frozen=True)
+class MarginTable:
+    """Margins at each value of the parameters, as `margin_table` finds them.
+
+    `rows`: (p, Margins); printed in dB and degrees, the crossover the highest one.
+    """
+
+    names: tuple[Signal, ...]
+    rows: tuple[tuple[tuple[float, ...], Margins], ...]
+
+    def values(self) -> np.ndarray:
+        """(K, columns): p, then the margins in the units of the columns; NaN of a loop that is not
+        stable.
+        """
+        return np.array([[*p, *_numbers(m)] for p, m in self.rows])
+
+    def __str__(self) -> str:
+        heads = [f"{label(s):>18}" for s in (*self.names, *COLUMNS)]
+        lines = ["".join(f"{v:18.5g}" for v in row) for row in self.values()]
+        return "\n".join(["".join(heads), *lines])
+
+    __repr__ = __str__
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A row a value of the parameters. Raises `InputError` without pandas."""
+        columns = self.values().T
+        count = len(self.names)
+        index = list(zip(self.names, columns[:count], strict=True)) or [
+            (Signal("loop"), np.arange(len(self.rows)))
+        ]
+        return frame(index, list(zip(COLUMNS, columns[count:], strict=True)))
+
+
+def margin_table(
+    model: Model,
+    feedback: Mapping[tuple[str, str], float] | LinearModel | LPVStateSpace,
+    at: str,
+    p: object = None,
+) -> MarginTable:
+    """Compute the margins of the loop u = feedback y broken at one input, at values of the
+    parameters.
+
+    Parameters
+    ----------
+    model : LPVStateSpace, LFT, LinearFamily or LinearModel
+        The plant.
+    feedback : mapping, LinearModel or LPVStateSpace
+        As of `loop`; of an LPVStateSpace over the parameters of the plant the frozen controller.
+    at : str
+        The input at which the loop is broken.
+    p : array_like, optional
+        Values of the parameters; by default seven over the range, of a family its nodes.
+
+    Returns
+    -------
+    MarginTable
+        Prints as a table; `.rows`, `.to_frame()`.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        As `loop`; another type of model.
+
+    Examples
+    --------
+    >>> from symheli.lpv import LPVStateSpace, Scheduling
+    >>> p = Scheduling("p", "1", 0.0, 1.0)
+    >>> lag = LPVStateSpace.polynomial([[[0.0]]], [[[1.0]], [[1.0]]], [[[1.0]]], [[[0.0]]], p)
+    >>> found = margin_table(lag, {("u1", "y1"): -2.0}, "u1", [0.0, 1.0])  # 2(1 + p)/s
+    >>> [round(float(m.crossover[0]), 6) for _, m in found.rows]
+    [2.0, 4.0]
+    """
+    rows = []
+    for one in frozen_at(model, p):
+        there: Any = feedback.at(*one.p) if isinstance(feedback, LPVStateSpace) else feedback
+        rows.append((one.p, margins(loop(one.model, there, at))))
+    return MarginTable(parameters_of(model), tuple(rows))
+
+
+def _numbers(found: Margins) -> list[float]:
+    if not found.stable:
+        return [math.nan] * len(COLUMNS)
+    with np.errstate(divide="ignore"):
+        down, up, disk = 20 * np.log10([*found.gain, found.disk_gain[1]])
+    angles = np.degrees([found.phase, found.disk_phase])
+    crossover = max(found.crossover, default=math.nan)
+    return [down, up, angles[0], found.delay, disk, angles[1], crossover]

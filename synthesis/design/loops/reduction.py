@@ -1,0 +1,174 @@
+"""Reduction of a controller by its reachability and observability within the loop.
+
+The Gramians are those of the closed loop, the block of the controller's states: what disturbances
+do to them, and what they do to the performance, averaged over frozen p. One constant projection
+for all p keeps the dependence on p what it was (truncation with the closed loop as the weight:
+Enns 1984; Anderson and Liu, IEEE Trans. Automatic Control 34 (1989); one projection over p: Wood,
+Goddard and Glover, CDC 1996). The analysis of the loop shows whether it was too much.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+
+from symheli.errors import InputError, SynthesisError
+from symheli.lpv import LPVStateSpace
+from symheli.lpv.balanced_truncation import response_gramians
+from symheli.lpv.bases.polynomials import lobatto_points
+from synthesis.design.loops.controller import Controller
+from synthesis.numerics.linear.norm import norm, stable
+
+Array = np.ndarray
+
+NOT_STABLE = (
+    "the closed loop is not stable at every frozen p: it has no Gramians by which the states of"
+    " the controller could be reduced"
+)
+
+NODES = {1: 14, 2: 6}
+"""Values of each parameter at which the loop is evaluated (more parameters: 4)."""
+
+
+def reduced(controller: Controller, order: int) -> Controller:
+    """Return the controller with at most `order` states. It has no promised gain, and a note gives
+    the frozen gains of its loop and of the full one.
+
+    Raises `InputError` for an order below 0, `SynthesisError` where the loop is not stable at some
+    frozen p, before or after.
+    """
+    if isinstance(order, bool) or not isinstance(order, int | np.integer) or order < 0:
+        raise InputError(f"order: expected an integer >= 0, got {order!r}")
+    return controller if order >= controller.order else _FullController(controller).kept(order)
+
+
+def within(controller: Controller, loss: float) -> Controller:
+    """Return the controller of least order whose loop has a frozen gain at most the fraction `loss`
+    above the full one.
+
+    Raises `InputError` for a loss that is no number >= 0, `SynthesisError` where the loop is not
+    stable at some frozen p.
+    """
+    if isinstance(loss, bool) or not isinstance(loss, int | float) or not 0 <= loss < math.inf:
+        raise InputError(
+            f"loss: expected a number >= 0, such as 0.03 for 3 % more gain, got {loss!r}"
+        )
+    whole = frozen_gain(controller)
+    if math.isinf(whole):
+        raise SynthesisError(NOT_STABLE)
+    return fewest(controller, frozen_gain, (1 + loss) * whole)
+
+
+def fewest(
+    controller: Controller,
+    gain: Callable[[Controller], float],
+    limit: float,
+    orders: Iterable[int] | None = None,
+) -> Controller:
+    """Return the reduced controller of the first of the `orders` (None: every one, from 0 on) with
+    gain at most `limit`; the controller itself where there is none.
+    """
+    whole = _FullController(controller)
+    for order in range(controller.order) if orders is None else orders:
+        try:
+            fewer = whole.kept(order)
+        except SynthesisError:
+            continue
+        if gain(fewer) <= limit:
+            return fewer
+    return controller
+
+
+class _FullController:
+    """The controller of full order, with the Gramians and gain that all reductions use."""
+
+    def __init__(self, controller: Controller) -> None:
+        self.controller = controller
+
+    @cached_property
+    def directions(self) -> tuple[Array, Array]:
+        """(left (n, n), right (n, n)) of the states, in falling order of their Hankel
+        singular values in the loop; the first rows and columns project on a reduced order.
+        """
+        P, Q = gramians(self.controller)
+        L, R = _root(P), _root(Q)
+        U, s, Vt = np.linalg.svd(R.T @ L)
+        size = np.sqrt(np.maximum(s, 1e-300))
+        return (U / size).T @ R.T, L @ Vt.T / size
+
+    @cached_property
+    def gain(self) -> float:
+        """Frozen gain of the full loop."""
+        return frozen_gain(self.controller)
+
+    def kept(self, order: int) -> Controller:
+        """Return the controller of `order` states; raises `SynthesisError` where the loop is not
+        stable.
+        """
+        controller, n = self.controller, self.controller.order
+        left, right = self.directions[0][:order], self.directions[1][:, :order]
+        model = controller.model
+        projected = replace(
+            model,
+            A=left @ model.A @ right,
+            B=left @ model.B,
+            C=model.C @ right,
+            states=tuple(f"k{i + 1}" for i in range(order)),  # type: ignore[arg-type]
+            trim=None,
+            residuals=None,
+        )
+        made = replace(
+            controller,
+            model=projected,
+            method=f"{controller.method}, {order} of {n} states kept",
+            promised=math.nan,
+            optimum=None,
+        )
+        gain = frozen_gain(made)
+        if math.isinf(gain):
+            raise SynthesisError(
+                f"with {order} of {n} states the closed loop is not stable at every frozen p: keep"
+                " more, or reduce(loss=0.03) finds the least order"
+            )
+        note = (
+            f"the largest gain of the loop at frozen p is {gain:.6g}, {self.gain:.6g} of all {n}"
+            " states"
+        )
+        return replace(made, notes=(note,))
+
+
+def frozen_gain(controller: Controller) -> float:
+    """Return the largest H-infinity norm of the frozen loops, inf where one is not stable."""
+    loop: LPVStateSpace = controller.closed()
+    every = zip(*loop.matrices(_conditions(loop)), strict=True)
+    return max(norm(*each, loop.dt)[0] for each in every)
+
+
+def gramians(controller: Controller) -> tuple[Array, Array]:
+    """Return the reachability and observability Gramians (n, n) of the controller's states in the
+    loop: means over frozen p, each in units of its own size.
+    """
+    closed: LPVStateSpace = controller.closed()
+    n = controller.order
+    A, B, C, _ = closed.matrices(_conditions(closed))
+    P, Q = np.zeros((n, n)), np.zeros((n, n))
+    for each in zip(A, B, C, strict=True):
+        if not stable(np.linalg.eigvals(each[0]), closed.dt):
+            raise SynthesisError(NOT_STABLE)
+        seen, reach = response_gramians(*each, closed.dt)
+        P += reach[-n:, -n:]
+        Q += seen[-n:, -n:]
+    return P / len(A), Q / len(A)
+
+
+def _conditions(loop: LPVStateSpace) -> Array:
+    return lobatto_points(NODES.get(len(loop.parameters), 4), loop.box)
+
+
+def _root(M: Array) -> Array:
+    values, vectors = np.linalg.eigh(0.5 * (M + M.T))
+    return vectors * np.sqrt(np.maximum(values, 1e-14 * values[-1]))

@@ -1,0 +1,137 @@
+"""Loop shaping over p: weights shape the loop at every p, the controller makes it robust."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+from symheli.errors import InputError
+from symheli.lpv import LinearModel, LPVStateSpace, series
+from symheli.lpv.mixing import itself, mixed
+from symheli.values.sample_period import same_period
+from symheli.values.signal import Signal
+from synthesis.certify.lower_bounds.rates import Rate
+from synthesis.certify.statement.impose import Grid
+from synthesis.design.loops.controller import Controller
+from synthesis.design.lpv.output_feedback import output_feedback
+from synthesis.design.lpv.search import BACK_OFF
+from synthesis.design.lti.weights import Weight, as_weight
+from synthesis.design.plant.plant import Plant
+from synthesis.numerics.program.bases import Dependence
+
+
+class LoopShaping(NamedTuple):
+    """`controller`, W1 K W2, of the plant itself: u = W1 K W2 y, positive feedback; `shaped`, K of
+    W2 G W1.
+
+    `shaped.promised` is the gain from noise at the outputs and a disturbance at the inputs of the
+    shaped plant to its inputs and outputs; at frozen p the inverse of the coprime stability margin.
+    `shaped.certify()` proves it.
+    """
+
+    controller: LPVStateSpace
+    shaped: Controller
+
+
+def loop_shaping(
+    G: LPVStateSpace,
+    W1: Weight | LPVStateSpace = 1.0,
+    W2: Weight | LPVStateSpace = 1.0,
+    rate: Rate = None,
+    *,
+    X: Dependence | None = None,
+    Y: Dependence | None = None,
+    back_off: float | Sequence[float] = BACK_OFF,
+    impose: Grid | None = None,
+) -> LoopShaping:
+    """Design the scheduled controller of the least gain [K; I] (I - W2 G W1 K)^-1 [I, W2 G W1] of a
+    plant shaped by weights: `output_feedback` of the problem that `ncf` solves at one p.
+
+    Parameters
+    ----------
+    G : LPVStateSpace
+        The plant, continuous or sampled.
+    W1, W2 : weight or LPVStateSpace
+        Before and behind it, as for `ncf`; also over the same parameters.
+    rate, X, Y, back_off, impose
+        As for `output_feedback`.
+
+    Returns
+    -------
+    LoopShaping
+        The controller of the plant, and that of the shaped plant with what it promises.
+
+    Raises
+    ------
+    InputError
+        Another kind of model; weights as for `ncf`; otherwise as `output_feedback`.
+    SynthesisError
+        As `output_feedback`.
+
+    References
+    ----------
+    McFarlane and Glover, IEEE Trans. Automatic Control 37 (1992), with a gain over p(t) in place of
+    the H-infinity norm; `lpvncfsyn` of LPVTools.
+
+    Examples
+    --------
+    An integrator, whose optimum is sqrt(2) while its gain p is at rest:
+
+    >>> from symheli.lpv import LPVStateSpace, Scheduling
+    >>> p = Scheduling("p", "1", 1.0, 2.0, rate=0.1)
+    >>> G = LPVStateSpace.polynomial([[[0.0]]], [[[0.0]], [[1.0]]], [[[1.0]]], [[[0.0]]], p)
+    >>> made = synthesis.loop_shaping(G, W1=0.5)
+    >>> bool(1.414 < made.shaped.optimum < 1.5), made.controller.inputs == G.outputs
+    (True, True)
+    """
+    if not isinstance(G, LPVStateSpace):
+        raise InputError(
+            f"G: expected an LPVStateSpace, got {type(G).__name__}; ncf takes one linear model"
+        )
+    before = _weight(W1, "W1", G.inputs, G.dt)
+    behind = _weight(W2, "W2", G.outputs, G.dt)
+    shaped = series(series(before, G), behind)
+    made = output_feedback(_four_block(shaped), rate, X=X, Y=Y, back_off=back_off, impose=impose)
+    made = replace(made, method=f"loop shaping, {made.method}")
+    return LoopShaping(series(series(behind, made.model), before), made)
+
+
+def _weight(
+    given: Any, name: str, channels: Sequence[Signal], dt: float | None
+) -> LinearModel | LPVStateSpace:
+    """Return the weight on these channels, from and to signals of their names."""
+    if isinstance(given, int | float) and given == 0:
+        raise InputError(f"{name}: expected a weight that is not 0, which opens the loop")
+    if not isinstance(given, LPVStateSpace):
+        return as_weight(given, name, channels, dt)
+    if len(given.inputs) != len(channels) or len(given.outputs) != len(channels):
+        raise InputError(
+            f"{name}: expected a weight of {len(channels)} channels ({', '.join(channels)}), got"
+            f" one from {len(given.inputs)} to {len(given.outputs)}"
+        )
+    if not same_period(given.dt, dt):
+        raise InputError(
+            f"{name}: its sample period is {given.dt} s, the model's {dt} s; make them equal"
+        )
+    states = tuple(Signal(f"{name}_{s}", s.unit) for s in given.states)
+    return replace(given, states=states, inputs=tuple(channels), outputs=tuple(channels))
+
+
+def _four_block(G: LPVStateSpace) -> Plant:
+    """Return the plant of `ncf` over p: from noise on y and a disturbance of u to u and y."""
+    noise = {Signal(f"{y}_noise", y.unit): y for y in G.outputs}
+    disturbance = {Signal(f"{u}_disturbance", u.unit): u for u in G.inputs}
+    inputs = {
+        **{n: {} for n in noise},
+        **{d: {u: 1.0} for d, u in disturbance.items()},
+        **itself(G.inputs),
+    }
+    across = {y: {n: 1.0} for n, y in noise.items()}
+    return Plant(
+        mixed(G, inputs, itself(G.outputs), across),
+        disturbances=(*noise, *disturbance),
+        performance=(*G.inputs, *G.outputs),
+        controls=G.inputs,
+        measurements=G.outputs,
+    )

@@ -1,0 +1,1 @@
+"""Linear time-invariant models: H-infinity norm, Riccati equations, balancing of matrices."""

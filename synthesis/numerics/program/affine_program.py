@@ -1,0 +1,216 @@
+"""Semidefinite programs in matrices that are unknown functions of p, imposed by Bernstein
+coefficients.
+
+At each p an inequality is affine in the values of these matrices there. It is kept as an array
+(1 + e, K, N, N): its known part, then the factor of each entry of the values, at the K nodes of a
+cell. Sums, products with known matrices (K, ., .) and block matrices of such arrays are NumPy's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import reduce
+from itertools import pairwise, product
+from typing import NamedTuple
+
+import numpy as np
+from scipy import sparse
+
+from symheli.lpv import FunctionSpace
+from symheli.lpv.bases.function_space import tensor_grid
+from symheli.lpv.bases.polynomials import interpolation_points
+from synthesis.numerics.polynomial.bernstein import blossom
+from synthesis.numerics.polynomial.symmetric import basis as symmetric_basis
+from synthesis.numerics.polynomial.symmetric import svec, symmetrized
+from synthesis.numerics.program.cone_program import ConeProgram, Solver, SolverPoint, solve
+from synthesis.numerics.program.unknown import UnknownFunction
+
+Array = np.ndarray
+
+MARGIN = 1e-8
+"""Every inequality is imposed as >= this multiple of the identity."""
+
+
+class BernsteinCell(NamedTuple):
+    """A box of the parameters: `nodes` (K, m) inside it, and `to_bernstein` (q, K) from values
+    there to Bernstein coefficients of degrees that take them exactly.
+    """
+
+    nodes: Array
+    to_bernstein: Array
+
+
+def cells(breaks: Sequence[Sequence[float]], degrees: Sequence[int]) -> list[BernsteinCell]:
+    """Return one cell between every two breaks of each parameter, for polynomials of these
+    degrees.
+    """
+    units = [interpolation_points([d], [(0.0, 1.0)]) for d in degrees]
+    maps = [
+        np.linalg.inv([blossom([t] * d) for t in unit])
+        for unit, d in zip(units, degrees, strict=True)
+    ]
+    return [
+        BernsteinCell(
+            tensor_grid([a + (b - a) * unit for (a, b), unit in zip(sides, units, strict=True)]),
+            reduce(np.kron, maps),
+        )
+        for sides in product(*(list(pairwise(b)) for b in breaks))
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class MatrixVariable:
+    """A matrix that is an unknown function of p.
+
+    Its value at p is a sum of `entries` (e, a, b), whose factors are the functions of `unknown`;
+    `columns` (k, e) are the numbers of their coefficients in the program. `here` and `along` are
+    the places of the factors and of their derivatives among the values at p.
+    """
+
+    unknown: UnknownFunction
+    entries: Array
+    columns: Array
+    here: slice
+    along: slice
+
+    def coefficients(self, x: Array) -> Array:
+        """Return the coefficients (k, a, b) of the functions at the solver's point x."""
+        return np.tensordot(x[self.columns], self.entries, axes=1)
+
+    def at(self, x: Array, p: Array) -> Array:
+        """Return the values (K, a, b) at p (K, m)."""
+        return self.unknown.at(self.coefficients(x), p)
+
+
+class AffineProgram:
+    """minimise c' x subject to inequalities in the values of variables, which are all declared
+    before the first of these.
+    """
+
+    def __init__(self) -> None:
+        self.variables: list[MatrixVariable] = []
+        self.count, self.values = 0, 1
+        self._zero: list[tuple[sparse.csr_matrix, Array]] = []
+        self._positive: list[tuple[sparse.csr_matrix, Array]] = []
+        self._sizes: list[int] = []
+
+    def variable(self, entries: Array, basis: FunctionSpace) -> MatrixVariable:
+        """Add a matrix that is a sum of `entries` (e, a, b), each times functions of this basis."""
+        e = len(entries)
+        columns = self.count + np.arange(basis.size * e).reshape(basis.size, e)
+        here = slice(self.values, self.values + e)
+        along = slice(here.stop, here.stop + (e if basis.size > 1 else 0))
+        made = MatrixVariable(UnknownFunction(basis, 0), entries, columns, here, along)
+        self.count, self.values = self.count + columns.size, along.stop
+        self.variables.append(made)
+        return made
+
+    def symmetric(self, n: int, basis: FunctionSpace) -> MatrixVariable:
+        """Add a symmetric matrix (n, n)."""
+        return self.variable(symmetric_basis(n), basis)
+
+    def full(self, rows: int, columns: int, basis: FunctionSpace) -> MatrixVariable:
+        """Add a matrix (rows, columns) without structure."""
+        return self.variable(np.eye(rows * columns).reshape(-1, rows, columns), basis)
+
+    def known(self, M: Array) -> Array:
+        """Return a given matrix (..., a, b) in the format of the variables' values."""
+        M = M if M.ndim > 2 else M[None]
+        out = np.zeros((self.values, *M.shape))
+        out[0] = M
+        return out
+
+    def value(self, variable: MatrixVariable) -> Array:
+        """Return the variable at p."""
+        return self._placed(variable.entries, variable.here)
+
+    def slope(self, variable: MatrixVariable) -> Array:
+        """Return its derivative along the motion of p for which the inequality is imposed."""
+        moving = variable.along.stop - variable.along.start
+        return self._placed(variable.entries[:moving], variable.along)
+
+    def _placed(self, entries: Array, where: slice) -> Array:
+        out = np.zeros((self.values, 1, *entries.shape[1:]))
+        out[where, 0] = entries
+        return out
+
+    def positive(self, cell: BernsteinCell, F: Array, motion: Array | None = None) -> None:
+        """Impose F(p) >= `MARGIN` on the cell, by its Bernstein coefficients, for the motion dp/dt
+        (K, m) at its nodes.
+        """
+        v = svec(symmetrized(np.broadcast_to(F, (len(F), len(cell.nodes), *F.shape[-2:]))))
+        v[0] -= MARGIN * svec(np.eye(F.shape[-1]))
+        for weights in cell.to_bernstein:
+            self._positive.append(self._row(weights, v, cell, motion))
+            self._sizes.append(F.shape[-1])
+
+    def zero(self, cell: BernsteinCell, F: Array) -> None:
+        """Impose F(p) = 0 at the nodes of the cell."""
+        v = np.broadcast_to(F, (len(F), len(cell.nodes), *F.shape[-2:]))
+        v = v.reshape(*v.shape[:2], -1)
+        for weights in np.eye(len(cell.nodes)):
+            A, b = self._row(weights, v, cell, None)
+            there = np.diff(A.indptr) + (b != 0) > 0
+            self._zero.append((A[there], b[there]))
+
+    def nonnegative(self, cell: BernsteinCell, F: Array) -> None:
+        """Impose F >= 0 for a number F, which is the same all over the cell."""
+        v = np.broadcast_to(F[..., 0], (len(F), len(cell.nodes), 1))
+        self._positive.append(self._row(cell.to_bernstein[0], v, cell, None))
+        self._sizes.append(1)
+
+    def _row(
+        self, weights: Array, v: Array, cell: BernsteinCell, motion: Array | None
+    ) -> tuple[sparse.csr_matrix, Array]:
+        """Return the sum of the values v (1 + e, K, L) at the nodes with these weights (K,):
+        factors (L, count) of x and the constant (L,).
+        """
+        out = np.zeros((v.shape[-1], self.count))
+        for each in self.variables:
+            functions = [(each.here, each.unknown.values(cell.nodes))]
+            if motion is not None:
+                functions.append((each.along, each.unknown.slopes(cell.nodes, motion)))
+            for where, f in functions:
+                if np.any(v[where]):
+                    part = np.tensordot(weights[:, None] * f, v[where], axes=(0, 1))
+                    out[:, each.columns] += np.moveaxis(part, -1, 0)
+        return sparse.csr_matrix(out), weights @ v[0]
+
+    def placed(self, columns: Array, count: int) -> tuple[sparse.csr_matrix, Array]:
+        """Return the rows A, b of its inequalities, A x + b in the cones of `sizes`, in a program
+        of `count` variables, which has the variables of this one at `columns`.
+        """
+        to = sparse.csr_matrix(
+            (np.ones(self.count), (range(self.count), columns)), (self.count, count)
+        )
+        A = sparse.vstack([A for A, _ in self._positive])
+        return sparse.csr_matrix(A @ to), np.concatenate([b for _, b in self._positive])
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """Numbers of rows of the matrices that are positive semidefinite."""
+        return tuple(self._sizes)
+
+    def minimise(self, cost: Array, solver: Solver) -> SolverPoint:
+        """Return the solver's candidate for the least cost' x."""
+        rows = [*self._zero, *self._positive]
+        A = sparse.csc_matrix(sparse.vstack([-A for A, _ in rows]))
+        b = np.concatenate([b for _, b in rows])
+        equalities = sum(len(b) for _, b in self._zero)
+        return solve(ConeProgram(cost, A, b, tuple(self._sizes), equalities), solver)
+
+
+def from_lower(rows: Sequence[Sequence[Array | None]]) -> Array:
+    """Return the symmetric block matrix of its lower triangle, None for a block of zeros."""
+    ends = np.cumsum([0, *(row[-1].shape[-1] for row in rows)])  # type: ignore[union-attr]
+    at = [slice(a, b) for a, b in pairwise(ends)]
+    there = [(i, j, M) for i, row in enumerate(rows) for j, M in enumerate(row) if M is not None]
+    leading = np.broadcast_shapes(*(M.shape[:-2] for _, _, M in there))
+    dtype = np.result_type(*(M.dtype for _, _, M in there))
+    out = np.zeros((*leading, ends[-1], ends[-1]), dtype=dtype)
+    for i, j, M in there:
+        out[..., at[i], at[j]] = M
+        if i != j:
+            out[..., at[j], at[i]] = np.swapaxes(M, -1, -2)
+    return out

@@ -1,0 +1,145 @@
+"""The largest gain of a model with several uncertain things at once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import brentq
+
+from symheli.lpv import LFT, LPVStateSpace
+from symheli.threads import with_one_thread
+from symheli.values.summary import summarized
+from synthesis.numerics.linear.norm import norm
+from synthesis.robust.lower_bound import ACCURACY, ROUGH, best_reals, worst_closing
+from synthesis.robust.structure import BlockLoop, DynamicBlock, loop_of
+from synthesis.robust.upper_bound import proven_level
+
+LARGEST_RATIO = 1e6
+"""A gain this many times that without dynamics counts as none."""
+
+
+class WorstCaseGain(NamedTuple):
+    """The gain of every model of the set is below `upper`; that of the model with the parameters at
+    `p` (of several a tuple) and a `perturbation` of this response at `omega` (rad/s) is `lower`.
+
+    `perturbation` (inputs, outputs of the blocks in their order); without a block None. Both gains
+    are inf where a model of the set is unstable.
+    """
+
+    lower: float
+    upper: float
+    p: float | tuple[float, ...]
+    omega: float
+    perturbation: np.ndarray | None = None
+
+    __repr__ = summarized
+
+
+@with_one_thread
+def worst_case_gain(
+    model: LFT | LPVStateSpace, blocks: Sequence[DynamicBlock] = ()
+) -> WorstCaseGain:
+    """Compute the largest L2 gain of a model over its constant parameters and blocks of any linear
+    dynamics, from the channels that belong to no block.
+
+    The lower bound is attained by what is returned; the upper one is proven by D and G scalings
+    over intervals of frequency that leave none out, in floating point. For parameters that move,
+    and one block, `l2_gain` of an `UncertainStateSpace`.
+
+    Parameters
+    ----------
+    model, blocks
+        As of `robust_margin`.
+
+    Returns
+    -------
+    WorstCaseGain
+        Both bounds, in units of the outputs per unit of the inputs.
+
+    Raises
+    ------
+    InputError
+        As of `robust_margin`; no channel besides those of the blocks.
+    UnknownNameError
+        A channel that the model does not have.
+
+    References
+    ----------
+    `wcgain` of MATLAB; Fan, Tits and Doyle, IEEE Trans. Automatic Control 36 (1991).
+
+    Examples
+    --------
+    x' = -(2 - k - delta) x + u with |k| <= 1/2 and |delta| <= 1/2; the worst gain is 1:
+
+    >>> from symheli.lpv import LPVStateSpace, Scheduling
+    >>> k = Scheduling("k", "1", -0.5, 0.5)
+    >>> lag = LPVStateSpace.polynomial(
+    ...     [[[-2.0]], [[1.0]]], [[[1.0, 1.0]]], [[[1.0], [1.0]]], [np.zeros((2, 2))], k,
+    ...     inputs=["u", "d"], outputs=["y", "v"])
+    >>> found = worst_case_gain(lag, [DynamicBlock(["d"], ["v"], 0.5)])
+    >>> print(f"{found.lower:.3f}", bool(1.0 <= found.upper < 1.01), round(found.p, 3))
+    1.000 True 0.5
+    """
+    loop = loop_of(model, blocks, performance=True)
+    nowhere = loop.physical(np.zeros(loop.reals))
+    if not loop.stable:
+        return WorstCaseGain(math.inf, math.inf, nowhere, math.nan)
+    negative, d = best_reals(lambda d: -_gain(loop.closed(d))[0], loop.reals)
+    lower, omega, delta = _gain(loop.closed(d), refine=True)
+    if math.isinf(negative) or math.isinf(lower):
+        return WorstCaseGain(math.inf, math.inf, loop.physical(d), math.nan)
+    if lower == 0.0:
+        return WorstCaseGain(0.0, 0.0, nowhere, math.nan)
+    proven = proven_level(loop, lower, performance=True)
+    inner = None
+    if delta is not None:  # without the last block, the performance
+        last = loop.parts[-1]
+        columns, rows = last.columns.stop - last.columns.start, last.rows.stop - last.rows.start
+        inner = loop.unscaled(delta, omega)[: len(delta) - columns, : len(loop.sizes) - rows]
+    return WorstCaseGain(lower, proven.level, loop.physical(d), loop.frequency(omega), inner)
+
+
+def _gain(closed: BlockLoop, refine: bool = False) -> tuple[float, float, np.ndarray | None]:
+    """Return the largest gain found of a loop of full blocks, its last part the performance, the
+    frequency, and the blocks; inf where the loop may be unstable.
+    """
+    if not closed.stable:
+        return math.inf, math.nan, None
+    part = closed.parts[-1]
+    own = norm(
+        closed.A, closed.B[:, part.columns], closed.C[part.rows], closed.D[part.rows, part.columns]
+    )
+    if len(closed.parts) == 1:
+        return own[0], own[1], None
+
+    def at(gamma: float) -> BlockLoop:
+        rows = np.ones(len(closed.C))
+        rows[part.rows] /= gamma
+        return closed._replace(C=rows[:, None] * closed.C, D=rows[:, None] * closed.D)
+
+    inner = closed._replace(
+        B=closed.B[:, : part.columns.start],
+        C=closed.C[: part.rows.start],
+        D=closed.D[: part.rows.start, : part.columns.start],
+        parts=closed.parts[:-1],
+    )
+    if worst_closing(inner, refine).level >= 1:
+        return math.inf, math.nan, None
+    start = own[0] or 1e-12
+
+    def excess(x: float) -> float:
+        return worst_closing(at(start * math.exp(x)), refine).level - 1
+
+    top = 1.0
+    while excess(top) > 0:
+        top *= 2
+        if top > math.log(LARGEST_RATIO):
+            return math.inf, math.nan, None
+    if excess(0.0) <= 0:
+        return own[0], own[1], np.zeros((closed.B.shape[1], len(closed.C)), complex)
+    gamma = start * math.exp(float(brentq(excess, 0.0, top, xtol=ACCURACY if refine else ROUGH)))  # type: ignore[arg-type]
+    found = worst_closing(at(gamma), refine)
+    return gamma, found.omega, found.delta
