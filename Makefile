@@ -1,4 +1,5 @@
 # make study : set up .venv and run the main job     make test : set up .venv and run the default tests
+# make guards : the rules of the house, forged and damaged files, second witnesses, the public surface; part of make test
 # make docs : the site in build/site; its blocks are run, and what they print is compared with the pages
 # make test-all : lint, slow tests, the site, the lowest versions of pyproject.toml, no compiler, no extras, wheel and sdist (.ci/gates)
 # Python >= 3.11 as python3; PYTHON=... for another one.
@@ -8,7 +9,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: study quick test test-all slow docs lint lowest no-compiler no-extras packaging bench clean
+.PHONY: study quick test guards test-all slow docs lint lowest no-compiler no-extras packaging bench clean
 .NOTPARALLEL: # test-all stops at the first that fails, and make names it
 
 $(STAMP): pyproject.toml constraints.txt setup.py $(wildcard identification/recursive/kernel/*.[ch])
@@ -24,9 +25,12 @@ quick: $(STAMP)
 	$(BIN)/symheli study --quick
 
 # what one process has compiled, the others and the programs that tests start read, whatever the environment says
-test slow: export PYTHONDONTWRITEBYTECODE :=
+test guards slow: export PYTHONDONTWRITEBYTECODE :=
 test: $(STAMP)
 	$(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadfile
+
+guards: $(STAMP)
+	$(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadfile -m guard
 
 test-all: lint slow docs lowest no-compiler no-extras packaging
 

@@ -36,7 +36,7 @@ MUTANTS = (
         "synthesis/numerics/polynomial/pieces.py",
         "        if not a < b:\n",
         "        if not b - a > 1e-9 * (high - low):\n",
-        "tests/synthesis/test_no_false_proof.py",
+        "tests/synthesis/certify/test_no_false_proof.py",
     ),
     Mutant(
         "slopes below 1e-12 of the whole controller are left out",

@@ -15,7 +15,7 @@ from evidence.seeds import over_seeds, parser_of, seeds_of
 from evidence.tables import DOCS, keep, markdown, parsed
 from identification import frequency_response
 from studies.output import as_json
-from studies.transition.flights import NOISE_DB, autopilot_for
+from studies.setup.flights import NOISE_DB, autopilot_for
 from symheli import AirspeedSchedule, Excitation, FlightRecord, Helicopter
 from symheli.values.arrays import Array
 

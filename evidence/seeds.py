@@ -14,7 +14,7 @@ from typing import Any
 
 from studies.campaigns.runners import results, runner
 from studies.output import progress
-from studies.transition.stored_stages import PACKAGES, Stored, StoredStages, code_digest
+from studies.setup.stored_stages import PACKAGES, Stored, StoredStages, code_digest
 
 
 def parser_of(about: str | None, seeds: str, quick: int = 2) -> argparse.ArgumentParser:

@@ -16,8 +16,8 @@ from evidence.marks.calibrated import start_of
 from evidence.seeds import over_seeds, parser_of, seeds_of
 from evidence.tables import DOCS, keep, markdown, parsed
 from identification import calibrate
+from studies.autopilot.tuned import QUANTITIES, LoopMargins, loop_margins
 from studies.known_kinematics.models import PAIRS
-from studies.loops.tuned import QUANTITIES, LoopMargins, loop_margins
 from studies.output import as_json
 from symheli import AirspeedSchedule, Excitation, Helicopter
 from symheli.flight import HelicopterLoops

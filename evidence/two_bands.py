@@ -21,8 +21,8 @@ from evidence.seeds import over_seeds, parser_of, seeds_of
 from evidence.tables import DOCS, keep, markdown, parsed
 from identification import calibrate, frequency_response
 from identification.judge.frequency_response import FrequencyResponse
+from studies.autopilot.tuned import DEVIATIONS
 from studies.known_kinematics.models import PAIRS
-from studies.loops.tuned import DEVIATIONS
 from studies.output import as_json
 from symheli import Helicopter
 from symheli.errors import TrimError
@@ -92,7 +92,9 @@ def of_seed(seed: int) -> Bands:
     for one in found.draws(DRAWS, seed):
         try:
             drawn.append(response(one))
-        except TrimError:  # as `studies.loops.tuned` leaves it out: the one that flew has a trim
+        except (
+            TrimError
+        ):  # as `studies.autopilot.tuned` leaves it out: the one that flew has a trim
             continue
     calibrated = response(found.heli)
     spread = np.sqrt(np.mean(np.abs(np.array(drawn) - calibrated) ** 2, axis=0))

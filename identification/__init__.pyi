@@ -76,7 +76,6 @@ from identification.judge.frozen_stability import (
 from identification.judge.frozen_stability import (
     frozen_stability as frozen_stability,
 )
-from identification.judge.matrix_ellipsoid import matrix_ellipsoid as matrix_ellipsoid
 from identification.judge.order_scan import order_scan as order_scan
 from identification.judge.residuals import residual_analysis as residual_analysis
 from identification.judge.residuals import theil as theil
@@ -92,6 +91,7 @@ from identification.judge.unseen_flight import unseen_flight as unseen_flight
 from identification.model.coefficients import Coefficients as Coefficients
 from identification.model.kinematic_model import KinematicModel as KinematicModel
 from identification.model.lpvarx_model import LPVARXModel as LPVARXModel
+from identification.model.matrix_ellipsoid import matrix_ellipsoid as matrix_ellipsoid
 from identification.model.noise_model import NoiseModel as NoiseModel
 from identification.model.prediction import fit_percent as fit_percent
 from identification.model.state_space_model import StateSpaceModel as StateSpaceModel

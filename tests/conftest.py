@@ -28,12 +28,12 @@ TOGETHER = {
 
 LONGEST = (
     "the report",
-    "tests/synthesis/test_about_the_model_given.py",
-    "tests/synthesis/test_uncertain_models.py",
-    "tests/synthesis/test_never_call_unstable_stable.py",
+    "tests/synthesis/certify/test_about_the_model_given.py",
+    "tests/synthesis/certify/test_uncertain_models.py",
+    "tests/synthesis/certify/test_never_call_unstable_stable.py",
     "tests/records/test_kinematic_check.py",
-    "tests/synthesis/test_order_of_bounds.py",
-    "tests/synthesis/test_tied_rates.py",
+    "tests/synthesis/certify/test_order_of_bounds.py",
+    "tests/synthesis/certify/test_tied_rates.py",
     "tests/synthesis/design/test_certify.py",
     "tests/synthesis/design/test_wrong_parameter.py",
     "tests/studies/test_resumed_study.py",

@@ -30,7 +30,7 @@ from identification import (
 )
 from identification.judge.frozen_models import continuous_poles
 from studies.output import as_json
-from studies.transition.comparison import SCALES
+from studies.setup.axes import SCALES
 from symheli.flight import AirspeedSchedule, Excitation, Servo
 from symheli.lpv import FunctionSpace, LinearModel
 from symheli.records import FlightRecord

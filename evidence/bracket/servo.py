@@ -11,12 +11,13 @@ import numpy as np
 
 import symheli
 from studies.output import progress
-from studies.transition import axes, gain_tables, guarantees
-from studies.transition.axes import LATERAL
-from studies.transition.certificates import bound_to_dict
+from studies.setup import axes
+from studies.setup.axes import LATERAL
+from studies.setup.bounds import Bound
+from studies.setup.certificates import bound_to_dict
+from studies.setup.flights import TOP, TransitionPlan, autopilot_for
+from studies.transition import gain_tables, guarantees
 from studies.transition.effort import Effort
-from studies.transition.flights import TOP, TransitionPlan, autopilot_for
-from studies.transition.guarantees import Bound
 from symheli import Helicopter
 from synthesis import GainCurve, Spline
 

@@ -22,7 +22,7 @@ from evidence.tables import DOCS, keep, parsed
 from studies.loops.lateral import lateral_loop
 from studies.loops.longitudinal import longitudinal_loop
 from studies.output import as_json, progress
-from studies.transition.flights import TransitionPlan, autopilot_for
+from studies.setup.flights import TransitionPlan, autopilot_for
 from symheli import Helicopter, LPVStateSpace
 from synthesis import Search
 

@@ -20,7 +20,7 @@ from studies.known_kinematics.flights import aggressive
 from studies.known_kinematics.models import PAIRS
 from studies.known_kinematics.truth import FrozenAxes, Truth
 from studies.output import as_json
-from studies.transition.flights import autopilot_for
+from studies.setup.flights import autopilot_for
 from symheli import DataWarning, Helicopter
 from symheli.errors import TrimError
 from symheli.values.arrays import Array

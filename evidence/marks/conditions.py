@@ -25,7 +25,7 @@ from studies.known_kinematics.conditions import (
 from studies.known_kinematics.models import PAIRS
 from studies.known_kinematics.truth import SPEEDS
 from studies.output import as_json
-from studies.transition.guarantees import PERIOD
+from studies.setup.bounds import PERIOD
 from symheli import DataWarning, SimulatedFlight
 
 FOUND_WITHIN = 0.002

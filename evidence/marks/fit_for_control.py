@@ -23,7 +23,7 @@ from studies.known_kinematics.models import INPUTS, PAIRS, SCHEDULING
 from studies.known_kinematics.truth import SCALES, Truth
 from studies.loops.robust_lateral import FEEDBACK, SIZES
 from studies.output import as_json
-from studies.transition.flights import TOP
+from studies.setup.flights import TOP
 from symheli import FlightRecord, SimulatedFlight, Wind
 from symheli.errors import DataWarning, SymheliError
 

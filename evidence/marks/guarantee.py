@@ -27,8 +27,9 @@ from studies.known_kinematics.truth import Truth
 from studies.loops.exact_lateral import ExactLateral
 from studies.loops.robust_lateral import FEEDBACK
 from studies.output import as_json, progress
-from studies.transition.flights import TOP, autopilot_for
-from studies.transition.guarantees import PERIOD, scaled
+from studies.setup.bounds import PERIOD
+from studies.setup.flights import TOP, autopilot_for
+from studies.transition.guarantees import scaled
 from symheli import Helicopter, SimulatedFlight
 from synthesis import Certificate
 

@@ -20,8 +20,8 @@ from studies.known_kinematics.models import PAIRS, identified
 from studies.known_kinematics.predictions import HORIZON, OUTPUTS, fits_of, states_of
 from studies.known_kinematics.truth import SPEEDS, Truth, frozen_axes
 from studies.output import as_json
-from studies.transition.comparison import along_the_command
-from studies.transition.flights import TOP, autopilot_for, light_turbulence
+from studies.setup.accelerating_baseline import along_the_command
+from studies.setup.flights import TOP, autopilot_for, light_turbulence
 from symheli import FlightRecord, Helicopter, Wind
 from symheli.values.arrays import Array
 

@@ -18,8 +18,9 @@ from studies.known_kinematics.models import PAIRS, identified
 from studies.known_kinematics.robust_loop import FORM, robust_loop
 from studies.loops.exact_lateral import ExactLateral
 from studies.loops.robust_lateral import FEEDBACK
-from studies.transition.flights import TOP, autopilot_for
-from studies.transition.guarantees import PERIOD, scaled
+from studies.setup.bounds import PERIOD
+from studies.setup.flights import TOP, autopilot_for
+from studies.transition.guarantees import scaled
 from symheli import Helicopter
 
 RATE = 3.0

@@ -16,8 +16,8 @@ from identification import FilterError, KinematicModel, fit, unseen_flight
 from studies.known_kinematics.conditions import CONDITIONS, Instruments
 from studies.known_kinematics.flights import aggressive, transition
 from studies.known_kinematics.models import PAIRS, identified
-from studies.transition.flights import TOP, autopilot_for
-from studies.transition.guarantees import PERIOD
+from studies.setup.bounds import PERIOD
+from studies.setup.flights import TOP, autopilot_for
 from symheli import DataWarning, FlightPlan, Helicopter, SimulatedFlight, Wind
 from symheli.flight import XCELL_SERVOS, Autopilot, gain_scheduled_lqr
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from identification.estimators.symmetric_root import symmetric_root
+from identification.model.symmetric_root import symmetric_root
 from identification.structure.actuators import CONTROLS, SETTLING, Actuators, pieces
 from symheli import Helicopter, trim
 from symheli.airframe.written import as_toml

@@ -18,7 +18,7 @@ from identification.estimators.least_squares import (
     residual_covariance,
     white_covariance,
 )
-from identification.estimators.symmetric_root import symmetric_root
+from identification.model.symmetric_root import symmetric_root
 from identification.structure.lpvarx import LPVARX
 from symheli.values.arrays import Array
 from symheli.values.numbers import whole

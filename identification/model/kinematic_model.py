@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from identification.judge.excited_directions import excited_directions
 from identification.model import kinematic_run
+from identification.model.excited_directions import excited_directions
 from identification.model.flown_in import sentence
 from identification.model.kinematic_realization import Realization
 from identification.model.kinematic_run import Run
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-    from identification.recursive.kinematic_observer import KinematicObserver
+    from identification.model.kinematic_observer import KinematicObserver
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -218,7 +218,7 @@ class KinematicModel:
             A name without a number, one that is not positive, or no `process` where the method
             found none.
         """
-        from identification.recursive.kinematic_observer import KinematicObserver, deviations
+        from identification.model.kinematic_observer import KinematicObserver, deviations
 
         self.structure.require_plain("an observer")
         found = self.details.get("process_noise") if process is None else process

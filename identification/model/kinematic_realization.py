@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from identification.judge.matrix_ellipsoid import MatrixEllipsoid, matrix_ellipsoid
+from identification.model.matrix_ellipsoid import MatrixEllipsoid, matrix_ellipsoid
 from identification.model.realization import one_value
 from identification.structure.kinematic_arx import MOVING, STATES, KinematicARX
 from symheli.errors import InputError

@@ -11,6 +11,7 @@ from identification.recursive.kernel import twin
 from identification.recursive.kernel.configuration import KernelConfiguration
 from identification.recursive.kernel.twin import DETERMINED, LEARNT, REFUSED, SATURATED
 from identification.recursive.rls_state import RLSState
+from identification.structure.regressors import vector
 from symheli.errors import InputError
 from symheli.values.arrays import Array
 
@@ -177,17 +178,6 @@ def aligned(size: int, dtype: type[np.floating]) -> Array:
 def _coefficients(configuration: KernelConfiguration, memory: Array) -> Array:
     layout = configuration.groups[0]
     return memory[layout.in_state["theta"]].reshape(layout.m, -1)[:, : layout.n].T
-
-
-def vector(value: object, size: int, name: str) -> Array:
-    """`size` numbers as float64; raises `InputError` for anything else."""
-    try:
-        array = np.atleast_1d(np.asarray(value, dtype=float))
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{name}: expected {size} numbers, got {value!r:.80}") from error
-    if array.shape != (size,):
-        raise InputError(f"{name}: expected shape ({size},), got {array.shape}")
-    return np.ascontiguousarray(array)
 
 
 def functions(configuration: KernelConfiguration, p: Array) -> Array:

@@ -16,12 +16,12 @@ from identification.recursive import kernel, saved_state
 from identification.recursive.forgetting import Forgetting, forgetting_of
 from identification.recursive.history import History
 from identification.recursive.kernel.configuration import KernelConfiguration
-from identification.recursive.online import Online, vector
+from identification.recursive.online import Online
 from identification.recursive.rigid_body_online import RigidBodyOnline
 from identification.recursive.rls_state import RLSInfo, RLSState
 from identification.structure.kinematic_arx import KinematicARX
 from identification.structure.lpvarx import LPVARX, require_structure
-from identification.structure.regressors import Samples, as_records, units_of
+from identification.structure.regressors import Samples, as_records, units_of, vector
 from symheli.errors import InputError
 from symheli.progress import task
 from symheli.records import FlightRecord

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from identification.recursive.kernel.configuration import KernelConfiguration
-from identification.recursive.online import Online, vector
+from identification.recursive.online import Online
 from identification.recursive.rls_state import RLSState
 from identification.structure.kinematic_arx import MOVING, STATES, increments
+from identification.structure.regressors import vector
 from symheli.errors import InputError
 from symheli.values.arrays import Array
 from symheli.values.kinematics import rates_of

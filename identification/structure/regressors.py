@@ -239,3 +239,14 @@ def _check_size(name: str, signal: Array) -> None:
             f"{name} reaches {size:.3g}, {'beyond' if size > high else 'below'} what squares can"
             " express; check its unit"
         )
+
+
+def vector(value: object, size: int, name: str) -> Array:
+    """`size` numbers as float64; raises `InputError` for anything else."""
+    try:
+        array = np.atleast_1d(np.asarray(value, dtype=float))
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name}: expected {size} numbers, got {value!r:.80}") from error
+    if array.shape != (size,):
+        raise InputError(f"{name}: expected shape ({size},), got {array.shape}")
+    return np.ascontiguousarray(array)

@@ -12,8 +12,8 @@ import numpy as np
 
 from identification import Experiment, Plan, choose_experiments, compare_experiments
 from studies.output import columns
-from studies.transition.axes import Axis
-from studies.transition.flights import AMPLITUDE, TOP, autopilot_for
+from studies.setup.axes import Axis
+from studies.setup.flights import AMPLITUDE, TOP, autopilot_for
 from symheli import AirspeedSchedule, Excitation, FlightRecord, Helicopter, SymheliError, fly
 from symheli.flight import Autopilot
 from symheli.flight.excitation import Kind

@@ -15,8 +15,8 @@ import numpy as np
 
 from identification import Experiment, Plan, compare_experiments
 from studies.campaigns.experiments import CANDIDATES, Candidate, Comparison
-from studies.transition.axes import ALL, LATERAL, LONGITUDINAL, SCHEDULING, Axis
-from studies.transition.flights import AMPLITUDE, TOP, autopilot_for
+from studies.setup.axes import ALL, LATERAL, LONGITUDINAL, SCHEDULING, Axis
+from studies.setup.flights import AMPLITUDE, TOP, autopilot_for
 from symheli import AirspeedSchedule, Excitation, FlightRecord, Helicopter, SymheliError, fly
 from symheli.errors import InputError
 from symheli.flight.excitation import FADE_IN, FADE_OUT

@@ -18,8 +18,8 @@ from studies.campaigns.campaign import Campaign
 from studies.campaigns.run import columns_of
 from studies.campaigns.runners import Runner
 from studies.campaigns.trials.pays import AXES, MODELS, TRIAL, fit_of, paying
-from studies.transition.axes import Axis
-from studies.transition.flights import NOISE_DB, TransitionPlan
+from studies.setup.axes import Axis
+from studies.setup.flights import NOISE_DB, TransitionPlan
 from symheli.progress import tracked
 
 CONDITIONS = {

@@ -19,7 +19,7 @@ from studies.campaigns.campaign import Campaign
 from studies.campaigns.dataset import CampaignDataset
 from studies.campaigns.runners import Runner, answers
 from studies.campaigns.trial import Trial, TrialOutcome, Value, reason_of
-from studies.transition.stored_stages import code_digest
+from studies.setup.stored_stages import code_digest
 from symheli.errors import DataWarning, SymheliError
 from symheli.progress import task
 from symheli.values.arrays import Array

@@ -19,7 +19,6 @@ def run(arguments: argparse.Namespace) -> Output:
     """The script; a shell evaluates it, or reads it from a file of its completions."""
     with extra("shell", "completion of the command line"):
         import shtab
-    from studies.cli import parser
 
-    script = shtab.complete(parser(), shell=arguments.shell)
+    script = shtab.complete(arguments.whole, shell=arguments.shell)
     return Output(script, {"shell": arguments.shell, "script": script})

@@ -18,8 +18,8 @@ from symheli.values.whole_files import write_text
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from studies.loops.between import Between
-    from studies.loops.tuned import LoopMargins
+    from studies.autopilot.between import Between
+    from studies.autopilot.tuned import LoopMargins
 
 HELP = (
     "margins and responses of an ArduPilot helicopter's loops before and after a change of gains,"
@@ -115,7 +115,7 @@ def run(arguments: argparse.Namespace) -> Output:
     """Calibrate, compute the margins before and after, and say what the change does."""
     import symheli
     from identification import calibrate
-    from studies.loops.tuned import CONTROLS, QUANTITIES, loop_margins
+    from studies.autopilot.tuned import CONTROLS, QUANTITIES, loop_margins
     from symheli.flight import HelicopterLoops
     from symheli.logs.parameters import read_parameters
 
@@ -149,7 +149,7 @@ def run(arguments: argparse.Namespace) -> Output:
     verdict = _verdict(both[1])
     between = None
     if arguments.prove is not None:
-        from studies.loops.between import stable_between
+        from studies.autopilot.between import stable_between
 
         between = stable_between(
             drawn[: arguments.prove],
@@ -203,8 +203,8 @@ def run(arguments: argparse.Namespace) -> Output:
             "drawn_proven": between.proven,
         }
     if arguments.out is not None:
+        from studies.autopilot.tuned_plot import csv, plot
         from studies.commands.table_and_figure import write
-        from studies.loops.tuned_plot import csv, plot
 
         data["figures"] = write(arguments.out, "tune", csv(*both), lambda: plot(*both))
         lines += ["", *(f"wrote {path}" for path in data["figures"])]
@@ -240,7 +240,7 @@ def _row(old: LoopMargins, new: LoopMargins) -> list[str]:
 
 def _quantities(before: list[LoopMargins], after: list[LoopMargins], names: Sequence[str]) -> str:
     """A table of quantities before and after the change."""
-    from studies.loops.tuned import QUANTITIES
+    from studies.autopilot.tuned import QUANTITIES
 
     def cell(row: LoopMargins, name: str) -> str:
         value, band = row.banded(name)

@@ -12,8 +12,8 @@ import synthesis
 from studies.controllers.design_choices import RATE
 from studies.controllers.designs import BASELINE, LFT, NAMES, Designs
 from studies.controllers.plant import closed
-from studies.transition.guarantees import CONSTANT, PLAIN, Bound
-from studies.transition.proofs import Questions
+from studies.setup.bounds import CONSTANT, PLAIN, Bound
+from studies.setup.questions import Questions
 from symheli import LPVStateSpace
 from synthesis import Solver, Spline
 

@@ -26,9 +26,9 @@ from studies.controllers.in_airspeed import of_degree
 from studies.controllers.plant import baseline, closed, design_plant, flown_plant
 from studies.known_kinematics import flights
 from studies.known_kinematics.models import simulator_of
-from studies.transition.flights import autopilot_for
-from studies.transition.known_kinematics import KnownKinematics
-from studies.transition.proofs import Questions
+from studies.known_kinematics.rivals import KnownKinematics
+from studies.setup.flights import autopilot_for
+from studies.setup.questions import Questions
 from symheli import FlightRecord, Helicopter, LPVStateSpace, SimulatedFlight, linearize
 from symheli.errors import (
     AccuracyError,

@@ -27,8 +27,8 @@ from identification.structure.kinematic_arx import STATES
 from studies.known_kinematics.flights import aggressive
 from studies.known_kinematics.models import FASTEST, GUST, INPUTS, SCHEDULING, structure
 from studies.known_kinematics.truth import AXES, SPEEDS, FrozenAxes, Truth, frozen
-from studies.transition.flights import NOISE_DB, TOP, autopilot_for, light_turbulence
-from studies.transition.guarantees import PERIOD
+from studies.setup.bounds import PERIOD
+from studies.setup.flights import NOISE_DB, TOP, autopilot_for, light_turbulence
 from symheli import FlightPlan, FlightRecord, Helicopter, Sensor, SimulatedFlight, Wind
 from symheli.flight import XCELL_SERVOS, gain_scheduled_lqr
 from symheli.values.arrays import Array

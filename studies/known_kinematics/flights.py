@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from studies.transition.flights import AMPLITUDE as STUDY_AMPLITUDE
-from studies.transition.flights import NOISE_DB, TOP
+from studies.setup.flights import AMPLITUDE as STUDY_AMPLITUDE
+from studies.setup.flights import NOISE_DB, TOP
 from symheli import AirspeedSchedule, Excitation, FlightPlan, Wind
 from symheli.flight import XCELL_SERVOS, Autopilot
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from identification import FilterError, KinematicARX, KinematicModel, Polynomial, Product, fit
-from studies.transition.flights import TOP
+from studies.setup.flights import TOP
 from symheli import FlightRecord, Helicopter, SimulatedFlight
 
 INPUTS = ("d_lon", "d_lat", "d_col", "d_ped")

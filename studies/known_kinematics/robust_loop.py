@@ -9,7 +9,7 @@ from typing import Literal
 
 from identification import KinematicModel
 from studies.loops.robust_lateral import FEEDBACK
-from studies.transition.guarantees import SIZES
+from studies.setup.bounds import SIZES
 from symheli import UncertainStateSpace
 from synthesis import Spline
 

@@ -11,9 +11,9 @@ import symheli
 from identification import FrozenModels, KinematicModel, compare_frozen
 from studies.known_kinematics.models import INPUTS
 from studies.loops.lateral import HOLD
-from studies.transition.comparison import SCALES
-from studies.transition.flights import TOP
-from studies.transition.guarantees import PERIOD, SIZES
+from studies.setup.axes import SCALES
+from studies.setup.bounds import PERIOD, SIZES
+from studies.setup.flights import TOP
 from symheli import Helicopter, LinearModel
 from symheli.flight import Servo
 from symheli.values import Signal

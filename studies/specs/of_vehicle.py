@@ -30,8 +30,8 @@ from studies.controllers.designs import (
 from studies.controllers.in_airspeed import of_degree
 from studies.controllers.plant import baseline, flown_plant
 from studies.known_kinematics import flights, models
-from studies.transition.flights import autopilot_for
-from studies.transition.stored_stages import Stored, StoredStages, content_key
+from studies.setup.flights import autopilot_for
+from studies.setup.stored_stages import Stored, StoredStages, content_key
 from symheli import Helicopter, LinearFamily, LPVStateSpace
 from symheli.flight import XCELL_SERVOS
 from symheli.progress import task, tracked

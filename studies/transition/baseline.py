@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 import symheli
+from studies.setup.flights import TOP
 from studies.transition.first_look import FirstLook, first_look
-from studies.transition.flights import TOP
 from symheli import LFT, Helicopter, LinearFamily, LPVStateSpace
 
 DEGREES = (2, 3, 4, 5, 6)

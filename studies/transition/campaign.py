@@ -14,10 +14,10 @@ from studies.campaigns.run import columns_of
 from studies.campaigns.runners import Runner
 from studies.campaigns.trials import marks
 from studies.output import columns
-from studies.transition.accelerating_baseline import ALONE, BOTH, MARKS, SCATTER
-from studies.transition.axes import AXES, FROZEN_SPEEDS
-from studies.transition.flights import NOISES
-from studies.transition.quantities import value
+from studies.setup.accelerating_baseline import ALONE, BOTH, MARKS, SCATTER
+from studies.setup.axes import AXES, FROZEN_SPEEDS
+from studies.setup.flights import NOISES
+from studies.setup.quantities import value
 
 MODE_MARK = 3.0
 """Percent by which a noise-free frozen rotor mode may miss the exact one."""

@@ -7,39 +7,24 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import symheli
-from identification import BaselineModel, FrozenModels, beside_baseline, compare_frozen
+from identification import FrozenModels, beside_baseline, compare_frozen
 from identification.judge.beside_baseline import BesideBaseline
-from studies.transition.axes import (
+from studies.setup.accelerating_baseline import along_the_command
+from studies.setup.axes import (
     ALL,
     AXES,
     HORIZON,
     LATERAL,
     LATERAL_WITH_COLLECTIVE,
     LONGITUDINAL,
-    SCHEDULING,
+    SCALES,
     Axis,
     rotor_mode,
 )
+from studies.setup.flights import NOISES, StudyRecords
 from studies.transition.baseline import Baseline
-from studies.transition.flights import NOISES, StudyRecords
 from studies.transition.identified import Identification
-from symheli import Helicopter, LPVStateSpace
-
-SCALES = {
-    "d_lon": 0.05,
-    "d_lat": 0.05,
-    "d_col": 0.05,
-    "d_ped": 0.1,
-    "u": 2.0,
-    "v": 2.0,
-    "w": 2.0,
-    "p": 1.0,
-    "q": 1.0,
-    "r": 1.0,
-    "phi": 0.3,
-    "theta": 0.3,
-}
-"""Sizes (SI) by which channels are scaled before a nu-gap is taken."""
+from symheli import Helicopter
 
 FAST = 3.0
 """Frequency (rad/s) above which the fast modes are compared on their own: the slow modes lie below
@@ -121,14 +106,6 @@ def compare(
         for axis in AXES
     ]
     return Comparisons(predictions=tuple(predictions), frozen=tuple(frozen))
-
-
-def along_the_command(lpv: LPVStateSpace, heli: Helicopter, *, drift: bool = True) -> BaselineModel:
-    """A baseline driven by the helicopter's inputs, scheduled on the commanded airspeed as the
-    identified models are.
-    """
-    inputs = tuple(map(str, heli.inputs))
-    return BaselineModel(model=lpv, scheduling=SCHEDULING, inputs=inputs, drift=drift)
 
 
 def _rivals(axis: Axis) -> dict[str, Axis]:

@@ -10,26 +10,19 @@ from typing import TYPE_CHECKING
 from studies.controllers.design_choices import RATE
 from studies.controllers.designs import BASELINE, LFT
 from studies.controllers.flown import WINDS
-from studies.controllers.tables import hypotheses
 from studies.known_kinematics import models
 from studies.known_kinematics.robust_loop import PROBABILITY, verdict
-from studies.transition.guarantees import (
-    ALLOWED,
-    CONSTANT,
-    ESTIMATE,
-    LFT_TESTS,
-    gain_curve,
-    proven,
-    rate_text,
-)
+from studies.setup.bounds import CONSTANT, LFT_TESTS, proven, rate_text
+from studies.transition.controller_tables import hypotheses
+from studies.transition.guarantees import ALLOWED, ESTIMATE, gain_curve
 from studies.transition.known_kinematics import CUBIC, KNOWN, LOOPS, SPLINE, TWO_INPUTS
 from studies.transition.tables import LEVEL, gain
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from studies.transition.guarantees import Bound
-    from studies.transition.known_kinematics import KnownKinematics
+    from studies.known_kinematics.rivals import KnownKinematics
+    from studies.setup.bounds import Bound
     from studies.transition.outcome import Outcome
     from synthesis import GainCurve
 

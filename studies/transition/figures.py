@@ -11,8 +11,8 @@ import numpy as np
 from studies.controllers.figure import RATIOS, SEEDS, energy_ratios, seeds
 from studies.known_kinematics import models
 from studies.known_kinematics.truth import SPEEDS
+from studies.setup.flights import NOISES
 from studies.transition.comparison import FAST
-from studies.transition.flights import NOISES
 from studies.transition.guarantees import curves
 from studies.transition.known_kinematics import CUBIC, KNOWN, TWO_INPUTS
 from symheli.values.drawing import BLUE, GREEN, GREY, INK, ORANGE, RED
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from identification import FrozenModels
+    from studies.known_kinematics.rivals import KnownKinematics
+    from studies.setup.flights import StudyRecords
     from studies.transition.comparison import ComparedAxis
-    from studies.transition.flights import StudyRecords
-    from studies.transition.known_kinematics import KnownKinematics
     from studies.transition.outcome import Outcome
     from studies.transition.paper_experiment import PaperExperiment
     from synthesis import GainCurve

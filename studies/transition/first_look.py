@@ -18,7 +18,7 @@ from studies.loops.margins import (
     AtAirspeed,
     over_airspeed,
 )
-from studies.transition.axes import RATES, rotor_mode
+from studies.setup.axes import RATES, rotor_mode
 from symheli import LinearFamily, TrimPoint
 from symheli.errors import InputError
 

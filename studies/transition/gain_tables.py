@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from studies.transition.guarantees import FORMS, SIZES, Bound, proven, rate_text
+from studies.setup.bounds import FORMS, SIZES, Bound, proven, rate_text
 from studies.transition.tables import Table, gain
 from synthesis import Status
 

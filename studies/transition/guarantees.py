@@ -6,14 +6,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 
 import synthesis
 from identification import LPVARXModel
 from studies.loops.exact_lateral import ExactLateral
 from studies.loops.lateral import ATTITUDE_HOLD, STATES, close
-from studies.transition.flights import TOP
+from studies.setup.bounds import (
+    CONSTANT,
+    FORMS,
+    LFT_TESTS,
+    MEMORY,
+    PERIOD,
+    PLAIN,
+    SIZES,
+    Bound,
+    unit_of,
+)
+from studies.setup.flights import TOP
 from symheli import (
     Helicopter,
     LinearFamily,
@@ -23,29 +33,12 @@ from symheli import (
     UncertainStateSpace,
 )
 from symheli.lpv.bases import Polynomial
-from synthesis import Certificate, GainCurve, Memory, Search, Spline
+from synthesis import GainCurve, Memory, Search, Spline
 from synthesis.numerics.linear.norm import norm
 
-SIZES = {"d_lat": 0.01, "d_ped": 0.02, "r": 0.1, "phi": 0.1}
-"""A disturbance of this size (rad) and an output of this size (rad/s, rad) count as 1 on the servo
-channel; the gust channel is in SI.
-"""
-
-PERIOD = 0.02
-
-
-PLAIN, CONSTANT, MEMORY = "P(p)", "constant P", "P(p, lag)"
-LFT_TESTS = {
-    "LFT full block": "full block",
-    "LFT D/G": "DG",
-    "LFT D": "D",
-    "LFT small gain": "small gain",
-}
 ESTIMATE, ALLOWED = "identified, the estimate", "identified, every model allowed"
 """One model of the flights, and all that their noise leaves possible."""
 
-FORMS = (MEMORY, PLAIN, CONSTANT, *LFT_TESTS)
-"""Forms of a proof, the least conservative first; from `CONSTANT` on they let the airspeed jump."""
 
 MEMORIES = {
     rate: Memory(lag, segments=8, grading=1.5, across_segments=across, across_degree=3)
@@ -54,19 +47,6 @@ MEMORIES = {
 """Accelerations (m/s^2) at which a P with a memory is tried, on a coarser mesh than
 `evidence.bracket.measured`, which takes minutes.
 """
-
-
-@dataclass(frozen=True)
-class Bound:
-    """One certificate: which model, which channel, permitted acceleration (m/s^2), which of
-    `FORMS`.
-    """
-
-    model: str
-    channel: str
-    rate: float
-    form: str
-    certificate: Certificate
 
 
 def scaled(lpv: LPVStateSpace) -> LPVStateSpace:
@@ -246,16 +226,6 @@ def curves(found: Sequence[Bound]) -> list[GainCurve]:
     ]
 
 
-def unit_of(channel: str) -> str:
-    """Return the unit of the gain of a channel."""
-    return "1" if channel in ("servo", "robust", "controllers") else "(rad/s, rad)/(m/s)"
-
-
-def proven(b: Bound) -> float:
-    """The gain proven, inf where none is."""
-    return b.certificate.gamma if b.certificate.verified else math.inf
-
-
 def gain_curve(found: Sequence[Bound], model: str, channel: str, title: str) -> GainCurve:
     """Return the gain curve of the bounds of one loop."""
     own = [
@@ -263,8 +233,3 @@ def gain_curve(found: Sequence[Bound], model: str, channel: str, title: str) -> 
     ]
     own.sort(key=lambda b: FORMS.index(b.form))
     return GainCurve.of(((b.form, b.rate, b.certificate) for b in own), title, unit_of(channel))
-
-
-def rate_text(rate: float) -> str:
-    """Return the rate in words."""
-    return "frozen" if rate == 0 else "arbitrarily fast" if math.isinf(rate) else f"{rate:g} m/s^2"

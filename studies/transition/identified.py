@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from identification import LPVARXModel, Scores
-from studies.transition.axes import (
+from studies.setup.axes import (
     ALL,
     AXES,
     LATERAL,
@@ -18,7 +18,7 @@ from studies.transition.axes import (
     mode_misses,
     update_time,
 )
-from studies.transition.flights import NOISES, StudyRecords
+from studies.setup.flights import NOISES, StudyRecords
 from symheli import Helicopter
 
 CLEAN, NOISY = NOISES

@@ -5,23 +5,23 @@ by the same unseen one and by exact models with the airspeed held.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 
 import symheli
-from identification import BaselineModel, KinematicModel, LPVARXModel, fit
+from identification import BaselineModel, LPVARXModel, fit
 from studies.known_kinematics import flights, models
 from studies.known_kinematics.predictions import HORIZON, OUTPUTS, fits_of, states_of
+from studies.known_kinematics.rivals import KnownKinematics, Rival
 from studies.known_kinematics.truth import AXES, SPEEDS, FrozenAxes, Truth, frozen_axes, sampled
 from studies.loops.lateral import ATTITUDE_HOLD
 from studies.loops.robust_lateral import FEEDBACK, margin
-from studies.transition import accelerating_baseline
-from studies.transition.axes import ALL, LATERAL, LONGITUDINAL, update_time
+from studies.setup import accelerating_baseline
+from studies.setup.accelerating_baseline import along_the_command
+from studies.setup.axes import ALL, LATERAL, LONGITUDINAL, update_time
+from studies.setup.flights import autopilot_for
 from studies.transition.baseline import Baseline
-from studies.transition.comparison import along_the_command
-from studies.transition.flights import autopilot_for
 from symheli import FlightRecord, Helicopter
 from symheli.values.arrays import Array
 
@@ -39,42 +39,6 @@ FREQUENCIES = 500
 """Frequencies of a nu-gap, beside those around the poles: within 0.001 of those on 2000."""
 
 LOOPS = {"attitude hold": ATTITUDE_HOLD, "loop with a margin": FEEDBACK}
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Rival:
-    """One model: fits in percent, 1 s ahead, against the states without noise (none of a
-    simulator, which is no predictor); nu-gaps at `SPEEDS` by axis; at how many of them its
-    stability is another than the exact one's, by axis; its static gain in the study's lateral loop
-    over the exact one by airspeed (m/s), where it has that axis.
-    """
-
-    name: str
-    ahead: Mapping[str, float]
-    gaps: Mapping[str, Array]
-    unlike: Mapping[str, int]
-    static: Mapping[float, float]
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class KnownKinematics:
-    """Results of the models with known kinematics.
-
-    `flown`: seconds of each flight; `simulator`: the vehicle that the instruments are flown in;
-    `model`: that over airspeed and acceleration; `margins`: b(P, C) of each of `LOOPS` around the
-    exact models at `SPEEDS`; `update_time`: seconds of one recursive update of all coefficients.
-    """
-
-    flown: Mapping[str, float]
-    simulator: str
-    rivals: tuple[Rival, ...]
-    model: KinematicModel
-    margins: Mapping[str, Array]
-    update_time: float
-
-    def of(self, name: str) -> Rival:
-        """One of the rivals."""
-        return next(rival for rival in self.rivals if rival.name == name)
 
 
 def identify_with_known_kinematics(

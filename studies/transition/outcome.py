@@ -8,13 +8,13 @@ from dataclasses import dataclass, field
 from studies.controllers.certified import CertifiedControllers
 from studies.controllers.designs import Designs
 from studies.controllers.flown import FlownControllers
+from studies.known_kinematics.rivals import KnownKinematics
+from studies.setup.bounds import Bound
+from studies.setup.flights import StudyRecords
 from studies.transition.baseline import Baseline
 from studies.transition.comparison import Comparisons
 from studies.transition.effort import Effort
-from studies.transition.flights import StudyRecords
-from studies.transition.guarantees import Bound
 from studies.transition.identified import Identification
-from studies.transition.known_kinematics import KnownKinematics
 from studies.transition.paper_experiment import PaperExperiments
 from studies.transition.proofs import GustProofs, LongitudinalProofs, RobustProofs, ServoProofs
 from studies.transition.real_conditions import RealConditions

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import solve_discrete_are
 
 from identification import LPVARX, LPVARXModel, Polynomial, RecursiveLeastSquares, excitation_report
-from studies.transition.flights import TOP
+from studies.setup.flights import TOP
 from symheli import ExcitationError, FlightRecord, LinearFamily, LPVStateSpace
 
 PERIOD = 0.11408

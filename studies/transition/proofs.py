@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
+from studies.known_kinematics.rivals import KnownKinematics
 from studies.known_kinematics.robust_loop import FORM, robust_loop
 from studies.loops.exact_lateral import ExactLateral
 from studies.loops.longitudinal import longitudinal_loop
 from studies.loops.robust_lateral import FEEDBACK
+from studies.setup.axes import LATERAL
+from studies.setup.bounds import PERIOD, Bound
+from studies.setup.flights import NOISES, TOP
+from studies.setup.questions import Questions
 from studies.transition import guarantees
-from studies.transition.axes import LATERAL
 from studies.transition.baseline import Baseline
 from studies.transition.effort import GLANCE
-from studies.transition.flights import NOISES, TOP
-from studies.transition.guarantees import PERIOD, Bound, Proof
+from studies.transition.guarantees import Proof
 from studies.transition.identified import Identification
-from studies.transition.known_kinematics import KnownKinematics
 from symheli import Helicopter
 from synthesis import Search, Spline, frozen_gain
 from synthesis.certify.lower_bounds.frozen import FrozenGain
@@ -56,27 +57,6 @@ class RobustProofs:
     """Proofs of the loop with a margin at 50 Hz."""
 
     bounds: tuple[Bound, ...]
-
-
-Question = Callable[[], list[Any]]
-"""What a process can answer: a `functools.partial`; of a proof the answers are bounds."""
-
-
-@dataclass(frozen=True)
-class Questions:
-    """Proofs or designs that need nothing of each other, and what their answers become together;
-    those of `long` take longest and go first.
-    """
-
-    proofs: Sequence[Question]
-    together: Callable[[tuple[Any, ...]], Any]
-    long: Sequence[Question] = ()
-
-    @property
-    def order(self) -> list[int]:
-        """Positions of the proofs, those of `long` first."""
-        first = [self.proofs.index(proof) for proof in self.long]
-        return [*first, *(i for i in range(len(self.proofs)) if i not in first)]
 
 
 def gust_questions(

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from studies.known_kinematics.conditions import CONDITIONS, Instruments, frozen_all
 from studies.known_kinematics.models import simulator_of
-from studies.transition.guarantees import PERIOD
+from studies.setup.bounds import PERIOD
 from symheli import SimulatedFlight
 from symheli.errors import SymheliError
 from symheli.values.arrays import Array

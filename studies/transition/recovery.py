@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from identification import LPVARX, Polynomial, fit
-from studies.transition.flights import TOP
+from studies.setup.flights import TOP
 from symheli import FlightRecord, LinearFamily
 from symheli.lpv import simulate
 from symheli.values.signal import UNITS

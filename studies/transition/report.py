@@ -7,21 +7,14 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from studies.controllers import tables as controllers
 from studies.report.drawn import Drawn, drawn
 from studies.report.equations import EQUATIONS
 from studies.report.labels import Labels
 from studies.report.pages import FOLDER, environment
 from studies.report.references import REFERENCES
-from studies.report.shortfalls import (
-    FAILED,
-    NEGATIVE,
-    failures,
-    negative_results,
-    without_certificate,
-)
+from studies.setup.axes import AXES
+from studies.transition import controller_tables as controllers
 from studies.transition import gain_tables, tables
-from studies.transition.axes import AXES
 from studies.transition.conclusions import (
     abstract,
     answer,
@@ -34,6 +27,13 @@ from studies.transition.conclusions import (
 from studies.transition.guarantees import curves
 from studies.transition.results import to_dict
 from studies.transition.saved_proofs import linked_proofs, save_proofs
+from studies.transition.shortfalls import (
+    FAILED,
+    NEGATIVE,
+    failures,
+    negative_results,
+    without_certificate,
+)
 from symheli.progress import tracked
 from symheli.values.whole_files import write_text
 

@@ -11,27 +11,27 @@ from dataclasses import asdict
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
-from studies.controllers.written import controllers_to_dict
 from studies.known_kinematics.truth import SPEEDS
 from studies.output import plain
-from studies.report.held import held_to_dict
 from studies.report.provenance import provenance
-from studies.transition.axes import HORIZON
-from studies.transition.certificates import bound_to_dict
+from studies.setup.axes import HORIZON
+from studies.setup.bounds import unit_of
+from studies.setup.certificates import bound_to_dict
+from studies.setup.quantities import named, value, values
 from studies.transition.comparison import FAST
-from studies.transition.guarantees import unit_of
+from studies.transition.held import held_to_dict
 from studies.transition.paper_experiment import PERIOD
-from studies.transition.quantities import named, value, values
 from studies.transition.saved_proofs import proof_file
+from studies.transition.written_controllers import controllers_to_dict
 
 if TYPE_CHECKING:
     from identification import FrozenModels, Scores
+    from studies.known_kinematics.rivals import KnownKinematics
+    from studies.setup.flights import StudyRecords
     from studies.transition.baseline import Baseline
     from studies.transition.comparison import Comparisons
     from studies.transition.first_look import FirstLook
-    from studies.transition.flights import StudyRecords
     from studies.transition.identified import Identification
-    from studies.transition.known_kinematics import KnownKinematics
     from studies.transition.outcome import Outcome
     from studies.transition.paper_experiment import OutputResult, PaperExperiment
     from studies.transition.real_conditions import RealConditions

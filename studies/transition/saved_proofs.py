@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 from weakref import WeakKeyDictionary
 
-from studies.transition.guarantees import Bound, rate_text
+from studies.setup.bounds import Bound, rate_text
 from studies.transition.tables import gain
 from synthesis import Certificate
 

@@ -11,10 +11,10 @@ from studies.controllers.certified import controller_questions
 from studies.controllers.covered import proven
 from studies.controllers.designs import Designs, design_questions
 from studies.controllers.flown import FlownControllers, fly_controllers
+from studies.setup.flights import fly_transitions
 from studies.transition.baseline import Baseline, build_baseline
 from studies.transition.comparison import compare
 from studies.transition.effort import Effort
-from studies.transition.flights import fly_transitions
 from studies.transition.identified import identify_axes
 from studies.transition.known_kinematics import identify_with_known_kinematics
 from studies.transition.outcome import Outcome

@@ -16,22 +16,15 @@ from typing import Any
 
 from studies.controllers.designs import Designs
 from studies.processes import Processes
+from studies.setup.questions import Questions
+from studies.setup.stored_stages import STAGES, NotUsable, Stored, StoredStages, content_key
 from studies.transition.configuration import KEPT, Configuration
 from studies.transition.effort import Effort
 from studies.transition.outcome import Outcome
-from studies.transition.proofs import Questions
 from studies.transition.report import write_report, write_results
 from studies.transition.results import to_dict
+from studies.transition.stage_keys import loaded, stage_keys
 from studies.transition.stages import Stage, stages
-from studies.transition.stored_stages import (
-    STAGES,
-    NotUsable,
-    Stored,
-    StoredStages,
-    content_key,
-    loaded,
-    stage_keys,
-)
 from studies.transition.summary import summary
 from symheli import Helicopter
 from symheli.errors import InputError

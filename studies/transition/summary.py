@@ -6,8 +6,8 @@ import textwrap
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from studies.report.shortfalls import counted, without_certificate
 from studies.transition.conclusions import answer, conclusions, of_the_vehicle, question
+from studies.transition.shortfalls import counted, without_certificate
 
 if TYPE_CHECKING:
     from studies.transition.outcome import Outcome

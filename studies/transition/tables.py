@@ -8,17 +8,10 @@ from typing import TYPE_CHECKING
 
 from studies.known_kinematics import models
 from studies.known_kinematics.truth import SPEEDS
-from studies.transition.axes import (
-    ALL,
-    AXES,
-    FROZEN_SPEEDS,
-    LATERAL,
-    LATERAL_WITH_COLLECTIVE,
-    RATES,
-)
+from studies.setup.axes import ALL, AXES, FROZEN_SPEEDS, LATERAL, LATERAL_WITH_COLLECTIVE, RATES
+from studies.setup.flights import NOISES
 from studies.transition.campaign import MODE_MARK
 from studies.transition.comparison import DRIFT_LEFT_OUT
-from studies.transition.flights import NOISES
 from studies.transition.known_kinematics import KNOWN, SPLINE
 
 LEVEL = 3.0
@@ -27,10 +20,10 @@ LEVEL = 3.0
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from studies.known_kinematics.rivals import KnownKinematics
     from studies.transition.comparison import ComparedAxis
     from studies.transition.first_look import FirstLook
     from studies.transition.identified import Identification
-    from studies.transition.known_kinematics import KnownKinematics
     from studies.transition.outcome import Outcome
     from studies.transition.real_conditions import RealConditions
     from synthesis import Margins

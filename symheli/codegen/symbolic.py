@@ -166,3 +166,8 @@ def replaced(expressions: list[Any], symbol: Any, value: Any) -> list[Any]:
 def dense(expression: Any) -> Any:
     """The expression with structural zeros written out."""
     return casadi.densify(casadi.SX(expression))
+
+
+def unnamed(symbol: str, value: Any) -> Any:
+    """The value itself."""
+    return value

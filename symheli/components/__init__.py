@@ -13,7 +13,8 @@ import importlib.util
 import pkgutil
 from pathlib import Path
 
-from symheli.components.component import AirMotion, Component, Effect, Flow, unnamed
+from symheli.codegen.symbolic import unnamed
+from symheli.components.component import AirMotion, Component, Effect, Flow
 from symheli.components.entry import Entry
 from symheli.errors import InputError, UnknownNameError
 

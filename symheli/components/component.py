@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
+from symheli.codegen.symbolic import unnamed
 from symheli.components.entry import Entry
 from symheli.errors import InputError
 from symheli.values.signal import Signal
@@ -26,11 +27,6 @@ class AirMotion(NamedTuple):
     r: Any
     Om: Any
     rho: Any
-
-
-def unnamed(symbol: str, value: Any) -> Any:
-    """The value itself."""
-    return value
 
 
 @dataclass

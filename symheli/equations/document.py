@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from symheli.equations.listing import Parameter, Section, listing
 
 if TYPE_CHECKING:
-    from symheli.helicopter import Helicopter
+    from symheli.equations.described import Described
 
 _REMARK = (
     "Printed from the code that computes them: each component is evaluated with symbols. SI units"
@@ -20,7 +20,7 @@ _REMARK = (
 )
 
 
-def latex(heli: Helicopter, standalone: bool = False) -> str:
+def latex(heli: Described, standalone: bool = False) -> str:
     """A section for every part: its equations and a table of its parameters. `standalone` adds
     preamble and title.
     """
@@ -50,7 +50,7 @@ def latex(heli: Helicopter, standalone: bool = False) -> str:
     )
 
 
-def markdown(heli: Helicopter) -> str:
+def markdown(heli: Described) -> str:
     """Return the document as one page of Markdown, each equation in dollars."""
     parts = [f"# {heading(heli)}", _REMARK.replace("_", r"\_")]
     for section in listing(heli):
@@ -69,7 +69,7 @@ def markdown(heli: Helicopter) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def heading(heli: Helicopter) -> str:
+def heading(heli: Described) -> str:
     """Return the subject of the document."""
     options = f", as printed: {', '.join(sorted(heli.printed))}" if heli.printed else ""
     return f"Equations of motion: {heli.vehicle.title}, {heli.governor} governor{options}"

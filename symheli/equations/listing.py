@@ -18,7 +18,7 @@ from symheli.equations.notation import dot, printed, real, symbol_of, upright
 from symheli.physics import inflow, rigid_body
 
 if TYPE_CHECKING:
-    from symheli.helicopter import Helicopter
+    from symheli.equations.described import Described
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class _Notes:
             self.equations.append(equation)
 
 
-def listing(heli: Helicopter) -> tuple[Section, ...]:
+def listing(heli: Described) -> tuple[Section, ...]:
     """Return the equations of `heli`: rigid body, components in the order they are evaluated,
     drivetrain, attitude and position in flight.
     """
@@ -109,7 +109,7 @@ def listing(heli: Helicopter) -> tuple[Section, ...]:
     return (_rigid_body(heli, s, effects), *sections, _drivetrain(heli, own, effects), _flight(s))
 
 
-def _symbols(heli: Helicopter) -> SimpleNamespace:
+def _symbols(heli: Described) -> SimpleNamespace:
     """A symbol for every signal and every field of the motion, by the code's name."""
     names = (
         *heli.states,
@@ -126,21 +126,21 @@ def _symbols(heli: Helicopter) -> SimpleNamespace:
     return SimpleNamespace(**{str(name): real(symbol_of(str(name))) for name in names})
 
 
-def _parameters(heli: Helicopter, section: str) -> SimpleNamespace:
+def _parameters(heli: Described, section: str) -> SimpleNamespace:
     latex = _latex_of(heli, section)
     values = {entry: real(latex[entry]) for entry in heli.vehicle.sections[section]}
     weight = real(FIXED["body"]["mass"].symbol) * rigid_body.GRAVITY
     return SimpleNamespace(**values, printed=heli.printed, smoothing=heli.smoothing, weight=weight)
 
 
-def _latex_of(heli: Helicopter, section: str) -> Mapping[str, str]:
+def _latex_of(heli: Described, section: str) -> Mapping[str, str]:
     return {
         name: entry.symbol or rf"\mathrm{{{name}}}".replace("_", r"\_")
         for name, entry in heli.vehicle.entries[section].items()
     }
 
 
-def _table(heli: Helicopter, section: str) -> tuple[Parameter, ...]:
+def _table(heli: Described, section: str) -> tuple[Parameter, ...]:
     latex = _latex_of(heli, section)
     return tuple(
         Parameter(upright(latex[entry]), f"{section}.{entry}", q.value, q.unit, q.source)
@@ -183,7 +183,7 @@ def _total(symbol: str, effects: Mapping[str, Effect], entry: Callable[[Effect],
     return f"{symbol} = {' + '.join(terms) or 0}"
 
 
-def _rigid_body(heli: Helicopter, s: SimpleNamespace, effects: Mapping[str, Effect]) -> Section:
+def _rigid_body(heli: Described, s: SimpleNamespace, effects: Mapping[str, Effect]) -> Section:
     notes = _Notes()
     for name in ("u", "v", "w"):
         notes.equal(symbol_of(f"{name}_a"), vars(s)[name] - vars(s)[f"{name}_w"])
@@ -212,7 +212,7 @@ def _rigid_body(heli: Helicopter, s: SimpleNamespace, effects: Mapping[str, Effe
     return Section("Rigid body", text, tuple(notes.equations), _table(heli, "body"))
 
 
-def _drivetrain(heli: Helicopter, own: Mapping[str, Any], effects: Mapping[str, Effect]) -> Section:
+def _drivetrain(heli: Described, own: Mapping[str, Any], effects: Mapping[str, Effect]) -> Section:
     notes = _Notes([_total(r"\tau", effects, lambda e: e.shaft_torque)])
     drive = heli.dynamics.drive(_parameters(heli, "drivetrain"), real(r"\tau"), own, notes.name)
     if drive.torque != real("Q_e"):

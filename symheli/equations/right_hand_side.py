@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import sympy
 
 if TYPE_CHECKING:
-    from symheli.helicopter import Helicopter
+    from symheli.equations.described import Described
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,7 +30,7 @@ class RightHandSide:
     parameters: Mapping[sympy.Symbol, float]
 
 
-def right_hand_side(heli: Helicopter) -> RightHandSide:
+def right_hand_side(heli: Described) -> RightHandSide:
     """The Euler form of `heli` in body axes with a symbol for every one of its `parameters`, air
     density among them.
     """

@@ -54,9 +54,10 @@ from studies.controllers.plant import baseline, flown_plant
 from studies.loops.exact_lateral import ExactLateral
 from studies.loops.lateral import lateral_loop
 from studies.loops.longitudinal import longitudinal_loop
+from studies.setup.bounds import PERIOD
+from studies.setup.flights import TOP, autopilot_for
 from studies.specs.flown import in_still_air
-from studies.transition.flights import TOP, autopilot_for
-from studies.transition.guarantees import PERIOD, scaled
+from studies.transition.guarantees import scaled
 from symheli import Helicopter
 
 ROOT = DOCS.parent

@@ -10,8 +10,8 @@ from known_vehicles import Vehicle
 from scipy.stats import chi2
 
 import identification as idn
-from identification.estimators.symmetric_root import symmetric_root
 from identification.judge import coefficient_covariance
+from identification.model.symmetric_root import symmetric_root
 from identification.structure.regressors import stacked
 from symheli.errors import InputError
 from symheli.records import FlightRecord

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from identification import matrix_ellipsoid
-from identification.judge.matrix_ellipsoid import spectral_radius
+from identification.model.matrix_ellipsoid import spectral_radius
 from symheli.errors import InputError
 from synthesis.numerics.polynomial.exact import exact, positive_definite
 

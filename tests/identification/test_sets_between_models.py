@@ -7,10 +7,10 @@ import pytest
 from known_vehicles import Vehicle
 
 import identification as idn
-from identification.judge.excited_directions import excited_directions
-from identification.judge.matrix_ellipsoid import spectral_radius
+from identification.model.excited_directions import excited_directions
 from identification.model.flown_in import CONDITIONS
 from identification.model.kinematic_realization import covering
+from identification.model.matrix_ellipsoid import spectral_radius
 from symheli.errors import InputError
 
 OUTPUTS, INPUTS = ("v", "p", "r", "phi"), ("d_lat", "d_ped")

@@ -21,7 +21,7 @@ import synthesis
 from studies.campaigns.campaign import Campaign
 from studies.campaigns.dataset import CampaignDataset
 from studies.campaigns.trial import Trial, TrialOutcome
-from studies.transition.stored_stages import Stored, StoredStages
+from studies.setup.stored_stages import Stored, StoredStages
 from symheli.logs.signal_map import SignalMap
 from symheli.lpv.linear_models import LinearModels
 from symheli.values import NamedVector, Signal, signals

@@ -11,8 +11,8 @@ import symheli
 from studies import cli
 from studies.campaigns import flyable
 from studies.campaigns.experiments import Candidate, design
-from studies.transition.axes import LONGITUDINAL
-from studies.transition.flights import autopilot_for
+from studies.setup.axes import LONGITUDINAL
+from studies.setup.flights import autopilot_for
 from symheli.errors import InputError
 
 SMALL, LARGE = Candidate("prbs", (0.1, 5.0), 0.25, 3.0), Candidate("prbs", (0.1, 5.0), 0.75, 3.0)

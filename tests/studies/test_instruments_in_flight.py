@@ -4,8 +4,8 @@ import pytest
 
 import symheli
 from identification import InstrumentalVariables, fit
-from studies.transition.axes import LONGITUDINAL
-from studies.transition.flights import TransitionPlan, autopilot_for
+from studies.setup.axes import LONGITUDINAL
+from studies.setup.flights import TransitionPlan, autopilot_for
 from symheli.errors import DataWarning
 
 ADDED = ("e_d_lon", "e_d_col")

@@ -5,9 +5,9 @@ import pytest
 
 import symheli
 from evidence.tuning import THROW, parameters
-from studies.loops.between import stable_between
-from studies.loops.responses import DURATION, LOWEST, closed_loops, responses
-from studies.loops.tuned import QUANTITIES, RESPOND, loop_margins
+from studies.autopilot.between import stable_between
+from studies.autopilot.responses import DURATION, LOWEST, closed_loops, responses
+from studies.autopilot.tuned import QUANTITIES, RESPOND, loop_margins
 from symheli import LinearModel
 from symheli.errors import InputError
 from symheli.flight import HelicopterLoops

@@ -12,16 +12,15 @@ from statistics import median
 
 import pytest
 
-from studies.controllers import tables as controllers
 from studies.controllers.flown import WINDS
-from studies.report import held
 from studies.report.labels import Labels
 from studies.report.references import REFERENCES
-from studies.report.shortfalls import shortfalls
-from studies.transition import conclusions, gain_tables, guarantees, report, tables
-from studies.transition.flights import NOISES
+from studies.setup.flights import NOISES
+from studies.transition import conclusions, gain_tables, guarantees, held, report, tables
+from studies.transition import controller_tables as controllers
 from studies.transition.outcome import Outcome
 from studies.transition.results import to_dict
+from studies.transition.shortfalls import shortfalls
 from symheli import LPVStateSpace, Scheduling
 from synthesis import Search, Spline
 

@@ -12,19 +12,15 @@ from pathlib import Path
 import pytest
 
 from studies.campaigns.runners import Here
-from studies.transition import stages, stored_stages, study
+from studies.setup import stored_stages
+from studies.setup.questions import Questions
+from studies.setup.stored_stages import NotUsable, Stored, StoredStages, content_key
+from studies.transition import stages, study
 from studies.transition.configuration import Configuration
 from studies.transition.effort import Effort
 from studies.transition.outcome import Outcome
-from studies.transition.proofs import Questions
 from studies.transition.recovery import Recoveries
-from studies.transition.stored_stages import (
-    NotUsable,
-    Stored,
-    StoredStages,
-    content_key,
-    stage_keys,
-)
+from studies.transition.stage_keys import stage_keys
 from symheli import Helicopter
 from symheli.errors import InputError
 from synthesis import Search, Spline

@@ -11,11 +11,11 @@ import pytest
 
 from studies.controllers.designs import LQR, Design, Designs
 from studies.controllers.flown import plan
+from studies.setup.stored_stages import NotUsable, Stored
 from studies.specs.flown import at_a_switch, flown, measured, quickness
 from studies.specs.of_vehicle import OfVehicle, share_met
 from studies.transition import study
 from studies.transition.configuration import Configuration
-from studies.transition.stored_stages import NotUsable, Stored
 from symheli import (
     AirspeedSchedule,
     Helicopter,

@@ -9,7 +9,7 @@ from collections import OrderedDict
 import numpy as np
 import pytest
 
-from studies.transition import stage_file
+from studies.setup import stage_file
 from symheli import LinearModel, Scheduling, Signal
 
 

@@ -11,7 +11,6 @@ import pytest
 
 import symheli
 from identification import Criterion, FitForControl
-from studies.controllers import tables
 from studies.controllers.certified import CertifiedControllers, bounded
 from studies.controllers.covered import NO_TUBE
 from studies.controllers.design_choices import (
@@ -53,9 +52,10 @@ from studies.controllers.measures import (
     to_body,
 )
 from studies.controllers.plant import actuator, baseline, closed, design_plant, flown_plant
-from studies.transition.guarantees import PLAIN, Bound
+from studies.setup.bounds import PLAIN, Bound
+from studies.setup.stored_stages import Stored, StoredStages
+from studies.transition import controller_tables as tables
 from studies.transition.outcome import Outcome
-from studies.transition.stored_stages import Stored, StoredStages
 from symheli import (
     AirspeedSchedule,
     LPVStateSpace,

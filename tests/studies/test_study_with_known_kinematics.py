@@ -13,9 +13,10 @@ import synthesis
 from studies.known_kinematics.truth import AXES, Truth, frozen_axes
 from studies.loops.lateral import ATTITUDE_HOLD
 from studies.loops.robust_lateral import margin
+from studies.setup.bounds import PLAIN, Bound
 from studies.transition import conclusions, guarantees, tables
 from studies.transition.baseline import build_baseline
-from studies.transition.guarantees import ALLOWED, ESTIMATE, PLAIN, Bound
+from studies.transition.guarantees import ALLOWED, ESTIMATE
 from studies.transition.known_kinematics import (
     ALL_AXES,
     CUBIC,

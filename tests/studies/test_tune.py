@@ -5,7 +5,7 @@ import pytest
 
 import symheli
 from evidence.tuning import THROW, parameters
-from studies.loops.tuned import QUANTITIES, loop_margins
+from studies.autopilot.tuned import QUANTITIES, loop_margins
 from symheli import AirspeedSchedule, Excitation
 from symheli.airframe.written import as_toml
 from symheli.errors import InputError

@@ -9,8 +9,8 @@ from identification import fit, scores
 from identification.judge.against_constant import HORIZONS
 from studies.campaigns import pays
 from studies.campaigns.runners import Here
-from studies.transition.axes import LATERAL
-from studies.transition.flights import TransitionPlan, autopilot_for
+from studies.setup.axes import LATERAL
+from studies.setup.flights import TransitionPlan, autopilot_for
 
 
 @pytest.mark.slow

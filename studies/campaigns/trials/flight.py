@@ -9,7 +9,7 @@ import numpy as np
 
 from studies.campaigns.trial import Trial
 from studies.campaigns.trials.vehicle import helicopter, scattered
-from studies.transition.flights import ABOVE_GROUND, BREEZE, TOP
+from studies.setup.flights import ABOVE_GROUND, BREEZE, TOP
 from symheli import AirspeedSchedule, Dryden, Wind, fly_batch, gain_scheduled_lqr
 from symheli.errors import UnknownNameError, ValidityWarning
 from symheli.flight import XCELL_SERVOS, Autopilot

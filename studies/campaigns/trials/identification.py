@@ -8,8 +8,8 @@ from identification import LPVARX, BSpline, PiecewiseLinear, Polynomial, fit, sc
 from identification.judge.against_constant import HORIZONS
 from studies.campaigns.trial import Trial
 from studies.campaigns.trials.vehicle import autopilot, helicopter
-from studies.transition.axes import ALL, LATERAL, LONGITUDINAL, SCHEDULING, Axis, mode_misses
-from studies.transition.flights import ACCELERATIONS, TOP, TransitionPlan
+from studies.setup.axes import ALL, LATERAL, LONGITUDINAL, SCHEDULING, Axis, mode_misses
+from studies.setup.flights import ACCELERATIONS, TOP, TransitionPlan
 from symheli.errors import UnknownNameError
 
 AXES: dict[str, Axis] = {"longitudinal": LONGITUDINAL, "lateral": LATERAL, "all": ALL}

@@ -7,10 +7,10 @@ from typing import Any
 
 from studies.campaigns.trial import Trial
 from studies.campaigns.trials.vehicle import autopilot, helicopter
-from studies.transition import accelerating_baseline, axes
-from studies.transition.accelerating_baseline import ALONE, BOTH, MARKS
-from studies.transition.axes import AXES, FROZEN_SPEEDS, Axis
-from studies.transition.flights import NOISE_DB, NOISES, TransitionPlan
+from studies.setup import accelerating_baseline, axes
+from studies.setup.accelerating_baseline import ALONE, BOTH, MARKS
+from studies.setup.axes import AXES, FROZEN_SPEEDS, Axis
+from studies.setup.flights import NOISE_DB, NOISES, TransitionPlan
 
 DECIBELS = dict(zip(NOISES, (None, NOISE_DB), strict=True))
 

@@ -8,8 +8,8 @@ from identification import against_constant
 from identification.judge.against_constant import HORIZONS
 from studies.campaigns.trial import Trial
 from studies.campaigns.trials.vehicle import autopilot, helicopter
-from studies.transition.axes import ALL, LATERAL, LONGITUDINAL, Axis
-from studies.transition.flights import ACCELERATIONS, TransitionPlan
+from studies.setup.axes import ALL, LATERAL, LONGITUDINAL, Axis
+from studies.setup.flights import ACCELERATIONS, TransitionPlan
 
 AXES = (LONGITUDINAL, LATERAL, ALL)
 MODELS = ("LPV", "LTI")

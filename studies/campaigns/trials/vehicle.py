@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 
-from studies.transition.flights import autopilot_for
+from studies.setup.flights import autopilot_for
 from symheli import Helicopter
 from symheli.dynamics import Governor
 from symheli.flight import Autopilot

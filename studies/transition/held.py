@@ -12,11 +12,11 @@ import numpy as np
 
 from identification.judge.frozen_models import continuous_poles
 from studies.known_kinematics.truth import AXES, frozen, sampled
-from studies.transition.axes import LATERAL, LONGITUDINAL
+from studies.setup.axes import LATERAL, LONGITUDINAL
+from studies.setup.flights import NOISES, TOP
+from studies.setup.quantities import values
 from studies.transition.baseline import derivative_name
 from studies.transition.comparison import CHANNELS
-from studies.transition.flights import NOISES, TOP
-from studies.transition.quantities import values
 from symheli import LinearFamily, LinearModel
 
 if TYPE_CHECKING:

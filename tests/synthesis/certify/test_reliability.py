@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-sys.path.append(str(Path(__file__).resolve().parents[2]))  # benchmarks/ is not installed
+sys.path.append(str(Path(__file__).resolve().parents[3]))  # benchmarks/ is not installed
 
 from benchmarks.reliability import ROUTES, count
 

@@ -12,7 +12,7 @@ from scipy.linalg import cholesky
 from scipy.special import gammaln, ndtri
 from scipy.stats import binom, chi2
 
-from identification.estimators.symmetric_root import symmetric_root
+from identification.model.symmetric_root import symmetric_root
 from symheli.errors import InputError
 from symheli.values.arrays import Array, frozen
 from symheli.values.summary import summarized
@@ -54,7 +54,7 @@ class MatrixEllipsoid(NamedTuple):
 
     Examples
     --------
-    >>> from identification.judge.matrix_ellipsoid import MatrixEllipsoid
+    >>> from identification.model.matrix_ellipsoid import MatrixEllipsoid
     >>> line = MatrixEllipsoid(np.eye(1), np.eye(1), 1.96, 0.95, 1.0)  # |theta| <= 1.96
     >>> line.contains([[[1.9]], [[2.0]]])
     array([ True, False])
@@ -215,7 +215,7 @@ def spectral_radius(n: int, m: int, probability: float) -> float:
 
     Examples
     --------
-    >>> from identification.judge.matrix_ellipsoid import spectral_radius
+    >>> from identification.model.matrix_ellipsoid import spectral_radius
     >>> round(spectral_radius(33, 6, 0.95), 2), round(spectral_radius(33, 1, 0.95), 2)
     (9.7, 6.88)
     """

@@ -19,20 +19,15 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from studies.transition import stage_file
-from studies.transition.configuration import Configuration
-from studies.transition.effort import Effort
-from studies.transition.stages import Stage
+from studies.setup import stage_file
 from symheli import Helicopter
-from symheli.errors import InputError, SymheliError
+from symheli.errors import SymheliError
 from symheli.values.whole_files import write_bytes
 
 FORMAT = "symheli stage 2"
 STAGES = "stages"
 """Folder of the stored stages, in that of the run."""
 PACKAGES = ("symheli", "identification", "synthesis", "studies")
-FILES = ("tubes",)
-"""Options that name files."""
 LIBRARIES = ("casadi", "numpy", "scipy", "cvxpy", "clarabel")
 
 
@@ -110,36 +105,6 @@ class StoredStages:
         return None
 
 
-def loaded(configuration: Configuration) -> Helicopter:
-    """The helicopter of a run."""
-    return Helicopter.load(configuration.vehicle, governor="ideal")
-
-
-def stage_keys(stages: Iterable[Stage], content: str, effort: Effort) -> dict[str, str]:
-    """By stage, in order, a digest of all that decides what it finds: the content that all share,
-    what the stage reads of the effort, and the keys of the stages it needs.
-    """
-    keys: dict[str, str] = {}
-    for stage in stages:
-        own = [f"{name} = {_value(effort, name)}" for name in sorted(stage.reads)]
-        before = [keys[name] for name in stage.needs]
-        keys[stage.name] = _digest((content, stage.name, *own, *before))
-    return keys
-
-
-def _value(effort: Effort, name: str) -> str:
-    """An option of the effort, of one that names files what these hold; raises `InputError` for one
-    that cannot be read.
-    """
-    value = getattr(effort, name)
-    if name not in FILES:
-        return repr(value)
-    try:
-        return repr([hashlib.sha256(Path(file).read_bytes()).hexdigest() for file in value])
-    except OSError as error:
-        raise InputError(f"{name}: {error.filename} cannot be read: {error.strerror}") from error
-
-
 def content_key(heli: Helicopter, vehicle: str, seed: int) -> str:
     """A digest of what decides what every stage finds: the code and vehicles of this project, the
     libraries, the equations and data of the helicopter, its name, by which the simulator is chosen,
@@ -156,10 +121,11 @@ def content_key(heli: Helicopter, vehicle: str, seed: int) -> str:
         vehicle,
         str(seed),
     )
-    return _digest(parts)
+    return digest(parts)
 
 
-def _digest(parts: Iterable[str]) -> str:
+def digest(parts: Iterable[str]) -> str:
+    """Return the SHA-256 digest of these texts, one a line."""
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 

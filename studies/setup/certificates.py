@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from studies.transition.guarantees import Bound, unit_of
-from studies.transition.quantities import value
+from studies.setup.bounds import Bound, unit_of
+from studies.setup.quantities import value
 
 
 def bound_to_dict(b: Bound, proof: str | None = None) -> dict[str, Any]:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from models import constant, random_stable, random_uncertain, searched, spring
 
-sys.path.append(str(Path(__file__).resolve().parents[2]))  # benchmarks/ is not installed
+sys.path.append(str(Path(__file__).resolve().parents[3]))  # benchmarks/ is not installed
 
 import synthesis.numerics.program.interior_point as method
 from benchmarks.closed_loops import DELAY, GUSTS, LOOPS, closed_loop, sampled_loop

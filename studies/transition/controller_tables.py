@@ -12,7 +12,7 @@ import numpy as np
 from studies.controllers.design_choices import RATE, TOP
 from studies.controllers.designs import LQR
 from studies.controllers.flown import WINDS
-from studies.transition.guarantees import CONSTANT, PLAIN, proven
+from studies.setup.bounds import CONSTANT, PLAIN, proven
 from studies.transition.tables import Table, gain
 
 if TYPE_CHECKING:

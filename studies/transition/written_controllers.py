@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from studies.controllers.tables import conclusions
-from studies.transition.certificates import bound_to_dict
-from studies.transition.quantities import named, value, values
+from studies.setup.certificates import bound_to_dict
+from studies.setup.quantities import named, value, values
+from studies.transition.controller_tables import conclusions
 from studies.transition.saved_proofs import proof_file
 
 if TYPE_CHECKING:

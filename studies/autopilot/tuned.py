@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 import symheli
-from studies.loops.responses import Responses, closed_loops, responses
+from studies.autopilot.responses import Responses, closed_loops, responses
 from symheli import Helicopter, Servo
 from symheli.errors import InputError, TrimError
 from symheli.flight import HelicopterLoops

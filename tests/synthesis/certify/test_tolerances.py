@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 PAGE = ROOT / "docs" / "tolerances.md"
 ROOMS = ("synthesis", "symheli/lpv")
 SMALL, LARGE = 0.01, 1e4

@@ -21,7 +21,7 @@ from identification import (
     pole_miss,
     scores,
 )
-from studies.transition.flights import TOP
+from studies.setup.flights import TOP
 from symheli import FlightRecord, Helicopter, LinearModel
 from symheli.errors import DataWarning
 
@@ -170,3 +170,20 @@ def update_time(structure: LPVARX, flight: FlightRecord) -> float:
     begin = time.thread_time()
     online.run(rows, history=False)
     return (time.thread_time() - begin) / len(rows)
+
+
+SCALES = {
+    "d_lon": 0.05,
+    "d_lat": 0.05,
+    "d_col": 0.05,
+    "d_ped": 0.1,
+    "u": 2.0,
+    "v": 2.0,
+    "w": 2.0,
+    "p": 1.0,
+    "q": 1.0,
+    "r": 1.0,
+    "phi": 0.3,
+    "theta": 0.3,
+}
+"""Sizes (SI) by which channels are scaled before a nu-gap is taken."""

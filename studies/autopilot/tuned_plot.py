@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from studies.loops.tuned import CONTROLS, QUANTITIES, LoopMargins
+from studies.autopilot.tuned import CONTROLS, QUANTITIES, LoopMargins
 from symheli.values.drawing import plain
 
 if TYPE_CHECKING:

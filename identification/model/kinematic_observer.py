@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from identification.model.kinematic_run import stepped
-from identification.recursive.online import vector
 from identification.structure.kinematic_arx import MOVING, STATES
-from identification.structure.regressors import scheduling_values
+from identification.structure.regressors import scheduling_values, vector
 from symheli.errors import AccuracyError, InputError, UnknownNameError
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array

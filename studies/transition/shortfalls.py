@@ -10,16 +10,16 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from studies.controllers.flown import WINDS
-from studies.transition.axes import AXES
+from studies.setup.axes import AXES
+from studies.setup.bounds import rate_text
+from studies.setup.flights import NOISES
 from studies.transition.campaign import MODE_MARK
-from studies.transition.flights import NOISES
 from studies.transition.gain_tables import not_about_the_helicopter
-from studies.transition.guarantees import rate_text
 from studies.transition.tables import Table, diverges, percent
 from synthesis import Status
 
 if TYPE_CHECKING:
-    from studies.transition.guarantees import Bound
+    from studies.setup.bounds import Bound
     from studies.transition.outcome import Outcome
 
 NEGATIVE = (

@@ -6,10 +6,12 @@ import numpy as np
 
 import symheli
 from identification import BaselineModel, beside_baseline
-from studies.transition.axes import HORIZON
-from studies.transition.comparison import along_the_command
-from studies.transition.flights import TOP
-from symheli import FlightRecord, Helicopter
+from studies.setup.axes import (
+    HORIZON,
+    SCHEDULING,
+)
+from studies.setup.flights import TOP
+from symheli import FlightRecord, Helicopter, LPVStateSpace
 
 ACCELERATIONS = (-4.0, -2.0, 0.0, 2.0, 4.0)
 """m/s^2, of the quasi-steady trims: the ramps of the study keep within them."""
@@ -43,3 +45,11 @@ def fits(models: dict[str, BaselineModel], test: FlightRecord) -> dict[tuple[str
     """{(model, output): percent}, 1 s ahead on a flight."""
     found = beside_baseline({}, models, test, tuple(MARKS), horizon=HORIZON)
     return {(p.name, y): p.scores.ahead[y] for p in found.predictions for y in MARKS}
+
+
+def along_the_command(lpv: LPVStateSpace, heli: Helicopter, *, drift: bool = True) -> BaselineModel:
+    """A baseline driven by the helicopter's inputs, scheduled on the commanded airspeed as the
+    identified models are.
+    """
+    inputs = tuple(map(str, heli.inputs))
+    return BaselineModel(model=lpv, scheduling=SCHEDULING, inputs=inputs, drift=drift)

@@ -1,0 +1,1 @@
+"""Loops of an autopilot: their responses before and after a change of gains."""
