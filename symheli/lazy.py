@@ -5,6 +5,7 @@ import importlib
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 
@@ -21,6 +22,15 @@ def lazily(
         if isinstance(node, ast.ImportFrom) and node.module
         for alias in node.names
     }
+
+    class Package(ModuleType):
+        """A package in which a public name is never hidden by the module of that name."""
+
+        def __setattr__(self, name: str, value: Any) -> None:
+            if not (name in home and isinstance(value, ModuleType)):
+                super().__setattr__(name, value)
+
+    sys.modules[package].__class__ = Package
 
     def find(name: str) -> Any:
         if name not in home:

@@ -12,7 +12,8 @@ from symheli.flight.anti_windup import observer_gains
 from symheli.flight.controller import RATE, deviations
 from symheli.flight.single_precision import increasing
 from symheli.lpv.bases.interpolating import PiecewiseLinear
-from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
+from symheli.lpv.lpv_matrices import Matrices
+from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.values.arrays import Array
 from symheli.values.signal import Signal
 

@@ -13,7 +13,8 @@ from symheli.errors import DataWarning, InputError
 from symheli.lpv.equilibration import loop_inverse
 from symheli.lpv.further_parameter import over
 from symheli.lpv.linear_model import LinearModel, is_control_system
-from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
+from symheli.lpv.lpv_matrices import Matrices
+from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.lpv.matrix_function import Box, MatrixFunction, block, functions_of, in_one_basis
 from symheli.lpv.scheduling import UNSCHEDULED, Scheduling
 from symheli.lpv.uncertain_state_space import UncertainStateSpace

@@ -17,10 +17,10 @@ from symheli.lpv.bases.polynomials import coefficients_of, lobatto_points, polyn
 from symheli.lpv.bases.rescaled import rescaled
 from symheli.lpv.bases.restricted import Restricted
 from symheli.lpv.linear_model import LinearModel, feedback_matrix
+from symheli.lpv.lpv_matrices import LPVMatrices, Matrices
 from symheli.lpv.monomials import as_blocks
 from symheli.lpv.recentred import centre, recentred
 from symheli.lpv.scheduling import (
-    RANGE_SLACK,
     UNSCHEDULED,
     Rates,
     Scheduling,
@@ -30,7 +30,7 @@ from symheli.lpv.scheduling import (
     with_rates,
 )
 from symheli.lpv.trim_schedule import TrimSchedule
-from symheli.values.arrays import Array, frozen
+from symheli.values.arrays import Array
 from symheli.values.signal import Signal, indices, signals
 from symheli.values.summary import as_table, summarized
 
@@ -42,17 +42,6 @@ if TYPE_CHECKING:
     from symheli.lpv.balanced_truncation import Balance, BalancedTruncation
     from symheli.lpv.lft import LFT
     from symheli.lpv.prediction import SteppedFlight
-
-
-class Matrices(NamedTuple):
-    """A (..., nx, nx), B (..., nx, nu), C (..., ny, nx), D (..., ny, nu)."""
-
-    A: Array
-    B: Array
-    C: Array
-    D: Array
-
-    __repr__ = summarized
 
 
 class FitResiduals(NamedTuple):
@@ -81,7 +70,7 @@ class FitResiduals(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class LPVStateSpace:
+class LPVStateSpace(LPVMatrices):
     """dx/dt = A(p) x + B(p) u, y = C(p) x + D(p) u, or sampled x(k+1) = A(p(k)) x(k) + ...
 
     A(p) = sum_j f_j(p) A_j with the n functions f_j of `basis`, of one scheduling parameter p or of
@@ -122,48 +111,11 @@ class LPVStateSpace:
            [-2.25, -1.  ]])
     """
 
-    basis: FunctionSpace
-    A: Array
-    B: Array
-    C: Array
-    D: Array
-    parameters: tuple[Scheduling, ...]
-    states: tuple[Signal, ...]
-    inputs: tuple[Signal, ...]
-    outputs: tuple[Signal, ...]
-    dt: float | None = None
     trim: TrimSchedule | None = None
     residuals: FitResiduals | None = None
 
     __repr__ = summarized
     _repr_html_ = as_table
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "parameters", parameters(self.parameters))
-        for group in ("states", "inputs", "outputs"):
-            object.__setattr__(self, group, signals(getattr(self, group)))
-        n, nx, nu, ny = self.basis.size, len(self.states), len(self.inputs), len(self.outputs)
-        for name, shape in (
-            ("A", (n, nx, nx)),
-            ("B", (n, nx, nu)),
-            ("C", (n, ny, nx)),
-            ("D", (n, ny, nu)),
-        ):
-            object.__setattr__(self, name, frozen(getattr(self, name), name, shape))
-        if self.basis.dimension != len(self.parameters):
-            raise InputError(
-                f"the basis is one of {self.basis.dimension} parameter(s), the model has"
-                f" {len(self.parameters)}: {', '.join(s.name for s in self.parameters)}"
-            )
-        for s, (low, high) in zip(self.parameters, self.basis.ranges, strict=True):
-            slack = RANGE_SLACK * (s.high - s.low)
-            if low > s.low + slack or high < s.high - slack:
-                raise InputError(
-                    f"the basis covers [{low}, {high}] but scheduling {s.name} ranges over"
-                    f" [{s.low}, {s.high}]"
-                )
-        if self.dt is not None and not self.dt > 0:
-            raise InputError(f"dt must be a positive number of seconds or None, got {self.dt}")
 
     @classmethod
     def polynomial(
@@ -267,26 +219,9 @@ class LPVStateSpace:
         )
 
     @property
-    def scheduling(self) -> Scheduling:
-        """The scheduling parameter; raises `InputError` where there are several."""
-        if len(self.parameters) > 1:
-            raise InputError(
-                f"the model has {len(self.parameters)} scheduling parameters"
-                f" ({', '.join(s.name for s in self.parameters)}): use .parameters"
-            )
-        return next(iter(self.parameters))
-
-    @property
     def box(self) -> tuple[tuple[float, float], ...]:
         """(low, high) of each parameter."""
         return tuple((s.low, s.high) for s in self.parameters)
-
-    def matrices(self, p: object) -> Matrices:
-        """A, B, C, D at p; the axes of p come first, that of several parameters left out. Raises
-        `InputError` outside the ranges.
-        """
-        f = self.basis(check_all(self.parameters, p))
-        return Matrices(*(np.tensordot(f, M, axes=1) for M in (self.A, self.B, self.C, self.D)))
 
     def at(self, *p: float) -> LinearModel:
         """The model frozen at p, one value a parameter."""

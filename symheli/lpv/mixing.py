@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
+from symheli.lpv.lpv_matrices import Matrices
+from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.values.arrays import Array
 from symheli.values.signal import Signal, indices
 

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
+from symheli.lpv.lpv_matrices import Matrices
+from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.values.arrays import Array
 from symheli.values.signal import Signal
 from symheli.values.units import per_second

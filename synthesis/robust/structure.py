@@ -11,7 +11,7 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv import LFT, LinearModel, LPVStateSpace, UncertainStateSpace
-from symheli.lpv.lft.model import parts as slices
+from symheli.lpv.lft_matrices import parts as slices
 from symheli.values.sample_period import same_period
 from symheli.values.signal import Signal, indices
 from synthesis.design.lti.weights import as_weight

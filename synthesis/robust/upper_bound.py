@@ -25,7 +25,8 @@ import numpy as np
 from scipy import sparse
 
 from synthesis.numerics.polynomial.symmetric import svec
-from synthesis.numerics.program.cone_program import Answer, ConeProgram, Solver, solve
+from synthesis.numerics.program.answer import Answer
+from synthesis.numerics.program.cone_program import ConeProgram, Solver, solve
 from synthesis.robust.structure import BlockLoop
 
 Array = np.ndarray

@@ -17,7 +17,8 @@ from synthesis.numerics.program.affine_program import (
     cells,
     from_lower,
 )
-from synthesis.numerics.program.cone_program import Answer, Solver
+from synthesis.numerics.program.answer import Answer
+from synthesis.numerics.program.cone_program import Solver
 from synthesis.sets.inequality import decrease, decrease_sampled, within
 from synthesis.sets.statement import SetStatement
 

@@ -19,7 +19,8 @@ from symheli.values.signal import Signal
 from symheli.values.summary import summarized
 from synthesis.numerics.polynomial.pieces import pieces
 from synthesis.numerics.program.affine_program import AffineProgram, BernsteinCell
-from synthesis.numerics.program.cone_program import Answer, Solver, general_solver
+from synthesis.numerics.program.answer import Answer
+from synthesis.numerics.program.cone_program import Solver, general_solver
 from synthesis.switching.inequality import Modes, holds
 
 POINT = BernsteinCell(np.zeros((1, 1)), np.ones((1, 1)))

@@ -16,7 +16,8 @@ from synthesis.numerics.program.affine_program import (
     MatrixVariable,
     from_lower,
 )
-from synthesis.numerics.program.cone_program import Answer, ConeProgram, Solver, solve
+from synthesis.numerics.program.answer import Answer
+from synthesis.numerics.program.cone_program import ConeProgram, Solver, solve
 from synthesis.tubes.deviations import CommandCell
 from synthesis.tubes.inequality import (
     MatrixSet,

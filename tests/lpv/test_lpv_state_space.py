@@ -20,7 +20,7 @@ from symheli.lpv import (
     UserFunctions,
     simulate,
 )
-from symheli.lpv.lpv_state_space import Matrices
+from symheli.lpv.lpv_matrices import Matrices
 from symheli.lpv.scheduling import parameters
 
 

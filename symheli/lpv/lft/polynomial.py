@@ -14,7 +14,8 @@ from symheli.lpv.bases.polynomials import (
     polynomials,
     scaled_powers,
 )
-from symheli.lpv.lft.model import LFT, Block, parts
+from symheli.lpv.lft.model import LFT
+from symheli.lpv.lft_matrices import Block, parts
 from symheli.lpv.lpv_state_space import FitResiduals, LPVStateSpace
 from symheli.lpv.monomials import as_blocks
 from symheli.lpv.recentred import centre, recentred

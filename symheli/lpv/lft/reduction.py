@@ -9,7 +9,8 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv.equilibration import equilibrate, peaks_to_one, significant
-from symheli.lpv.lft.model import LFT, Block, parts
+from symheli.lpv.lft.model import LFT
+from symheli.lpv.lft_matrices import Block, parts
 from symheli.values.arrays import Array
 
 SAMPLES = 12

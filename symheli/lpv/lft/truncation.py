@@ -10,8 +10,9 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv.equilibration import equilibrate, significant
-from symheli.lpv.lft.model import LFT, Block, parts
+from symheli.lpv.lft.model import LFT
 from symheli.lpv.lft.reduction import reduce
+from symheli.lpv.lft_matrices import Block, parts
 from symheli.values.arrays import Array
 from symheli.values.summary import summarized
 

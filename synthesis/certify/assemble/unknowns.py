@@ -26,14 +26,16 @@ from synthesis.certify.assemble.memory_blocks import memory_blocks
 from synthesis.certify.proof.one_parameter import IntervalEvidence
 from synthesis.certify.statement.forms import HigherOrder, LyapunovForm, Memory, Spline
 from synthesis.certify.statement.lag import LagRegion
-from synthesis.certify.statement.norm_bounded import NormBounded, open_block
-from synthesis.certify.statement.scaling import Scaling, block_scaling, scaling
+from synthesis.certify.statement.norm_bounded import NormBounded
+from synthesis.certify.statement.opened import open_block
+from synthesis.certify.statement.scaling import block_scaling, scaling
 from synthesis.certify.statement.spline import (
     Lyapunov,
     MemoryLyapunov,
     SplineLyapunov,
     graded_knots,
 )
+from synthesis.certify.statement.units import Scaling
 from synthesis.numerics.polynomial.cells import Strip, cells, strips
 from synthesis.numerics.polynomial.pieces import ModelPiece, model_pieces, rounded
 from synthesis.numerics.polynomial.symmetric import extended, length, smat, svec

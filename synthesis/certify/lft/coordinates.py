@@ -8,8 +8,9 @@ import numpy as np
 from scipy import linalg
 
 from symheli.lpv import LFT, Matrices
-from symheli.lpv.lft.model import parts
-from synthesis.certify.statement.scaling import Scaling, model_scaling
+from symheli.lpv.lft_matrices import parts
+from synthesis.certify.lft.proof import Coordinates
+from synthesis.certify.statement.scaling import model_scaling
 
 Array = np.ndarray
 
@@ -28,16 +29,6 @@ class Loop(NamedTuple):
     Cy: Array
     Dyw: Array
     Dyu: Array
-
-
-class Coordinates(NamedTuple):
-    """`units` of state, output and time; z = right z', w = right w' with left = right^-1 and both
-    commuting with Delta.
-    """
-
-    units: Scaling
-    left: Array
-    right: Array
 
 
 def split(lft: LFT) -> Loop:

@@ -27,7 +27,7 @@ from typing import NamedTuple
 import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv.lft.model import parts
+from symheli.lpv.lft_matrices import parts
 from symheli.values.summary import summarized
 from synthesis.numerics.polynomial import structure
 from synthesis.numerics.polynomial.symmetric import basis

@@ -13,11 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symheli.lpv import LFT, Matrices, Scheduling
-from symheli.lpv.lft.model import parts
-from synthesis.certify.lft.coordinates import Coordinates
+from symheli.lpv.lft_matrices import LFTMatrices, parts
+from symheli.lpv.lpv_matrices import Matrices
+from symheli.lpv.scheduling import Scheduling
 from synthesis.certify.lft.multipliers import Multiplier
 from synthesis.certify.proof import pointwise
+from synthesis.certify.statement.units import Scaling
 from synthesis.numerics.polynomial import structure
 from synthesis.numerics.polynomial.exact import Number, exact, positive_definite, rational
 from synthesis.numerics.polynomial.symmetric import schur_complement, symmetrized
@@ -47,7 +48,7 @@ class QuadraticStorage(NamedTuple):
 class LFTEvidence(NamedTuple):
     """An LFT, and the coordinates in which its numbers are of order one."""
 
-    lft: LFT
+    lft: LFTMatrices
     coordinates: Coordinates
 
     @property
@@ -135,10 +136,9 @@ class LFTEvidence(NamedTuple):
         corners = product((-1.0, 1.0), repeat=m) if m <= MAX_PARAMETERS_AT_CORNERS else ()
         diagonals = (np.where(np.arange(m) % 2, -t, t) for t in np.linspace(-0.9, 0.9, 7))
         for delta in (*corners, *diagonals):
-            model = self.lft.at(
-                *(s.middle + d * s.radius for s, d in zip(self.lft.parameters, delta, strict=True))
-            )
-            own = Matrices(*(exact(M, number) for M in (model.A, model.B, model.C, model.D)))
+            M, x = self.lft.matrix(np.array(delta, dtype=float)), len(self.lft.states)
+            parts_of = (M[:x, :x], M[:x, x:], M[x:, :x], M[x:, x:])
+            own = Matrices(*(exact(part, number) for part in parts_of))
             F = pointwise.dissipation(own, P, None, None if self.lft.dt is None else P, g)
             if not positive_definite(-F):
                 return False
@@ -157,7 +157,7 @@ class LFTEvidence(NamedTuple):
         return all(_negative(-(T.T @ M @ T)) for M, T in zip(scaled, transforms, strict=True))
 
 
-def _left_side(lft: LFT, proof: QuadraticStorage, number: Number) -> Array:
+def _left_side(lft: LFTMatrices, proof: QuadraticStorage, number: Number) -> Array:
     """The quadratic form on (w, x, u) with gamma = 0: rows of the LFT are (z, dx/dt or x(k+1),
     y).
     """
@@ -186,7 +186,7 @@ def _left_side(lft: LFT, proof: QuadraticStorage, number: Number) -> Array:
     return F
 
 
-def _structure_holds(multiplier: Multiplier, lft: LFT) -> bool:
+def _structure_holds(multiplier: Multiplier, lft: LFTMatrices) -> bool:
     """Check exactly that the blocks are those of the LFT, and that the multiplier has the form of
     its class.
     """
@@ -233,3 +233,13 @@ def _negative(M: Array) -> bool:
         return True
     values = np.linalg.eigvalsh(0.5 * (M + M.T))
     return bool(values[-1] < -20 * len(M) * np.finfo(float).eps * np.abs(values).max())
+
+
+class Coordinates(NamedTuple):
+    """`units` of state, output and time; z = right z', w = right w' with left = right^-1 and both
+    commuting with Delta.
+    """
+
+    units: Scaling
+    left: Array
+    right: Array

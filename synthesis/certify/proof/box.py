@@ -16,14 +16,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symheli.lpv import Matrices, Scheduling
 from symheli.lpv.bases.polynomials import factors_of
+from symheli.lpv.lpv_matrices import Matrices
+from symheli.lpv.scheduling import Scheduling
 from symheli.progress import tracked
 from synthesis.certify.proof import pointwise
 from synthesis.certify.proof.inequalities import Pair, decrease, output_form, positivity
 from synthesis.certify.statement.box import BoxLyapunov
 from synthesis.certify.statement.demand import Demand
-from synthesis.certify.statement.scaling import Scaling
+from synthesis.certify.statement.units import Scaling
 from synthesis.numerics.polynomial import structure
 from synthesis.numerics.polynomial.definite import negative_definite, negative_definite_exactly
 from synthesis.numerics.polynomial.exact import Number, exact, rational

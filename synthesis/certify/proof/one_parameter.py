@@ -11,14 +11,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symheli.lpv import LPVStateSpace, Matrices, Scheduling
+from symheli.lpv.lpv_matrices import LPVMatrices, Matrices
+from symheli.lpv.scheduling import Scheduling
 from symheli.progress import tracked
 from synthesis.certify.proof import pointwise
 from synthesis.certify.proof.inequalities import Statement, lmi_polynomials
 from synthesis.certify.statement.demand import Demand
 from synthesis.certify.statement.norm_bounded import NormBounded
-from synthesis.certify.statement.scaling import Scaling
 from synthesis.certify.statement.spline import Lyapunov, MemoryLyapunov, SplineLyapunov
+from synthesis.certify.statement.units import Scaling
 from synthesis.numerics.polynomial import structure
 from synthesis.numerics.polynomial.exact import Number, exact, positive_definite, rational
 from synthesis.numerics.polynomial.motion import Motion
@@ -121,7 +122,7 @@ class IntervalEvidence(NamedTuple):
     `block` the inputs are (d, u) and the outputs (y, v).
     """
 
-    lpv: LPVStateSpace
+    lpv: LPVMatrices
     pieces: tuple[ModelPiece, ...]
     units: Scaling
     rate: float

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from symheli.lpv import Matrices
+from symheli.lpv.lpv_matrices import Matrices
 from synthesis.certify.statement.box import BoxLyapunov
 from synthesis.certify.statement.norm_bounded import NormBounded
 from synthesis.certify.statement.spline import MemoryLyapunov, SplineLyapunov

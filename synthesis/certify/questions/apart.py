@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 
-from synthesis.numerics.program.cone_program import Answer
+from synthesis.numerics.program.answer import Answer
 
 MAX_UNEXPLAINED_RATIO = 1.05
 """Largest ratio of upper to lower bound for which no cause of the gap is reported."""

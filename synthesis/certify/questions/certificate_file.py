@@ -20,24 +20,32 @@ from typing import Any
 import numpy as np
 
 from symheli.errors import CertificateError, InputError
-from symheli.lpv import LFT, LPVStateSpace, Scheduling, bases
-from symheli.lpv.lft import Block
+from symheli.lpv.bases import (
+    BSpline,
+    CubicSpline,
+    Patches,
+    PiecewiseLinear,
+    Polynomial,
+    Product,
+)
+from symheli.lpv.lft_matrices import Block, LFTMatrices
+from symheli.lpv.lpv_matrices import LPVMatrices
+from symheli.lpv.scheduling import Scheduling
 from symheli.values import Signal
 from symheli.values.whole_files import write_text
 from synthesis.certify.lft import proof as lft_proof
-from synthesis.certify.lft.coordinates import Coordinates
 from synthesis.certify.lft.multipliers import Multiplier
 from synthesis.certify.lower_bounds.trajectory import SchedulingTrajectory
 from synthesis.certify.proof import box, one_parameter
 from synthesis.certify.questions.certificate import Certificate, Proof
-from synthesis.certify.questions.hypotheses import motion
 from synthesis.certify.statement.box import BoxLyapunov
 from synthesis.certify.statement.demand import Demand
 from synthesis.certify.statement.lag import LagRegion
 from synthesis.certify.statement.norm_bounded import NormBounded
 from synthesis.certify.statement.outcome import Attempt, Seconds, Status
-from synthesis.certify.statement.scaling import Scaling
+from synthesis.certify.statement.sentences import motion
 from synthesis.certify.statement.spline import MemoryLyapunov, SplineLyapunov
+from synthesis.certify.statement.units import Scaling
 from synthesis.numerics.polynomial.matrix import PolynomialMatrix
 from synthesis.numerics.polynomial.motion import Motion
 from synthesis.numerics.polynomial.pieces import model_pieces, pieces
@@ -58,21 +66,17 @@ def _former_units(
 TYPES: dict[str, Any] = {
     kind.__name__: kind
     for kind in (
-        *(Attempt, Seconds, Scheduling, Block, LFT, LPVStateSpace),
-        *(PolynomialMatrix, Motion, Scaling, Demand, Coordinates, NormBounded),
+        *(Attempt, Seconds, Scheduling, Block),
+        *(PolynomialMatrix, Motion, Scaling, Demand, lft_proof.Coordinates, NormBounded),
         *(SplineLyapunov, MemoryLyapunov, LagRegion, BoxLyapunov),
         Multiplier,
-        *(
-            bases.Polynomial,
-            bases.BSpline,
-            bases.PiecewiseLinear,
-            bases.Product,
-            bases.Patches,
-        ),
+        *(Polynomial, BSpline, PiecewiseLinear, Product, Patches),
     )
 } | {
+    "LFT": LFTMatrices,
+    "LPVStateSpace": LPVMatrices,
     "Quadratic": lft_proof.QuadraticStorage,
-    "Spline": bases.CubicSpline,
+    "Spline": CubicSpline,
     "Trajectory": SchedulingTrajectory,
     "Units": _former_units,
 }
@@ -80,9 +84,6 @@ TYPES: dict[str, Any] = {
 the class.
 """
 WORDS = {kind: word for word, kind in TYPES.items()}
-
-LEFT_OUT = {LPVStateSpace: ("trim", "residuals")}
-"""Fields of a model that a proof does not need."""
 
 LATER = ("perturbation",)
 """Fields that files of this version may lack: they were written before the field existed."""
@@ -223,15 +224,15 @@ def _decoded_proof(content: Any) -> Proof:
     route = content["route"]
     own = {name: decoded(v) for name, v in content.items() if name not in ("route", "lyapunov")}
     if route == "one parameter":
-        own["pieces"] = model_pieces(_a(LPVStateSpace, own["lpv"]))
+        own["pieces"] = model_pieces(_a(LPVMatrices, own["lpv"]))
     elif route == "box":
-        own["model"] = pieces(_a(LPVStateSpace, own.pop("source")))
+        own["model"] = pieces(_a(LPVMatrices, own.pop("source")))
     else:
-        _a(LFT, own["lft"])
+        _a(LFTMatrices, own["lft"])
     for name, kind in (
         ("units", Scaling),
         ("demand", Demand),
-        ("coordinates", Coordinates),
+        ("coordinates", lft_proof.Coordinates),
     ):
         if name in own:
             _a(kind, own[name])
@@ -261,15 +262,10 @@ def encoded(value: Any) -> Any:
         return {"shape": list(value.shape), "array": numbers}
     if isinstance(value, dict):
         return {name: encoded(v) for name, v in value.items()}
-    if type(value) in WORDS:
-        left_out = LEFT_OUT.get(type(value), ())
-        names = (
-            [f.name for f in fields(value) if f.init]
-            if is_dataclass(value)
-            else list(value._fields)
-        )
-        own = {name: encoded(getattr(value, name)) for name in names if name not in left_out}
-        return {"type": WORDS[type(value)], **own}
+    kind = next((kind for kind in type(value).__mro__ if kind in WORDS), None)
+    if kind is not None:
+        names = [f.name for f in fields(kind) if f.init] if is_dataclass(kind) else kind._fields
+        return {"type": WORDS[kind], **{name: encoded(getattr(value, name)) for name in names}}
     if isinstance(value, tuple | list):
         return [encoded(v) for v in value]
     raise InputError(

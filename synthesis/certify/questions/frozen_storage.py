@@ -18,6 +18,7 @@ from symheli.lpv import Matrices
 from symheli.progress import task
 from synthesis.certify.assemble.unknowns import ScaledProblem
 from synthesis.certify.proof.inequalities import Statement, lmi_polynomials
+from synthesis.certify.statement.scaling import of_model
 from synthesis.certify.statement.spline import SplineLyapunov
 from synthesis.numerics.polynomial.pieces import joined
 from synthesis.numerics.polynomial.symmetric import basis, smat, svec
@@ -117,7 +118,7 @@ def _too_fast(
 
 
 def _frozen(problem: ScaledProblem, p: float) -> Matrices:
-    return problem.units.of_model(problem.lpv.at(min(p, problem.lpv.scheduling.high)))
+    return of_model(problem.units, problem.lpv.at(min(p, problem.lpv.scheduling.high)))
 
 
 def _any(model: Matrices, level: float, discrete: bool = False) -> Array | None:

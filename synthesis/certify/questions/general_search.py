@@ -23,21 +23,17 @@ from synthesis.certify.statement.forms import Spline
 from synthesis.certify.statement.impose import Grid
 from synthesis.certify.statement.kind import Kind
 from synthesis.certify.statement.outcome import Attempt
-from synthesis.certify.statement.scaling import Scaling, dissipative, gramian_units, model_scaling
+from synthesis.certify.statement.scaling import dissipative, gramian_units, model_scaling
 from synthesis.certify.statement.spline import graded_knots
+from synthesis.certify.statement.units import Scaling
 from synthesis.numerics.linear.norm import norm
 from synthesis.numerics.polynomial.matrix import PolynomialMatrix
 from synthesis.numerics.polynomial.pieces import Pieces
 from synthesis.numerics.polynomial.regions import model_on, regions
 from synthesis.numerics.polynomial.symmetric import extended, length, smat
 from synthesis.numerics.program import interior_point
-from synthesis.numerics.program.cone_program import (
-    LYAPUNOV,
-    Answer,
-    SolverPoint,
-    general_solver,
-    solve,
-)
+from synthesis.numerics.program.answer import Answer
+from synthesis.numerics.program.cone_program import LYAPUNOV, SolverPoint, general_solver, solve
 from synthesis.numerics.program.interior_point import Minimum
 from synthesis.numerics.program.lyapunov_program import LyapunovBlocks, LyapunovProgram, Sizes
 

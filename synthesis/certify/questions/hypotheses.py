@@ -4,7 +4,6 @@ trusted.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,7 +12,8 @@ from symheli.lpv import LPVStateSpace, Scheduling, UncertainStateSpace
 from symheli.lpv.bases.function_space import tensor_grid
 from symheli.lpv.trim_drift import PREFIX
 from synthesis.certify.statement.kind import Kind
-from synthesis.certify.statement.norm_bounded import open_block
+from synthesis.certify.statement.opened import open_block
+from synthesis.certify.statement.sentences import motion
 
 Array = np.ndarray
 
@@ -74,24 +74,6 @@ def perturbed(model: object) -> tuple[str, ...]:
         else f"the bound on Delta holds with probability {model.probability:g}"
     )
     return (block.sentence, f"{promise}: {model.source}")
-
-
-def motion(s: Scheduling, rate: float) -> str:
-    """The range and the rate of one parameter."""
-    unit = "" if s.unit == "1" else f" {s.unit}"
-    if isinstance(s.rate, str):
-        return (
-            f"{s.name} is in [{s.low:g}, {s.high:g}]{unit}, d{s.name}/dt is {s.rate}, which keeps"
-            f" to what lets {s.name} stay in that range"
-        )
-    speed = (
-        "arbitrarily fast"
-        if math.isinf(rate)
-        else "constant"
-        if rate == 0
-        else f"|d{s.name}/dt| <= {rate:g}{unit} per second"
-    )
-    return f"{s.name} is exogenous, in [{s.low:g}, {s.high:g}]{unit}, {speed}"
 
 
 def drifting(model: object) -> tuple[str, ...]:

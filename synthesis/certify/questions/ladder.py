@@ -18,7 +18,7 @@ from synthesis.certify.questions.certificate import Proof
 from synthesis.certify.questions.own_scale import in_its_own_scale
 from synthesis.certify.questions.problem import BoundProblem
 from synthesis.certify.statement.outcome import Attempt
-from synthesis.numerics.program.cone_program import Answer
+from synthesis.numerics.program.answer import Answer
 
 INFLATION = 1e-6
 """gamma^2 is raised by this fraction above the value that P admits in floating point, to leave a

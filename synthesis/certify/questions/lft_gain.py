@@ -40,7 +40,8 @@ from synthesis.certify.statement.impose import Bernstein
 from synthesis.certify.statement.kind import Kind
 from synthesis.certify.statement.outcome import Attempt, Status
 from synthesis.numerics.polynomial.motion import Motion
-from synthesis.numerics.program.cone_program import Answer, Solver, general_solver, solve
+from synthesis.numerics.program.answer import Answer
+from synthesis.numerics.program.cone_program import Solver, general_solver, solve
 
 Array = np.ndarray
 

@@ -25,11 +25,12 @@ from synthesis.certify.questions.ladder import CLOSE_TO_LOWER, NO_MARGIN, Found,
 from synthesis.certify.statement.forms import Spline
 from synthesis.certify.statement.impose import Bernstein
 from synthesis.certify.statement.outcome import Attempt
-from synthesis.certify.statement.scaling import dissipative
+from synthesis.certify.statement.scaling import dissipative, storage_of
 from synthesis.certify.statement.spline import Lyapunov, SplineLyapunov
 from synthesis.numerics.linear.norm import norm
 from synthesis.numerics.program import interior_point
-from synthesis.numerics.program.cone_program import LYAPUNOV, Answer, SolverPoint, solve
+from synthesis.numerics.program.answer import Answer
+from synthesis.numerics.program.cone_program import LYAPUNOV, SolverPoint, solve
 from synthesis.numerics.program.lyapunov_program import MANY_STATES, LyapunovProgram
 
 Array = np.ndarray
@@ -169,7 +170,7 @@ class OneParameter(Ladder):
         if scaled is not None:
             knots, middle = self.constant().knots, scaled.lpv.at(scaled.lpv.scheduling.middle)
             for above in GAIN_MARGINS:
-                P = scaled.units.storage(middle, above)
+                P = storage_of(scaled.units, middle, above)
                 if P is None:
                     continue
                 lyapunov = SplineLyapunov(knots, 0, P[None])

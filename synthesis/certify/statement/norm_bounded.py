@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symheli.lpv import LPVStateSpace, UncertainStateSpace
+from symheli.lpv.lpv_matrices import LPVMatrices
 from synthesis.numerics.polynomial import structure
 
 Array = np.ndarray
@@ -32,7 +32,7 @@ class NormBounded(NamedTuple):
     bound: float
     parts: tuple[tuple[int, int, bool], ...] = ()
 
-    def fault(self, lpv: LPVStateSpace) -> str | None:
+    def fault(self, lpv: LPVMatrices) -> str | None:
         """Return why it is not a block of this model; None where it is."""
         found = structure.first(
             structure.whole(self.inputs, 1, "inputs of the block"),
@@ -96,14 +96,3 @@ class NormBounded(NamedTuple):
             f"for every Delta ({self.inputs} x {self.outputs}) with |Delta|_2 <= {self.bound!r},"
             " constant or moving in any way, d = Delta v"
         )
-
-
-def open_block(unc: UncertainStateSpace, *, channels: bool) -> tuple[LPVStateSpace, NormBounded]:
-    """Return the model with its block open, inputs (d, u) and outputs (y, v), u and y only with
-    `channels`; and the block.
-    """
-    u, y = (unc.inputs, unc.outputs) if channels else ((), ())
-    model = unc.model.select(
-        inputs=(*unc.perturbation_inputs, *u), outputs=(*y, *unc.perturbation_outputs)
-    )
-    return model, NormBounded(*unc.shape, unc.bound, tuple((d, v, own) for d, v, own in unc.parts))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import Enum
 from typing import TYPE_CHECKING, NamedTuple
 
-from synthesis.numerics.program.cone_program import Answer
+from synthesis.numerics.program.answer import Answer
 
 if TYPE_CHECKING:
     pass

@@ -5,9 +5,8 @@ units of the states.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from scipy import linalg
@@ -15,10 +14,9 @@ from scipy import linalg
 from symheli.errors import InputError
 from symheli.lpv import LinearModel, LPVStateSpace, Matrices
 from synthesis.certify.statement.norm_bounded import NormBounded
+from synthesis.certify.statement.units import Scaling
 from synthesis.numerics.linear.balance import balance, size_of
 from synthesis.numerics.linear.norm import norm
-from synthesis.numerics.polynomial import structure
-from synthesis.numerics.polynomial.pieces import ModelPiece
 from synthesis.numerics.polynomial.symmetric import powered, symmetrized
 from synthesis.numerics.program.storage import least_storage, strict_storage
 
@@ -51,71 +49,21 @@ GRAMIAN_SHARE = 0.01
 """
 
 
-class Scaling(NamedTuple):
-    """x = right z, left = right^-1, outputs in units of `channel`, time in units of `time` (s; 1 in
-    discrete time).
+def of_model(units: Scaling, model: LinearModel) -> Matrices:
+    """Return the matrices of a frozen model in these units."""
+    every = units.of_matrices(Matrices(*(M[None] for M in (model.A, model.B, model.C, model.D))))
+    return Matrices(*(M[0] for M in every))
 
-    `weight` (n, n): in the coordinates weight^-1 z the state block of the LMI is near -I, or below,
-    where P is near I: slow and fast states then count alike. `multiplier` is the unit of that of a
-    norm-bounded block, squared outputs per squared v.
+
+def storage_of(units: Scaling, model: LinearModel, above: float) -> Array | None:
+    """Return P of a frozen model in these units, which dissipates strictly at the level 1 + `above`
+    of the channel; None where there is none.
     """
-
-    left: Array
-    right: Array
-    channel: float
-    time: float
-    weight: Array
-    multiplier: float = 1.0
-
-    def fault(self, states: int) -> str | None:
-        """Return why these are not coordinates of this number of states; None where they are."""
-        return structure.first(
-            structure.coordinates(
-                self.left, self.right, (self.channel, self.time, self.multiplier), states
-            ),
-            structure.symmetric(np.asarray(self.weight), (states, states), "the weight"),
-        )
-
-    def of_pieces(
-        self, pieces: Iterable[ModelPiece], block: NormBounded | None = None
-    ) -> tuple[ModelPiece, ...]:
-        """Return the pieces of a model in these units, those of the channels of a `block` too."""
-
-        def scaled(piece: ModelPiece) -> ModelPiece:
-            inputs, outputs = np.ones(piece.B.shape[2]), np.full(piece.C.shape[1], self.channel)
-            if block is not None:
-                own = self.channel / math.sqrt(self.multiplier)
-                inputs[: block.inputs] = outputs[len(outputs) - block.outputs :] = own
-            return piece.scaled(self.left, self.right, inputs, outputs, self.time)
-
-        return tuple(map(scaled, pieces))
-
-    def storage(self, model: LinearModel, above: float) -> Array | None:
-        """Return P of a frozen model in these units, which dissipates strictly at the level 1 +
-        `above` of the channel; None where there is none.
-        """
-        inner = linalg.inv(self.weight)
-        share = 0.5 * above / (LEVELS[0] - 1.0)
-        return least_storage(
-            *self.of_model(model), 1.0 + above, share * inner @ inner, discrete=model.dt is not None
-        )
-
-    def of_model(self, model: LinearModel) -> Matrices:
-        """Return a frozen model in these units."""
-        every = self.of_matrices(Matrices(*(M[None] for M in (model.A, model.B, model.C, model.D))))
-        return Matrices(*(M[0] for M in every))
-
-    def of_matrices(self, model: Matrices, block: NormBounded | None = None) -> Matrices:
-        """Return the matrices (K, ...) of a model in these units, as `of_pieces`."""
-        return Matrices(*self.of_pieces([ModelPiece(0.0, 1.0, *model)], block)[0][2:])
-
-    def to_physical(self, P: Array) -> Array:
-        """Return Lyapunov matrices in physical units from those in z."""
-        return symmetrized(self.channel**2 * self.left.T @ P @ self.left)
-
-    def to_scaled(self, P: Array) -> Array:
-        """Return the inverse of `to_physical`."""
-        return symmetrized(self.right.T @ P @ self.right / self.channel**2)
+    inner = linalg.inv(units.weight)
+    share = 0.5 * above / (LEVELS[0] - 1.0)
+    return least_storage(
+        *of_model(units, model), 1.0 + above, share * inner @ inner, discrete=model.dt is not None
+    )
 
 
 def scaling(lpv: LPVStateSpace, gain: float) -> Scaling:
@@ -233,7 +181,7 @@ def dissipative(units: Scaling, model: LinearModel, gain: float) -> Scaling | No
         return None
     found, levels = None, LEVELS
     while levels:
-        scaled = (found or units)._replace(channel=gain).of_model(model)
+        scaled = of_model((found or units)._replace(channel=gain), model)
         tried = (
             (k, strict_storage(*scaled, level, discrete=model.dt is not None))
             for k, level in enumerate(levels)
@@ -258,7 +206,7 @@ def gramian_units(units: Scaling, model: LinearModel) -> Scaling:
     of a little noise at each state, which raises the variance of the outputs by `GRAMIAN_SHARE`;
     weight^-2 is what that noise adds. Other models keep their units.
     """
-    A, B, C, _ = units.of_model(model)
+    A, B, C, _ = of_model(units, model)
     continuous, n = model.dt is None, len(A)
     if not (model.is_stable() and B.size and C.size):
         return units

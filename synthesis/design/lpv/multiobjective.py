@@ -37,8 +37,9 @@ from synthesis.numerics.program.affine_program import (
     cells,
     from_lower,
 )
+from synthesis.numerics.program.answer import Answer
 from synthesis.numerics.program.bases import Dependence, functions, limited, used
-from synthesis.numerics.program.cone_program import Answer, Solver, general_solver
+from synthesis.numerics.program.cone_program import Solver, general_solver
 
 Array = np.ndarray
 

@@ -12,15 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv import (
-    FunctionSpace,
-    LPVStateSpace,
-    Matrices,
-    Piece,
-    Polynomial,
-    Product,
-    Scheduling,
-)
+from symheli.lpv.bases import FunctionSpace, Piece, Polynomial, Product
+from symheli.lpv.lpv_matrices import LPVMatrices, Matrices
+from symheli.lpv.scheduling import Scheduling
 from synthesis.numerics.polynomial.bernstein import restriction
 from synthesis.numerics.polynomial.matrix import PolynomialMatrix
 
@@ -61,7 +55,7 @@ class ModelPiece(NamedTuple):
         )
 
 
-def model_pieces(lpv: LPVStateSpace) -> tuple[ModelPiece, ...]:
+def model_pieces(lpv: LPVMatrices) -> tuple[ModelPiece, ...]:
     """Return the pieces of the model over its scheduling range, in order of p.
 
     The coefficients are doubles: an exact proof is about the model they define, which is the given
@@ -83,7 +77,7 @@ def model_pieces(lpv: LPVStateSpace) -> tuple[ModelPiece, ...]:
     )
 
 
-def rounded(lpv: LPVStateSpace, exactly: Sequence[ModelPiece]) -> tuple[ModelPiece, ...]:
+def rounded(lpv: LPVMatrices, exactly: Sequence[ModelPiece]) -> tuple[ModelPiece, ...]:
     """Return the pieces with a constant for every matrix that changes by rounding alone: fewer
     inequalities for the search.
     """
@@ -137,7 +131,7 @@ def same_pieces(a: Sequence[ModelPiece], b: Sequence[ModelPiece]) -> bool:
     )
 
 
-def _each(every: Sequence[list[Array] | None], k: int, lpv: LPVStateSpace) -> list[Array]:
+def _each(every: Sequence[list[Array] | None], k: int, lpv: LPVMatrices) -> list[Array]:
     """Return the coefficients on piece k; for a constant matrix, a single one."""
     return [
         found[k] if found is not None else _constant(lpv.basis, M)[None]  # type: ignore[index]
@@ -178,7 +172,7 @@ class Pieces(NamedTuple):
     `source` is the model as it was given.
     """
 
-    source: LPVStateSpace
+    source: LPVMatrices
     parameters: tuple[Scheduling, ...]
     breaks: tuple[tuple[float, ...], ...]
     models: dict[tuple[int, ...], tuple[PolynomialMatrix, ...]]
@@ -257,7 +251,7 @@ class Pieces(NamedTuple):
         return self._replace(models=models)
 
 
-def pieces(model: LPVStateSpace) -> Pieces:
+def pieces(model: LPVMatrices) -> Pieces:
     """Return the model in polynomial pieces over its box."""
     s = model.parameters
     if len(s) == 1:
@@ -281,7 +275,7 @@ def pieces(model: LPVStateSpace) -> Pieces:
     return Pieces(model, s, breaks, models, model.dt)
 
 
-def joined(model: LPVStateSpace, parts: Sequence[ModelPiece]) -> Pieces:
+def joined(model: LPVMatrices, parts: Sequence[ModelPiece]) -> Pieces:
     """Return the pieces of the `parts` of a model of one parameter, in any units."""
     models = {
         (k,): tuple(PolynomialMatrix(((piece.low, piece.high),), M) for M in piece[2:])

@@ -16,7 +16,6 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from enum import Enum
 from functools import lru_cache
 from itertools import groupby
 from threading import Event
@@ -27,6 +26,7 @@ from scipy import sparse
 
 from symheli.errors import InputError, SolverError
 from synthesis.numerics.polynomial.symmetric import basis, length
+from synthesis.numerics.program.answer import Answer
 from synthesis.numerics.program.interruptible import in_process, in_thread, no_panic
 
 Array = np.ndarray
@@ -35,15 +35,6 @@ Array = np.ndarray
 LYAPUNOV = "LYAPUNOV"
 """Name in `Solver` of the method of `interior_point`, for programs of Lyapunov inequalities only.
 """
-
-
-class Answer(Enum):
-    """Status that the solver reports for the program."""
-
-    SOLVED = "the solver reports a solution"
-    INFEASIBLE = "the solver reports that no solution exists"
-    FAILED = "the solver stopped without an answer"
-    UNTRIED = "the program was not given to the solver"
 
 
 @dataclass(frozen=True)

@@ -32,8 +32,9 @@ import numpy as np
 
 from symheli.progress import Task, task
 from synthesis.numerics.polynomial.symmetric import indices, length, smat, svec, symmetrized
+from synthesis.numerics.program.answer import Answer
 from synthesis.numerics.program.block_cholesky import BlockCholesky
-from synthesis.numerics.program.cone_program import Answer, Solver, SolverPoint
+from synthesis.numerics.program.cone_program import Solver, SolverPoint
 from synthesis.numerics.program.lyapunov_program import LyapunovBlocks, Program, Sizes
 
 Array = np.ndarray

@@ -11,7 +11,7 @@ from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace, Scheduling
 from synthesis import Certificate, Spline, l2_gain
 from synthesis.certify.questions.apart import apart
-from synthesis.numerics.program.cone_program import Answer
+from synthesis.numerics.program.answer import Answer
 
 RATE = 0.1
 CLOSE = 1.01

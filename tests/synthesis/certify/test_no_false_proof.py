@@ -16,8 +16,8 @@ from synthesis.certify.assemble.unknowns import scaled_problem
 from synthesis.certify.proof import box, one_parameter
 from synthesis.certify.statement.box import BoxLyapunov
 from synthesis.certify.statement.demand import Demand
-from synthesis.certify.statement.scaling import Scaling
 from synthesis.certify.statement.spline import SplineLyapunov
+from synthesis.certify.statement.units import Scaling
 from synthesis.numerics.polynomial.motion import Motion
 from synthesis.numerics.polynomial.pieces import model_pieces, pieces
 

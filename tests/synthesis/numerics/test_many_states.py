@@ -39,8 +39,9 @@ from synthesis.certify.questions.problem import pose
 from synthesis.certify.statement.spline import graded_knots
 from synthesis.numerics.polynomial import exact
 from synthesis.numerics.polynomial.symmetric import basis, length, svec, symmetrized
+from synthesis.numerics.program.answer import Answer
 from synthesis.numerics.program.block_cholesky import BlockCholesky
-from synthesis.numerics.program.cone_program import LYAPUNOV, Answer
+from synthesis.numerics.program.cone_program import LYAPUNOV
 from synthesis.numerics.program.lyapunov_program import LyapunovBlocks, LyapunovProgram, Sizes
 
 FORM = Spline(segments=2, degree=2)

@@ -1,0 +1,10 @@
+from symheli.lpv.bases.basis import Basis as Basis
+from symheli.lpv.bases.bspline import BSpline as BSpline
+from symheli.lpv.bases.function_space import FunctionSpace as FunctionSpace
+from symheli.lpv.bases.function_space import Piece as Piece
+from symheli.lpv.bases.interpolating import CubicSpline as CubicSpline
+from symheli.lpv.bases.interpolating import PiecewiseLinear as PiecewiseLinear
+from symheli.lpv.bases.patches import Patches as Patches
+from symheli.lpv.bases.polynomial import Polynomial as Polynomial
+from symheli.lpv.bases.product import Product as Product
+from symheli.lpv.bases.user_functions import UserFunctions as UserFunctions
