@@ -239,7 +239,8 @@ def _static(expression: Expression, symbols: dict[Expression, Scheduling]) -> LF
                 return reduce(series, map(of, e.args))
             case sympy.Pow() if int(e.exp) < 0:
                 inner = of(e.base**-e.exp)
-                return feedback(1.0, parallel(1.0, series(inner, -1.0)))  # y = u + (1 - f) y
+                y = parallel(1.0, series(inner, -1.0))
+                return feedback(1.0, y, sign=+1)  # y = u + (1 - f) y
             case sympy.Pow():
                 return reduce(series, [of(e.base)] * int(e.exp))
         raise InputError(f"{e} cannot be written as a linear fractional transformation")

@@ -3,6 +3,7 @@ of this package.
 """
 
 from dataclasses import replace
+from functools import partial
 
 import control
 import numpy as np
@@ -70,7 +71,7 @@ def test_a_python_control_system_connects_by_its_names():
     )
 
 
-@pytest.mark.parametrize("join", [feedback, series, parallel, append])
+@pytest.mark.parametrize("join", [partial(feedback, sign=+1), series, parallel, append])
 def test_gains_lpv_models_and_python_control_systems_are_joined_in_their_order(join):
     lpv, _ = random_lpv(1, nu=1, ny=1)
     lpv = replace(lpv, D=np.zeros_like(lpv.D))  # a loop through D(p) is rational, see below

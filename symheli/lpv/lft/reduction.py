@@ -64,8 +64,8 @@ def _without_idle_copies(lft: LFT) -> LFT:
     loop, reached, seen = lft.M11 != 0, np.any(lft.M12, axis=1), np.any(lft.M21, axis=0)
     for _ in range(lft.order):
         reached, seen = reached | (loop @ reached), seen | (loop.T @ seen)
-    kept = np.flatnonzero(reached & seen)
-    sizes = [int(np.sum((kept >= here.start) & (kept < here.stop))) for here in parts(lft.sizes)]
+    kept = [int(i) for i in np.flatnonzero(reached & seen)]
+    sizes = [sum(here.start <= i < here.stop for i in kept) for here in parts(lft.sizes)]
     blocks = tuple(Block(b.scheduling, n) for b, n in zip(lft.blocks, sizes, strict=True))
     return replace(
         lft, M11=lft.M11[np.ix_(kept, kept)], M12=lft.M12[kept], M21=lft.M21[:, kept], blocks=blocks
