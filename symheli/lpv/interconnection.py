@@ -506,8 +506,8 @@ def _system(given: System, *, by_name: bool) -> Any:
         return LinearModel.from_control(given)
     if not isinstance(given, int | float | np.number | np.ndarray | list):
         raise InputError(
-            "expected an LFT, a LinearModel, an LPVStateSpace or a system of python-control to"
-            f" connect, got {type(given).__name__}"
+            "expected an LFT, a LinearModel, an LPVStateSpace, a system of python-control, a real"
+            f" number or a matrix to connect, got {type(given).__name__}"
         )
     if by_name:
         raise InputError(

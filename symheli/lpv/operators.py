@@ -134,6 +134,8 @@ class Operators:
 
 
 def _is_number(given: Any) -> bool:
+    if isinstance(given, np.ndarray):
+        return given.ndim == 0 and not np.iscomplexobj(given)
     return isinstance(given, int | float | np.number) and not isinstance(given, np.complexfloating)
 
 

@@ -51,6 +51,7 @@ def named(system):
         lambda P, Q: P + np.eye(2) - Q * P,
         lambda P, Q: np.eye(2) - P,
         lambda P, Q: np.float64(3.0) * P,
+        lambda P, Q: np.array(3.0) * P * np.int64(2),
         lambda P, Q: P[1, 0],
     ],
 )
