@@ -290,10 +290,7 @@ def fit_for_control(
         FrozenPlant(each, outputs, inputs)
         for each in (second if isinstance(second, Sequence) else (second,))
     )
-    at = [
-        AtPoint(plant, p, loop(p) if callable(loop) else loop, scales, thetas, covariance, others)
-        for p in chosen
-    ]
+    at = [AtPoint(plant, p, _loop_at(loop, p), scales, thetas, covariance, others) for p in chosen]
     true = [None if truth is None else _discrete(truth[p], plant) for p in chosen]
     gap = np.array([a.drawn_gaps.max() for a in at])
     second_gap = np.array([a.second_gap for a in at])
@@ -351,6 +348,12 @@ def _points(
                 f"{name}: expected a model at every point {list(points)}, got {list(models)}"
             )
     return tuple(points)
+
+
+def _loop_at(loop: Feedback | Callable[[Any], Feedback], p: Any) -> Feedback:
+    """The loop at p: the same everywhere, or a function of p."""
+    # a LinearModel can be called too, for its transfer matrix
+    return loop if isinstance(loop, LinearModel | Mapping) or not callable(loop) else loop(p)
 
 
 def _discrete(model: LinearModel, plant: FrozenPlant) -> LinearModel:

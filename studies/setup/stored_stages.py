@@ -2,9 +2,10 @@
 one.
 
 A stage is stored as JSON and arrays, see `stage_file`, below a line with the key of what it was
-computed from and the digest of its bytes. The key covers what the stage reads of the effort and the
-keys of the stages it needs: where one entry changes, the stages that it reaches are computed again,
-and no others.
+computed from and the digest of its bytes. The key covers what the stage reads of the effort, the
+keys of the stages it needs, and which stage and which of its questions the file answers: where one
+entry changes, the stages that it reaches are computed again, and no others; a file that was copied
+or renamed is none.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from symheli import Helicopter
 from symheli.errors import SymheliError
 from symheli.values.whole_files import write_bytes
 
-FORMAT = "symheli stage 2"
+FORMAT = "symheli stage 3"
 STAGES = "stages"
 """Folder of the stored stages, in that of the run."""
 PACKAGES = ("symheli", "identification", "synthesis", "studies")
@@ -57,12 +58,16 @@ class StoredStages:
         """Where the stage, or an answer to one of its questions, is stored."""
         return self.folder / (f"{name}.stage" if part is None else f"{name}-{part}.stage")
 
+    def _key(self, name: str, part: int | None) -> str:
+        """What the file was computed from, and of which stage and question it is the answer."""
+        return digest((self.keys[name], name, "whole" if part is None else str(part)))
+
     def save(self, name: str, stored: Stored, part: int | None = None) -> Path:
         """Store it, in place of an older one; see `whole_files.write_bytes`. The answers to the
         questions of a stage go when it is stored.
         """
         content = stage_file.written(stored)
-        head = f"{FORMAT} {self.keys[name]} {hashlib.sha256(content).hexdigest()}\n"
+        head = f"{FORMAT} {self._key(name, part)} {hashlib.sha256(content).hexdigest()}\n"
         path = write_bytes(self.path(name, part), head.encode() + content)
         for answer in self.folder.glob(f"{name}-*.stage") if part is None else ():
             answer.unlink(missing_ok=True)
@@ -71,8 +76,8 @@ class StoredStages:
     def load(self, name: str, part: int | None = None) -> Stored | None:
         """Return the stored result; None where there is none.
 
-        Raises `NotUsable` for what another version, vehicle, effort or seed has left, and for what
-        is damaged.
+        Raises `NotUsable` for what another version, vehicle, effort or seed has left, for the
+        answer to another question, and for what is damaged.
         """
         path = self.path(name, part)
         if not path.is_file():
@@ -81,8 +86,11 @@ class StoredStages:
         words = head.decode("utf-8", "replace").rsplit(" ", 2)
         if len(words) != 3 or words[0] != FORMAT:
             raise NotUsable(f"{path} is damaged: it is no stored stage")
-        if words[1] != self.keys[name]:
-            raise NotUsable(f"{path} is of another version, vehicle, effort or seed")
+        if words[1] != self._key(name, part):
+            raise NotUsable(
+                f"{path} is of another stage or question, or of another version, vehicle, effort or"
+                " seed"
+            )
         if words[2] != hashlib.sha256(content).hexdigest():
             raise NotUsable(f"{path} is damaged: its content is not what was written")
         try:

@@ -16,6 +16,7 @@ from symheli.lpv.bases.user_functions import UserFunctions
 from symheli.lpv.interconnection import append, feedback, parallel, series
 from symheli.lpv.lft.algebra import close
 from symheli.lpv.lft.model import LFT
+from symheli.lpv.lft.reduction import reduce_without_loss
 from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.lpv.scheduling import Scheduling, parameters
 from symheli.values.signal import Signal, signals
@@ -108,7 +109,7 @@ def lft_of(
     K = np.zeros((len(moving), len(moving)))
     static = close(together, K, E, F, columns, rows, constant)
     blocks = (static.M11, static.M12, static.M21, static.M22, static.blocks)
-    return LFT(*blocks, x, u, y, dt).reduce()
+    return reduce_without_loss(LFT(*blocks, x, u, y, dt))
 
 
 def _matrices(given: Sequence[Given], known: Sequence[Scheduling]) -> list[Expression]:
@@ -238,7 +239,8 @@ def _static(expression: Expression, symbols: dict[Expression, Scheduling]) -> LF
                 return reduce(series, map(of, e.args))
             case sympy.Pow() if int(e.exp) < 0:
                 inner = of(e.base**-e.exp)
-                return feedback(1.0, parallel(1.0, series(inner, -1.0)))  # y = u + (1 - f) y
+                y = parallel(1.0, series(inner, -1.0))
+                return feedback(1.0, y, sign=+1)  # y = u + (1 - f) y
             case sympy.Pow():
                 return reduce(series, [of(e.base)] * int(e.exp))
         raise InputError(f"{e} cannot be written as a linear fractional transformation")

@@ -95,7 +95,9 @@ def series(first: System, second: System) -> Any:
     (nu, ny), (mu, my) = both.sizes
     if mu != ny:
         raise InputError(
-            f"series connection needs as many inputs ({mu}) as outputs of the other ({ny})"
+            f"series connection needs as many inputs ({mu}) as outputs of the other ({ny});"
+            f" {_listed('inputs', both.groups[1][0])}, {_listed('outputs', both.groups[0][1])}:"
+            " choose some with P[outputs, inputs], or connect by names with lpv.connect"
         )
     K, E = np.zeros((nu + mu, ny + my)), np.eye(nu + mu)[:, :nu]
     K[nu:, :ny] = np.eye(ny)
@@ -134,23 +136,26 @@ def parallel(first: System, second: System) -> Any:
     if other != (nu, ny):
         raise InputError(
             f"parallel connection needs equal numbers of inputs and outputs, got {nu}, {ny} and"
-            f" {other[0]}, {other[1]}"
+            f" {other[0]}, {other[1]}; {_channels(both.groups[0])} beside"
+            f" {_channels(both.groups[1])}: choose some with P[outputs, inputs]"
         )
     E, F = np.vstack([np.eye(nu), np.eye(nu)]), np.hstack([np.eye(ny), np.eye(ny)])
     return both.closed(np.zeros((2 * nu, 2 * ny)), E, F, *both.groups[0])
 
 
-def feedback(plant: System, controller: System) -> Any:
-    """Close the loop y = plant(u + controller(y)), all outputs to all inputs, in their order.
+def feedback(plant: System, controller: System, sign: int | None = None) -> Any:
+    """Close the loop y = plant(u + sign controller(y)), all outputs to all inputs, in their order.
 
-    The sign is positive, as in every `.feedback(...)` of this package; MATLAB's and
-    python-control's `feedback(P, K)` is `feedback(P, -K)`. `lower_feedback` connects by names and
-    may keep other inputs and outputs.
+    The sign has no default, because conventions differ. `feedback(P, K, sign=+1)` closes u = +K y,
+    as every method `.feedback(...)` of this package does. `feedback(P, K, sign=-1)` closes u = -K
+    y: `control.feedback(P, K)` of python-control, and `feedback(P, K)` of MATLAB.
 
     Parameters
     ----------
     plant, controller : as in `append`
         The outputs of each as many as the inputs of the other.
+    sign : +1 or -1
+        Of the controller's output where it is added to the input.
 
     Returns
     -------
@@ -160,27 +165,40 @@ def feedback(plant: System, controller: System) -> Any:
     Raises
     ------
     InputError
-        Numbers of signals or sample periods that differ, a singular loop, or one of an
+        No sign, numbers of signals or sample periods that differ, a singular loop, or one of an
         `LPVStateSpace` through feedthrough that depends on the parameters: `.to_lft()` of one of
         the two closes that exactly.
 
+    See Also
+    --------
+    LPVStateSpace.feedback : constant gains by name, a positive loop
+    lower_feedback : by names; may keep other inputs and outputs
+    connect : several systems by names
+
     Examples
     --------
-    A gain of -2 stiffens the spring:
+    A gain of 2 in a negative loop stiffens the spring:
 
-    >>> lpv.feedback(spring, -2.0).at(0.0).A.round(6) + 0.0
+    >>> lpv.feedback(spring, 2.0, sign=-1).at(0.0).A.round(6) + 0.0
     array([[ 0.,  1.],
            [-4., -1.]])
     """
+    if sign not in (1, -1):
+        raise InputError(
+            f"sign: expected +1 or -1, got {sign!r:.40}; feedback(P, K, sign=+1) closes u = +K y,"
+            " this project's convention, and feedback(P, K, sign=-1) closes u = -K y, as"
+            " control.feedback(P, K) does"
+        )
     both = _Together.of((plant, controller))
     (nu, ny), other = both.sizes
     if other != (ny, nu):
         raise InputError(
             f"expected a controller with {ny} input(s) and {nu} output(s), got {other[0]} and"
-            f" {other[1]}"
+            f" {other[1]}; {_channels(both.groups[1])} around {_channels(both.groups[0])}: choose"
+            " some with P[outputs, inputs], or connect by names with lpv.lower_feedback"
         )
     K = np.zeros((nu + ny, ny + nu))
-    K[:nu, ny:], K[nu:, :ny] = np.eye(nu), np.eye(ny)
+    K[:nu, ny:], K[nu:, :ny] = sign * np.eye(nu), np.eye(ny)
     return both.closed(K, np.eye(nu + ny)[:, :nu], np.eye(ny + nu)[:ny], *both.groups[0])
 
 
@@ -295,6 +313,13 @@ def connect(
     K, E, F, G = (M for rows in (into, seen) for M in np.split(rows, [len(given)], axis=1))
     kept = [known[known.index(y)] if y in known else Signal(y) for y in map(Signal, outputs)]
     return both.closed(K, E, F, external, kept, G)
+
+
+def multiplied(system: System, factor: float) -> Any:
+    """Return the system with its outputs times a number, under its names; exact."""
+    alone = _Together.of((system,))
+    ((nu, ny),) = alone.sizes
+    return alone.closed(np.zeros((nu, ny)), np.eye(nu), factor * np.eye(ny), *alone.groups[0])
 
 
 def star(upper: LFT, lower: System, outputs: int, inputs: int | None) -> Any:
@@ -481,8 +506,8 @@ def _system(given: System, *, by_name: bool) -> Any:
         return LinearModel.from_control(given)
     if not isinstance(given, int | float | np.number | np.ndarray | list):
         raise InputError(
-            "expected an LFT, a LinearModel, an LPVStateSpace or a system of python-control to"
-            f" connect, got {type(given).__name__}"
+            "expected an LFT, a LinearModel, an LPVStateSpace, a system of python-control, a real"
+            f" number or a matrix to connect, got {type(given).__name__}"
         )
     if by_name:
         raise InputError(
@@ -494,6 +519,15 @@ def _system(given: System, *, by_name: bool) -> Any:
     return LinearModel.gain(
         gain, [f"u{i + 1}" for i in range(nu)], [f"y{i + 1}" for i in range(ny)]
     )
+
+
+def _listed(kind: str, names: Sequence[Signal]) -> str:
+    return f"{kind} {', '.join(names) or 'none'}"
+
+
+def _channels(group: tuple[Sequence[Signal], Sequence[Signal]]) -> str:
+    """The names of the inputs and outputs of a system."""
+    return f"({_listed('inputs', group[0])}; {_listed('outputs', group[1])})"
 
 
 def _external(name: str, inputs: Sequence[Signal]) -> Signal:

@@ -11,6 +11,7 @@ from scipy.linalg import block_diag
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.equilibration import is_singular, loop_inverse
+from symheli.lpv.operators import Operators
 from symheli.values.aligned import matrix
 from symheli.values.arrays import Array, frozen
 from symheli.values.operating_point import OperatingPoint
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class LinearModel:
+class LinearModel(Operators):
     """dx/dt = A x + B u, y = C x + D u, or x(k+1) = A x(k) + B u(k), in deviations from `point`.
 
     Parameters
@@ -189,8 +190,14 @@ class LinearModel:
         )
 
     def feedback(self, gains: Mapping[tuple[str, str], float]) -> LinearModel:
-        """Close u_i = gain y_j + (new u_i) for each {(input, output): gain}; raises `InputError`
-        where I - K D is singular.
+        """Close the positive loops u_i = gain y_j + (new u_i) for each {(input, output): gain}; a
+        negative loop has a negative gain.
+
+        Raises `InputError` where I - K D is singular.
+
+        See Also
+        --------
+        symheli.lpv.feedback : with a dynamic controller, and a sign
         """
         K = feedback_matrix(gains, self.inputs, self.outputs)
         N = loop_inverse(K @ self.D)
@@ -199,15 +206,65 @@ class LinearModel:
             self, A=self.A + self.B @ NKC, B=self.B @ N, C=self.C + self.D @ NKC, D=self.D @ N
         )
 
-    def frequency_response(self, omega: object) -> np.ndarray:
-        """G(j omega) (n, ny, nu), complex, at `omega` (n,) in rad/s."""
-        omega = frozen(omega, "omega", (None,))
-        s = 1j * omega if self.dt is None else np.exp(1j * omega * self.dt)
-        pencil = s[:, None, None] * np.eye(len(self.states)) - self.A
+    def __call__(self, s: object) -> np.ndarray:
+        """Evaluate the transfer matrix C (s I - A)^-1 B + D at a point of the complex plane.
+
+        Parameters
+        ----------
+        s : complex, or array (...) of complex
+            s in rad/s of a continuous model, z of a sampled one, as in python-control; inf: D.
+
+        Returns
+        -------
+        array (ny, nu), or (..., ny, nu)
+            Complex, outputs per unit of the inputs; a matrix also for one input and one output.
+
+        Raises
+        ------
+        InputError
+            A pole of the model, where it has no value.
+
+        See Also
+        --------
+        LinearModel.frequency_response : on the imaginary axis, or the unit circle
+
+        Examples
+        --------
+        >>> lag = symheli.LinearModel([[-2.0]], [[2.0]], [[1.0]], [[0.0]], ("x",), ("u",), ("y",))
+        >>> lag(2.0).real, lag([0.0, 2j]).shape
+        (array([[0.5]]), (2, 1, 1))
+        """
+        at = np.asarray(s, complex)
+        if np.any(np.isnan(at)):
+            raise InputError(f"s: expected complex numbers, got {s!r:.60}")
+        infinite = np.isinf(at)
+        away = 1.0 + 2.0 * np.linalg.norm(self.A)  # no pole, whatever stands there is not taken
+        try:
+            found = self._values(np.where(infinite, away, at))
+        except np.linalg.LinAlgError:
+            poles = ", ".join(f"{pole:.6g}" for pole in self.poles())
+            raise InputError(
+                f"the transfer matrix has no value at a pole of the model, one of {poles}"
+            ) from None
+        return np.where(infinite[..., None, None], self.D, found)
+
+    def _values(self, s: np.ndarray) -> np.ndarray:
+        """The transfer matrix (..., ny, nu) at finite s (...), complex."""
+        pencil = s[..., None, None] * np.eye(len(self.states)) - self.A
         return (
-            self.C @ np.linalg.solve(pencil, np.broadcast_to(self.B, (len(omega), *self.B.shape)))
+            self.C @ np.linalg.solve(pencil, np.broadcast_to(self.B, (*s.shape, *self.B.shape)))
             + self.D
         )
+
+    def frequency_response(self, omega: object) -> np.ndarray:
+        """G(j omega) (n, ny, nu), complex, at `omega` (n,) in rad/s.
+
+        See Also
+        --------
+        LinearModel.__call__ : anywhere in the complex plane, P(s)
+        """
+        omega = frozen(omega, "omega", (None,))
+        return self._values(1j * omega if self.dt is None else np.exp(1j * omega * self.dt))
 
     def step_response(self, duration: float, samples: int = 501) -> StepResponse:
         """Outputs after a unit step of each input from rest, over `duration` (s): exact at the

@@ -19,6 +19,7 @@ from symheli.lpv.bases.restricted import Restricted
 from symheli.lpv.linear_model import LinearModel, feedback_matrix
 from symheli.lpv.lpv_matrices import LPVMatrices, Matrices
 from symheli.lpv.monomials import as_blocks
+from symheli.lpv.operators import Operators
 from symheli.lpv.recentred import centre, recentred
 from symheli.lpv.scheduling import (
     UNSCHEDULED,
@@ -70,7 +71,7 @@ class FitResiduals(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class LPVStateSpace(LPVMatrices):
+class LPVStateSpace(Operators, LPVMatrices):
     """dx/dt = A(p) x + B(p) u, y = C(p) x + D(p) u, or sampled x(k+1) = A(p(k)) x(k) + ...
 
     A(p) = sum_j f_j(p) A_j with the n functions f_j of `basis`, of one scheduling parameter p or of
@@ -336,8 +337,8 @@ class LPVStateSpace(LPVMatrices):
         )
 
     def feedback(self, gains: Mapping[tuple[str, str], float]) -> LPVStateSpace:
-        """Close u_i = gain * y_j + (new u_i) for each {(input, output): gain}; always an
-        `LPVStateSpace`, exact.
+        """Close the positive loops u_i = gain * y_j + (new u_i) for each {(input, output): gain};
+        always an `LPVStateSpace`, exact. A negative loop has a negative gain.
 
         Outputs that depend on p multiply inputs that do: a polynomial model then has up to twice
         the degree, a piecewise polynomial one gets `Patches`, in another basis `InputError`. A
@@ -345,6 +346,10 @@ class LPVStateSpace(LPVMatrices):
         through feedthrough D(p) that depends on p, from an input that is driven to an output that
         is fed back, the closed loop is rational and `InputError` says so:
         `to_lft().feedback(gains)` closes it exactly, as an `LFT`.
+
+        See Also
+        --------
+        symheli.lpv.feedback : with a dynamic controller, and a sign
         """
         from symheli.lpv.lower_feedback import close_static
 

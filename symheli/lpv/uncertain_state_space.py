@@ -14,6 +14,7 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.lpv.linear_model import feedback_matrix
 from symheli.lpv.lpv_state_space import LPVStateSpace
+from symheli.lpv.operators import Operators
 from symheli.lpv.scheduling import Rates, Scheduling
 from symheli.values.arrays import Array, frozen
 from symheli.values.signal import Signal, indices, signals
@@ -37,7 +38,7 @@ class DeltaPart(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class UncertainStateSpace:
+class UncertainStateSpace(Operators):
     """Every LPV model dx/dt = A x + B u + E d, y = C x + D u + F d, d = Delta v, v = G x + H u + J
     d, |Delta|_2 <= bound; or sampled.
 
@@ -347,7 +348,7 @@ class UncertainStateSpace:
         return tuple(self.perturbed(delta) for delta in self.perturbations(count, seed, where))
 
     def feedback(self, gains: Mapping[tuple[str, str], float]) -> UncertainStateSpace:
-        """Close u_i = gain * y_j + (new u_i) around every model of the set; see
+        """Close the positive loops u_i = gain * y_j + (new u_i) around every model of the set; see
         `LPVStateSpace.feedback`. Raises `UnknownNameError` for the channels of the block.
         """
         feedback_matrix(gains, self.inputs, self.outputs)

@@ -7,8 +7,12 @@ stable if for some multiplier M
 
 M = 1 is the circle criterion and q that of Popov; h, the impulse response of H on both sides of
 time zero, has an integral of |h| below 1, and h >= 0 unless phi is odd. Here H is a sum of powers
-of a/(s + a), found by a linear program over frequencies; that nothing is violated between them is
-shown by the eigenvalues of a Hamiltonian matrix, whose crossings join the program.
+of a/(s + a), found by a linear program over frequencies. Between them the eigenvalues of a
+Hamiltonian matrix say where the inequality is lost, and these frequencies join the program.
+
+Which of these eigenvalues are imaginary is decided by a tolerance. With lightly damped or slow
+poles in mixed coordinates a crossing moves off the axis by more than the tolerance and is missed.
+So a slope found here is computed, not verified.
 """
 
 from __future__ import annotations
@@ -29,6 +33,10 @@ from synthesis.numerics.linear.model import as_model
 
 Array = np.ndarray
 
+UNVERIFIED = "computed, not verified"
+REASON = "frequencies are decided by eigenvalues in floating point and a tolerance"
+"""Why no slope found here is a proof."""
+
 CRITERIA = ("circle", "Popov", "Zames-Falb")
 """The classes of multipliers, each with those before it."""
 POLES, ORDER = 10, 6
@@ -40,7 +48,7 @@ FREQUENCIES = 200
 ROUNDS = 25
 """Largest number of programs with one slope."""
 GROWTH = 1.001
-"""Ratio of a slope that is not proven to one that is at which the search ends."""
+"""Ratio of a slope without a multiplier to one with it at which the search ends."""
 LARGEST = 1e6
 """Largest slope, in units of the inverse of the norm of G, that is looked for."""
 NORM = 1 - 1e-6
@@ -54,8 +62,12 @@ LEAST = 1e-9
 
 
 class SlopeMargin(NamedTuple):
-    """Functions of slopes from 0 to `slope` are proven to leave the loop stable; with the straight
-    line of slope `limit` it is not (inf: no such line was found).
+    """Functions of slopes from 0 to `slope` leave the loop stable, as computed; with the straight
+    line of slope `limit` it is not stable (inf: no such line was found).
+
+    `status` is always "computed, not verified": the inequality of the multiplier is held at the
+    frequencies that eigenvalues in floating point and a tolerance point out. Where poles are
+    lightly damped and coordinates badly mixed, `slope` may be too large by orders of magnitude.
 
     The multiplier is 1 - sum c (a/(s + a))^r + q s, with a/(a - s) for those that act ahead of
     time: `poles` a (rad/s), `causal` and `ahead` their c (powers, poles), `popov` q (s).
@@ -67,8 +79,20 @@ class SlopeMargin(NamedTuple):
     causal: Array
     ahead: Array
     popov: float
+    status: str = UNVERIFIED
 
     __repr__ = summarized
+
+    @property
+    def verified(self) -> bool:
+        """False: a slope is computed, not proven."""
+        return False
+
+    def __str__(self) -> str:
+        return (
+            f"slopes from 0 to {self.slope:.6g}: stable ({self.status}: {REASON}); a line of slope"
+            f" {self.limit:.6g} is not"
+        )
 
     def multiplier(self, omega: Array) -> Array:
         """Return M (K,) at frequencies omega (K,), rad/s."""
@@ -93,8 +117,8 @@ def slope_margin(
     *,
     odd: bool = False,
 ) -> SlopeMargin:
-    """Compute the largest slope of a static function d = phi(v) for which the loop is proven stable
-    whatever the function: a saturation, a dead zone, a soft stop.
+    """Compute the largest slope of a static function d = phi(v) for which the loop is stable
+    whatever the function: a saturation, a dead zone, a soft stop. Computed, not verified.
 
     Parameters
     ----------
@@ -111,7 +135,9 @@ def slope_margin(
     Returns
     -------
     SlopeMargin
-        Proven for all frequencies in floating point; `limit` is where no proof can be.
+        `slope` computed, not verified: frequencies are decided by eigenvalues and a tolerance. Plot
+        Re M(j w) (1/k - G(j w)) about lightly damped poles before it is relied on. `limit` is where
+        no proof can be.
 
     Raises
     ------
@@ -178,11 +204,11 @@ class _ScalarLoop(NamedTuple):
         low, high = 0.5 / size, min(found.limit, LARGEST / size)
         k = high / math.sqrt(GROWTH)
         while high > GROWTH * low:
-            proven, line = self._proven(k, found, line)
-            low, high = (low, k) if proven is None else (k, high)
-            found, k = proven or found, math.sqrt(low * high)
+            made, line = self._found(k, found, line)
+            low, high = (low, k) if made is None else (k, high)
+            found, k = made or found, math.sqrt(low * high)
         if not found.slope:
-            found = self._proven(low, found, line)[0] or found
+            found = self._found(low, found, line)[0] or found
         return found
 
     def _limit(self, low: float, high: float) -> float:
@@ -204,7 +230,7 @@ class _ScalarLoop(NamedTuple):
             before = float(k)
         return math.inf
 
-    def _proven(self, k: float, at: SlopeMargin, line: Array) -> tuple[SlopeMargin | None, Array]:
+    def _found(self, k: float, at: SlopeMargin, line: Array) -> tuple[SlopeMargin | None, Array]:
         """Return a multiplier for the slope k, None where none is found, and the frequencies."""
         for _ in range(ROUNDS):
             trial = self._least(k, at, line)

@@ -11,6 +11,7 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv import LFT, LinearModel, LPVStateSpace, UncertainStateSpace
+from symheli.lpv.lft.reduction import reduce_without_loss
 from symheli.lpv.lft_matrices import parts as slices
 from symheli.values.sample_period import same_period
 from symheli.values.signal import Signal, indices
@@ -252,11 +253,14 @@ def loop_of(
     """Return the loop of a model whose parameters are constant and whose channels are closed by
     these blocks; with the other channels as the last part where `performance` is asked.
 
-    Raises `InputError` for another model, a bound that is no finite number > 0, a signal of two
-    blocks, or nothing uncertain; `UnknownNameError` for a signal that the model does not have.
+    Raises `InputError` for another model, an LFT with a parameter that has no copies, a bound that
+    is no finite number > 0, a signal of two blocks, or nothing uncertain; `UnknownNameError` for a
+    signal that the model does not have.
     """
     if isinstance(model, LPVStateSpace):
-        model = model.to_lft().reduce()
+        model = reduce_without_loss(model.to_lft())
+    elif isinstance(model, LFT):
+        _check_copies(model)
     if not isinstance(model, LFT):
         raise InputError(
             f"model: expected an LFT, or an LPVStateSpace that is polynomial, got"
@@ -298,6 +302,18 @@ def loop_of(
     radii = np.array([s.radius * (size > 0) for s, size in model.blocks])
     whole = (*real, *full)
     return BlockLoop(A, B, C, D, whole, model.dt, units[:, 0], middles, radii, weights)
+
+
+def _check_copies(model: LFT) -> None:
+    """Raise `InputError` for a parameter without copies: the LFT no longer says whether the model
+    depends on it.
+    """
+    if none := [s.name for s, size in model.blocks if not size]:
+        raise InputError(
+            f"this LFT has no copies of {', '.join(none)}: nothing depends on it, or reduce() took"
+            " what does for rounding, and the margin would be that of another model; give the LFT"
+            " as it was before reduce() (or the LPVStateSpace), or make it without this parameter"
+        )
 
 
 def loop_at(unc: UncertainStateSpace, p: float) -> BlockLoop:

@@ -154,6 +154,8 @@ def _held(
     """Return the interval about omega in which the scalings hold; its upper end inf where they hold
     for all above. None where they do not hold at omega.
     """
+    if not _positive(found):
+        return None
     by = found._replace(W=_levelled(found.W, loop, level, performance))
     if np.linalg.eigvalsh(_left(loop.response(omega), by))[0] <= 0.1 * LEAST_MARGIN:
         return None
@@ -176,6 +178,11 @@ def _held(
         return None
     low = max(float(below.max()), 0.0) if len(below) else 0.0
     return low, float(above.min()) if len(above) else math.inf
+
+
+def _positive(found: Scalings) -> bool:
+    """Whether the scalings are positive definite: without that the left side says nothing."""
+    return all(np.linalg.eigvalsh(M)[0] > 0 for M in (found.Z, found.W) if len(M))
 
 
 def _levelled(W: Array, loop: BlockLoop, level: float, performance: bool) -> Array:

@@ -18,7 +18,11 @@ from synthesis.robust.structure import BlockLoop, DynamicBlock, loop_of
 from synthesis.robust.upper_bound import proven_level
 
 LARGEST_RATIO = 1e6
-"""A gain this many times that without dynamics counts as none."""
+"""A gain this many times that without dynamics, or that through the blocks, counts as none."""
+LEAST_SHARE = 1e-6
+"""Share of the gain through the blocks from which it is looked for where that without dynamics is
+(nearly) zero.
+"""
 
 
 class WorstCaseGain(NamedTuple):
@@ -91,9 +95,10 @@ def worst_case_gain(
     lower, omega, delta = _gain(loop.closed(d), refine=True)
     if math.isinf(negative) or math.isinf(lower):
         return WorstCaseGain(math.inf, math.inf, loop.physical(d), math.nan)
-    if lower == 0.0:
+    start = lower or LEAST_SHARE * _through(loop)
+    if start == 0.0:
         return WorstCaseGain(0.0, 0.0, nowhere, math.nan)
-    proven = proven_level(loop, lower, performance=True)
+    proven = proven_level(loop, start, performance=True)
     inner = None
     if delta is not None:  # without the last block, the performance
         last = loop.parts[-1]
@@ -128,18 +133,42 @@ def _gain(closed: BlockLoop, refine: bool = False) -> tuple[float, float, np.nda
     )
     if worst_closing(inner, refine).level >= 1:
         return math.inf, math.nan, None
-    start = own[0] or 1e-12
 
     def excess(x: float) -> float:
         return worst_closing(at(start * math.exp(x)), refine).level - 1
 
-    top = 1.0
-    while excess(top) > 0:
-        top *= 2
-        if top > math.log(LARGEST_RATIO):
-            return math.inf, math.nan, None
-    if excess(0.0) <= 0:
+    def above(ratio: float) -> float:
+        """Return an x of a gain that is not reached; inf where it counts as none."""
+        top = 1.0
+        while excess(top) > 0:
+            top *= 2
+            if top > math.log(ratio):
+                return math.inf
+        return top
+
+    start = own[0]
+    top = above(LARGEST_RATIO) if start else math.inf
+    if math.isinf(top):  # without dynamics there may be (nearly) no gain
+        start = max(own[0], LEAST_SHARE * _through(closed))
+        top = above(LARGEST_RATIO / LEAST_SHARE) if start > own[0] else top
+    if math.isinf(top) and start:
+        return math.inf, math.nan, None
+    if not start or excess(0.0) <= 0:
         return own[0], own[1], np.zeros((closed.B.shape[1], len(closed.C)), complex)
     gamma = start * math.exp(float(brentq(excess, 0.0, top, xtol=ACCURACY if refine else ROUGH)))  # type: ignore[arg-type]
     found = worst_closing(at(gamma), refine)
     return gamma, found.omega, found.delta
+
+
+def _through(loop: BlockLoop) -> float:
+    """Return the gain from the inputs of the performance to the blocks times that from the blocks
+    to its outputs.
+    """
+    part, n = loop.parts[-1], loop.parts[-1].columns.start
+    m = part.rows.start
+    if not n or not m:
+        return 0.0
+    A, B, C, D = loop[:4]
+    into = norm(A, B[:, part.columns], C[:m], D[:m, part.columns])[0]
+    out = norm(A, B[:, :n], C[part.rows], D[part.rows, :n])[0]
+    return into * out

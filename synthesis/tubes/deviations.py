@@ -212,6 +212,20 @@ class Deviations:
             found.append([middle, rest * ROUNDED_UP, *linear.T])
         return np.array(found)
 
+    def is_defined(self, cells: Sequence[CommandCell]) -> bool:
+        """Whether the reference of another model than a helicopter is shown to exist for all
+        commands of these cells: a motion that holds sqrt(c) does not where c < 0.
+        """
+        r = self.reference
+        if not isinstance(r, Motions):
+            return True
+        c, data = casadi.SX.sym("c", 1 + len(r.ranges)), casadi.SX.sym("data", r.data.shape[1])
+        x, moving, u, _ = r.between(data, c)
+        values = [casadi.densify(v) for v in (x, moving, u) if v is not None and v.numel()]
+        function = casadi.Function("reference", [c, data], [casadi.vertcat(*values)])
+        every = (self.parts(cell, r.drift_parts)[2:] for cell in cells)
+        return all(np.all(enclose(function, *each).finite) for each in every)
+
     def parts(self, cell: CommandCell, parts: Sequence[int]) -> tuple[Array, Array, Domain, Domain]:
         """A cell in so many parts along each of its ranges, with all the other commands: the parts'
         places (N, r) and half widths (r,) in units of the cell's half widths, the commands, and the

@@ -56,7 +56,10 @@ def written_loop(loop: Deviations) -> dict[str, Any]:
 def read_loop(content: dict[str, Any]) -> Deviations:
     """The loop so written; raises `ValueError` for damaged values."""
     model, reference = _read_flight(content) if "vehicle" in content else _read_model(content)
-    return Deviations(model, reference, float(numbers(content["gust"])))
+    gust = float(numbers(content["gust"]))
+    if not gust >= 0:
+        raise ValueError(f"gust: expected the size of the gusts, >= 0, got {gust:g}")
+    return Deviations(model, reference, gust)
 
 
 def _written(r: Reference) -> dict[str, Any]:

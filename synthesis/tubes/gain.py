@@ -97,16 +97,19 @@ class LocalGain:
 
     @classmethod
     def read(
-        cls, given: dict[str, Any], nodes: int, states: tuple[str, ...], moved: int
+        cls, given: dict[str, Any], nodes: int, states: tuple[str, ...], moved: int, gust: float
     ) -> LocalGain:
         """The bound so written, for a tube with so many nodes and these states, of which the first
-        ones are those of the model.
+        ones are those of the model, in gusts of this size. Raises `ValueError` for a bound in
+        others: the inequality is in units of the tube's gust, and `gamma` divides by it.
         """
-        n = len(states)
+        n, own = len(states), float(numbers(given["gust"]))
+        if not (own == gust > 0):
+            raise ValueError(f"a gain in gusts of {own:g} in a tube in gusts of {gust:g}")
         return cls(
             tuple(map(str, given["outputs"])),
             bool(given["energy"]),
-            float(numbers(given["gust"])),
+            own,
             numbers(given["Q"], nodes, n, n),
             tuple(read_multipliers(by, moved) for by in given["multipliers"]),
             float(numbers(given["bias"])),

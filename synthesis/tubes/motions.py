@@ -99,6 +99,9 @@ class Motions:
         inputs = tuple(self.inputs) or tuple(f"u{i}" for i in range(k))
         if (len(states), len(inputs)) != (n, k):
             raise InputError(f"states and inputs need {n} and {k} names")
+        for word, names in (("states", states), ("inputs", inputs)):
+            if len(set(names)) < len(names):
+                raise InputError(f"{word}: expected a name once each, got {', '.join(names)}")
         made = {
             "schedule": nodes if scheduled else None,
             "rate": (float(rate[0]), float(rate[1])),

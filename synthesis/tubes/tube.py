@@ -73,6 +73,7 @@ SPARE = 0.02
 """Spare of the inequality in the search, 1/s."""
 INSIDE = 1 - 1e-6
 """Share of the enclosed deviations that the tube may fill, for rounding of the search."""
+UNDEFINED = "the reference is not defined for all commands, as the root of a negative number"
 TOLERANCE = 1e-6
 """Of the semidefinite programs: the exact check decides."""
 
@@ -225,6 +226,8 @@ class Tube:
         """
         if not self.proven:
             raise InputError(f"only a proven tube has gains; here {self.why}")
+        if not self.deviations.gust > 0:
+            raise InputError("a gain from gusts needs a tube in gusts: make it with gust > 0")
         if self.deviations.reference.jump is not None:
             raise InputError("gains are of loops in continuous time: the tube's is sampled")
         d, own = self.deviations, solver or Solver(tolerance=TOLERANCE)
@@ -253,6 +256,10 @@ class Tube:
         counts = {len(gain.multipliers) for gain in self.gains}
         if not (complete and counts <= {len(self.cells)} and _covers(self.cells, loop.reference)):
             return "the cells do not cover all commands"
+        if not loop.is_defined(self.cells):
+            return UNDEFINED
+        if any(gain.gust != loop.gust or gain.states != loop.states for gain in self.gains):
+            return "a gain is in other gusts, or of other states, than the tube"
         if not all(gain.has_storage for gain in self.gains):
             return "a gain has no storage"
         if jump is not None and (self.gains or not falls_in(jump, self.P[0], self.P[-1])):
@@ -306,11 +313,11 @@ class Tube:
         content = content_of(path, SCHEMA, VERSION, "a tube", "Tube.save")
         try:
             found = _read(content)
-        except InputError:
-            raise
+            why = found._refused()
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from None
         except DAMAGED as error:
             raise InputError(f"{path}: damaged, a value is invalid or missing ({error})") from None
-        why = found._refused()
         return replace(found, proven=not why, why=why)
 
 
@@ -322,15 +329,21 @@ def _read(content: dict[str, Any]) -> Tube:
         own = numbers(ranges, 1 + len(loop.reference.ranges), 2).tolist()
         s, a, *others = ((low, high) for low, high in own)
         cells.append(CommandCell(int(interval), s, a, tuple(others)))
+    factors = numbers(content["factors"], count, n, n)
+    if np.any(np.linalg.matrix_rank(factors) < n):
+        raise ValueError("a factor of the deviations enclosed is singular")
     return Tube(
         loop,
         numbers(content["P"], k, n, n),
         tuple(cells),
-        numbers(content["factors"], count, n, n),
+        factors,
         tuple(read_multipliers(given, loop.moved) for given in content["multipliers"]),
         False,
         "not verified",
-        tuple(LocalGain.read(given, k, loop.states, loop.moved) for given in content["gains"]),
+        tuple(
+            LocalGain.read(given, k, loop.states, loop.moved, loop.gust)
+            for given in content["gains"]
+        ),
     )
 
 
@@ -600,6 +613,8 @@ def _grown(
     linear = enclosed_cells(loop, cells, factors, drifts, FIRST_SHARE)
     if linear is None or not np.all(np.isfinite(drifts)):
         return None, (), P, "the equations have no bounds near the reference"
+    if not loop.is_defined(cells):
+        return None, (), P, UNDEFINED
     found = of_linear_loop(loop, cells, linear, roots, sizes, solver)
     if found is None:
         return None, (), P, "the linear loop has no invariant ellipsoid"

@@ -48,6 +48,11 @@ def on_a_spline(seed=0):
     return LPVStateSpace(basis, A, B, C, np.zeros((basis.size, 2, 2)), SPEED, *names)
 
 
+def positive(plant, controller):
+    """The positive loop, as one of the connections that take two systems."""
+    return feedback(plant, controller, sign=+1)
+
+
 def response(model, p=4.2):
     at = model if isinstance(model, LinearModel) else model.at(p)
     return at.frequency_response(OMEGA)
@@ -59,12 +64,12 @@ def joined(G, K):
     return {
         series: K @ G,
         parallel: G + K,
-        feedback: np.linalg.solve(np.eye(2) - G @ K, G),
+        positive: np.linalg.solve(np.eye(2) - G @ K, G),
         append: np.block([[G, zero], [zero, K]]),
     }
 
 
-@pytest.mark.parametrize("join", [series, parallel, feedback, append])
+@pytest.mark.parametrize("join", [series, parallel, positive, append])
 @pytest.mark.parametrize("kinds", ["linear, linear", "linear, spline", "spline, polynomial"])
 def test_a_connection_is_that_of_the_frozen_models_and_of_the_most_general_kind(join, kinds):
     makers = {
@@ -84,7 +89,7 @@ def test_linear_models_are_connected_as_python_control_connects_them():
     G, K = linear(1), linear(2)
     expected = control.feedback(G.to_control(), K.to_control(), sign=1)
     np.testing.assert_allclose(
-        response(feedback(G, K)), np.moveaxis(expected(1j * OMEGA), -1, 0), rtol=1e-9
+        response(feedback(G, K, sign=+1)), np.moveaxis(expected(1j * OMEGA), -1, 0), rtol=1e-9
     )
 
 
@@ -166,8 +171,8 @@ def test_names_of_blocks_and_the_units_they_take():
 def test_a_loop_through_feedthrough_that_depends_on_p_needs_an_lft():
     lpv, _ = random_lpv(2, nu=1, ny=1)
     with pytest.raises(InputError, match=r"to_lft\(\)"):
-        feedback(lpv, 0.5)
-    closed = feedback(lpv.to_lft(), 0.5)
+        feedback(lpv, 0.5, sign=+1)
+    closed = feedback(lpv.to_lft(), 0.5, sign=+1)
     G = response(lpv)
     np.testing.assert_allclose(response(closed), G / (1 - 0.5 * G), rtol=1e-9)
 
@@ -188,7 +193,7 @@ def test_an_uncertain_system_stays_a_set_with_the_same_block():
     model = on_a_spline()
     unc = UncertainStateSpace(model, [Signal("u1")], [Signal("y1")], 0.4, 1.0, "a test")
     controller = replace(linear(4, 1, 1), inputs=("y0",), outputs=("u0",))
-    by_order = feedback(unc, controller)
+    by_order = feedback(unc, controller, sign=+1)
     assert isinstance(by_order, UncertainStateSpace)
     kept = lower_feedback(unc, controller, inputs=["u0"], outputs=["y0"])
     np.testing.assert_allclose(response(by_order.model), response(kept.model), rtol=1e-9)

@@ -35,7 +35,7 @@ def test_series_parallel_and_feedback_are_those_of_the_frozen_models():
     np.testing.assert_allclose(responses(series(a, b), **TWO), K @ G, rtol=1e-9)
     np.testing.assert_allclose(responses(parallel(a, b), **TWO), G + K, rtol=1e-9)
     np.testing.assert_allclose(
-        responses(feedback(a, b), **TWO), np.linalg.solve(np.eye(2) - G @ K, G), rtol=1e-8
+        responses(feedback(a, b, sign=+1), **TWO), np.linalg.solve(np.eye(2) - G @ K, G), rtol=1e-8
     )
 
 
@@ -43,7 +43,7 @@ def test_feedback_agrees_with_python_control():
     a, b = lft(0), lft(1)
     loop = control.feedback(a.at(4.2).to_control(), b.at(4.2).to_control(), sign=1)
     expected = np.moveaxis(loop(1j * OMEGA), -1, 0)
-    np.testing.assert_allclose(responses(feedback(a, b), **ONE), expected, rtol=1e-8)
+    np.testing.assert_allclose(responses(feedback(a, b, sign=+1), **ONE), expected, rtol=1e-8)
 
 
 def test_the_star_product_closes_both_ways():
@@ -72,7 +72,7 @@ def test_gains_by_name_are_those_of_the_polynomial_model():
     )
     by_gain, by_system = (
         lpv.to_lft().feedback({("u1", "y1"): 0.3}),
-        feedback(lpv.to_lft(), constant),
+        feedback(lpv.to_lft(), constant, sign=+1),
     )
     np.testing.assert_allclose(responses(by_gain, **ONE), responses(by_system, **ONE), rtol=1e-10)
 
@@ -121,7 +121,7 @@ def test_selected_channels_keep_their_responses():
     [
         (lambda: series(lft(0), lft(1, nu=1)), "as many inputs"),
         (lambda: parallel(lft(0), lft(1, ny=1)), "equal numbers"),
-        (lambda: feedback(lft(0), lft(1, nu=1)), "controller with 2 input"),
+        (lambda: feedback(lft(0), lft(1, nu=1), sign=+1), "controller with 2 input"),
         (lambda: append(lft(0), lft(1).discretize(0.1)), "one sample period"),
         (
             lambda: append(lft(0), lft(1).with_scheduling(Scheduling("airspeed", "m/s", 0.0, 9.0))),

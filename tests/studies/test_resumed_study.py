@@ -129,7 +129,7 @@ def test_stages_of_another_seed_or_vehicle_are_computed_again(stopped, short, ca
     run(stopped, resume=True, **other)
     assert tuple(short) == FIRST
     said = capsys.readouterr().err
-    assert said.count("is of another version, vehicle, effort or seed: not taken") == 2
+    assert said.count("of another version, vehicle, effort or seed: not taken") == 2
 
 
 @pytest.mark.slow
@@ -166,7 +166,7 @@ def test_a_stage_under_the_name_of_another_is_refused(tmp_path):
     assert stored.load("baseline").seconds == 1.0
     assert stored.load("servo") is None
     stored.path("baseline").rename(stored.path("servo"))
-    with pytest.raises(NotUsable, match="is of another version"):
+    with pytest.raises(NotUsable, match="is of another stage"):
         stored.load("servo")
 
 

@@ -3,6 +3,7 @@
 import io
 import json
 import math
+import shutil
 import zipfile
 from collections import OrderedDict
 
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 from studies.setup import stage_file
+from studies.setup.stored_stages import NotUsable, Stored, StoredStages
 from symheli import LinearModel, Scheduling, Signal
 
 
@@ -80,3 +82,22 @@ def test_a_damaged_file_is_refused(cut):
     content = stage_file.written({"array": np.arange(100.0)})
     with pytest.raises(stage_file.UnreadableError):
         stage_file.read(content[:cut])
+
+
+@pytest.mark.guard
+def test_an_answer_copied_over_another_is_refused(tmp_path):
+    """The proof of one loop stood as that of another, and as the whole stage."""
+    stages = StoredStages(tmp_path, {"proofs": "k" * 64, "gains": "k" * 64})
+    for i in (0, 1):
+        stages.save("proofs", Stored(result=("loop", i), seconds=1.0), i)
+    assert {i: each.result for i, each in stages.parts("proofs", 2).items()} == {
+        0: ("loop", 0),
+        1: ("loop", 1),
+    }
+    first = stages.path("proofs", 0)
+    for name, part in (("proofs", 1), ("proofs", None), ("gains", 0), ("gains", None)):
+        shutil.copy(first, stages.path(name, part))
+        with pytest.raises(NotUsable, match="another stage or question"):
+            stages.load(name, part)
+        assert stages.usable(name, part) is None
+    assert list(stages.parts("proofs", 2)) == [0]

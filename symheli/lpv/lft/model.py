@@ -14,6 +14,7 @@ from symheli.errors import UnknownNameError
 from symheli.lpv.lft_matrices import Block, LFTMatrices
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.lpv_state_space import LPVStateSpace
+from symheli.lpv.operators import Operators
 from symheli.lpv.scheduling import Scheduling
 from symheli.values.arrays import Array
 from symheli.values.signal import Signal, indices, signals
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class LFT(LFTMatrices):
+class LFT(Operators, LFTMatrices):
     """M(delta) = M22 + M21 Delta (I - M11 Delta)^-1 M12 = [A B; C D], Delta = diag(delta_i I_ni),
     |delta_i| <= 1: the upper loop of a constant matrix with normalised scheduling parameters.
 
@@ -282,8 +283,12 @@ class LFT(LFTMatrices):
         return star(self, other, outputs, inputs)
 
     def feedback(self, gains: Mapping[tuple[str, str], float]) -> LFT:
-        """Close u_i = gain * y_j + (new u_i) for each {(input, output): gain}; for a dynamic
-        controller see `connect`.
+        """Close the positive loops u_i = gain * y_j + (new u_i) for each {(input, output): gain}; a
+        negative loop has a negative gain.
+
+        See Also
+        --------
+        symheli.lpv.feedback : with a dynamic controller, and a sign
         """
         from symheli.lpv.lft.algebra import close
 

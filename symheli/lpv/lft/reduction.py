@@ -15,11 +15,62 @@ from symheli.values.arrays import Array
 
 SAMPLES = 12
 """Number of points of the box at which the parameter-dependent part is evaluated."""
+TOLERANCES = (1e-12, 1e-14)
+"""Of the reductions that are tried where nothing may be lost."""
+ROUNDING = 4 * np.finfo(float).eps
+"""Relative change of an entry below which it is the same number."""
+LOSS = 64 * np.finfo(float).eps
+"""Largest change of an entry, in units of the size that row and column give it or of its own terms,
+that is rounding of the reduction itself.
+"""
 
 
 def reduce(lft: LFT, tolerance: float) -> LFT:
     """See `LFT.reduce`."""
     return _one_parameter(lft, tolerance) if len(lft.blocks) == 1 else _structured(lft, tolerance)
+
+
+def reduce_without_loss(lft: LFT) -> LFT:
+    """Return the same model with the fewest copies found by reductions that change no entry by more
+    than `LOSS` and drop no parameter; without copies that zeros cut off, where all of them do.
+
+    `LFT.reduce` takes dependence below its tolerance for rounding. In coordinates of entries that
+    nearly cancel such a dependence may decide stability.
+    """
+    whole = _without_idle_copies(lft)
+    delta = _samples(whole)
+    values, bar = whole.matrix(delta), _rounding(whole, delta)
+    for tolerance in TOLERANCES:
+        smaller = reduce(whole, tolerance)
+        change = np.abs(smaller.matrix(delta) - values)
+        dropped = any(a and not b for a, b in zip(whole.sizes, smaller.sizes, strict=True))
+        if np.all(change <= bar) and not (dropped and np.any(change > ROUNDING * np.abs(values))):
+            return smaller
+    return whole
+
+
+def _rounding(lft: LFT, delta: Array) -> Array:
+    """Changes of the entries (SAMPLES, nx + ny, nx + nu) that count as rounding at these points."""
+    own = np.repeat(delta, lft.sizes, axis=-1)
+    inverse = np.abs(np.linalg.inv(np.eye(lft.order) - lft.M11 * own[:, None, :]))
+    terms = np.abs(lft.M22) + (np.abs(lft.M21) * np.abs(own)[:, None, :]) @ inverse @ np.abs(
+        lft.M12
+    )
+    rows, columns = equilibrate(np.abs(lft.matrix(delta)).max(axis=0, initial=0.0))
+    return LOSS * np.maximum(terms, 1 / (rows[:, None] * columns))
+
+
+def _without_idle_copies(lft: LFT) -> LFT:
+    """Remove the copies that zeros of M cut off from its inputs or from its outputs; exact."""
+    loop, reached, seen = lft.M11 != 0, np.any(lft.M12, axis=1), np.any(lft.M21, axis=0)
+    for _ in range(lft.order):
+        reached, seen = reached | (loop @ reached), seen | (loop.T @ seen)
+    kept = [int(i) for i in np.flatnonzero(reached & seen)]
+    sizes = [sum(here.start <= i < here.stop for i in kept) for here in parts(lft.sizes)]
+    blocks = tuple(Block(b.scheduling, n) for b, n in zip(lft.blocks, sizes, strict=True))
+    return replace(
+        lft, M11=lft.M11[np.ix_(kept, kept)], M12=lft.M12[kept], M21=lft.M21[:, kept], blocks=blocks
+    )
 
 
 def _one_parameter(lft: LFT, tolerance: float) -> LFT:

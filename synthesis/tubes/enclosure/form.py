@@ -53,7 +53,10 @@ class AffineForm:
     @cached_property
     def interval(self) -> Interval:
         """Guaranteed interval of the numbers."""
-        own = Interval.around(self.centre, up((self.linear + self.rest) * MARGIN))
+        radius = self.linear + self.rest
+        # a constant has no radius: 0 stays 0, so that max(x, 0) has a square root
+        radius = np.where(radius == 0.0, 0.0, up(radius * MARGIN))
+        own = Interval.around(self.centre, radius)
         return own if self.bound is None else own.intersect(self.bound)
 
     @property
@@ -223,7 +226,10 @@ class AffineForm:
         return AffineForm(shifted, free.slopes, rest, self.groups, bound).settled()
 
     def sqrt(self) -> AffineForm:
-        """Square roots: concave, so that sqrt(x) - s x lies between its ends and 1/(4 s)."""
+        """Square roots: concave, so that sqrt(x) - s x lies between its ends and 1/(4 s); without
+        bounds where some of the numbers are negative.
+        """
+        none = ~(self.interval.lower >= 0)
         x = Interval(np.maximum(self.interval.lower, 0.0), self.interval.upper)
         bound = self.interval.sqrt()
         total = bound.lower + bound.upper
@@ -232,6 +238,7 @@ class AffineForm:
         ends = [Interval.around(t).sqrt() - s * Interval.around(t) for t in (x.lower, x.upper)]
         least = np.minimum(ends[0].lower, ends[1].lower)
         most = (Interval.around(np.full(self.shape, 4.0)) * s).inverse().upper
+        least, most = np.where(none, -np.inf, least), np.where(none, np.inf, most)
         return self._line(slope, Interval(least, most), bound)
 
     def inverse(self) -> AffineForm:

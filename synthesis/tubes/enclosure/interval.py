@@ -53,7 +53,8 @@ class Interval:
         return Interval(-self.upper, -self.lower)
 
     def __add__(self, other: Interval) -> Interval:
-        return Interval(down(self.lower + other.lower), up(self.upper + other.upper))
+        lower = _not_below(down(self.lower + other.lower), self, other)
+        return Interval(lower, up(self.upper + other.upper))
 
     def __sub__(self, other: Interval) -> Interval:
         return self + -other
@@ -62,8 +63,9 @@ class Interval:
         products = [a * b for a in (self.lower, self.upper) for b in (other.lower, other.upper)]
         # 0 times a side at infinity: the numbers themselves are finite
         products = [np.where(np.isnan(p), 0.0, p) for p in products]
+        lower = down(np.minimum(np.minimum(*products[:2]), np.minimum(*products[2:])))
         return Interval(
-            down(np.minimum(np.minimum(*products[:2]), np.minimum(*products[2:]))),
+            _not_below(lower, self, other),
             up(np.maximum(np.maximum(*products[:2]), np.maximum(*products[2:]))),
         )
 
@@ -82,8 +84,8 @@ class Interval:
         )
 
     def sqrt(self) -> Interval:
-        """Square roots of the numbers that are not negative; the whole line where all are."""
-        none = self.upper < 0
+        """Square roots; the whole line where some of the numbers are negative, which have none."""
+        none = ~(self.lower >= 0)
         lower = np.maximum(down(np.sqrt(np.maximum(self.lower, 0.0))), 0.0)
         upper = up(np.sqrt(np.maximum(self.upper, 0.0)))
         return Interval(np.where(none, -np.inf, lower), np.where(none, np.inf, upper))
@@ -113,6 +115,14 @@ class Interval:
         pairs = [bound(a, b) for a, b in zip(self.lower.ravel(), self.upper.ravel(), strict=True)]
         found = np.array(pairs, float).reshape(*self.lower.shape, 2)
         return Interval(found[..., 0], found[..., 1])
+
+
+def _not_below(lower: Array, one: Interval, other: Interval) -> Array:
+    """A lower bound of a sum or product, 0 at least where neither factor is negative: rounded
+    outwards it would be just below, where a square root is not defined.
+    """
+    both = (one.lower >= 0) & (other.lower >= 0)
+    return np.where(both, np.maximum(lower, 0.0), lower)
 
 
 def up(values: Any) -> Any:

@@ -46,7 +46,7 @@ def test_at_rest_it_comes_within_a_hundredth_of_the_worst_closed_form():
     assert worst * (1 - 2e-3) <= made.shaped.optimum <= 1.01 * worst
     # u = W1 K y of the plant itself: the frozen loops are those of the shaped plant
     for p in (0.5, 1.0, 2.0):
-        loop = feedback(G.at(p), made.controller.at(p))
+        loop = feedback(G.at(p), made.controller.at(p), sign=+1)
         assert loop.is_stable()
 
 

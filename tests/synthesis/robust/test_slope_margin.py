@@ -72,7 +72,7 @@ def test_the_multiplier_is_what_it_must_be(odd):
 
 
 @pytest.mark.slow
-def test_a_loop_of_the_proven_slope_decays():
+def test_a_loop_of_the_slope_found_decays():
     """A dead zone, a saturation and a soft stop, each of that slope at its steepest."""
     model = resonant()
     k = 0.9 * slope_margin(model, "d", "v").slope  # at the margin it takes long
@@ -96,6 +96,45 @@ def test_a_loop_that_no_slope_reaches_and_one_without_limit():
     lag = slope_margin(plant([1], [1, 1]), "d", "v")
     assert lag.slope > 1e5
     assert lag.limit == math.inf
+
+
+MISSED = """
+561.4738689574035 -734.1838091183005 -428.6633570333954 -213.2011148620911
+53.04480103578124 350.4676419872083 609.7445998665382 -896.9974845263846
+-344.0292439687711 -164.02394003618184 79.98645372402324 501.7878474895997
+125.40877231353505 -145.7334711464954 -119.07415198179156 -60.761774976203725
+7.770548288020008 55.58581324647251 -190.8003903088374 322.0508125362968
+59.299404544659374 24.66463377346277 -34.360879691145136 -206.41421179433024
+2039.5158505277604 -2616.4348237160934 -1617.0295773284784 -803.0244245958968
+181.63587917796394 1214.6749980129657 105.39081228324852 -287.83162473465933
+102.03210320000203 60.5786436142563 43.59048514012416 247.623338267347
+3.960279064501449e-10 6.505572854951972e-08 -1.2189817960499097e-08
+-4.634102120802915e-08 -2.9579468502010894e-08 9.68027815735774e-08 27.163838680621282
+-2.6271417321822503 27.1703310115021 3.3079950033059973 -8.244329070292107
+4.035953407054847
+"""
+"""A (6, 6), b (6,) and c (6,) of a loop about which a crossing is missed."""
+
+
+@pytest.mark.guard
+def test_a_slope_that_is_too_large_claims_no_proof():
+    """Three modes of 1 rad/s, lightly damped, in mixed coordinates: a crossing of the circle
+    criterion is missed. At 1/slope the inequality is lost, and the result says that it is none
+    that was proven.
+    """
+    A, b, c = np.split(np.array(MISSED.split(), float), [36, 42])
+    A, b, c = A.reshape(6, 6), b[:, None], c[None]
+    states = [f"x{i}" for i in range(6)]
+    model = LinearModel(A, b, c, [[0.0]], states, ["d"], ["v"])
+    found = slope_margin(model, "d", "v", "circle", odd=True)
+    G = model.frequency_response(np.linspace(0.99, 1.01, 20001))[:, 0, 0]
+    assert found.slope > 10 / G.real.max()  # the circle criterion allows no more than 1/max Re G
+    assert not found.verified
+    assert found.status == "computed, not verified"
+    for text in (str(found), repr(found)):
+        assert "computed, not verified" in text
+        assert "proven" not in text
+    assert "tolerance" in str(found)
 
 
 @pytest.mark.parametrize(

@@ -58,7 +58,7 @@ SQUARE = Domain.box([-1.0, -1.0], [1.0, 1.0])
         (lambda x: x[0] - x[0], DISK, 0.0, 0.0),  # dependencies are not forgotten
         (lambda x: casadi.sin(x[0]), SQUARE, -np.sin(1), np.sin(1)),
         (lambda x: casadi.fabs(x[0]), SQUARE, 0.0, 1.0),
-        (lambda x: casadi.sqrt(x[0] + 1), SQUARE, 0.0, np.sqrt(2)),
+        (lambda x: casadi.sqrt(x[0] + 1.25), SQUARE, 0.5, 1.5),
         (lambda x: 1 / (x[0] + 3), SQUARE, 0.25, 0.5),
         (lambda x: casadi.fmax(x[0], x[1]), SQUARE, -1.0, 1.0),
         (lambda x: casadi.if_else(x[0] > 0, 2.0, 1.0), SQUARE, 1.0, 2.0),
@@ -226,10 +226,35 @@ def test_the_slope_of_a_speed_is_bounded_where_it_passes_zero():
 
 
 def test_where_a_function_is_not_defined_there_is_no_bound():
-    for build in (lambda x: 1 / x[0], lambda x: casadi.asin(2 * x[0])):
+    for build in (
+        lambda x: 1 / x[0],
+        lambda x: casadi.asin(2 * x[0]),
+        lambda x: casadi.tan(2 * x[0]),
+        lambda x: casadi.sqrt(x[0]),
+        lambda x: casadi.sqrt(x[0] - 2),
+        lambda x: casadi.sqrt(x[0] + 0.999),
+        lambda x: casadi.sin(casadi.sqrt(x[0])),
+    ):
         found = enclose(function(build, 1), Domain.box([-1.0], [1.0]))
         assert not found.finite
         assert found.value.interval.upper[0] == np.inf
+
+
+@pytest.mark.parametrize(
+    "build",
+    [
+        lambda x: casadi.sqrt(casadi.fabs(x)),
+        lambda x: casadi.sqrt(casadi.fmax(x, 0)),
+        lambda x: casadi.sqrt(x**2 + 3 * x**4),
+        lambda x: casadi.sqrt(casadi.fabs(x) * x**2 / 2),
+        lambda x: casadi.sqrt(casadi.if_else(x > 0, x, 0)),
+    ],
+)
+def test_a_root_of_what_is_not_negative_has_bounds_from_zero_on(build):
+    """Rounded outwards a sum of squares would reach below zero, where there is no root."""
+    bound = enclose(function(build, 1), Domain.box([-1.0], [1.0])).value.interval
+    assert bound.lower[0] == 0.0
+    assert 0.7 < bound.upper[0] < 2.001
 
 
 def test_a_root_is_followed_over_the_set():

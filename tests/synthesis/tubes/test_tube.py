@@ -407,7 +407,10 @@ def test_a_tube_of_any_model_and_its_gains_are_proven_again_from_the_file(uprigh
 @pytest.mark.parametrize(
     "forgery",
     [
-        lambda c: c.update(gust=1.2 * c["gust"]),
+        lambda c: (
+            c.update(gust=1.2 * c["gust"]),
+            [gain.update(gust=c["gust"]) for gain in c["gains"]],
+        ),
         lambda c: c["gains"][0].update(energy=False),
         lambda c: c["gains"][0]["multipliers"][0].update(
             wind=(0.9 * np.array(c["gains"][0]["multipliers"][0]["wind"])).tolist()
@@ -423,6 +426,62 @@ def test_a_forged_gain_is_not_proven(upright, tmp_path, forgery):
     forgery(content)
     path.write_text(json.dumps(content))
     assert not Tube.load(path).proven
+
+
+@pytest.mark.guard
+@pytest.mark.parametrize(
+    ("forgery", "words"),
+    [
+        *(
+            (lambda c, gust=g: c["gains"][0].update(gust=gust), "gusts of")
+            for g in (2, 20, -0.2, 0)
+        ),
+        (lambda c: c.update(gust=-0.2, gains=[]), "gust: expected"),
+        (lambda c: c.update(gust=0.0), "gusts of 0"),
+        (lambda c: c.update(states=["x0", "x0"]), "once each"),
+        (lambda c: c.update(factors=np.zeros_like(c["factors"]).tolist()), "singular"),
+        (lambda c: c["factors"][0].__setitem__(1, c["factors"][0][0]), "singular"),
+    ],
+)
+def test_a_forged_tube_is_refused_in_words(upright, tmp_path, forgery, words):
+    """The gain of a pendulum was a hundredth of the true one after one number was changed."""
+    path = upright.save(tmp_path / "tube.json")
+    content = json.loads(path.read_text())
+    forgery(content)
+    path.write_text(json.dumps(content))
+    with pytest.raises(InputError, match=words) as told:
+        Tube.load(path)
+    assert str(path) in str(told.value)
+
+
+@pytest.mark.guard
+def test_a_gain_in_other_gusts_than_its_tube_is_not_verified(upright):
+    other = replace(upright, gains=(replace(upright.gains[0], gust=20.0),))
+    assert upright.verify()
+    assert not other.verify()
+
+
+@pytest.mark.guard
+@pytest.mark.parametrize("moving", [True, False])
+def test_a_reference_that_does_not_exist_for_all_commands_has_no_tube(moving):
+    """sqrt(c) for c from -1/2 on; the plant is linear, so that its Jacobian does not see x_r."""
+    x, u, w, c = (casadi.SX.sym(n, k) for n, k in (("x", 2), ("u", 1), ("w", 1), ("c", 1)))
+    line = casadi.Function("line", [x, u, w], [casadi.vertcat(x[1], u + w)])
+    outputs = [casadi.vertcat(0.1 * casadi.sqrt(c), 0), casadi.SX.zeros(1), casadi.SX.zeros(2)]
+    root = casadi.Function("root", [c], outputs[: 3 if moving else 2])
+    found = {
+        low: tube(line, Motions(root, [[-3, -2]], others=[[low, 0.5]]), gust=0.1, sizes=[0.2, 0.3])
+        for low in (-0.5, 0.1)
+    }
+    assert found[0.1].proven
+    assert not found[-0.5].proven
+    assert "reference is not defined" in found[-0.5].why
+
+
+def test_a_tube_without_gusts_has_no_gain():
+    model, about = _pendulum()
+    with pytest.raises(InputError, match="gust > 0"):
+        tube(model, about, gust=0.0, sizes=(0.2, 0.3)).with_gain(["x0"])
 
 
 def test_a_local_gain_is_between_that_flown_and_that_of_the_extreme_linear_loops(upright):
