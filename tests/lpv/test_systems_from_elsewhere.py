@@ -106,7 +106,7 @@ def test_what_has_no_states_goes_with_any_sample_period():
 def test_what_cannot_be_connected_is_told_what_can():
     with pytest.raises(InputError, match=r"sums=.*{\(inputs, outputs\): gain}"):
         connect(PLANT, 2.0, inputs=["d_col"], outputs=["q"])
-    with pytest.raises(InputError, match="a system of python-control.*to connect, got dict"):
+    with pytest.raises(InputError, match=r"a system of python-control.*to connect, got dict"):
         append(PLANT, {})
     spline = LPVStateSpace(
         PiecewiseLinear((0.0, 13.0)),
