@@ -51,7 +51,6 @@ def named(system):
         lambda P, Q: P + np.eye(2) - Q * P,
         lambda P, Q: np.eye(2) - P,
         lambda P, Q: np.float64(3.0) * P,
-        lambda P, Q: np.array(3.0) * P * np.int64(2),
         lambda P, Q: P[1, 0],
     ],
 )
@@ -147,6 +146,12 @@ def test_names_follow():
     assert named(P[1:, -1]) == (["u11"], ["y11", "y12"])
     units = replace(P, outputs=[Signal("phi", "rad"), Signal("p", "rad/s"), Signal("v", "m/s")])
     assert [y.unit for y in (-units * K).outputs] == ["rad", "rad/s", "m/s"]
+
+
+def test_an_array_without_axes_is_a_number():
+    P = linear(1, nu=2, ny=3)
+    for same in (np.array(6.0) * P, P * np.array(3.0) * np.int64(2)):
+        np.testing.assert_allclose(same(POINTS), 6 * P(POINTS), rtol=1e-13)
 
 
 def test_a_sum_of_many_is_that_of_the_builtin_function():
