@@ -1,6 +1,6 @@
 from synthesis.certify.lft.multipliers import SCALINGS as SCALINGS
 from synthesis.certify.lower_bounds.frozen import frozen_gain as frozen_gain
-from synthesis.certify.lower_bounds.lft import frozen_box_gain as frozen_box_gain
+from synthesis.certify.lower_bounds.lines import frozen_box_gain as frozen_box_gain
 from synthesis.certify.lower_bounds.lower_bound import Search as Search
 from synthesis.certify.lower_bounds.lower_bound import lower_bound as lower_bound
 from synthesis.certify.questions.certificate import Certificate as Certificate

@@ -14,10 +14,9 @@ from symheli.errors import InputError
 from symheli.lpv import LFT, LPVStateSpace, Polynomial, Scheduling, UncertainStateSpace
 from symheli.threads import with_one_thread
 from symheli.values.summary import summarized
-from synthesis.certify.lower_bounds.frozen import frozen_gain
-from synthesis.certify.lower_bounds.over_box import worst_over
-from synthesis.certify.lower_bounds.rates import Rate
+from synthesis.certify.lower_bounds.frozen import frozen_gain, worst_over
 from synthesis.certify.questions.questions import stability
+from synthesis.certify.statement.demand import Rate
 from synthesis.robust.lower_bound import ACCURACY, ROUGH, best_reals, worst_closing
 from synthesis.robust.structure import BlockLoop, DynamicBlock, loop_at, loop_of
 from synthesis.robust.uncertain import uncertain

@@ -14,21 +14,23 @@ from scipy import linalg
 
 from symheli.lpv import LPVStateSpace
 from symheli.progress import tracked
-from synthesis.certify.lower_bounds.budget import Budget
-from synthesis.certify.lower_bounds.frozen import FrozenGain
+from synthesis.certify.lower_bounds.frozen import FrozenGain, grid_of, worst_over
 from synthesis.certify.lower_bounds.lines import Line, alone, directions, growing_on, shared
 from synthesis.certify.lower_bounds.lower_bound import Search, lower_bound
-from synthesis.certify.lower_bounds.over_box import grid_of, worst_over
+from synthesis.certify.lower_bounds.paths import Budget, WaveFamily, samples, steps
 from synthesis.certify.lower_bounds.periodic import multiplier
-from synthesis.certify.lower_bounds.spectrum import surely_unstable
 from synthesis.certify.lower_bounds.tied import tied_lower_bound
-from synthesis.certify.lower_bounds.trajectory import SchedulingTrajectory
-from synthesis.certify.lower_bounds.wave_family import WaveFamily
-from synthesis.certify.lower_bounds.waves import samples, steps
 from synthesis.certify.statement.demand import Demand
 from synthesis.certify.statement.kind import Kind
+from synthesis.certify.statement.trajectory import SchedulingTrajectory
 from synthesis.numerics.linear.balance import balance
-from synthesis.numerics.linear.norm import gain_at_poles, norm, stable, to_continuous
+from synthesis.numerics.linear.norm import (
+    gain_at_poles,
+    norm,
+    stable,
+    surely_unstable,
+    to_continuous,
+)
 from synthesis.numerics.polynomial.motion import Motion
 from synthesis.numerics.polynomial.pieces import Pieces
 

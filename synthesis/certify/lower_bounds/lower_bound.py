@@ -21,16 +21,27 @@ from symheli.errors import InputError
 from symheli.progress import tracked
 from symheli.values.numbers import whole
 from symheli.values.summary import summarized
-from synthesis.certify.lower_bounds.ascent import GAIN, GROWTH, Objective, ascend, on_nodes
-from synthesis.certify.lower_bounds.budget import Budget
-from synthesis.certify.lower_bounds.corners import Corners, climb
+from synthesis.certify.lower_bounds.ascent import (
+    GAIN,
+    GROWTH,
+    Corners,
+    Objective,
+    ascend,
+    climb,
+    on_nodes,
+)
 from synthesis.certify.lower_bounds.frozen import FrozenGain, frozen_gain
+from synthesis.certify.lower_bounds.paths import (
+    Budget,
+    Scheduled,
+    TransitionMatrices,
+    WaveFamily,
+    samples,
+    steps,
+)
 from synthesis.certify.lower_bounds.periodic import Lifted, multiplier, ratio_from_rest, worst_input
-from synthesis.certify.lower_bounds.rates import Rate, rates
-from synthesis.certify.lower_bounds.scheduled import Scheduled
-from synthesis.certify.lower_bounds.trajectory import SchedulingTrajectory
-from synthesis.certify.lower_bounds.wave_family import WaveFamily
-from synthesis.certify.lower_bounds.waves import TransitionMatrices, samples, steps
+from synthesis.certify.statement.demand import Rate, rates
+from synthesis.certify.statement.trajectory import SchedulingTrajectory
 
 Array = np.ndarray
 

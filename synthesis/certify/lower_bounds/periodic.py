@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from synthesis.certify.lower_bounds.waves import TransitionMatrices
+from synthesis.certify.lower_bounds.paths import TransitionMatrices
 
 Array = np.ndarray
 

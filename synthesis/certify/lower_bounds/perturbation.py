@@ -16,9 +16,8 @@ import numpy as np
 
 from symheli.lpv import Matrices, UncertainStateSpace
 from symheli.values.signal import indices
-from synthesis.certify.lower_bounds.over_box import worst_over
-from synthesis.certify.lower_bounds.spectrum import surely_unstable
-from synthesis.numerics.linear.norm import gain_at_poles, norm
+from synthesis.certify.lower_bounds.frozen import worst_over
+from synthesis.numerics.linear.norm import gain_at_poles, norm, surely_unstable
 
 Array = np.ndarray
 

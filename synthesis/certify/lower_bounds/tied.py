@@ -17,11 +17,9 @@ from scipy.optimize import minimize
 
 from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace, Matrices, Scheduling
-from synthesis.certify.lower_bounds.budget import Budget
 from synthesis.certify.lower_bounds.lower_bound import LowerBound, Search, along_cycle
-from synthesis.certify.lower_bounds.trajectory import SchedulingTrajectory
-from synthesis.certify.lower_bounds.wave_family import WaveFamily
-from synthesis.certify.lower_bounds.waves import Wave
+from synthesis.certify.lower_bounds.paths import Budget, Wave, WaveFamily
+from synthesis.certify.statement.trajectory import SchedulingTrajectory
 from synthesis.numerics.polynomial.motion import Motion
 
 Array = np.ndarray

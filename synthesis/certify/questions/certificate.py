@@ -14,9 +14,9 @@ import numpy as np
 from symheli.errors import CertificateError, InputError
 from symheli.lpv import Scheduling
 from symheli.values.summary import as_table, summarized
-from synthesis.certify.lower_bounds.trajectory import SchedulingTrajectory
 from synthesis.certify.statement.kind import Kind
 from synthesis.certify.statement.outcome import Attempt, Seconds, Status
+from synthesis.certify.statement.trajectory import SchedulingTrajectory
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -35,7 +35,6 @@ from symheli.values import Signal
 from symheli.values.whole_files import write_text
 from synthesis.certify.lft import proof as lft_proof
 from synthesis.certify.lft.multipliers import Multiplier
-from synthesis.certify.lower_bounds.trajectory import SchedulingTrajectory
 from synthesis.certify.proof import box, one_parameter
 from synthesis.certify.questions.certificate import Certificate, Proof
 from synthesis.certify.statement.box import BoxLyapunov
@@ -45,6 +44,7 @@ from synthesis.certify.statement.norm_bounded import NormBounded
 from synthesis.certify.statement.outcome import Attempt, Seconds, Status
 from synthesis.certify.statement.sentences import motion
 from synthesis.certify.statement.spline import MemoryLyapunov, SplineLyapunov
+from synthesis.certify.statement.trajectory import SchedulingTrajectory
 from synthesis.certify.statement.units import Scaling
 from synthesis.numerics.polynomial.matrix import PolynomialMatrix
 from synthesis.numerics.polynomial.motion import Motion

@@ -15,9 +15,8 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.lpv import LFT, LPVStateSpace, Scheduling, UncertainStateSpace
 from synthesis.certify.lower_bounds.box import Worst, growing, unstable_at, worst_by, worst_moving
-from synthesis.certify.lower_bounds.budget import search_hypothesis
+from synthesis.certify.lower_bounds.paths import search_hypothesis
 from synthesis.certify.lower_bounds.perturbation import worst_perturbation
-from synthesis.certify.lower_bounds.trajectory import SchedulingTrajectory
 from synthesis.certify.questions.adjoint import ADJOINT, FAR_ABOVE, backwards
 from synthesis.certify.questions.apart import apart
 from synthesis.certify.questions.certificate import Certificate
@@ -29,6 +28,7 @@ from synthesis.certify.questions.one_parameter_search import OneParameter
 from synthesis.certify.questions.problem import BoundProblem
 from synthesis.certify.statement.impose import Grid
 from synthesis.certify.statement.outcome import Seconds, Status
+from synthesis.certify.statement.trajectory import SchedulingTrajectory
 from synthesis.numerics.polynomial.pieces import Pieces, pieces
 
 Array = np.ndarray

@@ -20,16 +20,14 @@ from synthesis.certify.lft.program import (
     with_state_channels,
 )
 from synthesis.certify.lft.proof import LFTEvidence, QuadraticStorage
-from synthesis.certify.lower_bounds.budget import search_hypothesis
-from synthesis.certify.lower_bounds.lft import (
+from synthesis.certify.lower_bounds.lines import (
     BoxGain,
     box_growing_trajectory,
     box_lower_bound,
     frozen_box_gain,
 )
 from synthesis.certify.lower_bounds.lower_bound import THOROUGH, Search
-from synthesis.certify.lower_bounds.spectrum import surely_unstable
-from synthesis.certify.lower_bounds.trajectory import SchedulingTrajectory
+from synthesis.certify.lower_bounds.paths import search_hypothesis
 from synthesis.certify.questions.certificate import Certificate, Proof
 from synthesis.certify.questions.certify import Beaten, Report
 from synthesis.certify.questions.hypotheses import VERIFIED
@@ -39,6 +37,8 @@ from synthesis.certify.statement.forms import Spline
 from synthesis.certify.statement.impose import Bernstein
 from synthesis.certify.statement.kind import Kind
 from synthesis.certify.statement.outcome import Attempt, Status
+from synthesis.certify.statement.trajectory import SchedulingTrajectory
+from synthesis.numerics.linear.norm import surely_unstable
 from synthesis.numerics.polynomial.motion import Motion
 from synthesis.numerics.program.answer import Answer
 from synthesis.numerics.program.cone_program import Solver, general_solver, solve

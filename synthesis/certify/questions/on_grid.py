@@ -15,10 +15,10 @@ from symheli.errors import InputError
 from symheli.lpv import LFT, FunctionSpace, LPVStateSpace, Matrices, Scheduling
 from symheli.lpv.bases.function_space import tensor_grid
 from symheli.lpv.bases.polynomials import polynomials
-from synthesis.certify.lower_bounds.rates import Rate, limits
 from synthesis.certify.questions.certificate import Certificate
 from synthesis.certify.questions.hypotheses import hypotheses
 from synthesis.certify.questions.problem import Model
+from synthesis.certify.statement.demand import Rate, limits
 from synthesis.certify.statement.impose import Grid, Imposed
 from synthesis.certify.statement.outcome import Attempt, Seconds, Status
 from synthesis.certify.statement.scaling import dissipative, model_scaling

@@ -8,8 +8,7 @@ from typing import NamedTuple
 from symheli.errors import InputError
 from symheli.lpv import LFT, LPVStateSpace, Scheduling, UncertainStateSpace
 from synthesis.certify.lower_bounds.lower_bound import Search
-from synthesis.certify.lower_bounds.rates import Rate, limits
-from synthesis.certify.statement.demand import Demand
+from synthesis.certify.statement.demand import Demand, Rate, limits
 from synthesis.certify.statement.forms import HigherOrder, LyapunovForm, Memory, Spline
 from synthesis.certify.statement.impose import Bernstein, Grid, Imposed, SumOfSquares, Vertices
 from synthesis.certify.statement.kind import Kind

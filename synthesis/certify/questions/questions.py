@@ -7,11 +7,11 @@ from __future__ import annotations
 from symheli.lpv import FunctionSpace
 from symheli.threads import with_one_thread
 from synthesis.certify.lower_bounds.lower_bound import THOROUGH, Search
-from synthesis.certify.lower_bounds.rates import Rate
 from synthesis.certify.questions.certificate import Certificate
 from synthesis.certify.questions.certify import certify
 from synthesis.certify.questions.on_grid import gain_on_grid
 from synthesis.certify.questions.problem import Model, pose
+from synthesis.certify.statement.demand import Rate
 from synthesis.certify.statement.forms import LyapunovForm, Spline
 from synthesis.certify.statement.impose import Imposed
 from synthesis.numerics.program.cone_program import Solver

@@ -15,8 +15,8 @@ from symheli.lpv import LinearModel, LPVStateSpace, UncertainStateSpace
 from symheli.values.arrays import Array
 from symheli.values.named_vector import NamedVector
 from symheli.values.summary import as_table, summarized
-from synthesis.certify.lower_bounds.rates import limits
 from synthesis.certify.questions.certificate import Certificate
+from synthesis.certify.statement.demand import limits
 from synthesis.certify.statement.forms import Spline
 from synthesis.certify.statement.impose import Bernstein
 from synthesis.certify.statement.outcome import Attempt

@@ -12,8 +12,8 @@ from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace
 from symheli.lpv.linear_model import LinearModel
 from symheli.threads import with_one_thread
-from synthesis.certify.lower_bounds.rates import Rate, limits
 from synthesis.certify.questions.questions import stability
+from synthesis.certify.statement.demand import Rate, limits
 from synthesis.design.plant.as_controller import as_controller
 from synthesis.design.plant.plant import Plant, require_plant
 

@@ -16,9 +16,9 @@ from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace, UncertainStateSpace
 from symheli.threads import with_one_thread
 from symheli.values.summary import summarized
-from synthesis.certify.lower_bounds.rates import Rate
 from synthesis.certify.questions.certificate import Certificate
 from synthesis.certify.questions.questions import l2_gain
+from synthesis.certify.statement.demand import Rate
 from synthesis.design.loops.controller import Controller
 from synthesis.design.plant.plant import Plant, require_plant
 

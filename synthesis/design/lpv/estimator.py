@@ -14,8 +14,8 @@ from symheli.lpv.matrix_function import MatrixFunction, block, in_one_basis
 from symheli.threads import with_one_thread
 from symheli.values.signal import Signal
 from symheli.values.summary import as_table, summarized
-from synthesis.certify.lower_bounds.rates import Rate, limits
 from synthesis.certify.questions.certificate import Certificate
+from synthesis.certify.statement.demand import Rate, limits
 from synthesis.certify.statement.impose import Grid
 from synthesis.certify.statement.outcome import Attempt
 from synthesis.design.lpv.existence import Existence, Solution, imposed_at

@@ -11,7 +11,7 @@ from symheli.lpv import LinearModel, LPVStateSpace, series
 from symheli.lpv.mixing import itself, mixed
 from symheli.values.sample_period import same_period
 from symheli.values.signal import Signal
-from synthesis.certify.lower_bounds.rates import Rate
+from synthesis.certify.statement.demand import Rate
 from synthesis.certify.statement.impose import Grid
 from synthesis.design.loops.controller import Controller
 from synthesis.design.lpv.output_feedback import output_feedback

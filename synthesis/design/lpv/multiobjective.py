@@ -17,7 +17,7 @@ from symheli.errors import InputError
 from symheli.lpv import FunctionSpace
 from symheli.threads import with_one_thread
 from symheli.values.signal import indices
-from synthesis.certify.lower_bounds.rates import Rate, limits
+from synthesis.certify.statement.demand import Rate, limits
 from synthesis.certify.statement.outcome import Attempt
 from synthesis.design.loops.controller import Controller
 from synthesis.design.lpv.fitted import fitted, in_plant_units

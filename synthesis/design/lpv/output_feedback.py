@@ -12,7 +12,7 @@ from symheli.errors import SynthesisError
 from symheli.lpv import UncertainStateSpace
 from symheli.lpv.bases.polynomials import lobatto_points
 from symheli.threads import with_one_thread
-from synthesis.certify.lower_bounds.rates import Rate, limits
+from synthesis.certify.statement.demand import Rate, limits
 from synthesis.certify.statement.impose import Grid
 from synthesis.certify.statement.outcome import Attempt
 from synthesis.design.loops.controller import Controller

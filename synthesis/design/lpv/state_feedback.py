@@ -9,7 +9,7 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.threads import with_one_thread
-from synthesis.certify.lower_bounds.rates import Rate, limits
+from synthesis.certify.statement.demand import Rate, limits
 from synthesis.certify.statement.impose import Grid
 from synthesis.certify.statement.outcome import Attempt
 from synthesis.design.loops.controller import Controller

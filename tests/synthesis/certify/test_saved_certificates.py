@@ -18,7 +18,7 @@ from test_forged_certificates import FORMS, genuine, same
 from symheli.errors import CertificateError, InputError, SymheliError
 from symheli.lpv import LPVStateSpace, PiecewiseLinear, Scheduling, UserFunctions
 from synthesis import Certificate, Grid, Spline, Status, l2_gain, stability
-from synthesis.certify.lower_bounds.trajectory import SchedulingTrajectory
+from synthesis.certify.statement.trajectory import SchedulingTrajectory
 
 QUICK = settings(
     max_examples=30, derandomize=True, deadline=None, suppress_health_check=list(HealthCheck)

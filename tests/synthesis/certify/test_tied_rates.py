@@ -10,8 +10,8 @@ import pytest
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv import LPVStateSpace, Scheduling, simulate
 from synthesis import Bernstein, Search, Spline, Status, generalized_h2, l2_gain, stability
+from synthesis.certify.lower_bounds.paths import Wave
 from synthesis.certify.lower_bounds.tied import Smooth
-from synthesis.certify.lower_bounds.waves import Wave
 from synthesis.certify.questions.certificate import Certificate
 from synthesis.numerics.polynomial.motion import Motion
 

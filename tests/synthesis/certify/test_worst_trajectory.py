@@ -8,8 +8,17 @@ import numpy as np
 import pytest
 from models import fastest_growth, lateral, random_stable, spring
 
-from synthesis.certify.lower_bounds.ascent import GAIN, GROWTH, _gradient, ascend, on_nodes
-from synthesis.certify.lower_bounds.corners import Corners, climb, gradient
+from synthesis.certify.lower_bounds.ascent import (
+    GAIN,
+    GROWTH,
+    Corners,
+    _gradient,
+    ascend,
+    climb,
+    gradient,
+    on_nodes,
+)
+from synthesis.certify.lower_bounds.paths import Wave, steps
 from synthesis.certify.lower_bounds.periodic import (
     Lifted,
     gain,
@@ -17,8 +26,7 @@ from synthesis.certify.lower_bounds.periodic import (
     ratio_from_rest,
     worst_input,
 )
-from synthesis.certify.lower_bounds.trajectory import SchedulingTrajectory
-from synthesis.certify.lower_bounds.waves import Wave, steps
+from synthesis.certify.statement.trajectory import SchedulingTrajectory
 
 
 def bumpy(lpv, period=4.0, nodes=24):
