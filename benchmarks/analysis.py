@@ -31,9 +31,11 @@ from benchmarks.memory import alone, peak  # noqa: E402
 from benchmarks.opponents import gridded_lmi  # noqa: E402
 from benchmarks.timing import arguments, keep  # noqa: E402
 from studies.loops.lateral import HOLD, OUTPUTS, STATES, lateral_loop  # noqa: E402
+from symheli import LFT, LPVStateSpace, Scheduling  # noqa: E402
 from symheli.flight import XCELL_SERVOS  # noqa: E402
-from symheli.lpv import LFT, LPVStateSpace, Scheduling, pade_delay  # noqa: E402
-from synthesis import Certificate, Spline, l2_gain, lft_gain  # noqa: E402
+from symheli.lpv.tools import pade_delay  # noqa: E402
+from synthesis import Certificate, l2_gain, lft_gain  # noqa: E402
+from synthesis.forms import Spline  # noqa: E402
 
 RATE = 1.0
 """Acceleration, m/s^2."""

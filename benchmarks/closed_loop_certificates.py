@@ -30,7 +30,8 @@ from benchmarks.closed_loops import LOOPS, RATE, closed_loop, sampled_loop  # no
 from benchmarks.memory import alone, with_children  # noqa: E402
 from benchmarks.race import Ratio, present, readable, table  # noqa: E402
 from benchmarks.timing import arguments  # noqa: E402
-from synthesis import Certificate, Spline, l2_gain  # noqa: E402
+from synthesis import Certificate, l2_gain  # noqa: E402
+from synthesis.forms import Spline  # noqa: E402
 
 PROOF = Spline(segments=4, degree=2)
 """Nine matrices."""

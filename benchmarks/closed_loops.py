@@ -13,7 +13,7 @@ import numpy as np
 import symheli
 from symheli import LinearFamily, LinearModel, LPVStateSpace, Scheduling
 from symheli.flight import XCELL_SERVOS, gain_scheduled_lqr
-from symheli.lpv import pade_delay
+from symheli.lpv.tools import pade_delay
 from symheli.values import Signal
 
 LOW, HIGH, POINTS = 0.0, 13.0, 27

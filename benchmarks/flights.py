@@ -33,7 +33,7 @@ SCHEDULE = symheli.AirspeedSchedule.transition(0.0, 13.0, acceleration=3.0, hold
 EXCITATION = symheli.Excitation({"d_lon": 0.006, "d_lat": 0.006, "d_col": 0.005, "d_ped": 0.01})
 NOISE = np.array([0.05, 0.05, 0.05, 0.01, 0.01, 0.01, 0.003, 0.003])
 MEASURED = ("u", "v", "w", "p", "q", "r", "phi", "theta")
-STORM = symheli.Wind((-2.0, 1.0, 0.0), turbulence=symheli.Dryden(7.7, 20.0))
+STORM = symheli.Wind((-2.0, 1.0, 0.0), turbulence=symheli.environment.Dryden(7.7, 20.0))
 
 
 def main() -> None:
@@ -41,7 +41,7 @@ def main() -> None:
     count = QUICK_FLIGHTS if options.quick else FLIGHTS
     notes = [f"{count} flights in place of {FLIGHTS:,}"] if options.quick else []
     heli = symheli.Helicopter.load("xcell60", governor="ideal")
-    pilot = symheli.gain_scheduled_lqr(heli, 0.0, 13.0, DT)
+    pilot = symheli.flight.gain_scheduled_lqr(heli, 0.0, 13.0, DT)
     sensors = {n: symheli.Sensor(noise=float(s)) for n, s in zip(MEASURED, NOISE, strict=True)}
     kit = {"controller": pilot, "excitation": EXCITATION, "sensors": sensors}
     rough = {**kit, "wind": STORM, "servos": XCELL_SERVOS, "delay": 0.02}
@@ -56,26 +56,26 @@ def main() -> None:
 
     def campaign() -> None:
         with tempfile.TemporaryDirectory() as folder:
-            symheli.fly_campaign(
+            symheli.flight.fly_campaign(
                 heli, SCHEDULE, Path(folder) / "flights.zarr", seeds=range(count), **kit
             )
 
     batch, one, by_hand, known, final = (
-        f"symheli.fly_batch, {count:,} flights",
+        f"symheli.flight.fly_batch, {count:,} flights",
         "symheli.fly, one flight",
         "one flight in Python around a compiled step",
-        f"symheli.simulate_batch, inputs known, {count:,} flights, every sample kept",
-        f"symheli.simulate_batch, inputs known, {count:,} flights, last states",
+        f"symheli.integrate.simulate_batch, inputs known, {count:,} flights, every sample kept",
+        f"symheli.integrate.simulate_batch, inputs known, {count:,} flights, last states",
     )
     stormy, kept = (
-        f"symheli.fly_batch, turbulence, servos and delay, {count:,} flights",
-        f"symheli.fly_campaign to disk, {count:,} flights",
+        f"symheli.flight.fly_batch, turbulence, servos and delay, {count:,} flights",
+        f"symheli.flight.fly_campaign to disk, {count:,} flights",
     )
     candidates = {
-        batch: lambda: symheli.fly_batch(heli, SCHEDULE, seeds=range(count), **kit),
-        known: lambda: symheli.simulate_batch(heli, x0, replayed, dt=DT, keep=1),
-        final: lambda: symheli.simulate_batch(heli, x0, replayed, dt=DT),
-        stormy: lambda: symheli.fly_batch(heli, SCHEDULE, seeds=range(count), **rough),
+        batch: lambda: symheli.flight.fly_batch(heli, SCHEDULE, seeds=range(count), **kit),
+        known: lambda: symheli.integrate.simulate_batch(heli, x0, replayed, dt=DT, keep=1),
+        final: lambda: symheli.integrate.simulate_batch(heli, x0, replayed, dt=DT),
+        stormy: lambda: symheli.flight.fly_batch(heli, SCHEDULE, seeds=range(count), **rough),
         kept: campaign,
         one: lambda: [symheli.fly(heli, plan) for plan in plans],
         by_hand: lambda: [python.fly(SCHEDULE, EXCITATION, NOISE, seed) for seed in range(ALONE)],

@@ -35,16 +35,11 @@ from benchmarks.opponents.covariance_rls import (  # noqa: E402
 )
 from benchmarks.timing import arguments, keep, lines, medians  # noqa: E402
 from benchmarks.unfused import unfused_peak  # noqa: E402
-from identification import (  # noqa: E402
-    LPVARX,
-    Directional,
-    KinematicARX,
-    Polynomial,
-    Product,
-    RecursiveLeastSquares,
-)
+from identification import LPVARX, KinematicARX, Polynomial, RecursiveLeastSquares  # noqa: E402
+from identification.forgetting import Directional  # noqa: E402
 from identification.recursive import kernel  # noqa: E402
 from identification.recursive.online import Online  # noqa: E402
+from symheli.lpv import Product  # noqa: E402
 
 BASIS = Polynomial(2, 0.0, 13.0)
 CASES = {

@@ -19,7 +19,8 @@ one_thread()
 import numpy as np  # noqa: E402
 
 from benchmarks.timing import arguments  # noqa: E402
-from identification import LPVARX, Directional, Polynomial, RecursiveLeastSquares  # noqa: E402
+from identification import LPVARX, Polynomial, RecursiveLeastSquares  # noqa: E402
+from identification.forgetting import Directional  # noqa: E402
 
 CHUNK = 100_000
 WAYS = {"no forgetting": 1.0, "factor 0.999": 0.999, "directional 0.99": Directional(0.99)}

@@ -10,9 +10,10 @@ import mpmath
 import numpy as np
 from scipy import linalg
 
+from symheli import LinearModel, LPVStateSpace, Scheduling
 from symheli.errors import SymheliError
-from symheli.lpv import LinearModel, LPVStateSpace, Matrices, Scheduling
-from synthesis import mixed_sensitivity
+from symheli.lpv.tools import Matrices
+from synthesis.designs import mixed_sensitivity
 from synthesis.numerics.linear.norm import norm
 
 Array = np.ndarray

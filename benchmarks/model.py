@@ -228,14 +228,19 @@ def fly_many(race: Race, who: Contestants) -> None:
     winds = rng.standard_normal((count, 3))
 
     def batch() -> np.ndarray:
-        return symheli.simulate_batch(who.heli, starts, inputs, winds[:, None], dt=DT).final
+        return symheli.integrate.simulate_batch(
+            who.heli, starts, inputs, winds[:, None], dt=DT
+        ).final
 
     def loop(fly: Fly) -> Callable[[], np.ndarray]:
         return lambda: np.stack(
             [fly(x, inputs, wind)[-1] for x, wind in zip(starts, winds, strict=True)]
         )
 
-    candidates = {"symheli.simulate_batch": batch, "a loop of symheli.simulate": loop(who.symheli)}
+    candidates = {
+        "symheli.integrate.simulate_batch": batch,
+        "a loop of symheli.simulate": loop(who.symheli),
+    }
     candidates |= {f"a loop of {name}": loop(fly) for name, fly in who.compiled.items()}
     if parallel := who.numba_batch:
         candidates["Numba, prange over the flights"] = lambda: parallel(
@@ -243,9 +248,12 @@ def fly_many(race: Race, who: Contestants) -> None:
         )
     ends = {name: call() for name, call in candidates.items()}
     # chaos does not build up in 10 s: what differs is rounding
-    apart = {name: np.abs(end - ends["symheli.simulate_batch"]).max() for name, end in ends.items()}
+    apart = {
+        name: np.abs(end - ends["symheli.integrate.simulate_batch"]).max()
+        for name, end in ends.items()
+    }
     times = medians(candidates, 1.0 if race.quick else 0.0, warm=False)
-    base = times["symheli.simulate_batch"]
+    base = times["symheli.integrate.simulate_batch"]
     race.batch = Flown(
         f"{count:,} flights", STEPS * len(inputs) * count, base, len(os.sched_getaffinity(0))
     )
@@ -257,7 +265,7 @@ def fly_many(race: Race, who: Contestants) -> None:
         )
     )
     for name, t in times.items():
-        if name != "symheli.simulate_batch":
+        if name != "symheli.integrate.simulate_batch":
             goal = 3.0 if name.startswith("a loop of") else None
             race.ratios.append(Ratio(f"flights of 10 s: batch against {name}", t / base, goal))
 
@@ -285,10 +293,10 @@ def sweep(race: Race, who: Contestants) -> None:
     speeds = np.linspace(0.0, 13.0, 200)
     grid, pushes = np.linspace(0.0, 13.0, 27), [-4.0, -2.0, 0.0, 2.0, 4.0]
     ours, theirs = "symheli.sweep (exact derivatives, kinks found)", "python-control"
-    both = "symheli.sweep_grid, 27 airspeeds by 5 accelerations"
+    both = "symheli.steady.sweep_grid, 27 airspeeds by 5 accelerations"
     candidates = {
         ours: lambda: symheli.sweep(who.heli, speeds),
-        both: lambda: symheli.sweep_grid(who.heli, grid, acceleration=pushes),
+        both: lambda: symheli.steady.sweep_grid(who.heli, grid, acceleration=pushes),
         theirs: lambda: python_control_sweep.sweep(speeds),
     }
     times = medians(candidates, 0.0 if race.quick else 5.0, time.thread_time)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symheli.lpv import LPVStateSpace, Scheduling
+from symheli import LPVStateSpace, Scheduling
 from synthesis import Plant
 from synthesis.design.lti.hinf import optimum_above
 from synthesis.design.plant.generalized import Generalized

@@ -20,11 +20,13 @@ from typing import NamedTuple
 import mpmath
 import numpy as np
 
-from symheli.lpv import LPVStateSpace, Scheduling
+from symheli import LPVStateSpace, Scheduling
 from symheli.lpv.exponential import expm
-from synthesis import Solver, Spline, SumOfSquares, l2_gain, lft_gain, stability
+from synthesis import Solver, l2_gain, lft_gain, stability
 from synthesis.certify.questions.certify import route as searching
 from synthesis.certify.questions.problem import pose
+from synthesis.forms import Spline
+from synthesis.impose import SumOfSquares
 
 ROUTES = (
     "stability by splines",

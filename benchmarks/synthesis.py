@@ -36,7 +36,8 @@ from benchmarks.memory import alone, with_children  # noqa: E402
 from benchmarks.race import Ratio, present, readable, table  # noqa: E402
 from benchmarks.timing import arguments, medians  # noqa: E402
 from symheli.errors import SymheliError  # noqa: E402
-from synthesis import Spline, certify_sampled, hinf, output_feedback  # noqa: E402
+from synthesis import certify_sampled, hinf, output_feedback  # noqa: E402
+from synthesis.forms import Spline  # noqa: E402
 
 BACK_OFF = 1.3
 LARGE = 18
@@ -148,7 +149,7 @@ def gridded(states: int) -> Made:
 
 def points(states: int, seconds: float) -> list[tuple[str, float, float, float]]:
     """At three airspeeds: own and SLICOT's gamma and median seconds."""
-    from symheli.lpv import LinearModel
+    from symheli import LinearModel
 
     axes = DESIGNS[states][0]
     plant = design_plant(states)

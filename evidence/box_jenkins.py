@@ -15,7 +15,8 @@ import identification as idn
 from evidence.seeds import over_seeds, parser_of, seeds_of
 from evidence.tables import DOCS, keep, markdown, parsed
 from studies.output import as_json
-from symheli import ConvergenceWarning, FlightRecord
+from symheli import FlightRecord
+from symheli.errors import ConvergenceWarning
 from symheli.values.arrays import Array
 
 SAMPLES, NOISE_DB = 2000, 10.0
@@ -39,12 +40,12 @@ STRUCTURE = idn.LPVARX(
     scheduling_at="now",
 )
 
-METHODS: Mapping[str, idn.Method] = {
-    "least squares": idn.LeastSquares(),
-    "ARMAX, second order": idn.ARMAX(ma=2),
-    "output error": idn.OutputError(),
-    "refined instruments, noise of order 2": idn.RefinedInstruments(noise_order=2),
-    "Box-Jenkins, noise of order 2": idn.BoxJenkins(ar=2),
+METHODS: Mapping[str, idn.methods.Method] = {
+    "least squares": idn.methods.LeastSquares(),
+    "ARMAX, second order": idn.methods.ARMAX(ma=2),
+    "output error": idn.methods.OutputError(),
+    "refined instruments, noise of order 2": idn.methods.RefinedInstruments(noise_order=2),
+    "Box-Jenkins, noise of order 2": idn.methods.BoxJenkins(ar=2),
 }
 
 

@@ -13,7 +13,8 @@ import symheli
 from studies.loops.exact_lateral import DEGREE, INPUTS, STATES, ExactLateral
 from symheli import Helicopter, LinearFamily, LinearModel, LPVStateSpace, Scheduling
 from symheli.flight import XCELL_SERVOS
-from symheli.lpv import Matrices, Patches
+from symheli.lpv.bases import Patches
+from symheli.lpv.tools import Matrices
 from symheli.values.signal import Signal, signals
 from synthesis import Controller, Plant, output_feedback
 

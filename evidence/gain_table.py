@@ -19,11 +19,15 @@ from studies.controllers.designs import lqr_schedule
 from studies.controllers.flown import transition
 from studies.controllers.measures import Measures, measured
 from studies.controllers.plant import baseline, closed, flown_plant
-from symheli import Dryden, FlightPlan, Helicopter, LPVStateSpace, ScheduledController, Wind
+from symheli import FlightPlan, Helicopter, LPVStateSpace, Wind
+from symheli.environment import Dryden
 from symheli.errors import ValidityWarning
-from symheli.flight import XCELL_SERVOS
+from symheli.flight import XCELL_SERVOS, ScheduledController
 from symheli.lpv.bases import Polynomial
-from synthesis import L2, Certificate, Plant, Structure, StructuredController
+from synthesis import Certificate, Plant
+from synthesis.objectives import L2
+from synthesis.structures import TunableController
+from synthesis.structures.design import StructuredController
 
 PATHS = {
     ("d_lon", "u"): "PI",
@@ -61,9 +65,9 @@ def plant(heli: Helicopter) -> Plant:
     return flown_plant(baseline(heli))
 
 
-def structure(of: Plant) -> Structure:
+def structure(of: Plant) -> TunableController:
     """The paths with gains of the second degree in airspeed."""
-    return Structure.pid(of, PATHS, basis=Polynomial(DEGREE, 0.0, TOP))
+    return TunableController.pid(of, PATHS, basis=Polynomial(DEGREE, 0.0, TOP))
 
 
 def specifications(of: Plant) -> list[L2]:
@@ -73,7 +77,7 @@ def specifications(of: Plant) -> list[L2]:
     return [L2(performance=z, bound=b) for z, b in zip((first, rest), BOUNDS, strict=True)]
 
 
-def first_gains(lqr: LPVStateSpace, of: Structure) -> dict[str, np.ndarray]:
+def first_gains(lqr: LPVStateSpace, of: TunableController) -> dict[str, np.ndarray]:
     """Those of the scheduled LQR, an integral as `LEAD` times the proportional gain."""
     assert of.basis is not None
     V = np.linspace(0.0, TOP, 14)
@@ -129,7 +133,7 @@ def flight(heli: Helicopter, model: LPVStateSpace) -> Measures:
     )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ValidityWarning)
-        return measured(symheli.fly_batch(heli, [plan]).data)[0]
+        return measured(symheli.flight.fly_batch(heli, [plan]).data)[0]
 
 
 def row(name: str, heli: Helicopter, of: Plant, model: LPVStateSpace) -> list[str]:

@@ -58,18 +58,21 @@ class House:
             for path in sorted((self.root / package).rglob("*.py"))
         }
         object.__setattr__(self, "files", files)
-        homes = {m: _exports(path) for m, path in files.items() if path.name == "__init__.py"}
+        homes = {
+            m: _exports(path)
+            for m, path in files.items()
+            if path.name == "__init__.py" or path.with_suffix(".pyi").exists()
+        }
         object.__setattr__(self, "homes", homes)
 
     def home(self, module: str, name: str) -> tuple[str, str | None]:
         """Return where a name of a module is defined; (module, None) where it is a module."""
         for _ in range(9):
-            if f"{module}.{name}" in self.files:
-                return f"{module}.{name}", None
-            if name not in self.homes.get(module, {}):
+            here = self.homes.get(module, {}).get(name)
+            if here is None or here == (module, name):
                 break
-            module, name = self.homes[module][name]
-        return module, name
+            module, name = here
+        return (f"{module}.{name}", None) if f"{module}.{name}" in self.files else (module, name)
 
     def imports(self, module: str) -> tuple[Import, ...]:
         """Return what a file imports of the packages, wherever in it, names at their homes."""
@@ -208,11 +211,14 @@ def upward(found: Iterable[tuple[Room, Room]]) -> Iterator[tuple[Room, Room]]:
 
 
 def roomless(house: House) -> list[str]:
-    """Return the files that lie in no room of the table; `__init__` of a package is in none."""
+    """Return the files that lie in no room of the table, nor are faces; `__init__` is in none."""
+    faces = tomllib.loads((HERE / "house.toml").read_text(encoding="utf-8"))["faces"]
     return [
         str(path.relative_to(house.root))
         for module, path in house.files.items()
-        if path.name not in ("__init__.py", "__main__.py") and room_of(module) is None
+        if path.name not in ("__init__.py", "__main__.py")
+        and room_of(module) is None
+        and module not in faces
     ]
 
 

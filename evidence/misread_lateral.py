@@ -12,8 +12,10 @@ import numpy as np
 import symheli
 from evidence.designed_lateral import ACCELERATION, DT, designed, sampled_plant
 from symheli import LPVStateSpace, TableController
-from synthesis import Plant, Spline, l2_gain, proven_around, stability, with_wrong_parameter
+from synthesis import Plant, l2_gain, stability
+from synthesis.analysis import proven_around, with_scheduling_error
 from synthesis.design.loops.frozen_reading import largest
+from synthesis.forms import Spline
 
 KNOTS = 3
 """Of the table: as few as cost the frozen gain nothing."""
@@ -59,7 +61,7 @@ def main() -> None:
     table = TableController.of(controller.discretize(DT).model, KNOTS)
 
     def proves(error: float) -> bool:
-        wrong = with_wrong_parameter(plant, table, error)
+        wrong = with_scheduling_error(plant, table, error)
         return stability(wrong, form=PROOF, search=None).verified
 
     found = largest(proves, MOST, 0.1)
@@ -74,7 +76,7 @@ def main() -> None:
         print(f"reading frozen at {at:g} m/s: proven stable from {low:.3g} to {high:.3g} m/s")
     both = max(errors().values())
     for error in (0.0, both):
-        gain = l2_gain(with_wrong_parameter(plant, table, error), form=PROOF, search=None)
+        gain = l2_gain(with_scheduling_error(plant, table, error), form=PROOF, search=None)
         print(f"gain with errors within {error:g} m/s: {gain.gamma:.4g} (frozen {gain.frozen:.4g})")
 
 

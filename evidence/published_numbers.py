@@ -236,7 +236,9 @@ def tail_derivatives(heli: Helicopter) -> tuple[PublishedNumber, ...]:
     return tuple(sorted(rows, key=lambda row: row.quantity.split(" at ")[0], reverse=True))
 
 
-def _side_slope(heli: Helicopter, point: symheli.TrimPoint, what: str, step: float = 1e-4) -> float:
+def _side_slope(
+    heli: Helicopter, point: symheli.steady.TrimPoint, what: str, step: float = 1e-4
+) -> float:
     """Change of the tail rotor's side acceleration Y_tr/m with v (m/s) or d_ped (rad), by central
     differences.
     """

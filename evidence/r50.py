@@ -7,7 +7,8 @@ import argparse
 import numpy as np
 
 from evidence.tables import DOCS, four_digits, keep, markdown
-from symheli import Helicopter, LinearModel, identified_model, linearize, trim
+from symheli import Helicopter, LinearModel, linearize, trim
+from symheli.airframe import identified_model
 
 ENTRIES = (
     ("L_b", "1/s^2", ("p", "b", "b1"), "made to, by the hub stiffness"),

@@ -14,7 +14,7 @@ import numpy as np
 import symheli
 from evidence.tables import DOCS, keep, markdown, parsed
 from symheli import Helicopter
-from synthesis import Governor, InvariantSet, governor, invariant_set
+from synthesis.sets import InvariantSet, ReferenceGovernor, invariant_set, reference_governor
 
 Array = np.ndarray
 
@@ -68,7 +68,7 @@ def flown(
     """Nonlinear flights (N,) from steady flight at one commanded airspeed to another, in gusts
     that change at random.
     """
-    by, trim, count = governor(found), found.statement.model.trim, len(start)
+    by, trim, count = reference_governor(found), found.statement.model.trim, len(start)
     assert trim is not None
     rate = _closed(heli).map(count)
     rng = np.random.default_rng(1)
@@ -117,7 +117,7 @@ def gains(found: InvariantSet, v: Array) -> Array:
     return np.swapaxes(np.linalg.solve(at.A, np.swapaxes(at.C, -1, -2)), -1, -2)
 
 
-def commands(by: Governor, count: int) -> tuple[Array, Array]:
+def commands(by: ReferenceGovernor, count: int) -> tuple[Array, Array]:
     """Steps of the commanded airspeed (N,) from and to, each of which leaves the set at once."""
     rng = np.random.default_rng(0)
     start, wanted = rng.uniform(*AIRSPEEDS, (2, 40 * count))
@@ -127,7 +127,7 @@ def commands(by: Governor, count: int) -> tuple[Array, Array]:
 
 def row(name: str, found: InvariantSet, flights: int) -> list[str]:
     """The row of one helicopter."""
-    heli, by = Helicopter.load(name, governor="ideal"), governor(found)
+    heli, by = Helicopter.load(name, governor="ideal"), reference_governor(found)
     steps = commands(by, flights)
     with_it, without = (flown(heli, found, *steps, governed=g) for g in (True, False))
     return [

@@ -20,8 +20,9 @@ from scipy.spatial.transform import Rotation
 import symheli
 from evidence.tuning import THROW, TRUTH, parameters
 from evidence.written_logs import FMT, FMTU, MULT, PARM, UNIT, UNITS, Format, dataflash, ulog
-from symheli import AirspeedSchedule, Dryden, Excitation, FlightRecord, Helicopter, Sensor, Wind
+from symheli import AirspeedSchedule, Excitation, FlightRecord, Helicopter, Sensor, Wind
 from symheli.airframe.written import as_toml
+from symheli.environment import Dryden
 from symheli.flight import HelicopterLoops
 from symheli.values.whole_files import write_bytes, write_text
 

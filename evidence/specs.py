@@ -12,7 +12,7 @@ from pathlib import Path
 from evidence.tables import DOCS, keep, markdown
 from studies.controllers.designs import NAMES
 from studies.specs.of_vehicle import OfVehicle
-from synthesis import SpecificationTable
+from synthesis.sheet.evaluation import SpecificationTable
 
 PAGE, SECTION = DOCS / "controllers.md", "specification sheet"
 POINTS = 14

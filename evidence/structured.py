@@ -21,7 +21,9 @@ from evidence.tables import DOCS, keep, markdown
 from symheli import LinearModel, LPVStateSpace
 from symheli.values.arrays import Array
 from symheli.values.signal import signals
-from synthesis import Plant, Structure, StructuredController
+from synthesis import Plant
+from synthesis.structures import TunableController
+from synthesis.structures.design import StructuredController
 
 COMPLEIB = "xi1ngang/Hinf-structured-output-Feedback", "76873b794055d828a2b042ff8efed98c4aa1f752"
 FILES = {
@@ -131,7 +133,7 @@ def _plant(
 def tuned(name: str, folder: Path | None = None, starts: int = STARTS) -> StructuredController:
     """Static output feedback of a model from so many starts."""
     given = plant(name, folder)
-    return synthesis.structured(given, Structure.pid(given), starts=starts)
+    return synthesis.structured(given, TunableController.pid(given), starts=starts)
 
 
 def row(name: str, made: StructuredController) -> list[str]:

@@ -10,7 +10,7 @@ import casadi
 import numpy as np
 from scipy.linalg import expm
 
-from synthesis import Tube
+from synthesis.tubes import Tube
 from synthesis.tubes.reference import Reference
 
 Array = np.ndarray

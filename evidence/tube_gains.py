@@ -13,7 +13,7 @@ import synthesis
 from evidence.tables import markdown
 from symheli import Helicopter
 from symheli.errors import InputError
-from synthesis import Tube
+from synthesis.tubes import Tube
 
 Array = np.ndarray
 
@@ -96,7 +96,7 @@ def certified(heli: Helicopter, airspeed: float, K: Array, output: str) -> tuple
     }
     model = family.interpolate("polynomial", DEGREE).feedback(gains)
     loop = model.select(inputs=GUSTS, outputs=(output,))
-    found = [ask(loop, rate=RATE) for ask in (synthesis.l2_gain, synthesis.generalized_h2)]
+    found = [ask(loop, rate=RATE) for ask in (synthesis.l2_gain, synthesis.analysis.energy_to_peak)]
     return float(found[0].gamma), float(found[1].gamma)
 
 
@@ -105,7 +105,7 @@ def table() -> str:
     rows = []
     for name, airspeed, output in CASES:
         heli = Helicopter.load(name, governor="ideal")
-        found = synthesis.tube(heli, airspeed, gust=GUST)
+        found = synthesis.tubes.tube(heli, airspeed, gust=GUST)
         found = found.with_gain([output]).with_gain([output], energy=False)
         own = [gain.gamma for gain in found.gains]
         lpv = certified(heli, airspeed, found.deviations.reference.gain[0], output)

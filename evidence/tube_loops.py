@@ -16,7 +16,7 @@ from evidence.tube_flights import WIDTHS, cells_of
 from symheli import Helicopter
 from symheli.dynamics import Governor
 from symheli.flight import XCELL_SERVOS
-from synthesis import Tube, tube
+from synthesis.tubes import Tube, tube
 
 Array = np.ndarray
 

@@ -15,7 +15,7 @@ from evidence.tables import DOCS, chosen, keep, kept_rows, markdown, renewed
 from evidence.tube_flights import WIDTHS, cells_of, widths, worst
 from evidence.tube_terms import HELD_AGAINST, INTERVALS, held_against, remainders
 from symheli import Helicopter
-from synthesis import Tube, tube
+from synthesis.tubes import Tube, tube
 
 VEHICLES = ("xcell60", "xcell_kahn_hudson", "yamaha_r50")
 AIRSPEEDS = (0.0, 3.0, 6.0, 8.0, 10.0, 13.0)

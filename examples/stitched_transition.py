@@ -5,7 +5,7 @@ linearizations; about 10 s.
 import numpy as np
 
 import symheli
-from identification import BaselinePredictor
+from identification.judge import BaselinePredictor
 
 OUTPUTS = {
     "u": "m/s",
@@ -35,7 +35,9 @@ lft = BaselinePredictor(
     family.interpolate("polynomial", degree=3), flight, scheduling="airspeed_command"
 )
 stitched = {
-    f"stitched, {s:g} s": symheli.StitchedModel.from_family(family, filter=s, inertia=inertia)
+    f"stitched, {s:g} s": symheli.flight.StitchedModel.from_family(
+        family, filter=s, inertia=inertia
+    )
     for s in (0.0, 0.5, 5.0)
 }
 x, u, truth = flight.columns(heli.states), flight.columns(heli.inputs), flight.columns(OUTPUTS)

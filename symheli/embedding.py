@@ -17,11 +17,12 @@ import casadi
 import numpy as np
 from scipy.linalg import qr
 
+from symheli import LPVStateSpace, Scheduling
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv import LPVStateSpace, Matrices, Scheduling
 from symheli.lpv.bases.polynomials import polynomials
 from symheli.lpv.bases.product import Product
 from symheli.lpv.entries import entries
+from symheli.lpv.tools import Matrices
 from symheli.values.arrays import Array, frozen
 from symheli.values.named_vector import NamedVector
 from symheli.values.signal import Signal, signals
@@ -165,7 +166,8 @@ def embed(
     >>> a, w, torque = casadi.SX.sym("a"), casadi.SX.sym("w"), casadi.SX.sym("torque")
     >>> f = casadi.Function("f", [casadi.vertcat(a, w), torque],
     ...                     [casadi.vertcat(w, -9.81 * casadi.sin(a) - 0.1 * w + torque)])
-    >>> found = symheli.embed(f, {"a": (-3.0, 3.0), "w": (-5.0, 5.0)}, {"torque": (-1.0, 1.0)})
+    >>> found = symheli.embedding.embed(
+    ...     f, {"a": (-3.0, 3.0), "w": (-5.0, 5.0)}, {"torque": (-1.0, 1.0)})
     >>> [s.name for s in found.model.parameters], bool(found.error < 1e-12)
     (['A[w, a]'], True)
     >>> round(float(found.parameters([0.5, 0.0], [0.0])[0]), 4)  # -9.81 sin(0.5)/0.5

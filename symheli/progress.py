@@ -89,8 +89,8 @@ def watched(listener: Listener | None) -> Iterator[None]:
 
     Examples
     --------
-    >>> with symheli.watched(lambda progress: print(progress) if progress.over else None):
-    ...     trims = symheli.trim_batch(heli, airspeed=[2.0, 5.0, 8.0])
+    >>> with symheli.progress.watched(lambda progress: print(progress) if progress.over else None):
+    ...     trims = symheli.steady.trim_batch(heli, airspeed=[2.0, 5.0, 8.0])
     trimming: 3 of 3
     """
     if listener is not None and not callable(listener):

@@ -7,7 +7,7 @@ The examples of the designs start from a lag that grows unstable with p, disturb
 with noise:
 
 >>> import synthesis
->>> from symheli.lpv import LPVStateSpace, Scheduling
+>>> from symheli import LPVStateSpace, Scheduling
 >>> lag = LPVStateSpace.polynomial(
 ...     A=[[[-1.0]], [[2.0]]],
 ...     B=[[[1.0, 0.0, 1.0]]],

@@ -6,8 +6,8 @@ import pytest
 import identification
 import symheli
 import synthesis
+from symheli import LPVStateSpace, Scheduling
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv import LPVStateSpace, Scheduling
 
 CLIMB = symheli.AirspeedSchedule.transition(4.0, 6.0, acceleration=2.0, hold=1.0)
 T = 0.02 * np.arange(5)

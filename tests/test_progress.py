@@ -6,7 +6,7 @@ import pytest
 import identification as idn
 import symheli
 import synthesis
-from symheli.lpv import LPVStateSpace, Scheduling
+from symheli import LPVStateSpace, Scheduling
 from symheli.progress import task, tracked
 
 
@@ -23,7 +23,7 @@ class Heard(list):
 @pytest.fixture
 def heard():
     said = Heard()
-    with symheli.watched(said.append):
+    with symheli.progress.watched(said.append):
         yield said
 
 
@@ -84,7 +84,7 @@ def test_a_task_ends_when_it_fails_or_is_left(heard):
 
 def test_nobody_is_told_after_the_block_nor_within_one_for_nobody():
     said = []
-    with symheli.watched(said.append), symheli.watched(None):
+    with symheli.progress.watched(said.append), symheli.progress.watched(None):
         list(tracked("quiet", range(3)))
     list(tracked("late", range(3)))
     assert not said
@@ -95,7 +95,7 @@ def test_an_exception_of_the_listener_ends_the_work():
         if progress.done == 2:
             raise KeyboardInterrupt
 
-    with symheli.watched(enough), pytest.raises(KeyboardInterrupt):
+    with symheli.progress.watched(enough), pytest.raises(KeyboardInterrupt):
         list(tracked("work", range(5)))
 
 
@@ -107,8 +107,8 @@ def test_sweeps_and_trim_maps_count_their_points(heard, ideal):
 
 def test_flights_are_counted(heard, ideal, tmp_path):
     climb = symheli.AirspeedSchedule.transition(4.0, 6.0, acceleration=2.0, hold=0.5)
-    symheli.fly_batch(ideal, climb, seeds=range(3))
-    symheli.fly_campaign(ideal, climb, tmp_path / "flights", seeds=range(2), signals=["q"])
+    symheli.flight.fly_batch(ideal, climb, seeds=range(3))
+    symheli.flight.fly_campaign(ideal, climb, tmp_path / "flights", seeds=range(2), signals=["q"])
     assert well_formed(heard)
     assert [p.done for p in heard.of("flying") if p.over] == [3, 2]
 

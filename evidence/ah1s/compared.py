@@ -17,22 +17,16 @@ from evidence.ah1s.trim import GUESS, trim
 from evidence.ah1s.truth import SLOWEST, realization
 from evidence.seeds import over_seeds, parser_of, seeds_of
 from evidence.tables import DOCS, keep, markdown, parsed
-from identification import (
-    Actuators,
-    BSpline,
-    FilterError,
-    InstrumentalVariables,
-    KinematicARX,
-    KinematicModel,
-    Polynomial,
-    compare_frozen,
-    fit,
-)
+from identification import Actuators, KinematicARX, Polynomial, compare_frozen, fit
 from identification.judge.frozen_models import continuous_poles
+from identification.methods import FilterError, InstrumentalVariables
+from identification.model import KinematicModel
 from studies.output import as_json
 from studies.setup.axes import SCALES
+from symheli import LinearModel
 from symheli.flight import AirspeedSchedule, Excitation, Servo
-from symheli.lpv import FunctionSpace, LinearModel
+from symheli.lpv import BSpline
+from symheli.lpv.bases import FunctionSpace
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from evidence.ah1s.simulator import AH1S, DT, STATES, STICKS
 from evidence.ah1s.trim import Trim
+from symheli import LinearModel
 from symheli.errors import AccuracyError
-from symheli.lpv import LinearModel
 from symheli.values import NamedVector, Signal
 from symheli.values.arrays import Array
 from symheli.values.operating_point import OperatingPoint

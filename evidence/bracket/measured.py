@@ -27,13 +27,16 @@ from studies.output import as_json, columns, progress
 from symheli import Helicopter, LPVStateSpace, UncertainStateSpace
 from symheli.lpv.bases import Polynomial
 from symheli.values.arrays import Array
-from synthesis import GainCurve, HigherOrder, Memory, Search, Solver, Spline
+from synthesis import Solver
+from synthesis.analysis import LowerBoundSearch
+from synthesis.certify.questions.gain_curve import GainCurve
 from synthesis.certify.statement.forms import LyapunovForm
+from synthesis.forms import HigherOrder, LaggedParameter, Spline
 
-SLOW = Memory(1.2, segments=12, grading=1.5, across_segments=4, across_degree=2)
-FAST = Memory(0.6, segments=12, grading=1.5, across_segments=4, across_degree=3)
-FASTEST = Memory(0.5, segments=12, grading=1.5, across_segments=6, across_degree=3)
-FURTHEST = Memory(0.45, segments=12, grading=1.5, across_segments=8, across_degree=3)
+SLOW = LaggedParameter(1.2, segments=12, grading=1.5, across_segments=4, across_degree=2)
+FAST = LaggedParameter(0.6, segments=12, grading=1.5, across_segments=4, across_degree=3)
+FASTEST = LaggedParameter(0.5, segments=12, grading=1.5, across_segments=6, across_degree=3)
+FURTHEST = LaggedParameter(0.45, segments=12, grading=1.5, across_segments=8, across_degree=3)
 """The faster the airspeed turns round, the shorter the lag that tells most, and the finer P has to
 be across.
 """
@@ -99,7 +102,7 @@ def bracket(
     loop: LPVStateSpace,
     rate: float,
     form: LyapunovForm,
-    search: Search | None = None,
+    search: LowerBoundSearch | None = None,
     missed: Array | None = None,
 ) -> Bracket:
     """The gain at one acceleration from both sides; `exact`: the better proof, and that of the
@@ -107,7 +110,7 @@ def bracket(
     """
     plain = synthesis.l2_gain(loop, rate, search=None)
     memory = synthesis.l2_gain(
-        loop, rate, form=form, search=search or Search(seconds=math.inf), solver=PATIENT
+        loop, rate, form=form, search=search or LowerBoundSearch(seconds=math.inf), solver=PATIENT
     )
     better = min(plain, memory, key=lambda c: c.gamma)
     covered, proof = math.nan, None
@@ -142,7 +145,7 @@ def measure(
         lft = loop.to_lft().reduce()
         tests |= {
             f"LFT {name}": synthesis.lft_gain(lft, name, search=None).gamma
-            for name in synthesis.SCALINGS
+            for name in synthesis.analysis.SCALINGS
         }
     yield "airspeed jumps", {"lower": jump.lower, **tests}
     for rate in GROWING:

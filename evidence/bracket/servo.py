@@ -19,7 +19,8 @@ from studies.setup.flights import TOP, TransitionPlan, autopilot_for
 from studies.transition import gain_tables, guarantees
 from studies.transition.effort import Effort
 from symheli import Helicopter
-from synthesis import GainCurve, Spline
+from synthesis.certify.questions.gain_curve import GainCurve
+from synthesis.forms import Spline
 
 RATES = (0.0, 0.1, 1.0, 3.0, 4.5, 8.0, 20.0, math.inf)
 """Permitted accelerations, m/s^2."""

@@ -27,8 +27,8 @@ from studies.controllers.plant import baseline, closed, flown_plant
 from studies.specs.flown import ACCELERATIONS, OF_A_SWITCH, SHARE, in_still_air
 from studies.specs.of_vehicle import OfVehicle, digest_of
 from symheli import Helicopter, LPVStateSpace
-from synthesis import Plant, SpecificationTable
-from synthesis.sheet.evaluation import Reached, margin, worst
+from synthesis import Plant
+from synthesis.sheet.evaluation import Reached, SpecificationTable, margin, worst
 from synthesis.sheet.sheet import Sheet, Specification
 
 PAGE = DOCS / "flown.md"

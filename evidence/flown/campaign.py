@@ -17,8 +17,9 @@ from studies.controllers.flown import HIGH, LOW, WINDS, plan
 from studies.controllers.measures import Measures, of_flight
 from studies.specs.flown import ACCELERATIONS, OF_A_SWITCH, SHARE, measured
 from studies.specs.of_vehicle import share_met
-from symheli import AirspeedSchedule, Helicopter, LPVStateSpace, fly_batch
+from symheli import AirspeedSchedule, Helicopter, LPVStateSpace
 from symheli.errors import UnknownNameError, ValidityWarning
+from symheli.flight import fly_batch
 from symheli.flight.flight_data import FlightData
 from synthesis.sheet.sheet import Sheet, Specification
 

@@ -141,7 +141,9 @@ def structured(plant: Plant) -> LPVStateSpace:
 def retuned(heli: Helicopter, powers: Powers = FOUND_LQR) -> LPVStateSpace:
     """The LQR schedule for the sizes of the study, each group of them times 2 to a power."""
     sizes = _scaled(SIZES, powers, LQR_GROUPS)
-    autopilot = symheli.gain_scheduled_lqr(heli, 0.0, TOP, PERIOD, AIRSPEEDS, XCELL_SERVOS, sizes)
+    autopilot = symheli.flight.gain_scheduled_lqr(
+        heli, 0.0, TOP, PERIOD, AIRSPEEDS, XCELL_SERVOS, sizes
+    )
     return autopilot.scheduled_controller.model
 
 

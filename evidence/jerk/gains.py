@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 
 import synthesis
 from symheli import LPVStateSpace, Scheduling
-from synthesis import Search, Spline
+from synthesis.analysis import LowerBoundSearch
+from synthesis.forms import Spline
 
 
 class Knots(NamedTuple):
@@ -75,7 +76,11 @@ def with_jerk(loop: LPVStateSpace, acceleration: float, jerk: float) -> LPVState
 
 
 def cell(
-    loop: LPVStateSpace, acceleration: float, jerk: float, knots: Knots, search: Search | None
+    loop: LPVStateSpace,
+    acceleration: float,
+    jerk: float,
+    knots: Knots,
+    search: LowerBoundSearch | None,
 ) -> Cell:
     """Proven gain and lower bound of one acceleration and jerk."""
     found = synthesis.l2_gain(
@@ -89,7 +94,7 @@ def measure(
     knots: Knots,
     accelerations: Sequence[float],
     jerks: Sequence[float],
-    search: Search | None,
+    search: LowerBoundSearch | None,
 ) -> Iterator[tuple[str, Any]]:
     """(what, result) of everything the page shows for one loop, as it is found."""
     yield "frozen", synthesis.frozen_gain(loop).gain

@@ -21,8 +21,8 @@ from studies.known_kinematics.models import PAIRS
 from studies.known_kinematics.truth import FrozenAxes, Truth
 from studies.output import as_json
 from studies.setup.flights import autopilot_for
-from symheli import DataWarning, Helicopter
-from symheli.errors import TrimError
+from symheli import Helicopter
+from symheli.errors import DataWarning, TrimError
 from symheli.values.arrays import Array
 
 ELSEWHERE = 0.3

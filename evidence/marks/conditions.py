@@ -26,7 +26,8 @@ from studies.known_kinematics.models import PAIRS
 from studies.known_kinematics.truth import SPEEDS
 from studies.output import as_json
 from studies.setup.bounds import PERIOD
-from symheli import DataWarning, SimulatedFlight
+from symheli.errors import DataWarning
+from symheli.flight import SimulatedFlight
 
 FOUND_WITHIN = 0.002
 """Error of a delay that counts as found, s."""

@@ -12,16 +12,15 @@ import numpy as np
 
 from evidence.seeds import by_name, parser_of
 from evidence.tables import DOCS, keep, markdown, parsed
-from identification import (
-    KinematicModel,
-    response_regions,
-    structure_bias,
-)
+from identification.judge import response_regions, structure_bias
+from identification.model import KinematicModel
 from studies.known_kinematics.conditions import ALL, CONDITIONS, Instruments
 from studies.known_kinematics.models import PAIRS
 from studies.known_kinematics.truth import AXES, SPEEDS, Truth
 from studies.output import as_json
-from symheli import DataWarning, FlightRecord, LinearModel, SimulatedFlight
+from symheli import FlightRecord, LinearModel
+from symheli.errors import DataWarning
+from symheli.flight import SimulatedFlight
 from symheli.values import Signal
 
 FREQUENCIES = np.geomspace(0.3, 20.0, 8)

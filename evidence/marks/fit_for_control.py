@@ -15,17 +15,19 @@ import numpy as np
 from evidence.marks.coverage import at_points
 from evidence.seeds import by_name, parser_of
 from evidence.tables import DOCS, keep, markdown, parsed
-from identification import FitForControl, KinematicARX, Polynomial, structure_bias
+from identification import KinematicARX, Polynomial
 from identification import fit_for_control as judge
-from identification.judge.fit_for_control import added
+from identification.judge import structure_bias
+from identification.judge.fit_for_control import FitForControl, added
 from studies.known_kinematics.conditions import ALL, CONDITIONS, Instruments, RealCondition
 from studies.known_kinematics.models import INPUTS, PAIRS, SCHEDULING
 from studies.known_kinematics.truth import SCALES, Truth
 from studies.loops.robust_lateral import FEEDBACK, SIZES
 from studies.output import as_json
 from studies.setup.flights import TOP
-from symheli import FlightRecord, SimulatedFlight, Wind
+from symheli import FlightRecord, Wind
 from symheli.errors import DataWarning, SymheliError
+from symheli.flight import SimulatedFlight
 
 JUDGED = (0, 2, 4, 8, 12, 16, 20, 26)
 """Of the airspeeds of a truth those that are judged at: 0, 1, 2, 4, 6, 8, 10, 13 m/s."""

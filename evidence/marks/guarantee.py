@@ -19,7 +19,7 @@ from evidence.marks import spanning, unseen
 from evidence.marks.coverage import held
 from evidence.seeds import over_seeds, parser_of, seeds_of
 from evidence.tables import DOCS, keep, parsed
-from identification import unseen_flight
+from identification.judge import validate
 from studies.known_kinematics.flights import aggressive, gentle, transition
 from studies.known_kinematics.models import PAIRS, identified
 from studies.known_kinematics.robust_loop import FORM, Verdict, robust_loop, verdict
@@ -30,7 +30,8 @@ from studies.output import as_json, progress
 from studies.setup.bounds import PERIOD
 from studies.setup.flights import TOP, autopilot_for
 from studies.transition.guarantees import scaled
-from symheli import Helicopter, SimulatedFlight
+from symheli import Helicopter
+from symheli.flight import SimulatedFlight
 from synthesis import Certificate
 
 RATE = 3.0
@@ -78,7 +79,7 @@ def of_seed(
     plans = [aggressive(seed, autopilot), *([gentle(seed, autopilot)] if with_gentle else [])]
     records = [symheli.fly(heli, plan) for plan in plans]
     model = identified(records, other)
-    judged = unseen_flight(model, symheli.fly(heli, transition(seed, autopilot)))
+    judged = validate(model, symheli.fly(heli, transition(seed, autopilot)))
     judged.require()
     loop = robust_loop(model)
     proof = synthesis.l2_gain(loop, rate=RATE, form=FORM, search=None)

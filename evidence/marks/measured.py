@@ -14,7 +14,8 @@ import numpy as np
 import symheli
 from evidence.seeds import over_seeds, parser_of, seeds_of
 from evidence.tables import DOCS, keep, parsed
-from identification import KinematicModel, frozen_stability
+from identification.judge import frozen_stability
+from identification.model import KinematicModel
 from studies.known_kinematics.flights import aggressive, gentle, transition
 from studies.known_kinematics.models import PAIRS, identified
 from studies.known_kinematics.predictions import HORIZON, OUTPUTS, fits_of, states_of

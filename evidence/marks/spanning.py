@@ -12,7 +12,7 @@ import numpy as np
 import symheli
 import synthesis
 from evidence.tables import markdown
-from identification import KinematicModel
+from identification.model import KinematicModel
 from studies.known_kinematics.flights import aggressive, gentle
 from studies.known_kinematics.models import PAIRS, identified
 from studies.known_kinematics.robust_loop import FORM, robust_loop

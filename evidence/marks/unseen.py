@@ -12,14 +12,18 @@ import numpy as np
 
 import symheli
 from evidence.tables import markdown
-from identification import FilterError, KinematicModel, fit, unseen_flight
+from identification import fit
+from identification.judge import validate
+from identification.methods import FilterError
+from identification.model import KinematicModel
 from studies.known_kinematics.conditions import CONDITIONS, Instruments
 from studies.known_kinematics.flights import aggressive, transition
 from studies.known_kinematics.models import PAIRS, identified
 from studies.setup.bounds import PERIOD
 from studies.setup.flights import TOP, autopilot_for
-from symheli import DataWarning, FlightPlan, Helicopter, SimulatedFlight, Wind
-from symheli.flight import XCELL_SERVOS, Autopilot, gain_scheduled_lqr
+from symheli import FlightPlan, Helicopter, Wind
+from symheli.errors import DataWarning
+from symheli.flight import XCELL_SERVOS, Autopilot, SimulatedFlight, gain_scheduled_lqr
 
 SAME = {True: 20, False: 4}
 """Flights of the same vehicle for each model, with multisines and without."""
@@ -113,10 +117,10 @@ def of_seed(seed: int, truth: str = "xcell60") -> Judged:
             for i in range(SAME[excited]):
                 plan = _plan(kind, seed + i * ANOTHER, autopilot, excited)
                 own = found.setdefault((kind, excited, SAME_VEHICLE), [])
-                own.append(unseen_flight(model, symheli.fly(heli, plan)).explained)
+                own.append(validate(model, symheli.fly(heli, plan)).explained)
             for name, change in changes.items():
                 record = symheli.fly(*change(heli, _plan(kind, seed, autopilot, excited)))
-                found[kind, excited, name] = [unseen_flight(model, record).explained]
+                found[kind, excited, name] = [validate(model, record).explained]
     return Judged(seed, found)
 
 

@@ -8,7 +8,7 @@ from scipy.linalg import expm
 
 from evidence.planar_vtol.metric import Metric
 from evidence.planar_vtol.model import GRAVITY, LIMITS, MASS, STATES, published
-from synthesis import Tube
+from synthesis.tubes import Tube
 
 Array = np.ndarray
 

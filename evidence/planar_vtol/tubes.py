@@ -1,4 +1,4 @@
-"""Tubes of the planar VTOL by `synthesis.tube`, beside the published metric: a table."""
+"""Tubes of the planar VTOL by `synthesis.tubes.tube`, beside the published metric: a table."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from evidence.planar_vtol.flights import from_its_border, published_law, worst_p
 from evidence.planar_vtol.metric import Metric, proven_positive, refuted
 from evidence.planar_vtol.model import ARM, GRAVITY, INERTIA, INPUTS, MASS, STATES, over_ground
 from evidence.tables import markdown
-from synthesis import Motions, Tube, tube
+from synthesis.tubes import Motions, Tube, tube
 
 Array = np.ndarray
 

@@ -18,7 +18,7 @@ from studies.loops.lateral import lateral_loop
 from studies.loops.longitudinal import longitudinal_loop
 from studies.output import as_json, columns, progress
 from symheli import Helicopter, LPVStateSpace, Scheduling
-from synthesis import Search, Status
+from synthesis.analysis import LowerBoundSearch, Status
 
 TESTS = ("small gain", "D", "DG")
 """Full blocks are left out: for one parameter they prove what D/G scalings prove, which
@@ -54,13 +54,15 @@ def on(loop: LPVStateSpace, low: float, high: float) -> LPVStateSpace:
 
 def proven(loop: LPVStateSpace, test: str) -> bool:
     """Whether this LFT test proves stability of the loop on its whole range."""
-    return synthesis.lft_stability(loop.to_lft().reduce(), test, search=None).verified
+    return synthesis.analysis.lft_stability(loop.to_lft().reduce(), test, search=None).verified
 
 
-def grows(loop: LPVStateSpace, search: Search | None = None) -> bool:
+def grows(loop: LPVStateSpace, search: LowerBoundSearch | None = None) -> bool:
     """Whether a jumping airspeed is found along which the state grows: no test can succeed then."""
     return (
-        synthesis.stability(loop, math.inf, search=search or Search(seconds=math.inf)).status
+        synthesis.stability(
+            loop, math.inf, search=search or LowerBoundSearch(seconds=math.inf)
+        ).status
         is Status.GROWING
     )
 
@@ -106,7 +108,7 @@ def about(loop: LPVStateSpace, middle: float, test: str) -> Reach:
     )
 
 
-def growing_from_hover(loop: LPVStateSpace, search: Search | None = None) -> Reach:
+def growing_from_hover(loop: LPVStateSpace, search: LowerBoundSearch | None = None) -> Reach:
     """Where the search stops finding a jumping airspeed in [low end, V] along which the state
     grows: `failed` is the least such range.
     """
@@ -125,9 +127,9 @@ def gains(loop: LPVStateSpace, low: float, high: float) -> dict[str, Any]:
     """
     narrow = on(loop, low, high)
     lft = narrow.to_lft().reduce()
-    varying = synthesis.l2_gain(narrow, RATE, search=Search(seconds=math.inf))
+    varying = synthesis.l2_gain(narrow, RATE, search=LowerBoundSearch(seconds=math.inf))
     certificates: dict[str, Any] = {
-        test: synthesis.lft_gain(lft, test, search=None) for test in synthesis.SCALINGS
+        test: synthesis.lft_gain(lft, test, search=None) for test in synthesis.analysis.SCALINGS
     }
     certificates[f"P(p) at {RATE:g} m/s^2"] = varying
     found = {test: c.gamma if c.verified else c.status.name for test, c in certificates.items()}

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from identification.design.tall_factors import triangular
-from symheli.lpv import FunctionSpace
+from symheli.lpv.bases import FunctionSpace
 from symheli.values.arrays import Array
 
 PRIOR = 32.0

@@ -40,7 +40,7 @@ class Experiment:
 
     Examples
     --------
-    >>> whole, half = idn.compare_experiments(
+    >>> whole, half = idn.design.compare_experiments(
     ...     arx, {"whole": record, "half": record.split(0.5)[0]}, limits={"y": 10.0}
     ... )
     >>> whole.name, whole.allowed, bool(np.all(whole.bounds < half.bounds))
@@ -86,7 +86,7 @@ class Plan:
     Examples
     --------
     >>> early, late = record.split(0.5)
-    >>> found = idn.compare_experiments(arx, {"early": early, "late": late}, limits={})
+    >>> found = idn.design.compare_experiments(arx, {"early": early, "late": late}, limits={})
     >>> plan = idn.choose_experiments(found, 2)
     >>> len(plan.experiments), len(plan.gains), plan.bounds.shape
     (2, 1, (4,))
@@ -134,7 +134,7 @@ def compare_experiments(
 
     Examples
     --------
-    >>> (one,) = idn.compare_experiments(arx, {"flown": record}, limits={"u": 0.5})
+    >>> (one,) = idn.design.compare_experiments(arx, {"flown": record}, limits={"u": 0.5})
     >>> one.allowed, list(one.exceeded)
     (False, ['u'])
     """
@@ -188,7 +188,7 @@ def choose_experiments(experiments: tuple[Experiment, ...], count: int) -> Plan:
     Examples
     --------
     >>> quiet = record.with_signals({"u": "1", "y": "1"}, u=0.1 * record["u"], y=0.1 * record["y"])
-    >>> found = idn.compare_experiments(arx, {"quiet": quiet, "loud": record}, limits={})
+    >>> found = idn.design.compare_experiments(arx, {"quiet": quiet, "loud": record}, limits={})
     >>> [e.name for e in idn.choose_experiments(found, 1).experiments]
     ['loud']
     """

@@ -315,7 +315,7 @@ def calibrate(
     --------
     >>> import symheli
     >>> heli = symheli.Helicopter.load("xcell60", governor="ideal")
-    >>> lqr = symheli.gain_scheduled_lqr(heli, 0.0, 8.0, 0.02)
+    >>> lqr = symheli.flight.gain_scheduled_lqr(heli, 0.0, 8.0, 0.02)
     >>> schedule = symheli.AirspeedSchedule.transition(0.0, 6.0, acceleration=2.0, hold=1.0)
     >>> shaken = symheli.Excitation({"d_lon": 0.01, "d_lat": 0.01}, "multisine", (0.1, 4.0), seed=1)
     >>> flight = symheli.fly(heli, schedule, controller=lqr, excitation=shaken, noise_db=30.0)

@@ -136,7 +136,7 @@ def fit(
     --------
     The coefficient of y(k-1) at p = 0 is -0.5:
 
-    >>> found = idn.fit(arx, record, method=idn.Ridge(weight=1e-6))
+    >>> found = idn.fit(arx, record, method=idn.methods.Ridge(weight=1e-6))
     >>> print(found.coefficients.at(0.0).A.round(2))
     [[[-0.5]]]
     """

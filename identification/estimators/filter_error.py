@@ -81,7 +81,7 @@ class FilterError(Method):
     Parameters
     ----------
     simulator : FlightSource
-        `symheli.SimulatedFlight(heli)`: the flight again without noise. It may be wrong.
+        `symheli.flight.SimulatedFlight(heli)`: the flight again without noise. It may be wrong.
     noise : mapping of str to float, optional
         Standard deviation of the sensor of each of u v w p q r phi theta, in its unit; default of
         each record from its spectrum above 0.8 of the Nyquist frequency.
@@ -121,7 +121,8 @@ class FilterError(Method):
     >>> kin = idn.KinematicARX(heli.inputs, "airspeed_command", nb=1,
     ...     basis=idn.Polynomial(1, 2.0, 6.0))
     >>> wrong = symheli.Helicopter.load("xcell_kahn_hudson", governor="ideal")
-    >>> found = idn.fit(kin, flight, method=idn.FilterError(symheli.SimulatedFlight(wrong)))
+    >>> method = idn.methods.FilterError(symheli.flight.SimulatedFlight(wrong))
+    >>> found = idn.fit(kin, flight, method=method)
     >>> found.method, found.covariance.shape
     ('filter error', (6, 28, 6, 28))
     """

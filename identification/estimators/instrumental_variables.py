@@ -53,8 +53,8 @@ class InstrumentalVariables(Method):
     instruments : str, sequence of str, InstrumentSource or FlightSource
         Names of signals of the record, `LaggedSignals` of them with their window, or another
         source. In closed loop name what is added to the stabilised inputs, in open loop the inputs.
-        A `FlightSource` such as `symheli.SimulatedFlight` gives the regressors themselves as a
-        simulator flies them: theta = (Z' Phi)^-1 Z' Y.
+        A `FlightSource` such as `symheli.flight.SimulatedFlight` gives the regressors themselves as
+        a simulator flies them: theta = (Z' Phi)^-1 Z' Y.
 
     Raises
     ------
@@ -70,7 +70,7 @@ class InstrumentalVariables(Method):
 
     Examples
     --------
-    >>> found = idn.fit(arx, record, method=idn.InstrumentalVariables("u"))
+    >>> found = idn.fit(arx, record, method=idn.methods.InstrumentalVariables("u"))
     >>> print(found.coefficients.at(0.0).A.round(2), found.details["first_stage_F"] > 10)
     [[[-0.5]]] True
     """

@@ -47,9 +47,9 @@ class InstrumentSource(Protocol):
     ...
     ...     def instrument_lags(self, dt, first, memory):
     ...         return tuple(range(first, memory + 4))
-    >>> isinstance(Simulated(), idn.InstrumentSource)
+    >>> isinstance(Simulated(), idn.methods.InstrumentSource)
     True
-    >>> found = idn.fit(arx, record, method=idn.InstrumentalVariables(Simulated()))
+    >>> found = idn.fit(arx, record, method=idn.methods.InstrumentalVariables(Simulated()))
     >>> print(found.coefficients.at(0.0).A.round(2))
     [[[-0.5]]]
     """
@@ -72,8 +72,8 @@ class FlightSource(Protocol):
     """Instruments from a simulated repetition of the recorded flight without noise and
     disturbances: its regressors, one for each coefficient.
 
-    `symheli.SimulatedFlight` flies the plan of the record in a simulator. That may be wrong: the
-    regressors of its flight depend on nothing but what was commanded.
+    `symheli.flight.SimulatedFlight` flies the plan of the record in a simulator. That may be wrong:
+    the regressors of its flight depend on nothing but what was commanded.
 
     Examples
     --------
@@ -83,9 +83,9 @@ class FlightSource(Protocol):
     ...         for k in range(1, len(y)):
     ...             y[k] = 0.4 * y[k - 1] + record["u"][k - 1]
     ...         return record.with_signals({"y": "1"}, y=y)
-    >>> isinstance(Clean(), idn.FlightSource)
+    >>> isinstance(Clean(), idn.methods.FlightSource)
     True
-    >>> found = idn.fit(arx, record, method=idn.InstrumentalVariables(Clean()))
+    >>> found = idn.fit(arx, record, method=idn.methods.InstrumentalVariables(Clean()))
     >>> print(found.coefficients.at(0.0).A.round(2))
     [[[-0.5]]]
     """
@@ -131,7 +131,7 @@ class LaggedSignals:
 
     Examples
     --------
-    >>> idn.LaggedSignals("u", window=0.5).instrument_lags(dt=0.1, first=1, memory=1)
+    >>> idn.structure.LaggedSignals("u", window=0.5).instrument_lags(dt=0.1, first=1, memory=1)
     (1, 2, 3, 4, 5)
     """
 

@@ -49,7 +49,7 @@ class Lasso(Method):
     --------
     Of B(p) = 1 the part that moves with p is left out:
 
-    >>> idn.fit(arx, record, method=idn.Lasso()).details["kept"]
+    >>> idn.fit(arx, record, method=idn.methods.Lasso()).details["kept"]
     [3]
     """
 

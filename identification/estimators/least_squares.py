@@ -26,7 +26,8 @@ class LeastSquares(Method):
 
     Examples
     --------
-    >>> print(idn.fit(arx, record, method=idn.LeastSquares()).coefficients.at(1.0).A.round(2))
+    >>> model = idn.fit(arx, record, method=idn.methods.LeastSquares())
+    >>> print(model.coefficients.at(1.0).A.round(2))
     [[[-0.8]]]
     """
 

@@ -41,7 +41,8 @@ class Estimate:
 
     Examples
     --------
-    >>> idn.Estimate(theta=np.zeros((4, 1)), details={"iterations": 3}).details["iterations"]
+    >>> found = idn.methods.Estimate(theta=np.zeros((4, 1)), details={"iterations": 3})
+    >>> found.details["iterations"]
     3
     """
 
@@ -69,11 +70,11 @@ class Method(ABC):
 
     Examples
     --------
-    >>> class Zero(idn.Method):
+    >>> class Zero(idn.methods.Method):
     ...     shorthand, needs_excitation = "zero", False
     ...
     ...     def estimate(self, arx, records, data):
-    ...         return idn.Estimate(theta=np.zeros((arx.n_regressors, arx.ny)))
+    ...         return idn.methods.Estimate(theta=np.zeros((arx.n_regressors, arx.ny)))
     >>> print(idn.fit(arx, record, method=Zero()).theta.T)
     [[0. 0. 0. 0.]]
     """

@@ -115,7 +115,7 @@ class OutputError(PredictionError):
 
     Examples
     --------
-    >>> found = idn.fit(arx, record, method=idn.OutputError())
+    >>> found = idn.fit(arx, record, method=idn.methods.OutputError())
     >>> print(found.coefficients.at(0.0).A.round(2))
     [[[-0.5]]]
     """
@@ -163,7 +163,7 @@ class BoxJenkins(OutputError):
 
     Examples
     --------
-    >>> found = idn.fit(arx, record, method=idn.BoxJenkins(ar=1))
+    >>> found = idn.fit(arx, record, method=idn.methods.BoxJenkins(ar=1))
     >>> print(found.coefficients.at(0.0).A.round(2), found.noise.ar.shape)
     [[[-0.5]]] (1, 1)
     """
@@ -201,7 +201,7 @@ class ARMAX(PredictionError):
 
     Examples
     --------
-    >>> found = idn.fit(arx, record, method=idn.ARMAX(ma=1))
+    >>> found = idn.fit(arx, record, method=idn.methods.ARMAX(ma=1))
     >>> print(found.coefficients.at(0.0).A.round(2), abs(found.noise.ma[0, 0]) < 0.2)
     [[[-0.5]]] True
     """

@@ -34,7 +34,7 @@ class Recursion(Method):
 
     Examples
     --------
-    >>> recent = idn.fit(arx, record, method=idn.Recursion(forgetting=0.99))
+    >>> recent = idn.fit(arx, record, method=idn.methods.Recursion(forgetting=0.99))
     >>> print(recent.coefficients.at(0.0).A.round(1))
     [[[-0.5]]]
     """

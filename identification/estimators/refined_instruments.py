@@ -75,7 +75,7 @@ class RefinedInstruments(Method):
 
     Examples
     --------
-    >>> found = idn.fit(arx, record, method=idn.RefinedInstruments(noise_order=1))
+    >>> found = idn.fit(arx, record, method=idn.methods.RefinedInstruments(noise_order=1))
     >>> print(found.coefficients.at(0.0).A.round(2), found.details["converged"])
     [[[-0.5]]] True
     """

@@ -18,7 +18,7 @@ from identification.estimators.method import Estimate, Method
 from identification.structure.lpvarx import LPVARX, EquationGroup
 from identification.structure.regressors import Regression
 from symheli.errors import ExcitationError, InputError
-from symheli.lpv import FunctionSpace
+from symheli.lpv.bases import FunctionSpace
 from symheli.progress import tracked
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
@@ -56,7 +56,7 @@ class Ridge(Method):
 
     Examples
     --------
-    >>> flat = idn.fit(arx, record, method=idn.Ridge(weight=1e6)).coefficients
+    >>> flat = idn.fit(arx, record, method=idn.methods.Ridge(weight=1e6)).coefficients
     >>> print(np.ptp(flat.at([-1.0, 1.0]).A).round(3))
     0.0
     """

@@ -13,8 +13,8 @@ from identification.model.lpvarx_model import LPVARXModel
 from identification.model.state_space_model import StateSpaceModel, pieces_of, start_of
 from identification.model.state_space_run import StateSpaceRun
 from identification.structure.state_space import StateSpace
+from symheli import LPVStateSpace
 from symheli.errors import ConvergenceWarning, ExcitationError, InputError
-from symheli.lpv import LPVStateSpace
 from symheli.records import FlightRecord
 from symheli.values import Signal
 from symheli.values.arrays import Array

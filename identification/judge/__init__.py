@@ -1,1 +1,5 @@
-"""After a fit: residuals, uncertainty, responses, orders and what the data leave open."""
+"""What a model is worth: comparisons, uncertainty, stability, dependence."""
+
+from symheli.lazy import lazily
+
+__getattr__, __dir__, __all__ = lazily(__name__, __file__)

@@ -84,7 +84,7 @@ class AgainstConstant:
     >>> record = symheli.FlightRecord.from_arrays(0.1 * np.arange(600), units, y=y, u=u, p=p)
     >>> arx = idn.LPVARX(
     ...     "y", "u", "p", na=1, nb=1, delay=1, basis=idn.Polynomial(1, -1.0, 1.0))
-    >>> [one.label for one in idn.against_constant(arx, record, None).models]
+    >>> [one.label for one in idn.judge.compare_constant(arx, record, None).models]
     ['LPV, degree 1', 'LTI']
     """
 
@@ -210,7 +210,7 @@ def difference(one: float, other: float) -> str:
     )
 
 
-def against_constant(
+def compare_constant(
     structure: LPVARX,
     training: FlightRecord,
     test: FlightRecord | None,
@@ -265,7 +265,7 @@ def against_constant(
     >>> record = symheli.FlightRecord.from_arrays(0.1 * np.arange(600), units, y=y, u=u, p=p)
     >>> arx = idn.LPVARX(
     ...     "y", "u", "p", na=1, nb=1, delay=1, basis=idn.Polynomial(1, -1.0, 1.0))
-    >>> idn.against_constant(arx, *record.split(0.7)).verdict_on("y")
+    >>> idn.judge.compare_constant(arx, *record.split(0.7)).verdict_on("y")
     'pays'
     """
 

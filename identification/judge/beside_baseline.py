@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.judge.scores import HORIZON, Identified, Scores, predicted, steps
+from symheli import LPVStateSpace, Scheduling
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv import LPVStateSpace, Scheduling
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 from symheli.values.sample_period import same_period
@@ -42,7 +42,7 @@ class BaselineModel:
     >>> lag = symheli.LPVStateSpace.polynomial(
     ...     A=[[[-2.0]]], B=[[[1.0]]], C=[[[1.0]]], D=[[[0.0]]],
     ...     scheduling=symheli.Scheduling("speed", "m/s", 0.0, 1.0))
-    >>> idn.BaselineModel(model=lag, scheduling="airspeed").drift
+    >>> idn.judge.BaselineModel(model=lag, scheduling="airspeed").drift
     True
     """
 
@@ -96,7 +96,7 @@ class BaselinePredictor:
     >>> zero, t = np.zeros(50), 0.1 * np.arange(50)
     >>> record = symheli.FlightRecord.from_arrays(
     ...     t, dict.fromkeys("xup", "1"), x=np.exp(-2 * t), u=zero, p=zero)
-    >>> along = idn.BaselinePredictor(lag, record)
+    >>> along = idn.judge.BaselinePredictor(lag, record)
     >>> bool(np.allclose(along.predict(["x"], 10)[10:, 0], record["x"][10:]))
     True
     """
@@ -203,7 +203,7 @@ class Prediction:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BesideBaseline:
-    """Predictions of the same unseen flight by all models: the result of `beside_baseline`.
+    """Predictions of the same unseen flight by all models: the result of `compare_baseline`.
 
     Examples
     --------
@@ -214,7 +214,8 @@ class BesideBaseline:
     >>> zero, t = np.zeros(50), 0.1 * np.arange(50)
     >>> record = symheli.FlightRecord.from_arrays(
     ...     t, dict.fromkeys("xup", "1"), x=np.exp(-2 * t), u=zero, p=zero)
-    >>> found = idn.beside_baseline({}, {"lag": idn.BaselineModel(model=lag)}, record, ["x"])
+    >>> known = idn.judge.BaselineModel(model=lag)
+    >>> found = idn.judge.compare_baseline({}, {"lag": known}, record, ["x"])
     >>> found.best("x").name
     'lag'
     """
@@ -236,7 +237,7 @@ class BesideBaseline:
         return max(among, key=lambda p: p.scores.ahead[output])
 
 
-def beside_baseline(
+def compare_baseline(
     identified: Mapping[str, Identified],
     baselines: Mapping[str, BaselineModel],
     record: FlightRecord,
@@ -293,9 +294,9 @@ def beside_baseline(
     ...     p=p, aileron=aileron, speed=speed)
     >>> arx = idn.LPVARX(
     ...     "p", "aileron", "speed", na=1, nb=1, delay=1, basis=idn.Polynomial(1, 0.0, 10.0))
-    >>> found = idn.beside_baseline(
+    >>> found = idn.judge.compare_baseline(
     ...     {"identified": idn.fit(arx, record)},
-    ...     {"equations": idn.BaselineModel(model=roll)}, record, ["p"])
+    ...     {"equations": idn.judge.BaselineModel(model=roll)}, record, ["p"])
     >>> [(one.name, round(one.scores.ahead["p"], 1)) for one in found.predictions]
     [('identified', 100.0), ('equations', 100.0)]
     """

@@ -15,11 +15,12 @@ from identification.judge.derivatives import Certainty, Derivatives
 from identification.judge.frozen_plant import AtPoint, FrozenPlant, Model, text, worst
 from identification.judge.residuals import theil
 from identification.judge.response_match import KNOWN, response_match
-from identification.judge.unseen_flight import unseen_flight
+from identification.judge.unseen_flight import validate
 from identification.model.kinematic_model import KinematicModel
 from identification.model.prediction import LARGEST
+from symheli import LinearModel
 from symheli.errors import ExcitationError
-from symheli.lpv import LinearModel, nu_gaps
+from symheli.lpv.tools import nu_gaps
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 from symheli.values.signal import Signal
@@ -78,7 +79,8 @@ class Criterion:
 
     Examples
     --------
-    >>> row = idn.Criterion(name="TIC", value=0.1, threshold=0.25, verdict="fit", source="book")
+    >>> row = idn.judge.Criterion(
+    ...     name="TIC", value=0.1, threshold=0.25, verdict="fit", source="book")
     >>> row.verdict
     'fit'
     """
@@ -275,7 +277,7 @@ def residual_power(model: Model, records: Sequence[FlightRecord]) -> tuple[Crite
     """
     if not isinstance(model, KinematicModel) or "sensor_noise" not in model.details:
         return ()
-    powers = [unseen_flight(model, record).power for record in records]
+    powers = [validate(model, record).power for record in records]
     value = float(max(powers))
     return (
         Criterion(

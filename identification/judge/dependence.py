@@ -47,7 +47,7 @@ class DependenceReport:
 
     Examples
     --------
-    >>> report = idn.dependence_report(model, record)
+    >>> report = idn.judge.dependence_report(model, record)
     >>> report.at, report.other, bool(report.explained[0] < 0.05)
     ('lag', 'now', True)
     """
@@ -128,7 +128,7 @@ def dependence_report(
 
     Examples
     --------
-    >>> print(idn.dependence_report(model, record).dynamic)
+    >>> print(idn.judge.dependence_report(model, record).dynamic)
     (False,)
     """
     arx, records = model.structure, as_records(records)

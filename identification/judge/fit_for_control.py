@@ -30,8 +30,8 @@ from identification.judge.response_regions import StructureBias, with_neighbours
 from identification.model.kinematic_model import KinematicModel
 from identification.model.lpvarx_model import LEAST_SQUARES
 from identification.structure.regressors import as_records
+from symheli import LinearModel, LPVStateSpace, UncertainStateSpace
 from symheli.errors import InputError, NotFitError
-from symheli.lpv import LinearModel, LPVStateSpace, UncertainStateSpace
 from symheli.lpv.stability_margin import Feedback
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array, frozen
@@ -406,13 +406,13 @@ def design_model(
     Examples
     --------
     >>> from symheli.errors import NotFitError
-    >>> poor = idn.FitForControl(
-    ...     criteria=(idn.Criterion(name="nu-gap over margin", value=1.4, threshold=1.0,
+    >>> poor = idn.judge.fit_for_control.FitForControl(
+    ...     criteria=(idn.judge.Criterion(name="nu-gap over margin", value=1.4, threshold=1.0,
     ...                             verdict="not fit", source="here", where="hover"),),
     ...     points=(0.0,), margin=np.array([0.1]), gap=np.array([0.14]),
     ...     second_gap=np.array([np.nan]))
     >>> try:
-    ...     idn.design_model(None, poor)
+    ...     idn.design.design_model(None, poor)
     ... except NotFitError as error:
     ...     print(error.reasons[0])
     nu-gap over margin is 1.4, at most 1 (hover): not fit

@@ -12,8 +12,8 @@ from scipy.signal import get_window
 from scipy.stats import f as fisher
 
 from identification.structure.regressors import as_records, units_of
+from symheli import LinearModel
 from symheli.errors import ExcitationError, InputError
-from symheli.lpv import LinearModel
 from symheli.records import FlightRecord
 from symheli.values import Signal
 from symheli.values.arrays import Array

@@ -8,8 +8,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from symheli import LinearModel
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv import LinearModel, chordal_distance, nu_gap
+from symheli.lpv import nu_gap
+from symheli.lpv.tools import chordal_distance
 from symheli.values.arrays import Array
 from symheli.values.numbers import whole
 from symheli.values.summary import summarized
@@ -118,7 +120,7 @@ class FrozenModels:
         return int(np.sum(self[name].stable != self.reference.stable))
 
 
-def pole_miss(model: LinearModel, pole: complex) -> float:
+def pole_distance(model: LinearModel, pole: complex) -> float:
     """Return the distance of the nearest pole of a linear model to `pole` (rad/s), in percent of
     its magnitude.
 
@@ -147,7 +149,7 @@ def pole_miss(model: LinearModel, pole: complex) -> float:
     >>> lag = symheli.LPVStateSpace.polynomial(
     ...     A=[[[-2.0]]], B=[[[1.0]]], C=[[[1.0]]], D=[[[0.0]]],
     ...     scheduling=symheli.Scheduling("speed", "m/s", 0.0, 1.0))
-    >>> round(idn.pole_miss(lag.at(0.0).discretize(0.1), -2.1), 2)
+    >>> round(idn.judge.pole_distance(lag.at(0.0).discretize(0.1), -2.1), 2)
     4.76
     """
     if pole == 0 or not np.isfinite(pole):
@@ -278,7 +280,7 @@ def compare_frozen(
             gap=each(lambda a, b: nu_gap(a, b, **sizes, points=frequencies)),
             miss=empty
             if mode is None
-            else np.array([pole_miss(m, mode[p]) for m, p in zip(linear, points, strict=True)]),
+            else np.array([pole_distance(m, mode[p]) for m, p in zip(linear, points, strict=True)]),
             distance=empty
             if fast is None
             else each(lambda a, b: chordal_distance(a, b, far, **sizes).max()),

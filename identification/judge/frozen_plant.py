@@ -14,9 +14,11 @@ import numpy as np
 from identification.model.kinematic_model import KinematicModel
 from identification.model.lpvarx_model import LPVARXModel
 from identification.structure.lpvarx import LPVARX
+from symheli import LinearModel
 from symheli.errors import UnknownNameError
-from symheli.lpv import LinearModel, LinearModels, nu_gaps, stability_margin
+from symheli.lpv import stability_margin
 from symheli.lpv.stability_margin import Feedback, as_controller, closed_loop
+from symheli.lpv.tools import LinearModels, nu_gaps
 from symheli.values.arrays import Array
 
 Model = LPVARXModel | KinematicModel

@@ -109,7 +109,7 @@ def frozen_stability(
 
     Examples
     --------
-    >>> print(idn.frozen_stability(model, [-0.5, 0.0, 0.5]))
+    >>> print(idn.judge.frozen_stability(model, [-0.5, 0.0, 0.5]))
     with the scheduling held: stable at 3, unstable at 0 of 3 points; not known at 0
     """
     covariance = model.covariance if covariance is None else covariance

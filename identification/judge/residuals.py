@@ -40,7 +40,7 @@ class Theil(NamedTuple):
 
     Examples
     --------
-    >>> found = idn.theil(record["y"], record["y"] + 0.5)
+    >>> found = idn.judge.theil(record["y"], record["y"] + 0.5)
     >>> round(found.bias, 3), round(found.variance, 3), round(found.covariance, 3)
     (1.0, 0.0, 0.0)
     """
@@ -207,7 +207,7 @@ def theil(measured: Array, predicted: Array) -> Theil:
 
     Examples
     --------
-    >>> round(idn.theil([1.0, 2.0, 3.0], [1.1, 1.9, 3.2]).coefficient, 3)
+    >>> round(idn.judge.theil([1.0, 2.0, 3.0], [1.1, 1.9, 3.2]).coefficient, 3)
     0.032
     """
     measured, predicted = np.asarray(measured, float), np.asarray(predicted, float)

@@ -16,8 +16,8 @@ from identification.judge.frequency_response import (
 )
 from identification.judge.frequency_response import windows as windows_of
 from identification.structure.regressors import as_records, units_of
+from symheli import LinearModel
 from symheli.errors import ExcitationError
-from symheli.lpv import LinearModel
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 

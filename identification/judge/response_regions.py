@@ -17,8 +17,8 @@ from identification.judge.coefficient_covariance import drawn
 from identification.judge.frozen_plant import FrozenPlant, Model, Point
 from identification.structure.kinematic_arx import KinematicARX
 from identification.structure.lpvarx import LPVARX
+from symheli import LinearModel
 from symheli.errors import InputError
-from symheli.lpv import LinearModel
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array, frozen
 from symheli.values.numbers import whole
@@ -83,7 +83,7 @@ class StructureBias:
 
     Examples
     --------
-    >>> off = idn.StructureBias(model, {0.0: model.at(0.0)})
+    >>> off = idn.judge.response_regions.StructureBias(model, {0.0: model.at(0.0)})
     >>> bool(np.abs(off.responses([0.1, 1.0], model.outputs, model.inputs)).max() < 1e-12)
     True
     """
@@ -157,7 +157,7 @@ def response_regions(
 
     Examples
     --------
-    >>> found = idn.response_regions(model, [-0.5, 0.5], [0.1, 1.0])
+    >>> found = idn.judge.response_regions(model, [-0.5, 0.5], [0.1, 1.0])
     >>> found.centre.shape[:2], bool(found.contains(found.centre).all())
     ((2, 2), True)
     """
@@ -210,7 +210,7 @@ def structure_bias(
     records : FlightRecord or sequence of them
         What it was identified from.
     simulator : FlightSource
-        `symheli.SimulatedFlight(heli)`.
+        `symheli.flight.SimulatedFlight(heli)`.
     exact : mapping of point to LinearModel
         Linear models of the simulator's vehicle at points of the scheduling, sampled at the period
         of the model, with its outputs and inputs.
@@ -242,8 +242,8 @@ def structure_bias(
     ...     basis=idn.Polynomial(1, 2.0, 6.0))
     >>> wrong = symheli.Helicopter.load("xcell_kahn_hudson", governor="ideal")
     >>> there = {4.0: symheli.linearize(wrong, airspeed=4.0).discretize(0.02)}
-    >>> off = idn.structure_bias(idn.fit(kin, flight), flight, symheli.SimulatedFlight(wrong),
-    ...     there)
+    >>> simulator = symheli.flight.SimulatedFlight(wrong)
+    >>> off = idn.judge.structure_bias(idn.fit(kin, flight), flight, simulator, there)
     >>> off.responses([1.0, 5.0], ["p"], ["d_lat"]).shape
     (1, 2, 1, 1)
     """

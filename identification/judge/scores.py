@@ -33,7 +33,7 @@ class Scores:
     --------
     >>> import numpy as np, identification as idn
     >>> y = np.sin(np.arange(20.0))[:, None]
-    >>> idn.Scores.of(y, ["y"], one_step=y, ahead=y, free_run=0.9 * y).one_step
+    >>> idn.judge.Scores.of(y, ["y"], one_step=y, ahead=y, free_run=0.9 * y).one_step
     {'y': 100.0}
     """
 

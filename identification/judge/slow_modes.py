@@ -163,7 +163,7 @@ def slow_modes(
 
     Examples
     --------
-    >>> print(idn.slow_modes(model, record))
+    >>> print(idn.judge.slow_modes(model, record))
     slow modes: none
     """
     records = as_records(records)

@@ -90,7 +90,7 @@ class UnseenFlight:
             )
 
 
-def unseen_flight(model: KinematicModel, record: FlightRecord) -> UnseenFlight:
+def validate(model: KinematicModel, record: FlightRecord) -> UnseenFlight:
     """Validate a model on a flight it was not identified from, by the chi-squared statistic of its
     equations, whitened by the covariance of sensor noise, of what the structure leaves out and of
     the errors of the coefficients; and band by band of each equation against windows of 20 s of
@@ -136,8 +136,9 @@ def unseen_flight(model: KinematicModel, record: FlightRecord) -> UnseenFlight:
     ...     symheli.fly(vehicle, ramps, noise_db=30.0, seed=seed, excitation=excited)
     ...     for vehicle, seed in ((heli, 1), (heli, 2), (wrong, 3))]
     >>> kin = idn.KinematicARX(heli.inputs, "airspeed_command", basis=idn.Polynomial(1, 2.0, 6.0))
-    >>> model = idn.fit(kin, flights[0], method=idn.FilterError(symheli.SimulatedFlight(wrong)))
-    >>> [idn.unseen_flight(model, flight).explained for flight in flights[1:]]
+    >>> method = idn.methods.FilterError(symheli.flight.SimulatedFlight(wrong))
+    >>> model = idn.fit(kin, flights[0], method=method)
+    >>> [idn.judge.validate(model, flight).explained for flight in flights[1:]]
     [True, False]
     """
     details = model.details

@@ -1,1 +1,5 @@
-"""The identified model: coefficients, predictions, state-space forms, files."""
+"""Identified models: coefficients, prediction, realization, sets of models."""
+
+from symheli.lazy import lazily
+
+__getattr__, __dir__, __all__ = lazily(__name__, __file__)

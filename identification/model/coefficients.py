@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from identification.structure.lpvarx import LPVARX, Term
-from symheli.lpv import FunctionSpace
+from symheli.lpv.bases import FunctionSpace
 from symheli.values.arrays import Array, frozen
 from symheli.values.summary import summarized
 

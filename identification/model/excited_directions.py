@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from symheli import UncertainStateSpace
 from symheli.errors import InputError
-from symheli.lpv import UncertainStateSpace
 from symheli.lpv.bases.function_space import tensor_grid
 from symheli.values.arrays import Array
 

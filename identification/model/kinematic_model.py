@@ -21,8 +21,9 @@ from identification.model.prediction import named_fit, require_horizon
 from identification.model.realization import held_value
 from identification.structure.actuators import bare
 from identification.structure.kinematic_arx import MOVING, STATES, KinematicARX
+from symheli import LinearModel, LPVStateSpace, UncertainStateSpace
 from symheli.errors import InputError
-from symheli.lpv import FunctionSpace, LinearModel, LPVStateSpace, UncertainStateSpace
+from symheli.lpv.bases import FunctionSpace
 from symheli.records import FlightRecord
 from symheli.values import NamedVector, Signal
 from symheli.values.arrays import Array, frozen
@@ -166,8 +167,9 @@ class KinematicModel:
         """The model flown in the loop of the record, (n, 8): same controller, reference and
         excitation.
 
-        `controller` is a `symheli.PureController` or `symheli.StatefulController`; default that of
-        the record's plan. From the first samples of each segment on nothing measured is used.
+        `controller` is a `symheli.flight.PureController` or `symheli.flight.StatefulController`;
+        default that of the record's plan. From the first samples of each segment on nothing
+        measured is used.
         Raises `InputError` for a record without references, or without a controller.
         """
         self.structure.require_plain("a run in the recorded loop")

@@ -11,9 +11,11 @@ import numpy as np
 from identification.model.matrix_ellipsoid import MatrixEllipsoid, matrix_ellipsoid
 from identification.model.realization import one_value
 from identification.structure.kinematic_arx import MOVING, STATES, KinematicARX
+from symheli import LinearModel, LPVStateSpace, Scheduling
 from symheli.errors import InputError
-from symheli.lpv import FunctionSpace, LinearModel, LPVStateSpace, Matrices, Scheduling
+from symheli.lpv.bases import FunctionSpace
 from symheli.lpv.bases.polynomials import interpolation_points, lobatto_points, polynomials
+from symheli.lpv.tools import Matrices
 from symheli.lpv.uncertain_state_space import DeltaPart
 from symheli.values import Signal
 from symheli.values.arrays import Array

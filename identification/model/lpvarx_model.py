@@ -16,8 +16,10 @@ from identification.model.coefficients import Coefficients
 from identification.model.noise_model import NoiseModel
 from identification.structure.lpvarx import LPVARX
 from identification.structure.regressors import check_units
+from symheli import LinearModel, LPVStateSpace, Scheduling
 from symheli.errors import InputError
-from symheli.lpv import BalancedTruncation, FunctionSpace, LinearModel, LPVStateSpace, Scheduling
+from symheli.lpv.balanced_truncation import BalancedTruncation
+from symheli.lpv.bases import FunctionSpace
 from symheli.records import FlightRecord
 from symheli.values import NamedVector, Signal, signals
 from symheli.values.arrays import Array, frozen

@@ -140,7 +140,7 @@ def matrix_ellipsoid(
     Examples
     --------
     >>> V_inverse, Sigma = np.diag([1.0, 0.01]), np.array([[1.0, 0.5], [0.5, 2.0]])
-    >>> ellipsoid = idn.matrix_ellipsoid(np.einsum("ij,ab->iajb", Sigma, V_inverse), 0.95)
+    >>> ellipsoid = idn.model.matrix_ellipsoid(np.einsum("ij,ab->iajb", Sigma, V_inverse), 0.95)
     >>> round(ellipsoid.inflation, 4), round(ellipsoid.bound, 2)
     (1.0, 3.08)
     """

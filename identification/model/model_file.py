@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from symheli.lpv import FunctionSpace, Polynomial, Product
+from symheli.lpv import Polynomial, Product
+from symheli.lpv.bases import FunctionSpace
 from symheli.values import Signal
 from symheli.values.arrays import Array
 from symheli.values.whole_files import write_bytes

@@ -41,7 +41,7 @@ class NoiseModel:
 
     Examples
     --------
-    >>> noise = idn.NoiseModel([[-0.9]], [[]])
+    >>> noise = idn.methods.NoiseModel([[-0.9]], [[]])
     >>> noise.white(np.array([[1.0], [0.9], [0.81], [1.729]])).round(3).ravel()
     array([1., 0., 0., 1.])
     >>> noise.ahead(np.array([[1.0], [0.9], [0.81]]), 2).round(2).ravel()

@@ -247,7 +247,7 @@ def fit_percent(y: object, yhat: object) -> Array:
 
     Examples
     --------
-    >>> print(idn.fit_percent([1.0, 2.0, 3.0], [1.0, 2.0, 2.5]).round(1))
+    >>> print(idn.judge.fit_percent([1.0, 2.0, 3.0], [1.0, 2.0, 2.5]).round(1))
     [64.6]
     """
     y, yhat = np.asarray(y, float), np.asarray(yhat, float)

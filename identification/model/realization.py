@@ -11,9 +11,12 @@ import numpy as np
 
 from identification.model.coefficients import Coefficients
 from identification.structure.lpvarx import LPVARX
+from symheli import LinearModel, LPVStateSpace, Scheduling
 from symheli.errors import InputError
-from symheli.lpv import FunctionSpace, LinearModel, LPVStateSpace, Matrices, Product, Scheduling
+from symheli.lpv import Product
+from symheli.lpv.bases import FunctionSpace
 from symheli.lpv.bases.polynomials import interpolation_points, polynomials
+from symheli.lpv.tools import Matrices
 from symheli.values import Signal
 from symheli.values.arrays import Array, frozen
 

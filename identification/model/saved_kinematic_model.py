@@ -16,7 +16,7 @@ from identification.structure.kinematic_arx import MOVING, KinematicARX
 from identification.structure.late_sensors import LateSensors
 from identification.structure.steady_wind import SteadyWind
 from symheli.flight import Servo
-from symheli.lpv import FunctionSpace
+from symheli.lpv.bases import FunctionSpace
 from symheli.values import plain_file
 from symheli.values.kinematics import GRAVITY
 

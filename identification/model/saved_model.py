@@ -13,7 +13,7 @@ from identification.model import model_file
 from identification.model.lpvarx_model import LPVARXModel
 from identification.model.noise_model import NoiseModel
 from identification.structure.lpvarx import LPVARX
-from symheli.lpv import FunctionSpace
+from symheli.lpv.bases import FunctionSpace
 from symheli.lpv.bases.described import basis_of, described_basis, tuples
 from symheli.values import plain_file
 from symheli.values.arrays import Array

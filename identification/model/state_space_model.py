@@ -12,8 +12,8 @@ from identification.model.prediction import named_fit
 from identification.model.state_space_run import StateSpaceRun
 from identification.structure.regressors import Samples, check_units
 from identification.structure.state_space import StateSpace
+from symheli import LPVStateSpace
 from symheli.errors import InputError
-from symheli.lpv import LPVStateSpace
 from symheli.records import FlightRecord
 from symheli.values import NamedVector, Signal
 from symheli.values.arrays import Array, frozen

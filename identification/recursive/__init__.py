@@ -1,1 +1,5 @@
-"""Recursive least squares: the estimator, its memory and its compiled kernel."""
+"""Estimators that follow the data sample by sample."""
+
+from symheli.lazy import lazily
+
+__getattr__, __dir__, __all__ = lazily(__name__, __file__)

@@ -39,7 +39,7 @@ class Constant:
 
     Examples
     --------
-    >>> rls = idn.RecursiveLeastSquares(arx, idn.Constant(0.99, floor=0.01))
+    >>> rls = idn.RecursiveLeastSquares(arx, idn.forgetting.Constant(0.99, floor=0.01))
     >>> print(rls.run(record).model.coefficients.at(0.0).A.round(1))
     [[[-0.5]]]
     """
@@ -92,7 +92,7 @@ class Variable:
 
     Examples
     --------
-    >>> rls = idn.RecursiveLeastSquares(arx, idn.Variable(longest=500, shortest=50))
+    >>> rls = idn.RecursiveLeastSquares(arx, idn.forgetting.Variable(longest=500, shortest=50))
     >>> print(rls.run(record).model.coefficients.at(0.0).A.round(1))
     [[[-0.5]]]
     """
@@ -147,7 +147,7 @@ class Directional:
 
     Examples
     --------
-    >>> rls = idn.RecursiveLeastSquares(arx, idn.Directional(0.98))
+    >>> rls = idn.RecursiveLeastSquares(arx, idn.forgetting.Directional(0.98))
     >>> print(rls.run(record).model.coefficients.at(0.0).A.round(1))
     [[[-0.5]]]
     """

@@ -11,9 +11,9 @@ import numpy as np
 from scipy.linalg import expm
 from scipy.signal import lfilter, ss2tf
 
+from symheli import LinearModel
 from symheli.errors import InputError
 from symheli.flight import Servo
-from symheli.lpv import LinearModel
 from symheli.records import FlightRecord
 from symheli.values import Signal
 from symheli.values.arrays import Array

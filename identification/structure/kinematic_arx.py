@@ -16,7 +16,7 @@ from identification.structure.lpvarx import CONSTANT, LPVARX, UNSCHEDULED
 from identification.structure.orders import Orders
 from identification.structure.steady_wind import VELOCITY, SteadyWind, of_air
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv import FunctionSpace
+from symheli.lpv.bases import FunctionSpace
 from symheli.records import FlightRecord
 from symheli.values import Signal
 from symheli.values.arrays import Array

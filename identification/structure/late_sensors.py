@@ -35,7 +35,7 @@ class LateSensors:
     --------
     >>> time = 0.02 * np.arange(200)
     >>> late = FlightRecord.from_arrays(time, {"q": "rad/s"}, q=np.sin(3.0 * (time - 0.05)))
-    >>> true = idn.LateSensors(delay=0.05, signals=("q",)).along(late)
+    >>> true = idn.structure.LateSensors(delay=0.05, signals=("q",)).along(late)
     >>> bool(np.abs(true["q"] - np.sin(3.0 * time))[:190].max() < 1e-5)
     True
     """

@@ -11,7 +11,8 @@ import numpy as np
 
 from identification.structure.orders import Orders, Table, compact, table
 from symheli.errors import InputError
-from symheli.lpv import Basis, FunctionSpace, Polynomial, Product
+from symheli.lpv import Polynomial, Product
+from symheli.lpv.bases import Basis, FunctionSpace
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 

@@ -7,7 +7,7 @@ from functools import cached_property
 
 from identification.structure.lpvarx import CONSTANT, LPVARX, UNSCHEDULED
 from symheli.errors import InputError
-from symheli.lpv import FunctionSpace
+from symheli.lpv.bases import FunctionSpace
 from symheli.values.numbers import whole
 
 

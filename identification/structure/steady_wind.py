@@ -39,7 +39,7 @@ class SteadyWind:
 
     Examples
     --------
-    >>> wind = idn.SteadyWind(north=-5.0, east=0.0)
+    >>> wind = idn.structure.SteadyWind(north=-5.0, east=0.0)
     >>> turned = wind.in_body(np.zeros(2), np.zeros(2), np.array([0.0, np.pi]))
     >>> print(turned.round(3) + 0.0)
     [[-5.  0.  0.]

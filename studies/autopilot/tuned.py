@@ -20,7 +20,7 @@ from symheli.flight.ardupilot import AXES, COMMANDS
 from symheli.progress import tracked
 from symheli.values.arrays import Array
 from synthesis.design.loops.actuated import actuated
-from synthesis.design.loops.margins import loop, margins
+from synthesis.design.loops.margins import margins, open_loop
 
 CONTROLS = tuple(control for _, _, control in AXES.values())
 
@@ -146,7 +146,7 @@ def _at(
     reached = responses(closed, RESPOND) if closed.is_stable() else dict.fromkeys(CONTROLS, unknown)
     out = []
     for control in CONTROLS:
-        found = margins(loop(plant, loops.linear, control))
+        found = margins(open_loop(plant, loops.linear, control))
         decibels = [abs(20 * math.log10(g)) if g > 0 else math.inf for g in found.gain]
         gain = min(*decibels, LARGEST) if found.stable else 0.0
         phase = min(math.degrees(found.phase), 180.0)

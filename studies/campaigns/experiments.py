@@ -10,11 +10,13 @@ from itertools import product
 
 import numpy as np
 
-from identification import Experiment, Plan, choose_experiments, compare_experiments
+from identification import choose_experiments
+from identification.design import Experiment, Plan, compare_experiments
 from studies.output import columns
 from studies.setup.axes import Axis
 from studies.setup.flights import AMPLITUDE, TOP, autopilot_for
-from symheli import AirspeedSchedule, Excitation, FlightRecord, Helicopter, SymheliError, fly
+from symheli import AirspeedSchedule, Excitation, FlightRecord, Helicopter, fly
+from symheli.errors import SymheliError
 from symheli.flight import Autopilot
 from symheli.flight.excitation import Kind
 from symheli.progress import tracked

@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from identification import Experiment, Plan, compare_experiments
+from identification.design import Experiment, Plan, compare_experiments
 from studies.campaigns.experiments import CANDIDATES, Candidate, Comparison
 from studies.setup.axes import ALL, LATERAL, LONGITUDINAL, SCHEDULING, Axis
 from studies.setup.flights import AMPLITUDE, TOP, autopilot_for
-from symheli import AirspeedSchedule, Excitation, FlightRecord, Helicopter, SymheliError, fly
-from symheli.errors import InputError
+from symheli import AirspeedSchedule, Excitation, FlightRecord, Helicopter, fly
+from symheli.errors import InputError, SymheliError
 from symheli.flight.excitation import FADE_IN, FADE_OUT
 from symheli.logs.files import text
 from symheli.progress import tracked

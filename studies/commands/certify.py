@@ -91,7 +91,7 @@ def run(arguments: argparse.Namespace) -> Output:
     if arguments.lft:
         _refuse_form(arguments)
         progress(f"LFT test with {arguments.lft} for a parameter that may jump")
-        test = synthesis.lft_stability if arguments.stability else synthesis.lft_gain
+        test = synthesis.analysis.lft_stability if arguments.stability else synthesis.lft_gain
         cert, rate = test(loop.to_lft().reduce(), arguments.lft), math.inf
     else:
         progress(f"searching a Lyapunov function for |dp/dt| <= {arguments.rate:g} per second")
@@ -174,7 +174,7 @@ def _refuse_form(arguments: argparse.Namespace) -> None:
 
 def _form(arguments: argparse.Namespace) -> LyapunovForm:
     """Raises `InputError` for options that do not go together."""
-    from synthesis import HigherOrder, Memory, Spline
+    from synthesis.forms import HigherOrder, LaggedParameter, Spline
 
     if arguments.memory and arguments.order > 1:
         raise InputError("give --memory or --order, not both: they are different forms of V")
@@ -183,7 +183,7 @@ def _form(arguments: argparse.Namespace) -> LyapunovForm:
     segments = tuple(arguments.segments) if arguments.segments else None
     if arguments.memory:
         across, degree = arguments.across or (3, 2)
-        return Memory(
+        return LaggedParameter(
             arguments.memory,
             segments=segments,
             grading=arguments.grading or 1.5,

@@ -50,7 +50,7 @@ def run(arguments: argparse.Namespace) -> Output:
     """Check the installation; exit with 1 where something required is missing."""
     from identification.recursive.kernel import compiled_kernel, compiled_kernels
     from symheli.codegen.compile import cache_directory, compiler
-    from synthesis import installed_solvers
+    from synthesis.analysis import installed_solvers
 
     required, optional = {n: _version(n) for n in REQUIRED}, {n: _version(n) for n in OPTIONAL}
     cc, cache, problem = compiler(), cache_directory(), _unwritable(str(cache_directory()))

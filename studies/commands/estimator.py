@@ -47,8 +47,9 @@ ARGUMENTS = (
 
 def write(arguments: argparse.Namespace, heli: Helicopter) -> tuple[Path, ...]:
     """Write the files into the folder --out (default: estimator)."""
-    from identification import LPVARX, Constant, Directional, Polynomial, RecursiveLeastSquares
+    from identification import LPVARX, Polynomial, RecursiveLeastSquares
     from identification.export import write_estimator
+    from identification.forgetting import Constant, Directional
     from symheli.errors import UnknownNameError
 
     units = {str(s): s.unit for s in (*heli.states, *heli.inputs)} | {"airspeed": "m/s"}

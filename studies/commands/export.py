@@ -102,8 +102,8 @@ def run(arguments: argparse.Namespace) -> Output:
 
 
 def _model(arguments: argparse.Namespace) -> tuple[Path, ...]:
-    from identification import KinematicModel, LPVARXModel
     from identification.export import write_kinematic_model, write_model
+    from identification.model import KinematicModel, LPVARXModel
 
     given = given_model.read(
         _named(arguments, "as symheli identify LOG --save FILE.json writes it")
@@ -122,8 +122,8 @@ def _model(arguments: argparse.Namespace) -> tuple[Path, ...]:
 
 def _mat(arguments: argparse.Namespace) -> tuple[Path, ...]:
     """The model of --model for MATLAB."""
+    from symheli import LinearFamily
     from symheli.export import write_family_mat
-    from symheli.lpv import LinearFamily
 
     given, path = given_model.read(arguments.model), arguments.out
     path = path or Path(f"{arguments.model.stem}.mat")

@@ -15,9 +15,8 @@ from studies.commands.arguments import group, option
 from symheli.errors import InputError
 
 if TYPE_CHECKING:
-    from identification import KinematicModel, LPVARXModel
-    from symheli import LPVStateSpace
-    from symheli.lpv import LinearFamily
+    from identification.model import KinematicModel, LPVARXModel
+    from symheli import LinearFamily, LPVStateSpace
 
     Given = LPVARXModel | KinematicModel | LinearFamily
 
@@ -56,8 +55,8 @@ WITHOUT_CHANNELS = (group(FROM_A_FILE, None, *MODEL), *LOOP)
 
 def read(path: Path) -> Given:
     """The model in a file, whichever it is; raises `InputError` for another."""
-    from identification import KinematicModel, LPVARXModel
-    from symheli.lpv import LinearFamily
+    from identification.model import KinematicModel, LPVARXModel
+    from symheli import LinearFamily
 
     kind = FAMILY if path.suffix == ".npz" else _schema(path)
     loaders: Mapping[str, Any] = {
@@ -74,7 +73,7 @@ def lpv_model(arguments: argparse.Namespace) -> LPVStateSpace:
     """The LPV model of --model: a family interpolated entry by entry in --degree, an
     identified model as it is; with --states. Raises `InputError` for states of an identified model.
     """
-    from symheli.lpv import LinearFamily
+    from symheli import LinearFamily
 
     given = read(arguments.model)
     if isinstance(given, LinearFamily):

@@ -167,7 +167,7 @@ ARGUMENTS = (
 
 def run(arguments: argparse.Namespace) -> Output:
     """Read, preprocess, fit and validate; or survey the log, where no fit is requested."""
-    from identification import against_constant
+    from identification.judge import compare_constant
     from studies.log import in_feedback, report
 
     if arguments.log.suffix.lower() == ".toml":
@@ -197,7 +197,7 @@ def run(arguments: argparse.Namespace) -> Output:
         if arguments.method != "ls":
             raise InputError("--orders compares models of least squares; leave --method out")
         return _orders(replace(structure, offset_rate=trim == "moving"), training, test, hold)
-    result = against_constant(
+    result = compare_constant(
         structure,
         training,
         test,
@@ -388,7 +388,7 @@ class _Prepared(NamedTuple):
 
 def _method(name: str, instruments: tuple[str, ...]) -> Any:
     """The method of this name, with its instruments."""
-    from identification import InstrumentalVariables, OutputError, RefinedInstruments
+    from identification.methods import InstrumentalVariables, OutputError, RefinedInstruments
 
     if not instruments:
         return name

@@ -14,7 +14,7 @@ from studies.output import Output, columns, progress
 from symheli.errors import InputError
 
 if TYPE_CHECKING:
-    from synthesis import Margins
+    from synthesis.design.loops.margins import Margins
 
 HELP = "gain, phase, delay and disk margins and attitude bandwidths over airspeed"
 MARGINS, UNITS = ("gain", "phase", "delay", "disk"), ("x", "deg", "ms", "")

@@ -64,7 +64,7 @@ def run(arguments: argparse.Namespace) -> Output:
 def _given(choices: DesignChoices):
     """The model of a file that is designed for."""
     from studies.commands.given_model import read
-    from symheli.lpv import LinearFamily
+    from symheli import LinearFamily
 
     if not choices.model:
         return None

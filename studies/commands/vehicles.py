@@ -66,7 +66,7 @@ def _list() -> Output:
         [
             "airframes (symheli.Helicopter.load)",
             *map(_lines, airframes),
-            "linear models (symheli.identified_model)",
+            "linear models (symheli.airframe.identified_model)",
             *map(_lines, models),
         ]
     )

@@ -15,7 +15,8 @@ from studies.controllers.plant import closed
 from studies.setup.bounds import CONSTANT, PLAIN, Bound
 from studies.setup.questions import Questions
 from symheli import LPVStateSpace
-from synthesis import Solver, Spline
+from synthesis import Solver
+from synthesis.forms import Spline
 
 CHANNEL = "controllers"
 

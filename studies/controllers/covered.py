@@ -9,14 +9,14 @@ from symheli.errors import InputError
 
 if TYPE_CHECKING:
     from symheli.flight.flight_data import FlightData
-    from synthesis import Tube
+    from synthesis.tubes import Tube
 
 NO_TUBE = "no tube of this controller was given"
 
 
 def proven(files: Iterable[str]) -> list[Tube]:
     """Tubes read from files and proven again; raises `InputError` where one is not."""
-    from synthesis import Tube
+    from synthesis.tubes import Tube
 
     found = [(name, Tube.load(name)) for name in files]
     for name, tube in found:
@@ -29,7 +29,7 @@ def uncovered(flown: FlightData, tubes: Sequence[Tube]) -> str:
     """What keeps a flight from being covered: the first hypothesis that fails, of the tube whose
     first failure comes last; empty where a tube covers it.
     """
-    from synthesis import coverage
+    from synthesis.tubes import coverage
 
     if flown.lost >= 0:
         return "the flight was lost"

@@ -12,7 +12,10 @@ from typing import Any
 import numpy as np
 
 import symheli
-from identification import FitForControl, KinematicModel, fit_for_control, structure_bias
+from identification import fit_for_control
+from identification.judge import structure_bias
+from identification.judge.fit_for_control import FitForControl
+from identification.model import KinematicModel
 from studies.controllers.design_choices import (
     BACK_OFF,
     BACK_OFFS,
@@ -29,14 +32,14 @@ from studies.known_kinematics.models import simulator_of
 from studies.known_kinematics.rivals import KnownKinematics
 from studies.setup.flights import autopilot_for
 from studies.setup.questions import Questions
-from symheli import FlightRecord, Helicopter, LPVStateSpace, SimulatedFlight, linearize
+from symheli import FlightRecord, Helicopter, LPVStateSpace, linearize
 from symheli.errors import (
     AccuracyError,
     CertificateError,
     SolverError,
     SymheliError,
 )
-from symheli.flight import XCELL_SERVOS, gain_scheduled_lqr
+from symheli.flight import XCELL_SERVOS, SimulatedFlight, gain_scheduled_lqr
 from synthesis import Plant
 from synthesis.design.loops.controller import Controller
 from synthesis.design.loops.reduction import fewest

@@ -21,21 +21,13 @@ from studies.controllers.design_choices import (
 )
 from studies.controllers.designs import Designs
 from studies.controllers.measures import Measures, measured
-from symheli import (
-    AirspeedSchedule,
-    Dryden,
-    FlightPlan,
-    Helicopter,
-    LPVStateSpace,
-    ScheduledController,
-    Wind,
-    fly_batch,
-)
+from symheli import AirspeedSchedule, FlightPlan, Helicopter, LPVStateSpace, Wind
+from symheli.environment import Dryden
 from symheli.errors import ValidityWarning
-from symheli.flight import XCELL_SERVOS, Sensor
+from symheli.flight import XCELL_SERVOS, ScheduledController, Sensor, fly_batch
 
 if TYPE_CHECKING:
-    from synthesis import Tube
+    from synthesis.tubes import Tube
 
 LOW, HIGH = 0.5, 12.0
 """Lowest and highest airspeed of the transition, m/s; the acceleration between them is the

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification import KinematicModel
+from identification.model import KinematicModel
 from studies.controllers.design_choices import GUSTS, MEASUREMENTS, RATE, TOP
 from studies.controllers.in_airspeed import of_degree
 from symheli import LPVStateSpace, Scheduling

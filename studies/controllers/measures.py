@@ -19,7 +19,7 @@ from symheli.steady.validity import Validity
 from symheli.values.arrays import Array
 
 if TYPE_CHECKING:
-    from synthesis import Tube
+    from synthesis.tubes import Tube
 
 AT_THE_STOP = 0.999
 """Of the travel."""

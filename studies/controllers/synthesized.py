@@ -16,7 +16,7 @@ import numpy as np
 
 import symheli
 import synthesis
-from identification import KinematicModel, LPVARXModel
+from identification.model import KinematicModel, LPVARXModel
 from studies.controllers.certified import FORM, SOLVER
 from studies.controllers.design_choices import NOISE_SHARE, DesignChoices
 from studies.controllers.designs import NEAR
@@ -39,21 +39,19 @@ from studies.controllers.plant import (
 )
 from symheli import (
     AirspeedSchedule,
-    Dryden,
     FlightPlan,
     Helicopter,
     LinearFamily,
     LPVStateSpace,
-    ScheduledController,
     Scheduling,
     Sensor,
     TableController,
     Wind,
-    fly_batch,
 )
 from symheli.dynamics import INPUTS
+from symheli.environment import Dryden
 from symheli.errors import CompilerWarning, InputError, SynthesisError, ValidityWarning
-from symheli.flight import TableState
+from symheli.flight import ScheduledController, TableState, fly_batch
 from symheli.flight.controller import Entered
 from symheli.flight.flight_data import FlightData
 from symheli.progress import task
@@ -291,7 +289,7 @@ def flights_of(table: TableController, choices: DesignChoices) -> tuple[FlightDa
     controller: object = table
     if len(table.outputs) < len(heli.inputs):
         ideal = Helicopter.load(choices.vehicle, governor="ideal")
-        lqr = symheli.gain_scheduled_lqr(ideal, low, high, choices.period)
+        lqr = symheli.flight.gain_scheduled_lqr(ideal, low, high, choices.period)
         controller = BesideAutopilot(table, lqr.scheduled_controller)
     servos = {u: choices.servo(u) for u in map(str, heli.inputs)}
     plan = FlightPlan(

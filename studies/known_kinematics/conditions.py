@@ -12,25 +12,19 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 import symheli
-from identification import (
-    Actuators,
-    FilterError,
-    KinematicARX,
-    KinematicModel,
-    LateSensors,
-    Polynomial,
-    Product,
-    SteadyWind,
-    fit,
-)
+from identification import Actuators, KinematicARX, Polynomial, fit
+from identification.methods import FilterError
+from identification.model import KinematicModel
+from identification.structure import LateSensors, SteadyWind
 from identification.structure.kinematic_arx import STATES
 from studies.known_kinematics.flights import aggressive
 from studies.known_kinematics.models import FASTEST, GUST, INPUTS, SCHEDULING, structure
 from studies.known_kinematics.truth import AXES, SPEEDS, FrozenAxes, Truth, frozen
 from studies.setup.bounds import PERIOD
 from studies.setup.flights import NOISE_DB, TOP, autopilot_for, light_turbulence
-from symheli import FlightPlan, FlightRecord, Helicopter, Sensor, SimulatedFlight, Wind
-from symheli.flight import XCELL_SERVOS, gain_scheduled_lqr
+from symheli import FlightPlan, FlightRecord, Helicopter, Sensor, Wind
+from symheli.flight import XCELL_SERVOS, SimulatedFlight, gain_scheduled_lqr
+from symheli.lpv import Product
 from symheli.values.arrays import Array
 
 ALL = "all axes"

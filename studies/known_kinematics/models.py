@@ -6,9 +6,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from identification import FilterError, KinematicARX, KinematicModel, Polynomial, Product, fit
+from identification import KinematicARX, Polynomial, fit
+from identification.methods import FilterError
+from identification.model import KinematicModel
 from studies.setup.flights import TOP
-from symheli import FlightRecord, Helicopter, SimulatedFlight
+from symheli import FlightRecord, Helicopter
+from symheli.flight import SimulatedFlight
+from symheli.lpv import Product
 
 INPUTS = ("d_lon", "d_lat", "d_col", "d_ped")
 SCHEDULING = ("airspeed_command", "acceleration_command")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import symheli
-from identification import fit_percent
+from identification.judge import fit_percent
 from symheli import FlightRecord, Helicopter
 from symheli.values.arrays import Array
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from identification import KinematicModel
+from identification.model import KinematicModel
 from symheli.values.arrays import Array
 
 

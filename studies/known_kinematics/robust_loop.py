@@ -7,17 +7,17 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-from identification import KinematicModel
+from identification.model import KinematicModel
 from studies.loops.robust_lateral import FEEDBACK
 from studies.setup.bounds import SIZES
 from symheli import UncertainStateSpace
-from synthesis import Spline
+from synthesis.forms import Spline
 
 OUTPUTS, INPUTS = ("v", "p", "r", "phi"), ("d_lat", "d_ped")
 
 PROBABILITY = 0.95
 DRAWS = 20_000
-"""Of the radius of the ellipsoid: see `identification.matrix_ellipsoid`."""
+"""Of the radius of the ellipsoid: see `identification.model.matrix_ellipsoid`."""
 
 DEGREE = 4
 """Of the loop in airspeed: what it leaves of any entry is below 1e-4 of the largest."""

@@ -8,7 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import symheli
-from identification import FrozenModels, KinematicModel, compare_frozen
+from identification import compare_frozen
+from identification.judge.frozen_models import FrozenModels
+from identification.model import KinematicModel
 from studies.known_kinematics.models import INPUTS
 from studies.loops.lateral import HOLD
 from studies.setup.axes import SCALES

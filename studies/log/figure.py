@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from identification import AgainstConstant
-from identification.judge.against_constant import Scored
+from identification.judge.against_constant import AgainstConstant, Scored
 from identification.judge.scores import percent, predicted, steps
 from symheli.records.record_plot import draw, shade_missing
 from symheli.values.drawing import label, windowless_figure

@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from identification import AgainstConstant, FitForControl, fit_for_control
+from identification import fit_for_control
+from identification.judge.against_constant import AgainstConstant
+from identification.judge.fit_for_control import FitForControl
 from symheli.errors import InputError
 from symheli.values.signal import indices
 

@@ -10,9 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from identification import AgainstConstant, LPVARXModel, residual_analysis, slow_modes, uncertainty
-from identification.judge.against_constant import HORIZONS, PAYS
+from identification import residual_analysis, uncertainty
+from identification.judge import slow_modes
+from identification.judge.against_constant import HORIZONS, PAYS, AgainstConstant
 from identification.judge.scores import Scores, percent
+from identification.model import LPVARXModel
 from identification.model.lpvarx_model import LEAST_SQUARES
 from studies.output import columns
 from symheli.logs.segments import Segment
@@ -170,8 +172,8 @@ def _fits(scores: Scores | None) -> dict[str, Any] | None:
 
 
 def _coefficients(model: LPVARXModel) -> dict[str, Any]:
-    """Return the coefficients of 1, p, p^2, ... by lag, as `identification.Coefficients.monomial`
-    arranges them.
+    """Return the coefficients of 1, p, p^2, ... by lag, in the order of
+    `identification.model.Coefficients.monomial`.
     """
     values = model.coefficients.monomial()
     return {

@@ -19,7 +19,7 @@ import numpy as np
 import symheli
 from studies.loops.lateral import ATTITUDE_HOLD, CHANNELS, STATES, close
 from symheli import Helicopter, LinearFamily, LPVStateSpace, Scheduling
-from symheli.lpv import Patches
+from symheli.lpv.bases import Patches
 
 Array = np.ndarray
 Channel = Literal["gust", "inputs"]

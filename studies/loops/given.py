@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import synthesis
 from symheli import LPVStateSpace
-from synthesis import Margins
+from synthesis.design.loops.margins import Margins
 
 
 @dataclass(frozen=True)
@@ -25,4 +25,6 @@ def over_parameter(
     inputs = list(dict.fromkeys(u for u, _ in gains))
     for p in values:
         model = lpv.at(p)
-        yield BrokenAt(p, {u: synthesis.margins(synthesis.loop(model, gains, u)) for u in inputs})
+        yield BrokenAt(
+            p, {u: synthesis.margins(synthesis.analysis.open_loop(model, gains, u)) for u in inputs}
+        )

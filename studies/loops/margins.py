@@ -11,10 +11,10 @@ import synthesis
 from studies.loops.lateral import HOLD
 from symheli import LinearModel
 from symheli.flight import XCELL_SERVOS
-from symheli.lpv import pade_delay
+from symheli.lpv.tools import pade_delay
 from symheli.progress import tracked
-from synthesis import Margins
 from synthesis.design.loops.handling_qualities import Bandwidth
+from synthesis.design.loops.margins import Margins
 
 DELAY = 0.02
 """From measurement to command, s."""
@@ -50,7 +50,12 @@ def over_airspeed(
         roll = behind_servo(roll, "d_lat")
         held = roll.feedback({("d_lat", "phi"): HOLD}).select(inputs=["d_lat"], outputs=["phi"])
         stick = behind_servo(pitch, "d_lon").select(inputs=["d_lon"], outputs=["theta"])
-        hold = synthesis.margins(synthesis.loop(roll, {("d_lat", "phi"): HOLD}, "d_lat"))
+        hold = synthesis.margins(
+            synthesis.analysis.open_loop(roll, {("d_lat", "phi"): HOLD}, "d_lat")
+        )
         yield AtAirspeed(
-            float(airspeed), hold, synthesis.bandwidth(held), synthesis.bandwidth(stick)
+            float(airspeed),
+            hold,
+            synthesis.analysis.attitude_bandwidth(held),
+            synthesis.analysis.attitude_bandwidth(stick),
         )

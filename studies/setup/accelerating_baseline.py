@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import symheli
-from identification import BaselineModel, beside_baseline
+from identification.judge import BaselineModel, compare_baseline
 from studies.setup.axes import (
     HORIZON,
     SCHEDULING,
@@ -34,7 +34,7 @@ def baselines(heli: Helicopter) -> dict[str, BaselineModel]:
     """
     airspeeds = np.linspace(0.0, TOP, POINTS).tolist()
     alone = symheli.sweep(heli, airspeeds)
-    both = symheli.sweep_grid(heli, airspeeds, acceleration=ACCELERATIONS)
+    both = symheli.steady.sweep_grid(heli, airspeeds, acceleration=ACCELERATIONS)
     return {
         ALONE: along_the_command(alone.interpolate("spline"), heli),
         BOTH: along_the_command(both.interpolate("spline"), heli),
@@ -43,7 +43,7 @@ def baselines(heli: Helicopter) -> dict[str, BaselineModel]:
 
 def fits(models: dict[str, BaselineModel], test: FlightRecord) -> dict[tuple[str, str], float]:
     """{(model, output): percent}, 1 s ahead on a flight."""
-    found = beside_baseline({}, models, test, tuple(MARKS), horizon=HORIZON)
+    found = compare_baseline({}, models, test, tuple(MARKS), horizon=HORIZON)
     return {(p.name, y): p.scores.ahead[y] for p in found.predictions for y in MARKS}
 
 

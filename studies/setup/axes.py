@@ -10,17 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 import symheli
-from identification import (
-    LPVARX,
-    InstrumentalVariables,
-    LPVARXModel,
-    Polynomial,
-    RecursiveLeastSquares,
-    Scores,
-    fit,
-    pole_miss,
-    scores,
-)
+from identification import LPVARX, Polynomial, RecursiveLeastSquares, fit, scores
+from identification.judge import Scores, pole_distance
+from identification.methods import InstrumentalVariables
+from identification.model import LPVARXModel
 from studies.setup.flights import TOP
 from symheli import FlightRecord, Helicopter, LinearModel
 from symheli.errors import DataWarning
@@ -126,7 +119,7 @@ def mode_misses(heli: Helicopter, model: LPVARXModel, mode: str) -> dict[float, 
     magnitude, at frozen airspeeds.
     """
     exact = {v: symheli.linearize(heli, symheli.trim(heli, v)) for v in FROZEN_SPEEDS}
-    return {v: pole_miss(model.at(v), rotor_mode(exact[v], mode)) for v in FROZEN_SPEEDS}
+    return {v: pole_distance(model.at(v), rotor_mode(exact[v], mode)) for v in FROZEN_SPEEDS}
 
 
 def judged(heli: Helicopter, axis: Axis, model: LPVARXModel, test: FlightRecord) -> Judged:

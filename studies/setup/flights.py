@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from symheli import AirspeedSchedule, Dryden, Excitation, FlightRecord, Helicopter, Wind, fly
+from symheli import AirspeedSchedule, Excitation, FlightRecord, Helicopter, Wind, fly
+from symheli.environment import Dryden
 from symheli.flight import Autopilot, gain_scheduled_lqr
 
 TOP = 13.0

@@ -18,16 +18,9 @@ from studies.controllers.measures import AT_THE_STOP, heading, noise_of, of_flig
 from studies.controllers.measures import MEASUREMENTS as MEASURED
 from studies.setup.flights import autopilot_for
 from studies.specs.of_vehicle import FLIGHTS_FROM, OfVehicle, digest_of, share_met
-from symheli import (
-    AirspeedSchedule,
-    FlightPlan,
-    Helicopter,
-    LPVStateSpace,
-    ScheduledController,
-    fly_batch,
-)
+from symheli import AirspeedSchedule, FlightPlan, Helicopter, LPVStateSpace
 from symheli.errors import CompilerWarning, ValidityWarning
-from symheli.flight import XCELL_SERVOS
+from symheli.flight import XCELL_SERVOS, ScheduledController, fly_batch
 from symheli.flight.flight_data import FlightData
 from symheli.progress import tracked
 from symheli.values.arrays import Array

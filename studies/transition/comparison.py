@@ -7,8 +7,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import symheli
-from identification import FrozenModels, beside_baseline, compare_frozen
+from identification import compare_frozen
+from identification.judge import compare_baseline
 from identification.judge.beside_baseline import BesideBaseline
+from identification.judge.frozen_models import FrozenModels
 from studies.setup.accelerating_baseline import along_the_command
 from studies.setup.axes import (
     ALL,
@@ -83,7 +85,7 @@ def compare(
             rivals = {
                 name: identification.of(which, noise).model for name, which in _rivals(axis).items()
             }
-            found = beside_baseline(
+            found = compare_baseline(
                 rivals, baselines, flights.test[noise], axis.outputs, horizon=HORIZON
             )
             predictions.append(ComparedAxis(axis=axis, noise=noise, found=found))

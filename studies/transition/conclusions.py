@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from studies.known_kinematics.rivals import KnownKinematics
     from studies.setup.bounds import Bound
     from studies.transition.outcome import Outcome
-    from synthesis import GainCurve
+    from synthesis.certify.questions.gain_curve import GainCurve
 
 CHEAP = 0.1
 """Share by which a gain that is proven for any rate may exceed the frozen one for the rate to

@@ -198,7 +198,7 @@ def covered(found: FlownControllers) -> Table:
         " the steady wind among them, without sensor noise, and of servos whose rate limit is not"
         f" reached. In the least turbulence flown ({calm.gust:.1f} m/s) the wind had up to"
         f" {np.median([flight.wind for flight in calm.flights]):.1f} m/s by median. Tubes are made"
-        " by synthesis.tube, and given by their files: tubes = [...] under [effort]."
+        " by synthesis.tubes.tube, and given by their files: tubes = [...] under [effort]."
     )
     return table
 

@@ -8,9 +8,10 @@ from dataclasses import dataclass, field
 from studies.choices import about, check, choice
 from studies.known_kinematics.flights import LONGEST as AGGRESSIVE
 from studies.known_kinematics.robust_loop import FORM
-from synthesis import Search, Spline
+from synthesis.analysis import LowerBoundSearch
+from synthesis.forms import Spline
 
-GLANCE = Search(levels=6, dwells=5, starts=1, nodes=60, evaluations=8, samples=20_000)
+GLANCE = LowerBoundSearch(levels=6, dwells=5, starts=1, nodes=60, evaluations=8, samples=20_000)
 """A short look for bad airspeeds."""
 
 
@@ -70,8 +71,9 @@ class Effort:
     tubes: tuple[str, ...] = choice(
         (), "files of proven tubes, by Tube.save, that these flights are compared with", empty=True
     )
-    search: Search = field(
-        default_factory=Search, metadata=about("for bad trajectories of the lateral gust loop")
+    search: LowerBoundSearch = field(
+        default_factory=LowerBoundSearch,
+        metadata=about("for bad trajectories of the lateral gust loop"),
     )
     """Its gain grows with the rate; elsewhere a glance finds the growth there is, and nothing above
     frozen.

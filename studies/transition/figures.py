@@ -20,13 +20,13 @@ from symheli.values.drawing import BLUE, GREEN, GREY, INK, ORANGE, RED
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from identification import FrozenModels
+    from identification.judge.frozen_models import FrozenModels
     from studies.known_kinematics.rivals import KnownKinematics
     from studies.setup.flights import StudyRecords
     from studies.transition.comparison import ComparedAxis
     from studies.transition.outcome import Outcome
     from studies.transition.paper_experiment import PaperExperiment
-    from synthesis import GainCurve
+    from synthesis.certify.questions.gain_curve import GainCurve
 
 DEGREES = 180 / math.pi
 

@@ -19,8 +19,9 @@ from studies.loops.margins import (
     over_airspeed,
 )
 from studies.setup.axes import RATES, rotor_mode
-from symheli import LinearFamily, TrimPoint
+from symheli import LinearFamily
 from symheli.errors import InputError
+from symheli.steady import TrimPoint
 
 POINTS = 5
 """Airspeeds that are shown, evenly over the range."""

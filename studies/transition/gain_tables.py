@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from studies.setup.bounds import FORMS, SIZES, Bound, proven, rate_text
 from studies.transition.tables import Table, gain
-from synthesis import Status
+from synthesis.analysis import Status
 
 CHANNELS = {
     "gust": (

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 import synthesis
-from identification import LPVARXModel
+from identification.model import LPVARXModel
 from studies.loops.exact_lateral import ExactLateral
 from studies.loops.lateral import ATTITUDE_HOLD, STATES, close
 from studies.setup.bounds import (
@@ -33,7 +33,9 @@ from symheli import (
     UncertainStateSpace,
 )
 from symheli.lpv.bases import Polynomial
-from synthesis import GainCurve, Memory, Search, Spline
+from synthesis.analysis import LowerBoundSearch
+from synthesis.certify.questions.gain_curve import GainCurve
+from synthesis.forms import LaggedParameter, Spline
 from synthesis.numerics.linear.norm import norm
 
 ESTIMATE, ALLOWED = "identified, the estimate", "identified, every model allowed"
@@ -41,7 +43,7 @@ ESTIMATE, ALLOWED = "identified, the estimate", "identified, every model allowed
 
 
 MEMORIES = {
-    rate: Memory(lag, segments=8, grading=1.5, across_segments=across, across_degree=3)
+    rate: LaggedParameter(lag, segments=8, grading=1.5, across_segments=across, across_degree=3)
     for rate, lag, across in ((3.0, 0.6, 3), (4.5, 0.6, 3), (6.0, 0.5, 4))
 }
 """Accelerations (m/s^2) at which a P with a memory is tried, on a coarser mesh than
@@ -141,7 +143,7 @@ def bounds(
     lpv: LPVStateSpace,
     rates: Sequence[float],
     form: Spline,
-    search: Search,
+    search: LowerBoundSearch,
 ) -> list[Proof]:
     """One gain a rate (m/s^2), and stability where no gain is proven and no growth was found.
 
@@ -152,10 +154,15 @@ def bounds(
 
 
 def _bound(
-    name: str, channel: str, lpv: LPVStateSpace, rate: float, spline: Spline, search: Search
+    name: str,
+    channel: str,
+    lpv: LPVStateSpace,
+    rate: float,
+    spline: Spline,
+    search: LowerBoundSearch,
 ) -> list[Bound]:
     form = CONSTANT if math.isinf(rate) else PLAIN
-    thorough = Search(seconds=math.inf) if math.isinf(rate) else search
+    thorough = LowerBoundSearch(seconds=math.inf) if math.isinf(rate) else search
     certificate = synthesis.l2_gain(lpv, rate, form=spline, search=thorough)
     found = [Bound(name, channel, rate, form, certificate)]
     if not certificate.verified and math.isfinite(certificate.lower):
@@ -170,7 +177,7 @@ def answered(proofs: Sequence[Proof]) -> list[Bound]:
 
 
 def memory_bounds(
-    name: str, channel: str, lpv: LPVStateSpace, known: Sequence[float], search: Search
+    name: str, channel: str, lpv: LPVStateSpace, known: Sequence[float], search: LowerBoundSearch
 ) -> list[Proof]:
     """Gains by a P with a memory; the lower bound is looked for where it is not `known`."""
     return [
@@ -180,7 +187,7 @@ def memory_bounds(
 
 
 def _memory_bound(
-    name: str, channel: str, lpv: LPVStateSpace, rate: float, search: Search | None
+    name: str, channel: str, lpv: LPVStateSpace, rate: float, search: LowerBoundSearch | None
 ) -> list[Bound]:
     certificate = synthesis.l2_gain(lpv, rate, form=MEMORIES[rate], search=search)
     return [Bound(name, channel, rate, MEMORY, certificate)]

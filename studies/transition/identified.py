@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from identification import LPVARXModel, Scores
+from identification.judge import Scores
+from identification.model import LPVARXModel
 from studies.setup.axes import (
     ALL,
     AXES,

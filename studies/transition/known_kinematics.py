@@ -10,7 +10,9 @@ from collections.abc import Sequence
 import numpy as np
 
 import symheli
-from identification import BaselineModel, LPVARXModel, fit
+from identification import fit
+from identification.judge import BaselineModel
+from identification.model import LPVARXModel
 from studies.known_kinematics import flights, models
 from studies.known_kinematics.predictions import HORIZON, OUTPUTS, fits_of, states_of
 from studies.known_kinematics.rivals import KnownKinematics, Rival

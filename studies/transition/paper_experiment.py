@@ -9,9 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_discrete_are
 
-from identification import LPVARX, LPVARXModel, Polynomial, RecursiveLeastSquares, excitation_report
+from identification import LPVARX, Polynomial, RecursiveLeastSquares, excitation_report
+from identification.model import LPVARXModel
 from studies.setup.flights import TOP
-from symheli import ExcitationError, FlightRecord, LinearFamily, LPVStateSpace
+from symheli import FlightRecord, LinearFamily, LPVStateSpace
+from symheli.errors import ExcitationError
 
 PERIOD = 0.11408
 """Sample period, s (Budiyono & Sutarto)."""

@@ -20,8 +20,10 @@ from studies.transition.effort import GLANCE
 from studies.transition.guarantees import Proof
 from studies.transition.identified import Identification
 from symheli import Helicopter
-from synthesis import Search, Spline, frozen_gain
+from synthesis import frozen_gain
+from synthesis.analysis import LowerBoundSearch
 from synthesis.certify.lower_bounds.frozen import FrozenGain
+from synthesis.forms import Spline
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,7 +68,7 @@ def gust_questions(
     gust_segments: tuple[int, ...],
     exact_rates: Sequence[float],
     thorough: bool,
-    search: Search,
+    search: LowerBoundSearch,
 ) -> Questions:
     """About the baseline, with `thorough` the exact models too; continuous time."""
     loop, form = guarantees.gust_loop(baseline.nodes), Spline(segments=gust_segments)

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from studies.known_kinematics.conditions import CONDITIONS, Instruments, frozen_all
 from studies.known_kinematics.models import simulator_of
 from studies.setup.bounds import PERIOD
-from symheli import SimulatedFlight
 from symheli.errors import SymheliError
+from symheli.flight import SimulatedFlight
 from symheli.values.arrays import Array
 
 CONDITION = "servos"

@@ -13,7 +13,7 @@ import numpy as np
 from identification import LPVARX, Polynomial, fit
 from studies.setup.flights import TOP
 from symheli import FlightRecord, LinearFamily
-from symheli.lpv import simulate
+from symheli.lpv.tools import simulate
 from symheli.values.signal import UNITS
 
 STATES = ("u", "w", "q", "theta", "a1")

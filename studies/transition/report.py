@@ -38,7 +38,7 @@ from symheli.progress import tracked
 from symheli.values.whole_files import write_text
 
 if TYPE_CHECKING:
-    from identification import LPVARXModel
+    from identification.model import LPVARXModel
     from studies.transition.identified import Identification
     from studies.transition.outcome import Outcome
 

@@ -25,7 +25,8 @@ from studies.transition.saved_proofs import proof_file
 from studies.transition.written_controllers import controllers_to_dict
 
 if TYPE_CHECKING:
-    from identification import FrozenModels, Scores
+    from identification.judge import Scores
+    from identification.judge.frozen_models import FrozenModels
     from studies.known_kinematics.rivals import KnownKinematics
     from studies.setup.flights import StudyRecords
     from studies.transition.baseline import Baseline
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
     from studies.transition.paper_experiment import OutputResult, PaperExperiment
     from studies.transition.real_conditions import RealConditions
     from studies.transition.recovery import Recovery
-    from symheli import Signal
+    from symheli.values import Signal
 
 SCHEMA = "symheli study 8"
 LIBRARIES = ("symheli", "casadi", "numpy", "scipy", "cvxpy", "clarabel")

@@ -16,7 +16,7 @@ from studies.setup.flights import NOISES
 from studies.transition.campaign import MODE_MARK
 from studies.transition.gain_tables import not_about_the_helicopter
 from studies.transition.tables import Table, diverges, percent
-from synthesis import Status
+from synthesis.analysis import Status
 
 if TYPE_CHECKING:
     from studies.setup.bounds import Bound

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from studies.transition.identified import Identification
     from studies.transition.outcome import Outcome
     from studies.transition.real_conditions import RealConditions
-    from synthesis import Margins
+    from synthesis.design.loops.margins import Margins
 
 
 @dataclass

@@ -1,1 +1,5 @@
-"""Airframes as data: vehicle files, their parts, and linear models others identified."""
+"""The vehicle file: quantities, units, sources; models identified elsewhere."""
+
+from symheli.lazy import lazily
+
+__getattr__, __dir__, __all__ = lazily(__name__, __file__)

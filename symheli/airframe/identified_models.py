@@ -38,7 +38,7 @@ class IdentifiedModel(LinearModel):
 
     Examples
     --------
-    >>> model = symheli.identified_model("r50_hover")
+    >>> model = symheli.airframe.identified_model("r50_hover")
     >>> [str(s) for s in model.inputs], len(model.parameters) > 20
     (['lat', 'lon', 'ped', 'col'], True)
     """
@@ -66,7 +66,7 @@ def identified_models() -> list[str]:
 
     Examples
     --------
-    >>> symheli.identified_models()
+    >>> symheli.airframe.identified_models()
     ['r50_hover']
     """
     names = (p.name for p in resources.files("symheli.airframe.vehicles").iterdir())
@@ -102,7 +102,7 @@ def identified_model(name_or_path: str | os.PathLike[str]) -> IdentifiedModel:
 
     Examples
     --------
-    >>> model = symheli.identified_model("r50_hover")
+    >>> model = symheli.airframe.identified_model("r50_hover")
     >>> model.A.shape, model.is_stable()
     ((13, 13), False)
     """

@@ -31,7 +31,7 @@ class Air(NamedTuple):
 
     Examples
     --------
-    >>> round(symheli.standard_atmosphere(0.0).speed_of_sound, 1)
+    >>> round(symheli.environment.standard_atmosphere(0.0).speed_of_sound, 1)
     340.3
     """
 
@@ -69,7 +69,7 @@ def standard_atmosphere(altitude: float, warmer: float = 0.0) -> Air:
 
     Examples
     --------
-    >>> air = symheli.standard_atmosphere(2000.0)
+    >>> air = symheli.environment.standard_atmosphere(2000.0)
     >>> round(air.density, 3), round(air.temperature, 2)
     (1.007, 275.15)
     """

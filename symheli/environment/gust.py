@@ -33,7 +33,7 @@ class Gust:
 
     Examples
     --------
-    >>> gust = symheli.Gust(peak=(0.0, 3.0, 0.0), start=1.0, duration=2.0)
+    >>> gust = symheli.environment.Gust(peak=(0.0, 3.0, 0.0), start=1.0, duration=2.0)
     >>> gust([0.0, 1.5, 2.0]).round(2)
     array([[0. , 0. , 0. ],
            [0. , 1.5, 0. ],

@@ -46,7 +46,7 @@ class Dryden:
 
     Examples
     --------
-    >>> light = symheli.Dryden(wind=7.7, altitude=30.0)
+    >>> light = symheli.environment.Dryden(wind=7.7, altitude=30.0)
     >>> light.intensities.round(2)
     array([1.32, 1.32, 0.77])
     >>> light.history(np.arange(0.0, 10.0, 0.02), airspeed=8.0, seed=1).shape

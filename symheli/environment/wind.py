@@ -39,7 +39,7 @@ class Wind:
 
     Examples
     --------
-    >>> gust = symheli.Gust(peak=(0.0, 2.0, 0.0), start=1.0, duration=2.0)
+    >>> gust = symheli.environment.Gust(peak=(0.0, 2.0, 0.0), start=1.0, duration=2.0)
     >>> wind = symheli.Wind(steady=(-3.0, 0.0, 0.0), gusts=(gust,))
     >>> wind.is_steady, wind.history([0.0, 2.0], [5.0, 5.0]).round(1).tolist()
     (False, [[-3.0, 0.0, 0.0], [-3.0, 2.0, 0.0]])

@@ -77,7 +77,7 @@ def write_controller(
     >>> import symheli, tempfile
     >>> from symheli.export import write_controller
     >>> heli = symheli.Helicopter.load("xcell60", governor="ideal")
-    >>> lqr = symheli.gain_scheduled_lqr(heli, 0.0, 8.0, dt=0.02, points=5)
+    >>> lqr = symheli.flight.gain_scheduled_lqr(heli, 0.0, 8.0, dt=0.02, points=5)
     >>> controller = symheli.TableController.of(lqr.scheduled_controller.model)
     >>> folder = tempfile.TemporaryDirectory()
     >>> [file.name for file in write_controller(controller, folder.name, "lqr")]

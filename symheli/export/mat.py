@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from symheli import LinearFamily
 from symheli.errors import InputError
 from symheli.helicopter import Helicopter
-from symheli.lpv import LinearFamily
 from symheli.steady.airspeed_sweep import sweep
 from symheli.values import Signal
 from symheli.values.whole_files import write_bytes, write_text

@@ -14,6 +14,7 @@ from symheli.flight.schedule import AirspeedSchedule
 from symheli.flight.sensor import Sensor
 from symheli.flight.servo import XCELL_SERVOS, Servo, ServoBank
 from symheli.flight.simulated_flight import SimulatedFlight
+from symheli.flight.stitched_model import StitchedModel
 from symheli.flight.table_arithmetic import StepEvents, TableState
 from symheli.flight.table_controller import TableController
 from symheli.values.controllers import PureController, StatefulController
@@ -38,6 +39,7 @@ __all__ = [
     "SimulatedFlight",
     "StatefulController",
     "StepEvents",
+    "StitchedModel",
     "TableController",
     "TableState",
     "fly",

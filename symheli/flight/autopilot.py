@@ -68,7 +68,7 @@ class Autopilot:
 
     Examples
     --------
-    >>> autopilot = symheli.gain_scheduled_lqr(heli, 0.0, 8.0, dt=0.02, points=5)
+    >>> autopilot = symheli.flight.gain_scheduled_lqr(heli, 0.0, 8.0, dt=0.02, points=5)
     >>> autopilot.gains.shape, autopilot.radius < 1
     ((5, 4, 8), True)
     """
@@ -167,7 +167,7 @@ def gain_scheduled_lqr(
 
     Examples
     --------
-    >>> autopilot = symheli.gain_scheduled_lqr(heli, 4.0, 6.0, dt=0.02, points=3)
+    >>> autopilot = symheli.flight.gain_scheduled_lqr(heli, 4.0, 6.0, dt=0.02, points=3)
     >>> slow = symheli.AirspeedSchedule.transition(4.0, 6.0, acceleration=2.0, hold=0.5)
     >>> record = symheli.fly(heli, slow, controller=autopilot)
     >>> bool(np.abs(record["phi"]).max() < 0.2)

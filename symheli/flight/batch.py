@@ -46,7 +46,7 @@ class FlightBatch(Sequence[FlightRecord]):
     Examples
     --------
     >>> climb = symheli.AirspeedSchedule.transition(4.0, 6.0, acceleration=2.0, hold=0.5)
-    >>> flights = symheli.fly_batch(heli, climb, seeds=range(3), noise_db=30.0)
+    >>> flights = symheli.flight.fly_batch(heli, climb, seeds=range(3), noise_db=30.0)
     >>> len(flights), bool(flights.lost.any()), flights[2].meta["plan"].seed
     (3, False, 2)
     """
@@ -151,7 +151,7 @@ def fly_batch(
     Examples
     --------
     >>> climb = symheli.AirspeedSchedule.transition(4.0, 6.0, acceleration=2.0, hold=0.5)
-    >>> flights = symheli.fly_batch(heli, climb, seeds=[3, 8], noise_db=30.0)
+    >>> flights = symheli.flight.fly_batch(heli, climb, seeds=[3, 8], noise_db=30.0)
     >>> alone = symheli.fly(heli, climb, seed=8, noise_db=30.0)
     >>> bool((flights[1].values == alone.values).all())
     True

@@ -85,7 +85,8 @@ def fly_campaign(
     >>> import tempfile, pathlib
     >>> folder = pathlib.Path(tempfile.mkdtemp()) / "monte-carlo.zarr"
     >>> climb = symheli.AirspeedSchedule.transition(4.0, 6.0, acceleration=2.0, hold=0.5)
-    >>> flights = symheli.fly_campaign(heli, climb, folder, seeds=range(4), signals=["q", "theta"])
+    >>> flights = symheli.flight.fly_campaign(
+    ...     heli, climb, folder, seeds=range(4), signals=["q", "theta"])
     >>> flights["theta"].shape, [str(s) for s in flights.signals]
     ((4, 307), ['q', 'theta'])
     """

@@ -103,7 +103,7 @@ class ScheduledController:
     >>> gains = symheli.LPVStateSpace(
     ...     basis, *empty, -np.array(D), speed, (), ("phi", "p"), ("d_lat",), dt=0.02
     ... )
-    >>> symheli.ScheduledController(gains).dt
+    >>> symheli.flight.ScheduledController(gains).dt
     0.02
     """
 

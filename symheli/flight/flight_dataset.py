@@ -41,8 +41,8 @@ class FlightDataset:
     >>> import tempfile, pathlib
     >>> folder = pathlib.Path(tempfile.mkdtemp()) / "flights.zarr"
     >>> climb = symheli.AirspeedSchedule.transition(4.0, 6.0, acceleration=2.0, hold=0.5)
-    >>> flights = symheli.fly_campaign(heli, climb, folder, seeds=range(5), noise_db=30.0)
-    >>> again = symheli.FlightDataset(folder)
+    >>> flights = symheli.flight.fly_campaign(heli, climb, folder, seeds=range(5), noise_db=30.0)
+    >>> again = symheli.flight.FlightDataset(folder)
     >>> len(again), bool(again.finished.all()), again["phi"].shape == (5, len(again.time))
     (5, True, True)
     """

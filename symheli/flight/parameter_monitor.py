@@ -46,7 +46,7 @@ class ParameterMonitor:
     Examples
     --------
     >>> import symheli
-    >>> symheli.ParameterMonitor(lag=0.2, fallback=4.0).hold
+    >>> symheli.flight.ParameterMonitor(lag=0.2, fallback=4.0).hold
     1.0
     """
 

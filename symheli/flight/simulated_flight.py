@@ -47,7 +47,7 @@ class SimulatedFlight:
     --------
     >>> slow = symheli.AirspeedSchedule.transition(4.0, 6.0, acceleration=2.0, hold=0.5)
     >>> flight = symheli.fly(heli, slow, noise_db=30.0, seed=1)
-    >>> clean = symheli.SimulatedFlight(heli).flown(flight)
+    >>> clean = symheli.flight.SimulatedFlight(heli).flown(flight)
     >>> len(clean) == len(flight), bool(np.abs(clean["p"]).max() < np.abs(flight["p"]).max())
     (True, True)
     """

@@ -62,7 +62,7 @@ class StitchedModel:
 
     Examples
     --------
-    >>> stitched = symheli.StitchedModel.from_family(symheli.sweep(heli, [2.0, 5.0, 8.0]))
+    >>> stitched = symheli.flight.StitchedModel.from_family(symheli.sweep(heli, [2.0, 5.0, 8.0]))
     >>> point = symheli.trim(heli, airspeed=5.0)
     >>> rate = stitched.rhs([point.x[s] for s in stitched.states], [*point.u.values()])
     >>> bool(np.abs(rate).max() < 1e-9)

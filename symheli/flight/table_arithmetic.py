@@ -105,7 +105,7 @@ class TableState:
 
     Examples
     --------
-    >>> lqr = symheli.gain_scheduled_lqr(heli, 0.0, 8.0, dt=0.02, points=5)
+    >>> lqr = symheli.flight.gain_scheduled_lqr(heli, 0.0, 8.0, dt=0.02, points=5)
     >>> table = symheli.TableController.of(lqr.scheduled_controller.model)
     >>> u, state = table.update(table.init(), np.zeros(8), np.zeros(8), np.zeros(4), 2.0)
     >>> round(float(state.parameter_used), 2), state.status

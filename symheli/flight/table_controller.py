@@ -103,7 +103,7 @@ class TableController:
 
     Examples
     --------
-    >>> lqr = symheli.gain_scheduled_lqr(heli, 0.0, 8.0, dt=0.02, points=5)
+    >>> lqr = symheli.flight.gain_scheduled_lqr(heli, 0.0, 8.0, dt=0.02, points=5)
     >>> limits = {name: (-t, t) for name, t in zip(heli.inputs, heli.travel)}
     >>> table = symheli.TableController.of(lqr.scheduled_controller.model, 17, limits=limits)
     >>> hover = symheli.AirspeedSchedule((2.0,), (1.0,), (0.0,), lead=0.2)

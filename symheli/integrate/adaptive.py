@@ -79,7 +79,7 @@ class DormandPrince(Adaptive):
     --------
     >>> point = symheli.trim(heli, airspeed=5.0)
     >>> inputs = np.tile(point.u.array, (10, 1))
-    >>> exact = symheli.DormandPrince(relative=1e-10, absolute=1e-10)
+    >>> exact = symheli.integrate.DormandPrince(relative=1e-10, absolute=1e-10)
     >>> flown = symheli.simulate(heli, point, inputs, dt=0.02, method=exact)
     >>> bool(np.abs(flown["q"]).max() < 1e-6)
     True
@@ -118,7 +118,7 @@ class CashKarp(Adaptive):
     --------
     >>> point = symheli.trim(heli, airspeed=5.0)
     >>> inputs = np.tile(point.u.array, (10, 1))
-    >>> quick = symheli.CashKarp(relative=1e-6, absolute=1e-6)
+    >>> quick = symheli.integrate.CashKarp(relative=1e-6, absolute=1e-6)
     >>> flown = symheli.simulate(heli, point, inputs, dt=0.02, method=quick)
     >>> len(flown.steps), flown.evaluations
     (10, 60)

@@ -47,7 +47,7 @@ class Batch:
     >>> point = symheli.trim(heli, airspeed=5.0)
     >>> x0 = np.tile(point.x.array, (2, 1))
     >>> inputs = np.tile(point.u.array, (20, 1))
-    >>> found = symheli.simulate_batch(heli, x0, inputs, dt=0.02, keep=5)
+    >>> found = symheli.integrate.simulate_batch(heli, x0, inputs, dt=0.02, keep=5)
     >>> found.states.shape, len(found)
     ((2, 5, 15), 2)
     """
@@ -144,7 +144,7 @@ def simulate_batch(
     >>> point = symheli.trim(heli, airspeed=5.0)
     >>> x0 = np.tile(point.x.array, (3, 1))
     >>> x0[:, 6] += [0.0, 0.1, 0.2]  # phi
-    >>> found = symheli.simulate_batch(heli, x0, np.tile(point.u.array, (25, 1)), dt=0.02)
+    >>> found = symheli.integrate.simulate_batch(heli, x0, np.tile(point.u.array, (25, 1)), dt=0.02)
     >>> found.final.shape, bool(found.lost.any())
     ((3, 15), False)
     """

@@ -36,7 +36,7 @@ class Feedback:
     >>> point = symheli.trim(heli, airspeed=5.0)
     >>> K = np.zeros((50, 4, len(heli.states)))
     >>> K[:, 1, heli.states.index("phi")] = 0.02  # d_lat on bank
-    >>> hold = symheli.Feedback(K, np.tile(point.x.array, (50, 1)), heli.travel)
+    >>> hold = symheli.integrate.Feedback(K, np.tile(point.x.array, (50, 1)), heli.travel)
     >>> inputs = np.tile(point.u.array, (50, 1))
     >>> len(symheli.simulate(heli, point, inputs, dt=0.02, feedback=hold).times)
     51

@@ -75,7 +75,7 @@ def many_flights(
     dt: float,
     parameters: Mapping[str, object],
 ) -> Problem:
-    """A problem of N flights from what a user gives; see `symheli.simulate_batch`."""
+    """A problem of N flights from what a user gives; see `symheli.integrate.simulate_batch`."""
     u, w, start = np.asarray(u, float), _wind(wind), _start(heli, x0)
     values = {name: np.asarray(value, float) for name, value in parameters.items()}
     lengths = {len(start)} if start.ndim == 2 else set()

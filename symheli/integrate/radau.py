@@ -40,7 +40,8 @@ class Radau:
     --------
     >>> point = symheli.trim(heli, airspeed=5.0)
     >>> inputs = np.tile(point.u.array, (5, 1))
-    >>> flown = symheli.simulate(heli, point, inputs, dt=0.02, method=symheli.Radau(step=0.02))
+    >>> method = symheli.integrate.Radau(step=0.02)
+    >>> flown = symheli.simulate(heli, point, inputs, dt=0.02, method=method)
     >>> bool(np.abs(flown["q"]).max() < 1e-6)
     True
     """

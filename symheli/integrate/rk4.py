@@ -42,7 +42,8 @@ class RungeKutta4:
     --------
     >>> point = symheli.trim(heli, airspeed=5.0)
     >>> inputs = np.tile(point.u.array, (10, 1))
-    >>> flown = symheli.simulate(heli, point, inputs, dt=0.02, method=symheli.RungeKutta4(0.002))
+    >>> method = symheli.integrate.RungeKutta4(0.002)
+    >>> flown = symheli.simulate(heli, point, inputs, dt=0.02, method=method)
     >>> len(flown.steps), int(flown.per_sample[0])
     (100, 10)
     """

@@ -45,8 +45,8 @@ class BalancedTruncation(Generic[Model]):
     Both with scaled channels, on a frequency grid. With d scheduling parameters `p` is (K, d).
     Nothing is promised for p that moves. `bound`, of a linear model: neither the nu-gap (balanced
     for feedback) nor the largest gain of the difference (balanced for the response, in the units of
-    the scaled channels) is above it; NaN over a parameter, of `synthesis.bounded_truncation` for
-    any motion of p.
+    the scaled channels) is above it; NaN over a parameter, of
+    `synthesis.designs.bounded_truncation` for any motion of p.
     """
 
     model: Model

@@ -43,7 +43,7 @@ def pade_delay(name: str, seconds: float, order: int = 4) -> LinearModel:
 
     Examples
     --------
-    >>> delay = lpv.pade_delay("d_lat", 0.02)
+    >>> delay = lpv.tools.pade_delay("d_lat", 0.02)
     >>> round(float(np.angle(delay.frequency_response([50.0])[0, 0, 0])), 6)
     -1.0
     """
@@ -95,7 +95,7 @@ def sample_delay(name: str, samples: int, dt: float) -> LinearModel:
 
     Examples
     --------
-    >>> late = lpv.sample_delay("d_lat", 2, dt=0.02)
+    >>> late = lpv.tools.sample_delay("d_lat", 2, dt=0.02)
     >>> s = np.exp(0.02j * 5.0)
     >>> bool(np.isclose(late.frequency_response([5.0])[0, 0, 0], s**-2))
     True

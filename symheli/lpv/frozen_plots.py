@@ -224,7 +224,7 @@ def nyquist(
 
     Examples
     --------
-    >>> ax = lpv.nyquist(spring, "u1", "y1", [0.0, 1.0])
+    >>> ax = lpv.tools.nyquist(spring, "u1", "y1", [0.0, 1.0])
     >>> ax.get_xlabel()
     'real part of y1 per u1'
     """
@@ -265,7 +265,7 @@ def pole_map(model: Model, p: object = None, *, ax: Axes | None = None) -> Axes:
 
     Examples
     --------
-    >>> lpv.pole_map(spring).get_xlabel()
+    >>> lpv.tools.pole_map(spring).get_xlabel()
     'real part (1/s)'
     """
     from symheli.lpv.pole_plot import frame_of_poles
@@ -339,7 +339,7 @@ def damping(model: Model, p: object = None) -> Damping:
 
     Examples
     --------
-    >>> print(lpv.damping(spring, [0.0]))
+    >>> print(lpv.tools.damping(spring, [0.0]))
                    p                   pole  frequency (rad/s)  damping ratio
                    0        -0.5000+1.3229j              1.414         0.3536
     """

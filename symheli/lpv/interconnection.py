@@ -87,7 +87,7 @@ def series(first: System, second: System) -> Any:
 
     Examples
     --------
-    >>> delayed = lpv.series(lpv.pade_delay("u1", 0.02, order=2), spring)
+    >>> delayed = lpv.series(lpv.tools.pade_delay("u1", 0.02, order=2), spring)
     >>> len(delayed.states), [str(s) for s in delayed.inputs]
     (4, ['u1_command'])
     """

@@ -38,7 +38,7 @@ def lagged(lpv: LPVStateSpace, seconds: float) -> LPVStateSpace:
 
     Examples
     --------
-    >>> slow = lpv.lagged(spring.with_rate(0.5), 0.2)
+    >>> slow = lpv.tools.lagged(spring.with_rate(0.5), 0.2)
     >>> print([s.name for s in slow.parameters], slow.parameters[0].rate)
     ['p_lagged', 'p_lag_rate'] p_lag_rate
     >>> float(abs(slow.at(0.5, 0.4).A - spring.at(0.58).A).max()) < 1e-12

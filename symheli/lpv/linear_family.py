@@ -66,7 +66,7 @@ class LinearFamily:
     >>> roll = family.select(["v", "p", "r", "phi", "b1"], ["d_lat", "d_ped"])
     >>> roll.interpolate("polynomial", degree=2).at(4.0).A.shape
     (5, 5)
-    >>> grid = symheli.sweep_grid(heli, [4.0, 6.0], acceleration=[-2.0, 0.0, 2.0])
+    >>> grid = symheli.steady.sweep_grid(heli, [4.0, 6.0], acceleration=[-2.0, 0.0, 2.0])
     >>> grid.A.shape
     (2, 3, 10, 10)
     >>> [(s.name, s.rate) for s in grid.interpolate(degree=1).parameters]

@@ -97,14 +97,14 @@ def lower_feedback(
 
     Examples
     --------
-    >>> p = lpv.Scheduling("p", "1", low=0.0, high=1.0)
-    >>> gain = lpv.LPVStateSpace.polynomial(
+    >>> p = symheli.Scheduling("p", "1", low=0.0, high=1.0)
+    >>> gain = symheli.LPVStateSpace.polynomial(
     ...     [np.zeros((0, 0))], [np.zeros((0, 1))], [np.zeros((1, 0))], [[[-1.0]], [[-3.0]]], p,
     ...     inputs=["y1"], outputs=["force"])
-    >>> pushed = lpv.LPVStateSpace(
+    >>> pushed = symheli.LPVStateSpace(
     ...     spring.basis, spring.A, np.repeat(spring.B, 2, axis=2), spring.C,
     ...     np.repeat(spring.D, 2, axis=2), p, spring.states, ["u1", "force"], spring.outputs)
-    >>> stiff = lpv.lower_feedback(pushed, gain)
+    >>> stiff = lpv.tools.lower_feedback(pushed, gain)
     >>> print(stiff.inputs, stiff.outputs, stiff.at(1.0).A[1].round(6))
     ('u1',) () [-6.5 -1. ]
     """

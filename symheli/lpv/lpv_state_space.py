@@ -186,9 +186,9 @@ class LPVStateSpace(Operators, LPVMatrices):
 
         Examples
         --------
-        >>> rho = lpv.Scheduling("rho", "1", low=-1.0, high=1.0, rate=0.5)
+        >>> rho = symheli.Scheduling("rho", "1", low=-1.0, high=1.0, rate=0.5)
         >>> p = rho.symbol
-        >>> plant = lpv.LPVStateSpace.from_expressions(
+        >>> plant = symheli.LPVStateSpace.from_expressions(
         ...     [[-1 - p**2, p], [0, -2]], [[0], [1 + p]], [[1, 0]], [[0]], rho)
         >>> plant.at(0.5).A
         array([[-1.25,  0.5 ],
@@ -556,7 +556,7 @@ class LPVStateSpace(Operators, LPVMatrices):
         offsets: bool = False,
     ) -> tuple[Array, Array]:
         """States (n, nx) and outputs (n, ny) along p (n,) or (n, d), or with p(t, x, u) a function;
-        see `symheli.lpv.simulate`.
+        see `symheli.lpv.tools.simulate`.
         """
         from symheli.lpv.simulate import simulate
 

@@ -189,7 +189,7 @@ def chordal_distance(
 
     Examples
     --------
-    >>> lpv.chordal_distance(spring.at(0.0), spring.at(1.0), [0.1, 1.0]).round(2)
+    >>> lpv.tools.chordal_distance(spring.at(0.0), spring.at(1.0), [0.1, 1.0]).round(2)
     array([0.08, 0.14])
     """
     require_same_signals(first, second)
@@ -265,8 +265,8 @@ def nu_gaps(
 
     Examples
     --------
-    >>> ladder = lpv.LinearModels.of([spring.at(p).discretize(0.1) for p in (0.0, 0.5, 1.0)])
-    >>> lpv.nu_gaps(ladder[0], ladder).round(2)
+    >>> ladder = lpv.tools.LinearModels.of([spring.at(p).discretize(0.1) for p in (0.0, 0.5, 1.0)])
+    >>> lpv.tools.nu_gaps(ladder[0], ladder).round(2)
     array([0.  , 0.09, 0.16])
     """
     if model.dt is None and others.dt is None:

@@ -25,7 +25,7 @@ class Operators:
 
     Examples
     --------
-    >>> from symheli.lpv import LinearModel
+    >>> from symheli import LinearModel
     >>> P = LinearModel([[-1.0]], [[1.0]], [[1.0]], [[0.0]], ["x"], ["u"], ["y"])
     >>> K = LinearModel.gain([[3.0]], ["e"], ["u"])
     >>> L = P * K

@@ -83,13 +83,13 @@ def simulate(
     Examples
     --------
     >>> p, u = np.linspace(0.0, 1.0, 400), np.ones((400, 1))
-    >>> states, outputs = lpv.simulate(spring, p, u, dt=0.1)
+    >>> states, outputs = lpv.tools.simulate(spring, p, u, dt=0.1)
     >>> round(float(outputs[-1, 0]), 2)
     0.4
 
     A spring that stiffens with its own deflection:
 
-    >>> states, outputs = lpv.simulate(spring, lambda t, x, u: abs(x[0]), u, dt=0.1)
+    >>> states, outputs = lpv.tools.simulate(spring, lambda t, x, u: abs(x[0]), u, dt=0.1)
     >>> round(float(outputs[-1, 0]), 2)
     0.45
     """

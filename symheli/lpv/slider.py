@@ -41,8 +41,8 @@ def slider(picture: Callable[..., Any], model: Model, *args: Any, **options: Any
 
     Examples
     --------
-    >>> lpv.slider(lpv.bode, spring, "u1", "y1")  # doctest: +SKIP
-    >>> lpv.slider("bode", None)
+    >>> lpv.tools.slider(lpv.bode, spring, "u1", "y1")  # doctest: +SKIP
+    >>> lpv.tools.slider("bode", None)
     Traceback (most recent call last):
         ...
     symheli.errors.InputError: expected an LPVStateSpace, an LFT or a LinearFamily, got NoneType

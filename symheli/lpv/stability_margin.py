@@ -69,10 +69,10 @@ def stability_margin(
     Of an integrator with u = -y, and of a plant of gain 1, whose graph is orthogonal to that of
     u = -y:
 
-    >>> lag = lpv.LinearModel([[0.0]], [[1.0]], [[1.0]], [[0.0]], ["x"], ["u"], ["y"])
+    >>> lag = symheli.LinearModel([[0.0]], [[1.0]], [[1.0]], [[0.0]], ["x"], ["u"], ["y"])
     >>> round(lpv.stability_margin(lag, {("u", "y"): -1.0}), 6)
     0.707107
-    >>> one = lpv.LinearModel([[0.0]], [[0.0]], [[0.0]], [[1.0]], ["x"], ["u"], ["y"], dt=0.1)
+    >>> one = symheli.LinearModel([[0.0]], [[0.0]], [[0.0]], [[1.0]], ["x"], ["u"], ["y"], dt=0.1)
     >>> round(lpv.stability_margin(one, {("u", "y"): -1.0}), 6)
     1.0
     """

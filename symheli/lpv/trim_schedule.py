@@ -59,11 +59,11 @@ class TrimSchedule:
 
         >>> import dataclasses, numpy as np, sympy
         >>> from symheli import lpv
-        >>> level = lpv.Scheduling("level", "m", low=0.1, high=2.0)
+        >>> level = symheli.Scheduling("level", "m", low=0.1, high=2.0)
         >>> h = level.symbol
-        >>> tank = lpv.LPVStateSpace.from_expressions(
+        >>> tank = symheli.LPVStateSpace.from_expressions(
         ...     [[-1 / (2 * sympy.sqrt(h))]], [[1]], [[1]], [[0]], level)
-        >>> trim = lpv.TrimSchedule.from_expressions([h], [sympy.sqrt(h)], level)
+        >>> trim = lpv.tools.TrimSchedule.from_expressions([h], [sympy.sqrt(h)], level)
         >>> tank = dataclasses.replace(tank, trim=trim)
         >>> inflow = np.full((300, 1), 1.2)
         >>> found, _ = tank.simulate(lambda t, x, u: x[0], inflow, [0.5], dt=0.1, offsets=True)

@@ -141,7 +141,7 @@ class UncertainStateSpace(Operators):
         >>> lag = symheli.LPVStateSpace.polynomial(
         ...     [[[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], symheli.Scheduling("p", "1", 0.0, 1.0))
         >>> around = symheli.UncertainStateSpace.covering(lag, np.array([[[0.0025, 0.0]]]))
-        >>> cert = synthesis.l2_gain(around, 0.0, form=synthesis.Spline(degree=0))
+        >>> cert = synthesis.l2_gain(around, 0.0, form=synthesis.forms.Spline(degree=0))
         >>> bool(1 / (1 - 0.005) <= cert.gamma < 1.006)
         True
         """

@@ -1,1 +1,5 @@
-"""Steady flight: trims, exact linear models about them, sweeps and maps of both."""
+"""Steady flight: trims, sweeps over airspeed and other conditions, linearizations."""
+
+from symheli.lazy import lazily
+
+__getattr__, __dir__, __all__ = lazily(__name__, __file__)

@@ -50,7 +50,7 @@ class FlightCondition:
 
     Examples
     --------
-    >>> print(symheli.FlightCondition(5.0, climb_rate=3.0).air_velocity)
+    >>> print(symheli.steady.FlightCondition(5.0, climb_rate=3.0).air_velocity)
     [ 4.  0. -3.]
     """
 

@@ -82,7 +82,7 @@ def sweep_grid(
     --------
     >>> import symheli
     >>> heli = symheli.Helicopter.load("xcell60", governor="ideal")
-    >>> grid = symheli.sweep_grid(heli, [3.0, 8.0], mass=[7.0, 8.2, 9.5])
+    >>> grid = symheli.steady.sweep_grid(heli, [3.0, 8.0], mass=[7.0, 8.2, 9.5])
     >>> grid.A.shape
     (2, 3, 10, 10)
     """

@@ -61,7 +61,7 @@ class TrimBatch(OperatingPoints):
 
     Examples
     --------
-    >>> found = symheli.trim_batch(heli, np.linspace(2.0, 8.0, 50), acceleration=1.0)
+    >>> found = symheli.steady.trim_batch(heli, np.linspace(2.0, 8.0, 50), acceleration=1.0)
     >>> found.x.shape, bool(found.success.all()), found[49].airspeed
     ((50, 10), True, 8.0)
     """
@@ -216,7 +216,7 @@ def trim_batch(
 
     Examples
     --------
-    >>> found = symheli.trim_batch(heli, [4.0, 5.0, 6.0], climb_rate=[0.0, 0.5, 1.0])
+    >>> found = symheli.steady.trim_batch(heli, [4.0, 5.0, 6.0], climb_rate=[0.0, 0.5, 1.0])
     >>> bool(found.success.all()), round(found[1].u["d_col"], 3)
     (True, 0.092)
     """

@@ -1,7 +1,5 @@
 """Names, units and arrays: the values that every room shares."""
 
-from symheli.values.named_vector import NamedVector
-from symheli.values.operating_point import OperatingPoint
-from symheli.values.signal import Signal, signals
+from symheli.lazy import lazily
 
-__all__ = ["NamedVector", "OperatingPoint", "Signal", "signals"]
+__getattr__, __dir__, __all__ = lazily(__name__, __file__)

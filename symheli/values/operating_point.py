@@ -31,7 +31,7 @@ class OperatingPoint:
     ...                                              NamedVector(alpha, [0.0])))
     ...     for mach, angle in at.items()]
     >>> family = symheli.LinearFamily.from_models(
-    ...     list(at), models, parameter=symheli.Signal("Mach", "1"))
+    ...     list(at), models, parameter=symheli.values.Signal("Mach", "1"))
     >>> lpv = family.interpolate("polynomial", degree=1)
     >>> print(lpv.trim.state(0.8).round(3), lpv.trim.input(0.8).round(4), lpv.scheduling.name)
     [0.035] [-0.0175] Mach

@@ -30,8 +30,8 @@ class Signal(str):
 
     Examples
     --------
-    >>> theta = symheli.Signal("theta")
-    >>> theta == "theta", theta.unit, symheli.Signal("altitude", "m").unit
+    >>> theta = symheli.values.Signal("theta")
+    >>> theta == "theta", theta.unit, symheli.values.Signal("altitude", "m").unit
     (True, 'rad', 'm')
     """
 

@@ -21,8 +21,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import optimize
 
+from symheli import LinearModel
 from symheli.errors import InputError
-from symheli.lpv import LinearModel
 from symheli.values.signal import Signal
 from synthesis.numerics.polynomial.definite import negative_definite
 from synthesis.numerics.polynomial.matrix import PolynomialMatrix

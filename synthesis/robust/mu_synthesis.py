@@ -15,8 +15,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy import optimize
 
+from symheli import LFT, LinearModel
 from symheli.errors import InputError
-from symheli.lpv import LFT, LinearModel, series
+from symheli.lpv import series
 from symheli.threads import with_one_thread
 from symheli.values.numbers import whole
 from symheli.values.signal import Signal
@@ -142,7 +143,7 @@ def mu_synthesis(
     --------
     x' = u + w, of which a tenth of u is not known; y = x + n, z = (x, u):
 
-    >>> from symheli.lpv import LinearModel
+    >>> from symheli import LinearModel
     >>> plant = LinearModel(
     ...     [[0.0]], [[1.0, 1.0, 0.0, 1.0]], [[0.0], [1.0], [0.0], [1.0]],
     ...     [[0, 0, 0, 0.1], [0, 0, 0, 0], [0, 0, 0, 1], [0, 0, 1, 0]],

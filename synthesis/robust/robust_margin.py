@@ -10,8 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
+from symheli import LFT, LPVStateSpace, Scheduling, UncertainStateSpace
 from symheli.errors import InputError
-from symheli.lpv import LFT, LPVStateSpace, Polynomial, Scheduling, UncertainStateSpace
+from symheli.lpv import Polynomial
 from symheli.threads import with_one_thread
 from symheli.values.summary import summarized
 from synthesis.certify.lower_bounds.frozen import frozen_gain, worst_over
@@ -106,7 +107,7 @@ def robust_margin(
     --------
     x' = -(1 - delta) x - k x with |delta| <= 1/2 and k = 1 within 1/2: 2 = r/2 + r/2:
 
-    >>> from symheli.lpv import LPVStateSpace, Scheduling, UncertainStateSpace
+    >>> from symheli import LPVStateSpace, Scheduling, UncertainStateSpace
     >>> k = Scheduling("k", "1", 0.5, 1.5)
     >>> lag = LPVStateSpace.polynomial([[[-1.0]], [[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], k)
     >>> found = robust_margin(UncertainStateSpace(lag, ["u1"], ["y1"], 0.5, 1.0, "an example"))

@@ -24,8 +24,8 @@ import numpy as np
 from scipy import optimize
 from scipy.linalg import block_diag
 
+from symheli import LinearModel
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv import LinearModel
 from symheli.threads import with_one_thread
 from symheli.values.signal import indices
 from symheli.values.summary import summarized
@@ -155,7 +155,7 @@ def slope_margin(
     --------
     1/(s + 1)^3 under negative feedback: 4 by the circle criterion, and 8 by Popov's, as of a gain.
 
-    >>> from symheli.lpv import LinearModel
+    >>> from symheli import LinearModel
     >>> A = [[-1.0, 1.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, -1.0]]
     >>> lags = LinearModel(
     ...     A, [[0.0], [0.0], [-1.0]], [[1.0, 0.0, 0.0]], [[0.0]], ["a", "b", "c"], ["d"], ["v"])

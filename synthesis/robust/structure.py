@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from symheli import LFT, LinearModel, LPVStateSpace, UncertainStateSpace
 from symheli.errors import InputError
-from symheli.lpv import LFT, LinearModel, LPVStateSpace, UncertainStateSpace
 from symheli.lpv.lft.reduction import reduce_without_loss
 from symheli.lpv.lft_matrices import parts as slices
 from symheli.values.sample_period import same_period
@@ -77,7 +77,7 @@ class DynamicBlock(NamedTuple):
         >>> loop = symheli.LPVStateSpace.constant(
         ...     symheli.LinearModel([[-1.0]], [[-1.0]], [[1.0]], [[0.0]], ["x"], ["d"], ["v"]), k)
         >>> late = [DynamicBlock.of_delay("d", "v", T) for T in (1.4, 1.57)]
-        >>> [bool(synthesis.robust_margin(loop, [block]).lower > 1) for block in late]
+        >>> [bool(synthesis.robust.robust_margin(loop, [block]).lower > 1) for block in late]
         [True, False]
         """
         return cls(*_paired(inputs, outputs), 1.0, covers.delay_weight(longest))

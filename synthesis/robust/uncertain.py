@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import chain
 
+from symheli import LPVStateSpace, UncertainStateSpace
 from symheli.errors import InputError
-from symheli.lpv import LPVStateSpace, UncertainStateSpace
 from symheli.lpv.uncertain_state_space import DeltaPart
 from symheli.values.signal import Signal, signals
 from synthesis.robust.structure import DynamicBlock, channels_of, stable_weight
@@ -38,7 +38,7 @@ def uncertain(
     A lag that moves, behind dynamics of gain .4 and beside a pole known to .5:
 
     >>> import symheli, synthesis
-    >>> from synthesis import DynamicBlock
+    >>> from synthesis.robust import DynamicBlock
     >>> p = symheli.Scheduling("p", "1", low=1.0, high=2.0, rate=1.0)
     >>> lag = symheli.LPVStateSpace.polynomial(
     ...     [[[-1.0]], [[-1.0]]], [[[1.0, 1.0, 1.0]]], [[[1.0], [1.0], [0.0]]],

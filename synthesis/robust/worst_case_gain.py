@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
-from symheli.lpv import LFT, LPVStateSpace
+from symheli import LFT, LPVStateSpace
 from symheli.threads import with_one_thread
 from symheli.values.summary import summarized
 from synthesis.numerics.linear.norm import norm
@@ -78,7 +78,7 @@ def worst_case_gain(
     --------
     x' = -(2 - k - delta) x + u with |k| <= 1/2 and |delta| <= 1/2; the worst gain is 1:
 
-    >>> from symheli.lpv import LPVStateSpace, Scheduling
+    >>> from symheli import LPVStateSpace, Scheduling
     >>> k = Scheduling("k", "1", -0.5, 0.5)
     >>> lag = LPVStateSpace.polynomial(
     ...     [[[-2.0]], [[1.0]]], [[[1.0, 1.0]]], [[[1.0], [1.0]]], [np.zeros((2, 2))], k,

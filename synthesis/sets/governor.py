@@ -10,8 +10,8 @@ from typing import Any, cast
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv import TrimSchedule
 from symheli.lpv.scheduling import UNSCHEDULED
+from symheli.lpv.tools import TrimSchedule
 from symheli.values.arrays import Array, frozen
 from symheli.values.summary import summarized
 from synthesis.sets.invariant_set import InvariantSet
@@ -21,7 +21,7 @@ HALVINGS = 40
 
 
 @dataclass(frozen=True, eq=False)
-class Governor:
+class ReferenceGovernor:
     """The scalar reference governor of a proven set; made by `governor`.
 
     Attributes
@@ -36,13 +36,13 @@ class Governor:
     Examples
     --------
     >>> import numpy as np
-    >>> from symheli.lpv import LinearModel
+    >>> from symheli import LinearModel
     >>> cart = LinearModel(
     ...     [[0, 1.0], [0, 0]], [[0], [1.0]], np.eye(2), np.zeros((2, 1)),
     ...     ["x", "v"], ["u"], ["x_m", "v_m"])
-    >>> found = synthesis.invariant_set(
+    >>> found = synthesis.sets.invariant_set(
     ...     cart, state_bounds={"x": 1.0, "v": 1.0}, input_bounds={"u": 1.0})
-    >>> made = synthesis.governor(found, [1.0, 0.0])  # steady at x = reference, v = 0
+    >>> made = synthesis.sets.reference_governor(found, [1.0, 0.0])  # at rest: x = r, v = 0
     >>> bool(0.9 < made.next([0.0, 0.0], 5.0, 0.0) < 1.0), float(made.next([0.0, 0.0], 0.5, 0.0))
     (True, 0.5)
     """
@@ -99,9 +99,9 @@ class Governor:
         return np.where(arrives, wanted, now + low * (wanted - now))
 
 
-def governor(
+def reference_governor(
     found: InvariantSet, steady: Any = None, *, at: Sequence[float] | None = None
-) -> Governor:
+) -> ReferenceGovernor:
     """The reference governor of a proven invariant set, whose states are deviations from the steady
     state of a reference.
 
@@ -133,10 +133,10 @@ def governor(
 
     Examples
     --------
-    >>> from symheli.lpv import LinearModel
+    >>> from symheli import LinearModel
     >>> plant = LinearModel([[1.0]], [[2.0]], [[1.0]], [[0.0]], ["x"], ["u"], ["x_m"])
-    >>> found = synthesis.invariant_set(plant, input_bounds={"u": 1.0})  # |x| <= 2
-    >>> print(synthesis.governor(found, [1.0]).next([0.5], 9.0, 0.0).round(4))
+    >>> found = synthesis.sets.invariant_set(plant, input_bounds={"u": 1.0})  # |x| <= 2
+    >>> print(synthesis.sets.reference_governor(found, [1.0]).next([0.5], 9.0, 0.0).round(4))
     2.5
     """
     if not isinstance(found, InvariantSet) or not found.proven:
@@ -157,7 +157,7 @@ def governor(
     own = None if at is None else frozen(at, "at", (m,))
     if own is None and m > 1:
         raise InputError(f"at: the set has {m} parameters; give the values where it is taken")
-    return Governor(found, moved, own)
+    return ReferenceGovernor(found, moved, own)
 
 
 def _along(direction: Array, v: Array) -> Array:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from symheli import LinearModel, LPVStateSpace
 from symheli.errors import InputError
-from symheli.lpv import LinearModel, LPVStateSpace
 from symheli.lpv.scheduling import UNSCHEDULED
 from symheli.progress import task
 from symheli.threads import with_one_thread
@@ -76,9 +76,9 @@ class InvariantSet(ProvenSet):
 
     Examples
     --------
-    >>> from symheli.lpv import LinearModel
+    >>> from symheli import LinearModel
     >>> plant = LinearModel([[1.0]], [[2.0]], [[1.0]], [[0.0]], ["x"], ["u"], ["x_m"])
-    >>> found = synthesis.invariant_set(plant, input_bounds={"u": 1.0})
+    >>> found = synthesis.sets.invariant_set(plant, input_bounds={"u": 1.0})
     >>> found.proven, bool(1.999 < found.half_widths()[0] < 2)  # b / a
     (True, True)
     """
@@ -227,7 +227,7 @@ def invariant_set(
 
     Examples
     --------
-    >>> held = synthesis.invariant_set(
+    >>> held = synthesis.sets.invariant_set(
     ...     lag.select(inputs=["w", "u"]), state_bounds={"x": 2.0}, input_bounds={"u": 3.0},
     ...     disturbance={"w": 0.5})
     >>> held.proven, held.contains([1.9], 0.3), max(held.used(0.5), key=held.used(0.5).get)

@@ -22,8 +22,8 @@ import numpy as np
 from scipy.linalg import solve_discrete_lyapunov
 from scipy.optimize import linprog
 
+from symheli import LinearModel, LPVStateSpace
 from symheli.errors import InputError
-from symheli.lpv import LinearModel, LPVStateSpace
 from symheli.values.arrays import Array, frozen
 from symheli.values.summary import summarized
 from synthesis.numerics.polynomial.exact import Number, exact, rational
@@ -66,11 +66,11 @@ class LowComplexitySet(ProvenSet):
     Examples
     --------
     >>> import numpy as np
-    >>> from symheli.lpv import LinearModel
+    >>> from symheli import LinearModel
     >>> model = LinearModel(
     ...     [[0.5, 0.2], [0.0, 0.7]], np.zeros((2, 0)), np.eye(2), np.zeros((2, 0)), ["x", "y"], [],
     ...     ["x_m", "y_m"], dt=0.1)
-    >>> found = synthesis.low_complexity_set(model, state_bounds={"x": 1.0, "y": 2.0})
+    >>> found = synthesis.sets.low_complexity_set(model, state_bounds={"x": 1.0, "y": 2.0})
     >>> found.proven, found.half_widths.round(3).tolist(), found.contains([0.9, 1.9])
     (True, [1.0, 2.0], True)
     """
@@ -193,10 +193,10 @@ def low_complexity_set(
 
     Examples
     --------
-    >>> from symheli.lpv import LinearModel
+    >>> from symheli import LinearModel
     >>> sampled = LinearModel(
     ...     [[1.2]], [[1.0, 0.1]], [[1.0]], [[0.0, 0.0]], ["x"], ["u", "w"], ["x_m"], dt=0.1)
-    >>> found = synthesis.low_complexity_set(
+    >>> found = synthesis.sets.low_complexity_set(
     ...     sampled, controller=[[-0.7]], input_bounds={"u": 0.7}, disturbance={"w": 1.0})
     >>> found.proven, round(found.half_widths.item(), 6)
     (True, 1.0)

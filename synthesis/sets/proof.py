@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from symheli.lpv import LPVStateSpace
+from symheli import LPVStateSpace
 from symheli.progress import tracked
 from symheli.values.arrays import Array
 from synthesis.certify.proof.inequalities import slope_along

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symheli.lpv import FunctionSpace
+from symheli.lpv.bases import FunctionSpace
 from symheli.lpv.bases.polynomials import factors_of, lobatto_points, polynomials
 from symheli.values.arrays import Array
 from synthesis.numerics.polynomial.motion import Motion

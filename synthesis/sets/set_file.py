@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from symheli import LPVStateSpace
 from symheli.errors import InputError
-from symheli.lpv import LPVStateSpace
 from symheli.values.arrays import frozen
 from symheli.values.whole_files import write_text
 from synthesis.certify.questions.certificate_file import DAMAGED, content_of, decoded, encoded

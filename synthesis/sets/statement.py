@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from symheli import LinearModel, LPVStateSpace
 from symheli.errors import InputError
-from symheli.lpv import LinearModel, LPVStateSpace
 from symheli.values.arrays import Array
 from symheli.values.signal import Signal, indices
 from symheli.values.summary import summarized

@@ -36,12 +36,12 @@ class SwitchInside:
     --------
     A slow law with a large set, and a fast one with a small set:
 
-    >>> from symheli.lpv import LinearModel
+    >>> from symheli import LinearModel
     >>> plant = LinearModel([[0.0]], [[1.0]], [[1.0]], [[0.0]], ["x"], ["u"], ["x_m"])
     >>> slow, fast = (
-    ...     synthesis.invariant_set(plant, controller=[[k]], input_bounds={"u": 1.0})
+    ...     synthesis.sets.invariant_set(plant, controller=[[k]], input_bounds={"u": 1.0})
     ...     for k in (-0.5, -5.0))
-    >>> law = synthesis.SwitchInside([slow, fast])
+    >>> law = synthesis.sets.SwitchInside([slow, fast])
     >>> law.next([1.0], wanted=1, active=0), law.next([0.1], wanted=1, active=0)
     (0, 1)
     """

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from symheli import LinearFamily, LinearModel, LPVStateSpace
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv import LinearFamily, LinearModel, LPVStateSpace
 from symheli.progress import tracked
 from symheli.threads import with_one_thread
 from symheli.values.aligned import columns

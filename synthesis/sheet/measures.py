@@ -14,12 +14,13 @@ import numpy as np
 from scipy.linalg import eig
 from scipy.optimize import least_squares
 
+from symheli import LinearModel
 from symheli.errors import InputError
-from symheli.lpv import LinearModel, connect
+from symheli.lpv import connect
 from symheli.values.arrays import Array
 from symheli.values.signal import indices, signals
-from synthesis.design.loops.handling_qualities import Bandwidth, bandwidth
-from synthesis.design.loops.margins import Margins, loop, margins
+from synthesis.design.loops.handling_qualities import Bandwidth, attitude_bandwidth
+from synthesis.design.loops.margins import Margins, margins, open_loop
 from synthesis.numerics.linear.norm import crossings, norm, to_continuous
 from synthesis.sheet.sheet import ControlAxis, Specification
 
@@ -51,7 +52,7 @@ class AxisLoop:
     @cached_property
     def broken(self) -> LinearModel:
         """L of 1 + L, broken at the control, the other loops closed."""
-        return loop(self.plant, self.controller, self.axis.control)
+        return open_loop(self.plant, self.controller, self.axis.control)
 
     @cached_property
     def margins(self) -> Margins:
@@ -115,7 +116,7 @@ class AxisLoop:
         if ("bandwidth", band) not in self._kept:
             T = self.closed.select(outputs=["response"])
             rate = self.axis.type == "rate"
-            self._kept["bandwidth", band] = bandwidth(
+            self._kept["bandwidth", band] = attitude_bandwidth(
                 integral(T) if rate else T, band, command=True
             )
         return self._kept["bandwidth", band]

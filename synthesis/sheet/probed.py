@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from symheli import LinearModel
 from symheli.errors import InputError
-from symheli.lpv import LinearModel
 from symheli.values.arrays import Array
 from symheli.values.controllers import PureController, StatefulController, begun
 from symheli.values.named_vector import NamedVector

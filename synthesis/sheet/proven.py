@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from symheli import LinearModel, LPVStateSpace
 from symheli.errors import InputError
-from symheli.lpv import LinearModel, LPVStateSpace
 from symheli.values.summary import summarized
 from synthesis.certify.questions.certificate import Certificate
 from synthesis.certify.questions.questions import l2_gain

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from symheli import UncertainStateSpace
 from symheli.errors import InputError, SynthesisError
-from symheli.lpv import UncertainStateSpace
 from symheli.lpv.bases.polynomials import lobatto_points
 from symheli.progress import task
 from symheli.threads import with_one_thread
@@ -29,7 +29,7 @@ from synthesis.design.plant.refusals import conditions, require_channels
 from synthesis.numerics.linear.norm import norm
 from synthesis.structures.descent import STANDSTILL, Point, Stationarity, bfgs, sampled_descent
 from synthesis.structures.peaks import Active, StructureLoops, Value
-from synthesis.structures.structure import Structure
+from synthesis.structures.structure import TunableController
 
 Array = np.ndarray
 
@@ -80,7 +80,8 @@ class StructuredController(Controller):
 
     Examples
     --------
-    >>> pi = synthesis.Structure.pid(plant, {("u", "y"): "PI"}, bounds={"": (-20.0, 0.0)})
+    >>> pi = synthesis.structures.TunableController.pid(
+    ...     plant, {("u", "y"): "PI"}, bounds={"": (-20.0, 0.0)})
     >>> made = synthesis.structured(plant, pi, starts=2)
     >>> print(made.structure.numbers, made.order, made.certify(search=None).verified)
     2 1 True
@@ -88,7 +89,7 @@ class StructuredController(Controller):
     ()
     """
 
-    structure: Structure
+    structure: TunableController
     gains: Mapping[str, Array]
     specifications: tuple[L2, ...]
     reached: tuple[float, ...]
@@ -150,7 +151,7 @@ class StructuredController(Controller):
 @with_one_thread
 def structured(
     plant: Plant,
-    structure: Structure,
+    structure: TunableController,
     specifications: L2 | Sequence[L2] = (),
     *,
     start: Mapping[str, float | Array] | None = None,
@@ -226,7 +227,7 @@ def structured(
     ...     [[0.0]], [[1.0, 1.0]], [[1.0], [0.0], [1.0]], [[0.0, 0.0], [0.0, 1.0], [0.0, 0.0]],
     ...     ["x"], ["w", "u"], ["z_x", "z_u", "y"])
     >>> unstable = synthesis.Plant(model, ["w"], ["z_x", "z_u"], ["u"], ["y"])
-    >>> k = synthesis.Structure.pid(unstable, bounds={"": (-2.0, 2.0)})
+    >>> k = synthesis.structures.TunableController.pid(unstable, bounds={"": (-2.0, 2.0)})
     >>> made = synthesis.structured(unstable, k, starts=1)
     >>> print(made.gains["u_y_P"].round(4), round(made.promised, 5))
     [-2.] 1.11803
@@ -254,7 +255,7 @@ class _StructureSearch:
     def __init__(
         self,
         plant: Plant,
-        structure: Structure,
+        structure: TunableController,
         wanted: tuple[L2, ...],
         first: Array,
         units: Array,
@@ -286,7 +287,7 @@ class _StructureSearch:
     def of(
         cls,
         plant: Plant,
-        structure: Structure,
+        structure: TunableController,
         specifications: L2 | Sequence[L2],
         start: Mapping[str, float | Array] | None,
         units: Mapping[str, float] | None,
@@ -301,17 +302,18 @@ class _StructureSearch:
                 "structured: the plant is uncertain; tune for its nominal model, and certify the"
                 " gain of the uncertain loop"
             )
-        if not isinstance(structure, Structure):
+        if not isinstance(structure, TunableController):
             raise InputError(
-                "structure: expected a synthesis.Structure, such as"
-                f" synthesis.Structure.pid(plant), got {type(structure).__name__}"
+                "structure: expected a synthesis.structures.TunableController, such as"
+                " synthesis.structures.TunableController.pid(plant), got"
+                f" {type(structure).__name__}"
             )
         given = (specifications,) if isinstance(specifications, L2) else tuple(specifications)
         for one in given:
             if not isinstance(one, L2) or one.weight is not None:
                 raise InputError(
-                    "specifications: expected synthesis.L2(...) with a bound and without a weight,"
-                    f" got {one!r:.80}"
+                    "specifications: expected synthesis.objectives.L2(...) with a bound and without"
+                    f" a weight, got {one!r:.80}"
                 )
         if structure.order and structure.frame.dt != plant.dt:
             raise InputError(

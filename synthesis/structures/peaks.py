@@ -15,7 +15,7 @@ from symheli.errors import AccuracyError, InputError
 from symheli.values.signal import indices
 from synthesis.design.plant.generalized import Generalized, blocks
 from synthesis.numerics.linear.norm import below, norm
-from synthesis.structures.structure import Structure
+from synthesis.structures.structure import TunableController
 
 if TYPE_CHECKING:
     from synthesis.design.lpv.objectives import L2
@@ -88,7 +88,7 @@ class StructureLoops:
     def of(
         cls,
         plant: Plant,
-        structure: Structure,
+        structure: TunableController,
         points: Array,
         specifications: Sequence[L2],
         units: Array,
@@ -273,7 +273,7 @@ def _own(given: Sequence[str] | None, known: Sequence[str], kind: str) -> list[i
     return list(range(len(known))) if given is None else indices(given, known, kind)
 
 
-def _around_frame(plant: Plant, structure: Structure, points: Array) -> Generalized:
+def _around_frame(plant: Plant, structure: TunableController, points: Array) -> Generalized:
     """Return the plant under the frame: from (disturbances, gain outputs) and gain outputs to
     (performance, gain inputs) and gain inputs, at points (K, m).
     """
@@ -324,7 +324,7 @@ def _around_frame(plant: Plant, structure: Structure, points: Array) -> Generali
     )  # fmt: skip
 
 
-def shares(structure: Structure, points: Array) -> Array:
+def shares(structure: TunableController, points: Array) -> Array:
     """Share (K, n, g) of every free number in every gain at points (K, m)."""
     count, g = len(points), len(structure.gains)
     out = np.zeros((count, structure.numbers, g))

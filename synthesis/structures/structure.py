@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from symheli import LinearModel, LPVStateSpace, Scheduling
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv import FunctionSpace, LinearModel, LPVStateSpace, Scheduling, lower_feedback
+from symheli.lpv.bases import FunctionSpace
+from symheli.lpv.tools import lower_feedback
 from symheli.values.signal import Signal, indices, signals
 from symheli.values.summary import summarized
 from synthesis.design.plant.parts import positive
@@ -25,7 +27,7 @@ TERMS = "PID"
 
 
 @dataclass(frozen=True)
-class Gain:
+class TunableGain:
     """A number of a structure, or a function of the scheduling parameters.
 
     Parameters
@@ -44,7 +46,7 @@ class Gain:
 
     Examples
     --------
-    >>> synthesis.Gain("damping", low=0.0).high
+    >>> synthesis.structures.TunableGain("damping", low=0.0).high
     inf
     """
 
@@ -70,7 +72,7 @@ class Gain:
 
 
 @dataclass(frozen=True, eq=False)
-class Structure:
+class TunableController:
     """u = K y of which only named gains are free.
 
     Parameters
@@ -97,21 +99,21 @@ class Structure:
     A gain on the attitude in front of one on the rate, u = rate (p + attitude phi):
 
     >>> import symheli, synthesis
-    >>> cascade = synthesis.Structure(
+    >>> cascade = synthesis.structures.TunableController(
     ...     symheli.LinearModel.gain(
     ...         [[0, 0, 0, 1], [0, 1, 0, 0], [1, 0, 1, 0]],
     ...         ["p", "phi", "attitude", "rate"], ["d_lat", "attitude", "rate"]),
-    ...     [synthesis.Gain("attitude"), synthesis.Gain("rate")])
+    ...     [synthesis.structures.TunableGain(name) for name in ("attitude", "rate")])
     >>> cascade.numbers
     2
-    >>> roll = [symheli.lpv.Scheduling("airspeed", "m/s", 0.0, 13.0)]
+    >>> roll = [symheli.Scheduling("airspeed", "m/s", 0.0, 13.0)]
     >>> K = cascade.controller({"attitude": 5.0, "rate": -0.02}, roll).at(6.0)
     >>> print(K.inputs, K.D)
     ('p', 'phi') [[-0.02 -0.1 ]]
     """
 
     frame: LinearModel
-    gains: tuple[Gain, ...]
+    gains: tuple[TunableGain, ...]
     basis: FunctionSpace | None = None
 
     __repr__ = summarized
@@ -140,7 +142,7 @@ class Structure:
         corner: float | Mapping[str, float] | None = None,
         basis: FunctionSpace | None = None,
         bounds: Mapping[str, tuple[float, float]] | None = None,
-    ) -> Structure:
+    ) -> TunableController:
         """Paths from measurements to controls, each with some of a proportional, an integral and a
         derivative part.
 
@@ -173,7 +175,8 @@ class Structure:
 
         Examples
         --------
-        >>> pi = synthesis.Structure.pid(plant, {("u", "y"): "PI"}, bounds={"_I": (-9.0, 0.0)})
+        >>> pi = synthesis.structures.TunableController.pid(
+        ...     plant, {("u", "y"): "PI"}, bounds={"_I": (-9.0, 0.0)})
         >>> print([gain.name for gain in pi.gains], pi.order)
         ['u_y_P', 'u_y_I'] 1
         """
@@ -225,7 +228,7 @@ class Structure:
             plant.dt,
         )
         limits = {n: (-math.inf, math.inf) for n in names} | _limits(bounds or {}, names)
-        return cls(frame, tuple(Gain(n, *limits[n]) for n in names), basis)
+        return cls(frame, tuple(TunableGain(n, *limits[n]) for n in names), basis)
 
     # --- what it is ------------------------------------------------------------------------------
 
@@ -249,7 +252,7 @@ class Structure:
         """How many numbers the gains are in all."""
         return sum(self.numbers_of(gain) for gain in self.gains)
 
-    def numbers_of(self, gain: Gain) -> int:
+    def numbers_of(self, gain: TunableGain) -> int:
         """How many numbers this gain is: the size of the basis, or 1."""
         return 1 if self.basis is None or not gain.scheduled else self.basis.size
 

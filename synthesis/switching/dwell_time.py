@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from scipy import linalg
 
+from symheli import LinearModel, LPVStateSpace
 from symheli.errors import InputError
-from symheli.lpv import LinearModel, LPVStateSpace, Polynomial
+from symheli.lpv import Polynomial
 from symheli.threads import with_one_thread
 from symheli.values.arrays import Array, frozen
 from symheli.values.numbers import positive, whole
@@ -80,7 +81,7 @@ class DwellTime:
     x' = -x, and at every switch x triples: it must fall by as much before.
 
     >>> three = {(0, 1): [[3.0]], (1, 0): [[3.0]]}
-    >>> found = synthesis.dwell_time([[[-1.0]], [[-1.0]]], three)
+    >>> found = synthesis.switching.dwell_time([[[-1.0]], [[-1.0]]], three)
     >>> bool(np.log(3) < found.seconds < 1.005 * np.log(3)), found.verified
     (True, True)
     """
@@ -163,7 +164,7 @@ def dwell_time(
     The example of Geromel and Colaneri (2006); the least is 2.7508 s.
 
     >>> A1, A2 = [[0.0, 1.0], [-10.0, -1.0]], [[0.0, 1.0], [-0.1, -0.5]]
-    >>> print(synthesis.dwell_time([A1, A2], within=2.8))
+    >>> print(synthesis.switching.dwell_time([A1, A2], within=2.8))
     proven: exponentially stable for every signal that stays at least 2.8 s in each mode
     """
     solver = general_solver(solver)

@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from symheli import LinearModel, LPVStateSpace, UncertainStateSpace
 from symheli.errors import InputError
-from symheli.lpv import LinearModel, LPVStateSpace, UncertainStateSpace
 from symheli.values.arrays import Array, frozen
 from symheli.values.named_vector import NamedVector
 from symheli.values.numbers import positive
@@ -55,7 +55,7 @@ class SwitchedController:
     Examples
     --------
     >>> low, high = (synthesis.lqg(plant).at(p) for p in (0.2, 0.8))
-    >>> made = synthesis.switched(plant, [low, high], edges=[0.5], hysteresis=0.2)
+    >>> made = synthesis.switching.switched(plant, [low, high], edges=[0.5], hysteresis=0.2)
     >>> made.regions
     ((0.0, 0.6), (0.4, 1.0))
     >>> made.certify(rate=0.05).verified
@@ -96,7 +96,7 @@ class SwitchedController:
         rate : float, optional
             Largest |dp/dt|, in the unit of the parameter per second; default the plant's own.
         **options
-            Of `synthesis.dwell_time`.
+            Of `synthesis.switching.dwell_time`.
 
         Raises
         ------
@@ -156,7 +156,7 @@ class SwitchedController:
         self, state: SwitchedState, measured: NamedVector, reference: NamedVector, p: NamedVector
     ) -> tuple[Array, SwitchedState]:
         """Return the commands (4,), rad, and the state at the next sample; see
-        `symheli.PureController`.
+        `symheli.flight.PureController`.
         """
         (parameter,) = self.plant.parameters
         design, own = self._design_at(float(p[parameter.name]), state.design), state.own
@@ -233,7 +233,7 @@ def switched(
     Examples
     --------
     >>> gains = [{("u", "y"): -k} for k in (5.0, 8.0)]
-    >>> made = synthesis.switched(plant, gains, edges=[0.5], hysteresis=0.2)
+    >>> made = synthesis.switching.switched(plant, gains, edges=[0.5], hysteresis=0.2)
     >>> print(made.regions, f"{made.travel:g}")
     ((0.0, 0.6), (0.4, 1.0)) 0.2
     """

@@ -2,9 +2,6 @@
 the gusts.
 """
 
-from synthesis.tubes.coverage import Coverage, coverage
-from synthesis.tubes.gain import LocalGain
-from synthesis.tubes.motions import Motions
-from synthesis.tubes.tube import Tube, tube
+from symheli.lazy import lazily
 
-__all__ = ["Coverage", "LocalGain", "Motions", "Tube", "coverage", "tube"]
+__getattr__, __dir__, __all__ = lazily(__name__, __file__)

@@ -52,7 +52,7 @@ class LocalGain:
     Examples
     --------
     >>> import casadi
-    >>> from synthesis import Motions, tube
+    >>> from synthesis.tubes import Motions, tube
     >>> x, u, w, c = (casadi.SX.sym(n, k) for n, k in (("x", 1), ("u", 1), ("w", 1), ("c", 0)))
     >>> model = casadi.Function("cubic", [x, u, w], [u - x**3 + w])
     >>> rest = casadi.Function("rest", [c], [casadi.SX(0), casadi.SX(0)])

@@ -12,10 +12,11 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.linalg import solve_continuous_lyapunov
 
-from symheli import Helicopter, trim, trim_batch
+from symheli import Helicopter, trim
 from symheli.errors import TrimError
 from symheli.flight import Servo
 from symheli.progress import task
+from symheli.steady import trim_batch
 from symheli.steady.newton import newton
 from symheli.values.summary import summarized
 from synthesis.tubes.controllers import Choice

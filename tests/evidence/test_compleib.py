@@ -14,9 +14,10 @@ from evidence import structured
 from evidence.gain_table import structure
 from evidence.structured import FILES, KNOWN, tuned
 from evidence.tuning import THROW, parameters
+from symheli import LinearModel
 from symheli.flight import HelicopterLoops
-from symheli.lpv import LinearModel
-from synthesis import Gain, Plant, Structure
+from synthesis import Plant
+from synthesis.structures import TunableController, TunableGain
 
 FOLDER = Path(os.environ.get("SYMHELI_COMPLEIB", "compleib"))
 
@@ -58,7 +59,7 @@ def test_the_gain_table_over_airspeed_is_of_at_most_sixty_numbers():
 def test_an_autopilots_loops_without_their_gains_are_a_structure():
     """Closed with their gains they are the linear model of the loops, which is what flies."""
     loops = HelicopterLoops.from_parameters(parameters(), throw=THROW)
-    frame = Structure(loops.opened, [Gain(name, low=0.0) for name in loops.gains])
+    frame = TunableController(loops.opened, [TunableGain(name, low=0.0) for name in loops.gains])
     assert frame.numbers == 14
     plant = Plant(loops.linear, (), ["d_lat"], ["p"], ["d_lon"])
     K = frame.controller(loops.gains, plant.parameters).at(0.0)

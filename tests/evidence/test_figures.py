@@ -3,7 +3,7 @@
 import math
 
 from evidence.figures import save
-from synthesis import GainCurve
+from synthesis.certify.questions.gain_curve import GainCurve
 
 CURVE = GainCurve(
     "loop",

@@ -206,7 +206,7 @@ def margins_of_the_first_flight():
 
 
 def proven_by_p_alone(section, loop):
-    found = bracket(loop, 1.0, GAINS[1.0], search=synthesis.Search(seconds=1.0))
+    found = bracket(loop, 1.0, GAINS[1.0], search=synthesis.analysis.LowerBoundSearch(seconds=1.0))
     shown = KEPT["gains.md", section].cells("1")
     assert same(shown[1], found.memory)
     assert same(shown[2], found.plain)
@@ -258,7 +258,7 @@ def hover_of_the_r50():
 
 def tube_in_hover():
     airspeed, gust, _, attitude, *_ = KEPT["tubes.md", "amplitudes"].cells("xcell60")
-    found = synthesis.tube(_xcell(), float(airspeed), gust=float(gust))
+    found = synthesis.tubes.tube(_xcell(), float(airspeed), gust=float(gust))
     assert found.proven
     assert attitude == " ".join(f"{w:.2g}" for w in found.half_widths[6:8])
 
@@ -293,7 +293,7 @@ def tube_along_a_transition():
     acceleration, jerk, snap = case[4:]
     assert (gust, limits) == (f"{case[3]:g}", f"{acceleration:g}, {jerk:g}, {snap:g}")
     heli = Helicopter.load(name, governor="ideal")
-    found = synthesis.tube(
+    found = synthesis.tubes.tube(
         heli, case[1:3], gust=case[3], acceleration=acceleration, jerk=jerk, snap=snap
     )
     assert attitude == (" ".join(f"{w:.2g}" for w in found.half_widths[6:8]) * found.proven)
@@ -301,7 +301,7 @@ def tube_along_a_transition():
 
 def gains_on_one_tube():
     airspeed, output, _, _, proven, flown = KEPT["tubes.md", "gains"].cells("xcell60")
-    found = synthesis.tube(_xcell(), float(airspeed), gust=tube_gains.GUST)
+    found = synthesis.tubes.tube(_xcell(), float(airspeed), gust=tube_gains.GUST)
     gain = found.with_gain([output.split(",")[0]]).gains[0]
     assert same(proven, gain.gamma, rel=1e-3)  # the solver stops at 1e-6 of a cost
     assert float(flown) < gain.gamma
@@ -537,10 +537,10 @@ ROWS = {
     ("identified.md", "changed gains"): margins_of_the_first_flight,
     ("checks.md", "fuzzing symheli"): lambda: faults_of_one_entry("symheli", "symheli.Scheduling"),
     ("checks.md", "fuzzing identification"): lambda: faults_of_one_entry(
-        "identification", "identification.theil"
+        "identification", "identification.judge.theil"
     ),
     ("checks.md", "fuzzing synthesis"): lambda: faults_of_one_entry(
-        "synthesis", "synthesis.PoleRegion"
+        "synthesis", "synthesis.objectives.PoleRegion"
     ),
     ("checks.md", "fuzzing readers"): outcomes_of_one_reader,
 }

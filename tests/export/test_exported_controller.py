@@ -14,8 +14,11 @@ import pytest
 from flight.tables import MACH, InFlight, over, static, table, velocity
 
 from studies.cli import main
-from symheli import InputError, ParameterMonitor, Signal, TableController
+from symheli import TableController
+from symheli.errors import InputError
 from symheli.export import write_controller
+from symheli.flight import ParameterMonitor
+from symheli.values import Signal
 
 CC = shutil.which("gcc") or shutil.which("clang") or shutil.which("cc")
 STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror")

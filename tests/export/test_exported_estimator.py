@@ -10,6 +10,7 @@ import pytest
 
 import identification as idn
 from identification.export import write_estimator
+from symheli import lpv
 from symheli.errors import InputError
 
 CC = shutil.which("gcc") or shutil.which("clang") or shutil.which("cc")
@@ -40,7 +41,7 @@ GROUPS = idn.LPVARX(
     na={"a": 1, "b": {"a": 0, "b": 2}},
     nb=2,
     delay=0,
-    basis=idn.CubicSpline((0.0, 1.0, 4.0, 9.0)),
+    basis=lpv.CubicSpline((0.0, 1.0, 4.0, 9.0)),
     offset_rate=True,
 )
 BESIDE = idn.LPVARX(
@@ -50,15 +51,15 @@ BESIDE = idn.LPVARX(
     na=2,
     nb=0,
     delay=0,
-    basis=idn.Product((idn.Polynomial(1, 0.0, 9.0), idn.PiecewiseLinear((-1.0, 0.0, 1.0)))),
+    basis=lpv.Product((idn.Polynomial(1, 0.0, 9.0), lpv.PiecewiseLinear((-1.0, 0.0, 1.0)))),
     offset=True,
 )
 CASES = {
     "longitudinal": idn.RecursiveLeastSquares(LONGITUDINAL),
     "longitudinal, single": idn.RecursiveLeastSquares(LONGITUDINAL, 0.99, precision="single"),
-    "groups, variable": idn.RecursiveLeastSquares(GROUPS, idn.Variable(200, 20)),
+    "groups, variable": idn.RecursiveLeastSquares(GROUPS, idn.forgetting.Variable(200, 20)),
     "groups, directional, single": idn.RecursiveLeastSquares(
-        GROUPS, idn.Directional(0.97), precision="single"
+        GROUPS, idn.forgetting.Directional(0.97), precision="single"
     ),
     "two parameters, no inputs": idn.RecursiveLeastSquares(BESIDE, 0.98),
 }
@@ -165,7 +166,7 @@ def test_what_cannot_be_written_is_refused(tmp_path):
         na=1,
         nb=1,
         delay=1,
-        basis=idn.UserFunctions((np.ones_like, np.sin), 0.0, 1.0),
+        basis=lpv.UserFunctions((np.ones_like, np.sin), 0.0, 1.0),
     )
     with pytest.raises(InputError, match="user-supplied functions"):
         write_estimator(idn.RecursiveLeastSquares(own), Everything(), tmp_path)

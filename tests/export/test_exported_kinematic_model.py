@@ -9,6 +9,7 @@ import pytest
 
 import identification as idn
 from identification.export import write_kinematic_model
+from symheli import lpv
 from symheli.errors import InputError
 from symheli.values import Signal
 
@@ -16,8 +17,8 @@ CC = shutil.which("gcc") or shutil.which("clang") or shutil.which("cc")
 STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror")
 CONTROLS = ("d_lon", "d_lat", "d_col", "d_ped")
 UNITS = dict.fromkeys("uvw", "m/s") | dict.fromkeys("pqr", "rad/s")
-BOX = idn.Product(
-    (idn.BSpline(2, (0.0, 6.0, 13.0)), idn.Polynomial(1, -2.0, 2.0)), total_degree=None
+BOX = lpv.Product(
+    (lpv.BSpline(2, (0.0, 6.0, 13.0)), idn.Polynomial(1, -2.0, 2.0)), total_degree=None
 )
 STRUCTURES = {
     "airspeed": idn.KinematicARX(CONTROLS, "V", na=2, nb=2, basis=idn.Polynomial(2, 0.0, 13.0)),
@@ -32,7 +33,7 @@ def model_of(kin, seed=0):
     """Random coefficients of order one a second, damped."""
     aero, rng = kin.aerodynamics, np.random.default_rng(seed)
     theta = rng.uniform(-0.02, 0.02, (aero.n_regressors, 6)) / kin.basis.size
-    regression = idn.LPVARXModel(
+    regression = idn.model.LPVARXModel(
         structure=aero,
         theta=theta,
         dt=0.02,
@@ -42,7 +43,7 @@ def model_of(kin, seed=0):
         residual_covariance=np.eye(6),
         rows_used=100,
     )
-    return idn.KinematicModel(
+    return idn.model.KinematicModel(
         structure=kin, aerodynamics=regression, trim=np.zeros((kin.basis.size, 8))
     )
 
@@ -129,7 +130,7 @@ int main(void)
 
 
 def test_what_cannot_be_written_is_refused(tmp_path):
-    own = idn.UserFunctions((np.ones_like, np.sin), 0.0, 1.0)
+    own = lpv.UserFunctions((np.ones_like, np.sin), 0.0, 1.0)
     with pytest.raises(InputError, match="user-supplied functions"):
         write_kinematic_model(model_of(idn.KinematicARX("d_lon", "V", basis=own)), tmp_path)
     with pytest.raises(InputError, match="C identifier"):

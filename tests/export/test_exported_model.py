@@ -11,14 +11,15 @@ import pytest
 import identification as idn
 from identification.export import write_model
 from studies.cli import main
+from symheli import lpv
 from symheli.errors import InputError
 from symheli.values import Signal
 
 CC = shutil.which("gcc") or shutil.which("clang") or shutil.which("cc")
 STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror")
 CUBIC = idn.Polynomial(3, 0.0, 13.0)
-BOX = idn.Product(
-    (idn.BSpline(2, (0.0, 6.0, 13.0)), idn.Polynomial(1, 0.9, 1.3)), total_degree=None
+BOX = lpv.Product(
+    (lpv.BSpline(2, (0.0, 6.0, 13.0)), idn.Polynomial(1, 0.9, 1.3)), total_degree=None
 )
 STRUCTURES = {
     "lag": idn.LPVARX(
@@ -34,10 +35,10 @@ STRUCTURES = {
         na={"a": 1, "b": {"a": 0, "b": 2}},
         nb=1,
         delay=3,
-        basis=idn.CubicSpline((0.0, 1.0, 4.0, 9.0)),
+        basis=lpv.CubicSpline((0.0, 1.0, 4.0, 9.0)),
     ),
     "no inputs": idn.LPVARX(
-        "a", (), "p", na=2, nb=0, delay=0, basis=idn.PiecewiseLinear((0.0, 3.0, 9.0)), offset=True
+        "a", (), "p", na=2, nb=0, delay=0, basis=lpv.PiecewiseLinear((0.0, 3.0, 9.0)), offset=True
     ),
     "no past": idn.LPVARX("a", "c", "p", na=0, nb=1, delay=0, basis=CUBIC, scheduling_at="now"),
     "two parameters": idn.LPVARX(
@@ -57,7 +58,7 @@ def model_of(arx, seed=0):
         tuple(Signal(str(s), "rad") for s in group)
         for group in (arx.outputs, arx.inputs, arx.parameters)
     )
-    return idn.LPVARXModel(
+    return idn.model.LPVARXModel(
         structure=arx,
         theta=theta,
         dt=0.02,
@@ -145,7 +146,7 @@ def test_what_cannot_be_written_is_refused(tmp_path):
         na=1,
         nb=1,
         delay=1,
-        basis=idn.UserFunctions((np.ones_like, np.sin), 0.0, 1.0),
+        basis=lpv.UserFunctions((np.ones_like, np.sin), 0.0, 1.0),
     )
     with pytest.raises(InputError, match="user-supplied functions"):
         write_model(model_of(own), tmp_path)

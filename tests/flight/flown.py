@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 import symheli
-from symheli import AirspeedSchedule, Dryden, Excitation, Gust, Sensor, Wind
+from symheli import AirspeedSchedule, Excitation, Sensor, Wind
+from symheli.environment import Dryden, Gust
 from symheli.flight import XCELL_SERVOS
 
 SLOW = {name: replace(servo, rate=0.4) for name, servo in XCELL_SERVOS.items()}
@@ -36,7 +37,7 @@ def dynamic(heli, follow="command", dt=0.02):
     """A controller with states that moves with the square of the airspeed: the gains of an LQR, a
     lag on the attitude it answers, and a slow integral of the yaw rate.
     """
-    pilot = symheli.gain_scheduled_lqr(heli, 0.0, 13.0, dt)
+    pilot = symheli.flight.gain_scheduled_lqr(heli, 0.0, 13.0, dt)
     basis = symheli.lpv.Polynomial(2, 0.0, 13.0)
     nodes = np.linspace(0.0, 13.0, 14)
     K = basis.fit(nodes, np.stack([pilot.gain(V) for V in nodes]))
@@ -62,7 +63,7 @@ def dynamic(heli, follow="command", dt=0.02):
         INPUTS,
         dt,
     )
-    return symheli.ScheduledController(model, follow)
+    return symheli.flight.ScheduledController(model, follow)
 
 
 class InPython:

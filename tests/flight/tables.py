@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 import symheli
-from symheli import ParameterMonitor, TableController
+from symheli import TableController
+from symheli.flight import ParameterMonitor
 
 OUTPUTS = ("d_lon", "d_lat", "d_col", "d_ped")
 INPUTS = ("u", "v", "w", "p", "q", "r", "phi", "theta")

@@ -7,17 +7,10 @@ import pytest
 from flight.flown import EVERYTHING, SHORT, STIRRED, STORM, InPython, differences, dynamic
 
 import symheli
-from symheli import (
-    AirspeedSchedule,
-    CompilerWarning,
-    FlightLostError,
-    FlightPlan,
-    InputError,
-    fly,
-    fly_batch,
-)
+from symheli import AirspeedSchedule, FlightPlan, fly
 from symheli.codegen import compile as compiling
-from symheli.flight import XCELL_SERVOS, gain_scheduled_lqr
+from symheli.errors import CompilerWarning, FlightLostError, InputError
+from symheli.flight import XCELL_SERVOS, fly_batch, gain_scheduled_lqr
 
 LONG = AirspeedSchedule.transition(0.0, 13.0, 3.0, hold=12.2)
 

@@ -14,8 +14,8 @@ import pytest
 from flight.flown import SHORT, STIRRED
 
 import symheli
-from symheli import FlightDataset, InputError, SymheliError, fly_batch, fly_campaign
-from symheli.flight import XCELL_SERVOS, gain_scheduled_lqr
+from symheli.errors import InputError, SymheliError
+from symheli.flight import XCELL_SERVOS, FlightDataset, fly_batch, fly_campaign, gain_scheduled_lqr
 from symheli.flight.batch import CHUNK
 
 COUNT = 2 * CHUNK + 5
@@ -83,8 +83,8 @@ def test_a_killed_campaign_loses_nothing_finished(campaign, tmp_path):
         import time, symheli
         from flight.flown import SHORT, STIRRED
         heli = symheli.Helicopter.load("xcell60", governor="ideal")
-        pilot = symheli.gain_scheduled_lqr(heli, 0.0, 13.0, 0.02)
-        symheli.fly_campaign(heli, SHORT, {str(path)!r}, seeds=range({COUNT}), signals=["q"],
+        pilot = symheli.flight.gain_scheduled_lqr(heli, 0.0, 13.0, 0.02)
+        symheli.flight.fly_campaign(heli, SHORT, {str(path)!r}, seeds=range({COUNT}), signals=["q"],
                              controller=pilot, excitation=STIRRED, workers=1,
                              progress=lambda done, count: time.sleep(done and 60))
     """)

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 import symheli
-from symheli import AirspeedSchedule, Excitation, FlightLostError, SymheliError, fly
+from symheli import AirspeedSchedule, Excitation, fly
 from symheli.codegen.numeric import Numeric
+from symheli.errors import FlightLostError, SymheliError
 from symheli.flight import gain_scheduled_lqr
 from symheli.flight.controller import MEASURED
 from symheli.integrate import runge_kutta

@@ -6,7 +6,8 @@ import pytest
 from flight.flown import EVERYTHING, INPUTS, SHORT, SLOW, InPython, differences, dynamic
 
 import symheli
-from symheli import InputError, LinearModel, fly
+from symheli import LinearModel, fly
+from symheli.errors import InputError
 from symheli.flight import XCELL_SERVOS, Autopilot, ScheduledController, gain_scheduled_lqr
 from symheli.flight.autopilot import SIZES
 

@@ -32,11 +32,11 @@ class Copying(Executor):
 
 @pytest.fixture(scope="module")
 def campaign(ideal):
-    pilot = symheli.gain_scheduled_lqr(ideal, 0.0, 13.0, 0.02)
+    pilot = symheli.flight.gain_scheduled_lqr(ideal, 0.0, 13.0, 0.02)
 
     def fly(path, **changes):
         options = {"seeds": range(COUNT), "signals": ["q", "phi"], "controller": pilot} | changes
-        return symheli.fly_campaign(ideal, SHORT, path, excitation=STIRRED, **options)
+        return symheli.flight.fly_campaign(ideal, SHORT, path, excitation=STIRRED, **options)
 
     return fly
 

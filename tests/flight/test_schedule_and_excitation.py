@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from symheli import AirspeedSchedule, Excitation, InputError, UnknownNameError
+from symheli import AirspeedSchedule, Excitation
+from symheli.errors import InputError, UnknownNameError
 
 INPUTS = {"d_lon": 0.012, "d_lat": 0.02, "d_col": 0.01}
 TIME = 0.02 * np.arange(3000)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import symheli
-from symheli import AirspeedSchedule, fly, fly_batch
+from symheli import AirspeedSchedule, fly
 from symheli.environment import Dryden, Gust, Wind
 from symheli.errors import InputError, UnknownNameError
-from symheli.flight import XCELL_SERVOS, Sensor, Servo, ServoBank, gain_scheduled_lqr
+from symheli.flight import XCELL_SERVOS, Sensor, Servo, ServoBank, fly_batch, gain_scheduled_lqr
 from symheli.flight.servo import CYCLIC, TAIL
 
 HOVER = AirspeedSchedule((0.5,), (0.5,), (3.0,), lead=0.5)

@@ -9,7 +9,9 @@ import pytest
 from flight.flown import INPUTS, SHORT, STORM, InPython, dynamic
 
 import symheli
-from symheli import InputError, PureController, StatefulController, TableController, fly
+from symheli import TableController, fly
+from symheli.errors import InputError
+from symheli.flight import PureController, StatefulController
 from symheli.flight.controller import CONTROLLER_INPUTS, SCHEDULING
 from symheli.flight.plan_text import described
 from symheli.values import NamedVector, Signal
@@ -26,7 +28,7 @@ BACK = symheli.AirspeedSchedule((2.0, 6.0), (2.0, 2.0), (0.5, 0.5), lead=0.5)
 class InValues:
     """A controller with its state outside, asked in Python at every sample."""
 
-    controller: symheli.ScheduledController
+    controller: symheli.flight.ScheduledController
 
     @property
     def dt(self):

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import symheli
-from symheli import InputError, StitchedModel, UnknownNameError
 from symheli.codegen.numeric import Numeric
+from symheli.errors import InputError, UnknownNameError
+from symheli.flight import StitchedModel
 from symheli.integrate import runge_kutta
 
 SMOOTH = (4.0, 8.0)  # m/s: no wake edge, no stall between

@@ -11,8 +11,9 @@ from flight.tables import DT, INPUTS, MACH, OUTPUTS, InFlight, over, sampled, st
 
 import symheli
 import synthesis
-from symheli import InputError, LinearModel, LPVStateSpace, ParameterMonitor, TableController, fly
-from symheli.flight import StepEvents
+from symheli import LinearModel, LPVStateSpace, TableController, fly
+from symheli.errors import InputError
+from symheli.flight import ParameterMonitor, StepEvents
 from symheli.flight.anti_windup import saturated_radius
 from symheli.flight.table_file import SCHEMA
 from symheli.values import plain_file
@@ -466,7 +467,9 @@ def test_a_flight_does_not_feed_its_airspeed_to_a_table_over_something_else(idea
 
 
 def test_what_a_flight_provides_in_another_unit_is_converted(ideal):
-    lqr = symheli.gain_scheduled_lqr(ideal, 0.0, 8.0, dt=DT, points=5).scheduled_controller.model
+    lqr = symheli.flight.gain_scheduled_lqr(
+        ideal, 0.0, 8.0, dt=DT, points=5
+    ).scheduled_controller.model
     speed = lqr.with_scheduling(symheli.Scheduling("airspeed", "km/h", 0.0, 28.8, 10.8))
     climb = symheli.AirspeedSchedule.transition(3.0, 5.0, acceleration=2.0, hold=0.5)
     models = lqr.with_rate(3.0), speed
@@ -479,7 +482,9 @@ def test_what_a_flight_provides_in_another_unit_is_converted(ideal):
 
 def test_a_table_over_the_acceleration_flies_and_one_over_nothing_too(ideal):
     """What the flight commands beside the airspeed serves too; a constant controller needs none."""
-    lqr = symheli.gain_scheduled_lqr(ideal, 0.0, 8.0, dt=DT, points=5).scheduled_controller.model
+    lqr = symheli.flight.gain_scheduled_lqr(
+        ideal, 0.0, 8.0, dt=DT, points=5
+    ).scheduled_controller.model
     hold = symheli.AirspeedSchedule.transition(3.0, 3.5, acceleration=0.5, hold=0.3)
     box = symheli.Scheduling("acceleration", "m/s^2", -1.0, 1.0, 5.0)
     records = []
@@ -552,7 +557,7 @@ def test_a_controller_that_reads_its_command_flies_on_and_off_the_ground(ideal):
     np.testing.assert_allclose(own.values, hand.values, atol=1e-4)
     assert np.ptp(own["d_lat"]) > 1e-6
     with pytest.raises(InputError, match=r"d_lat_rate: .* integrated by a TableController"):
-        symheli.ScheduledController(design)
+        symheli.flight.ScheduledController(design)
     bad = replace(gains, dt=DT, inputs=("phi", "p", "d_ped_command"))
     with pytest.raises(InputError, match="unknown measured signal 'd_ped_command'"):
         TableController.of(LPVStateSpace.constant(bad, speed), 2)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification import LPVARX, Coefficients, Polynomial
+from identification import LPVARX, Polynomial
+from identification.model import Coefficients
 from symheli.records import FlightRecord
 
 

@@ -117,7 +117,7 @@ class Vehicle:
         """The true coefficients, or others, in a `KinematicModel` beside what a fit says."""
         fitted = idn.fit(self.kin, record)
         aero = fitted.aerodynamics
-        known = idn.LPVARXModel(
+        known = idn.model.LPVARXModel(
             structure=aero.structure,
             theta=self.theta if theta is None else theta,
             dt=aero.dt,
@@ -127,7 +127,7 @@ class Vehicle:
             residual_covariance=aero.residual_covariance,
             rows_used=aero.rows_used,
         )
-        return idn.KinematicModel(structure=self.kin, aerodynamics=known, trim=fitted.trim)
+        return idn.model.KinematicModel(structure=self.kin, aerodynamics=known, trim=fitted.trim)
 
     def without_noise(self, **flight):
         """A source of flights: the same commands without noise."""

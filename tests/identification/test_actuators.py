@@ -6,7 +6,7 @@ from scipy.linalg import expm
 
 import identification as idn
 import symheli
-from symheli import InputError
+from symheli.errors import InputError
 from symheli.flight import XCELL_SERVOS
 
 CONTROLS = ("d_lon", "d_lat", "d_col", "d_ped")
@@ -41,7 +41,7 @@ def test_the_mean_deflection_is_that_of_the_servo_integrated_finely(delay):
 @pytest.fixture(scope="module")
 def flight(ideal):
     schedule = symheli.AirspeedSchedule.transition(2.0, 6.0, acceleration=2.0, hold=2.0)
-    lqr = symheli.gain_scheduled_lqr(ideal, 0.0, 8.0, 0.02, servos=XCELL_SERVOS)
+    lqr = symheli.flight.gain_scheduled_lqr(ideal, 0.0, 8.0, 0.02, servos=XCELL_SERVOS)
     shaken = symheli.Excitation(
         {"d_lon": 0.015, "d_lat": 0.01, "d_ped": 0.015}, "multisine", (0.1, 4.0), 1
     )

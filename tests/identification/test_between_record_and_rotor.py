@@ -10,7 +10,8 @@ import pytest
 from known_vehicles import CONTROLS, DT, HIGH, LOW, STATES, UNITS, Pilot, Vehicle, rates
 
 import identification as idn
-from symheli import FlightRecord, InputError, LinearModel, Servo
+from symheli import FlightRecord, LinearModel, Servo
+from symheli.errors import InputError
 
 SERVOS = {
     u: Servo(natural_frequency=w, damping=0.7)
@@ -144,7 +145,7 @@ def test_a_log_with_every_second_command_is_interpolated():
 
 def test_in_a_known_wind_the_coefficients_are_exact(vehicle):
     records = [flown(vehicle, 250, wind=WIND, heading=h, seed=s) for s, h in ((1, 0.3), (2, 2.0))]
-    wind = idn.SteadyWind(*WIND, over_ground="over_ground")
+    wind = idn.structure.SteadyWind(*WIND, over_ground="over_ground")
     basis = idn.Polynomial(1, LOW - 5.0, HIGH + 5.0)
     kin = commanded(vehicle, wind=wind, scheduling="over_ground", basis=basis)
     found = idn.fit(kin, records)
@@ -166,8 +167,8 @@ def test_what_is_not_known_is_found_beside_the_coefficients(vehicle, part):
     sizes = np.array(list(NOISE.values()))
     told = {
         "delay": {"actuators": idn.Actuators(delay=0.02, delay_deviation=0.02)},
-        "wind": {"wind": idn.SteadyWind(deviation=5.0)},
-        "sensors": {"sensors": idn.LateSensors(deviation=0.02)},
+        "wind": {"wind": idn.structure.SteadyWind(deviation=5.0)},
+        "sensors": {"sensors": idn.structure.LateSensors(deviation=0.02)},
     }[part]
     flying = {
         "delay": {"actuators": idn.Actuators(delay=0.033)},
@@ -181,12 +182,12 @@ def test_what_is_not_known_is_found_beside_the_coefficients(vehicle, part):
             for s in (sizes, None)
         )
         if part == "sensors":
-            noisy = idn.LateSensors(delay=-0.025).along(noisy)
+            noisy = idn.structure.LateSensors(delay=-0.025).along(noisy)
         pairs.append((noisy, clean))
     found = idn.fit(
         commanded(vehicle, **told),
         [noisy for noisy, _ in pairs],
-        idn.FilterError(Clean(*pairs), noise=NOISE),
+        idn.methods.FilterError(Clean(*pairs), noise=NOISE),
     )
     estimates = next(
         found.details[n] for n in ("actuators", "wind", "sensors") if n in found.details
@@ -231,10 +232,10 @@ def test_a_saved_model_keeps_its_parts(vehicle, tmp_path):
     actuators = idn.Actuators(SERVOS, delay=0.033)
     record = flown(vehicle, 300, actuators, WIND)
     record = record.with_signals({"Om": "rad/s"}, Om=160.0 + 0.1 * record["p"])
-    wind, sensors = idn.SteadyWind(*WIND), idn.LateSensors(delay=0.01)
+    wind, sensors = idn.structure.SteadyWind(*WIND), idn.structure.LateSensors(delay=0.01)
     kin = commanded(vehicle, actuators=actuators, wind=wind, sensors=sensors, rotor_speed="Om")
     model = idn.fit(kin, record)
-    again = idn.KinematicModel.load(model.save(tmp_path / "model.json"))
+    again = idn.model.KinematicModel.load(model.save(tmp_path / "model.json"))
     assert again.structure == model.structure
     for p in (1.0, 7.0):
         one, other = model.at(p), again.at(p)
@@ -254,13 +255,13 @@ def test_what_cannot_stand_between_is_refused(vehicle):
     with pytest.raises(InputError, match=r"wind: expected SteadyWind"):
         commanded(vehicle, wind=(1.0, 2.0, 0.0))
     with pytest.raises(InputError, match="over ground"):
-        commanded(vehicle, wind=idn.SteadyWind(over_ground="speed"))
+        commanded(vehicle, wind=idn.structure.SteadyWind(over_ground="speed"))
     with pytest.raises(InputError, match="a state or an input already"):
         commanded(vehicle, rotor_speed="p")
     with pytest.raises(InputError, match="without actuators"):
         idn.RecursiveLeastSquares(commanded(vehicle, actuators=idn.Actuators(delay=0.02)))
     for wrong in ({"deviation": -1.0}, {"north": float("nan")}):
         with pytest.raises(InputError):
-            idn.SteadyWind(**wrong)
+            idn.structure.SteadyWind(**wrong)
     with pytest.raises(InputError, match="finite delay"):
-        idn.LateSensors(delay=float("inf"))
+        idn.structure.LateSensors(delay=float("inf"))

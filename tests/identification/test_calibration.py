@@ -7,7 +7,7 @@ import pytest
 
 import identification as idn
 import symheli
-from symheli import InputError
+from symheli.errors import InputError
 
 BLADES = ["chord", "lift_slope", "profile_drag"]
 KNOWN = ["body.Ixx", "body.Iyy", "main_rotor.bar_lock_number"]
@@ -108,9 +108,9 @@ def test_hidden_rotor_states_are_estimated_too(pi):
 def test_wind_leaves_residuals_that_are_not_white(ideal, flown):
     schedule = symheli.AirspeedSchedule.transition(2.0, 6.0, acceleration=2.0, hold=2.0)
     lqr = symheli.flight.gain_scheduled_lqr(ideal, 0.0, 8.0, 0.02)
-    air = symheli.Wind((0, 0, 0), turbulence=symheli.Dryden(8.0, 30.0), seed=1)
+    air = symheli.Wind((0, 0, 0), turbulence=symheli.environment.Dryden(8.0, 30.0), seed=1)
     gusty = symheli.fly(ideal, schedule, controller=lqr, wind=air, noise_db=30.0)
-    with pytest.warns(symheli.DataWarning, match="no white noise: wind"):
+    with pytest.warns(symheli.errors.DataWarning, match="no white noise: wind"):
         found = idn.calibrate(ideal, gusty, KNOWN[:1])
     assert max(found.whiteness.values()) > 0.5
     assert "The residuals of" in str(found)
@@ -173,8 +173,8 @@ def test_bad_records_are_refused(ideal, flown):
 @pytest.mark.slow
 def test_a_search_that_is_cut_short_says_so(wrong, flown):
     with (
-        pytest.warns(symheli.ConvergenceWarning, match="allow more rounds"),
-        pytest.warns(symheli.DataWarning, match="no white noise"),
+        pytest.warns(symheli.errors.ConvergenceWarning, match="allow more rounds"),
+        pytest.warns(symheli.errors.DataWarning, match="no white noise"),
     ):
         found = idn.calibrate(wrong, flown["noisy"], KNOWN, rounds=1)
     assert "had not converged" in str(found)

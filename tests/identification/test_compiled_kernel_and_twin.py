@@ -12,15 +12,16 @@ from identification.recursive.kernel import twin
 from identification.recursive.kernel.configuration import KernelConfiguration
 from identification.recursive.online import Online
 from identification.structure.regressors import regression
+from symheli import lpv
 from symheli.lpv import CubicSpline
 from symheli.records import FlightRecord
 
 WAYS = (
     1.0,
     0.98,
-    idn.Constant(0.9, floor=0.0),
-    idn.Variable(longest=200, shortest=20, recent=10, usual=100),
-    idn.Directional(0.97, quiet=0.05),
+    idn.forgetting.Constant(0.9, floor=0.0),
+    idn.forgetting.Variable(longest=200, shortest=20, recent=10, usual=100),
+    idn.forgetting.Directional(0.97, quiet=0.05),
 )
 STRUCTURES = {
     "two outputs, offset, rate": structure(
@@ -134,11 +135,11 @@ def test_block_diagonal_estimates_are_those_of_least_squares_output_by_output():
 
 SQUARES = (np.ones_like, np.square)
 BESIDE = {
-    "two parameters": idn.Product(
-        (idn.Polynomial(1, 0.0, 13.0), idn.PiecewiseLinear((-1.0, 0.0, 1.0))), None
+    "two parameters": lpv.Product(
+        (idn.Polynomial(1, 0.0, 13.0), lpv.PiecewiseLinear((-1.0, 0.0, 1.0))), None
     ),
-    "total degree": idn.Product((idn.Polynomial(2, 0.0, 13.0), idn.Polynomial(2, -1.0, 1.0)), 2),
-    "one's own functions": idn.UserFunctions(SQUARES, 0.0, 13.0),
+    "total degree": lpv.Product((idn.Polynomial(2, 0.0, 13.0), idn.Polynomial(2, -1.0, 1.0)), 2),
+    "one's own functions": lpv.UserFunctions(SQUARES, 0.0, 13.0),
 }
 
 
@@ -180,7 +181,9 @@ def test_other_bases_give_what_batch_least_squares_gives(name, precision):
 def test_basis_in_the_kernel_is_the_basis_of_the_structure():
     """Its Bernstein form against Legendre's recursion and SciPy's splines."""
     for basis in (idn.Polynomial(5, -3.0, 13.0), CubicSpline((0.0, 1.0, 4.0, 9.0, 13.0))):
-        (factor,) = KernelConfiguration(structure(basis=basis), idn.Constant(), np.float64).factors
+        (factor,) = KernelConfiguration(
+            structure(basis=basis), idn.forgetting.Constant(), np.float64
+        ).factors
         for p in np.linspace(basis.low, basis.high, 41):
             # Legendre's fifth has Bernstein coefficients of up to 330: a few roundings of those
             np.testing.assert_allclose(twin.evaluate(factor, p), basis(p), rtol=0, atol=1e-12)
@@ -195,7 +198,7 @@ def test_directional_forgetting_is_its_formula():
         np.random.default_rng(0),
         0.9,
     )
-    rls = idn.RecursiveLeastSquares(arx, idn.Directional(factor, quiet=0.0))
+    rls = idn.RecursiveLeastSquares(arx, idn.forgetting.Directional(factor, quiet=0.0))
     online, n = rls.online(), arx.n_regressors
     information = np.zeros((n, n))
     for k in range(60):

@@ -103,24 +103,24 @@ def test_fit_keeps_what_each_method_gives():
     for method in ("ls", "rls"):
         assert idn.fit(SAME, record, method).covariance is not None
     for method in (
-        idn.Recursion(0.99),  # coefficients that move
-        idn.Ridge(1e-3),
-        idn.Lasso(),
-        idn.InstrumentalVariables("u"),
-        idn.RefinedInstruments(iterations=2),
-        idn.OutputError(evaluations=3),
+        idn.methods.Recursion(0.99),  # coefficients that move
+        idn.methods.Ridge(1e-3),
+        idn.methods.Lasso(),
+        idn.methods.InstrumentalVariables("u"),
+        idn.methods.RefinedInstruments(iterations=2),
+        idn.methods.OutputError(evaluations=3),
     ):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # weak or unsettled
             assert idn.fit(SAME, record, method).covariance is None
 
-    class Own(idn.Method):
+    class Own(idn.methods.Method):
         shorthand = "own"
 
         def estimate(self, arx, records, data):
             n = arx.n_regressors
             P = np.arange(4.0 * n * n).reshape(2, n, 2, n)
-            return idn.Estimate(theta=np.zeros((n, 2)), covariance=P)
+            return idn.methods.Estimate(theta=np.zeros((n, 2)), covariance=P)
 
     n = SAME.n_regressors
     found = idn.fit(SAME, record, Own()).covariance
@@ -155,7 +155,7 @@ def test_known_kinematics_have_that_of_their_regression_and_it_is_no_proof_by_le
     assert model.covariance is model.aerodynamics.covariance
     with pytest.raises(InputError, match="no covariance that holds for noise in the regressors"):
         model.uncertain()
-    flown = idn.InstrumentalVariables(vehicle.without_noise(seed=0))
+    flown = idn.methods.InstrumentalVariables(vehicle.without_noise(seed=0))
     by_instruments = idn.fit(vehicle.kin, record, flown)
     assert by_instruments.covariance.shape == (6, n, 6, n)
     assert by_instruments.uncertain().probability == 0.95

@@ -37,7 +37,7 @@ def test_the_nine_coefficients_of_a_system_with_dynamic_dependence_come_back(met
     found = model.coefficients.monomial()
     np.testing.assert_allclose(found.A[:, :, 0, 0], [A1, A2], atol=1e-9)
     np.testing.assert_allclose(found.B[0, :, 0, 0], B1, atol=1e-9)
-    report = idn.dependence_report(model, record)
+    report = idn.judge.dependence_report(model, record)
     assert report.residual[0] < 1e-12
     assert report.dynamic == (False,)
     assert "nothing left to explain" in str(report)
@@ -47,7 +47,7 @@ def test_the_nine_coefficients_of_a_system_with_dynamic_dependence_come_back(met
 def test_a_static_model_of_it_leaves_a_residual_and_the_report_says_why(noise):
     arx, record = dynamic(noise=noise)
     static = structure(na=2, nb=1, basis=arx.basis, scheduling_at="now")
-    report = idn.dependence_report(idn.fit(static, record), record)
+    report = idn.judge.dependence_report(idn.fit(static, record), record)
     assert report.residual[0] > 0.05
     assert report.explained[0] > 0.5
     assert report.dynamic == (True,)
@@ -83,7 +83,7 @@ def test_a_static_state_space_model_has_dynamic_dependence_as_input_output_model
     found = idn.fit(arx, record).coefficients.monomial()
     np.testing.assert_allclose(found.A[:, :, 0, 0], [A1, A2], atol=1e-9)
     np.testing.assert_allclose(found.B[0, :, 0, 0], B1, atol=1e-9)
-    static = idn.dependence_report(idn.fit(replace(arx, scheduling_at="now"), record), record)
+    static = idn.judge.dependence_report(idn.fit(replace(arx, scheduling_at="now"), record), record)
     assert static.residual[0] > 0.05
     assert static.dynamic == (True,)
     assert "do NOT depend on p as the structure says" in str(static)
@@ -96,7 +96,7 @@ def test_where_the_state_is_hidden_behind_moving_coefficients_both_models_leave_
     record = two_states(coupling=0.6)
     for at in ("lag", "now"):
         arx = structure(na=2, nb=1, basis=idn.Polynomial(2, -1.0, 1.0), scheduling_at=at)
-        report = idn.dependence_report(idn.fit(arx, record), record)
+        report = idn.judge.dependence_report(idn.fit(arx, record), record)
         assert report.residual[0] > 0.02
         assert report.dynamic == (True,)
         assert "dependence on several instants at once" in str(report)
@@ -104,7 +104,7 @@ def test_where_the_state_is_hidden_behind_moving_coefficients_both_models_leave_
 
 def test_the_right_model_of_noisy_data_is_not_suspected():
     arx, record = dynamic(noise=0.1)
-    report = idn.dependence_report(idn.fit(arx, record), record)
+    report = idn.judge.dependence_report(idn.fit(arx, record), record)
     # 1 % of the rows are explained by 9 more regressors by chance; significant in one of a thousand
     # records
     assert report.dynamic == (False,)

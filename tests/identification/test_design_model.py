@@ -11,11 +11,11 @@ from symheli.errors import InputError, NotFitError
 
 def judged(*verdicts):
     rows = tuple(
-        idn.Criterion(name=f"row {i}", value=1.4, threshold=1.0, verdict=v, source="here")
+        idn.judge.Criterion(name=f"row {i}", value=1.4, threshold=1.0, verdict=v, source="here")
         for i, v in enumerate(verdicts)
     )
     nothing = np.array([np.nan])
-    return idn.FitForControl(
+    return idn.judge.fit_for_control.FitForControl(
         criteria=rows, points=(0.0,), margin=nothing, gap=nothing, second_gap=nothing
     )
 
@@ -31,18 +31,21 @@ class Spy:
 
 
 def test_a_fit_model_is_handed_out_as_its_estimate_or_its_set():
-    assert idn.design_model(Spy(), judged("fit"), outputs=["r"])[:2] == ("estimate", (["r"], None))
-    assert idn.design_model(Spy(), judged("fit"), probability=0.9) == ("set", 0.9)
+    assert idn.design.design_model(Spy(), judged("fit"), outputs=["r"])[:2] == (
+        "estimate",
+        (["r"], None),
+    )
+    assert idn.design.design_model(Spy(), judged("fit"), probability=0.9) == ("set", 0.9)
 
 
 @pytest.mark.parametrize("verdict", ["not fit", "not known"])
 def test_any_other_is_refused_with_every_criterion_that_decides(verdict):
     with pytest.raises(NotFitError, match="force=True") as caught:
-        idn.design_model(Spy(), judged("fit", verdict))
+        idn.design.design_model(Spy(), judged("fit", verdict))
     assert caught.value.reasons == (f"row 1 is 1.4, at most 1: {verdict}",)
-    assert idn.design_model(Spy(), judged(verdict), force=True)[0] == "estimate"
+    assert idn.design.design_model(Spy(), judged(verdict), force=True)[0] == "estimate"
 
 
 def test_what_was_not_judged_is_said():
     with pytest.raises(InputError, match="fit_for_control"):
-        idn.design_model(Spy(), "fit")
+        idn.design.design_model(Spy(), "fit")

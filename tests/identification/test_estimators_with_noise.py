@@ -13,6 +13,7 @@ from identification.estimators.prediction_error import Residuals
 from identification.estimators.refined_instruments import refined_instruments
 from identification.model.stretches import contracted, filtered, stretches
 from identification.structure.regressors import stacked
+from symheli import lpv
 from symheli.errors import ConvergenceWarning, InputError
 from symheli.records import FlightRecord
 
@@ -59,7 +60,7 @@ def test_noise_at_10_db_biases_least_squares_with_or_without_a_penalty(method):
 
 
 @pytest.mark.slow(only="oe")
-@pytest.mark.parametrize("method", [idn.InstrumentalVariables("u"), "riv", "oe"])
+@pytest.mark.parametrize("method", [idn.methods.InstrumentalVariables("u"), "riv", "oe"])
 def test_noise_at_10_db_does_not_bias_instruments_nor_output_error(method):
     # what is left is scatter: up to 0.02 a realization (iv), so the mean of three stays within
     # 0.04; the bias of "ls" is 0.3
@@ -68,8 +69,8 @@ def test_noise_at_10_db_does_not_bias_instruments_nor_output_error(method):
 
 def test_refined_instruments_with_white_noise_are_the_output_error_estimate():
     record = oscillator(800, 5)
-    refined = idn.fit(ARX, record, method=idn.RefinedInstruments(tolerance=1e-9))
-    closest = idn.fit(ARX, record, method=idn.OutputError(initial="measured"))
+    refined = idn.fit(ARX, record, method=idn.methods.RefinedInstruments(tolerance=1e-9))
+    closest = idn.fit(ARX, record, method=idn.methods.OutputError(initial="measured"))
     assert refined.details["converged"]
     assert closest.details["converged"]
     # both solve (d response / d theta)' (y - response) = 0; they differ in the filter at the first
@@ -81,10 +82,10 @@ def test_refined_instruments_with_white_noise_are_the_output_error_estimate():
 def test_a_noise_model_finds_the_colour_and_narrows_the_scatter():
     white, coloured = (
         errors("riv", (0, 1, 2), 0.9),
-        errors(idn.RefinedInstruments(noise_order=1), (0, 1, 2), 0.9),
+        errors(idn.methods.RefinedInstruments(noise_order=1), (0, 1, 2), 0.9),
     )
     model = idn.fit(
-        ARX, oscillator(1500, 0, pole=0.9), method=idn.RefinedInstruments(noise_order=1)
+        ARX, oscillator(1500, 0, pole=0.9), method=idn.methods.RefinedInstruments(noise_order=1)
     )
     assert model.details["noise"][0][0] == pytest.approx(
         -0.9, abs=0.03
@@ -110,8 +111,8 @@ def test_closed_loop_noise_is_kept_out_of_the_refinement_by_the_external_excitat
         )
         for name, method in (
             ("ls", "ls"),
-            ("iv", idn.InstrumentalVariables("r")),
-            ("riv", idn.RefinedInstruments("r")),
+            ("iv", idn.methods.InstrumentalVariables("r")),
+            ("riv", idn.methods.RefinedInstruments("r")),
         )
     }
     # measured 0.39, 0.028 and 0.005 on this record; over three records iv 0.007 to 0.028, riv 0.001
@@ -133,7 +134,7 @@ def test_refined_instruments_identify_a_plant_that_is_unstable_in_open_loop(at):
     )
     true = np.stack([-(1.75 + 0.01 * nodes), 0.80 + 0.004 * nodes], axis=1)
     assert np.abs(np.roots([1.0, -(1.75 + 0.01 * 12.5), 0.80 + 0.004 * 12.5])).max() > 1.01
-    found = {idn.InstrumentalVariables("r"): [], idn.RefinedInstruments("r"): []}
+    found = {idn.methods.InstrumentalVariables("r"): [], idn.methods.RefinedInstruments("r"): []}
     for seed in range(1, 6):
         record = closed_loop(3000, noise=0.5, seed=seed, at=at)
         for method, errors in found.items():
@@ -180,14 +181,16 @@ def test_while_the_plant_is_stable_the_observer_is_the_simulation():
 
 def test_a_refinement_that_does_not_settle_says_so():
     with pytest.warns(ConvergenceWarning, match="'riv' did not settle: .* needs instruments"):
-        model = idn.fit(ARX, oscillator(300, 0), method=idn.RefinedInstruments(iterations=1))
+        model = idn.fit(
+            ARX, oscillator(300, 0), method=idn.methods.RefinedInstruments(iterations=1)
+        )
     assert not model.details["converged"]
 
 
 def test_without_noise_refined_instruments_in_closed_loop_are_exact():
     arx = structure(nb=1, basis=idn.Polynomial(1, 0.0, 13.0))
     record = closed_loop(1500, noise=0.0, seed=4)
-    found = idn.fit(arx, record, method=idn.RefinedInstruments("r"))
+    found = idn.fit(arx, record, method=idn.methods.RefinedInstruments("r"))
     np.testing.assert_allclose(found.theta, idn.fit(arx, record).theta, atol=1e-8)
 
 
@@ -203,9 +206,9 @@ MIMO = dict(
 
 
 @pytest.mark.parametrize("at", ["lag", "now"])
-@pytest.mark.parametrize("method", ["riv", "oe", idn.InstrumentalVariables(("u", "v"))])
+@pytest.mark.parametrize("method", ["riv", "oe", idn.methods.InstrumentalVariables(("u", "v"))])
 def test_without_noise_every_method_gives_the_coefficients_of_a_coupled_structure_back(method, at):
-    truth = Truth(structure(**MIMO, basis=idn.BSpline(2, (0.0, 6.0, 13.0)), scheduling_at=at))
+    truth = Truth(structure(**MIMO, basis=lpv.BSpline(2, (0.0, 6.0, 13.0)), scheduling_at=at))
     records = [truth.record(moving(350), seed=1), truth.record(moving(250)[::-1].copy(), seed=2)]
     # 1e-8: instruments and trust regions lose a few digits of a condition of 1e3 to 1e4
     np.testing.assert_allclose(
@@ -221,7 +224,7 @@ def test_refinement_comes_back_from_a_start_that_diverges():
     (run,) = stretches(truth.arx, [record], outputs=True)
     assert not np.isfinite(run.free_run(astray)).all()
     assert np.isfinite(run.free_run(contracted(truth.arx, astray, [run]))).all()
-    found = refined_instruments(truth.arx, [record], None, astray, idn.RefinedInstruments())
+    found = refined_instruments(truth.arx, [record], None, astray, idn.methods.RefinedInstruments())
     assert found.converged
     np.testing.assert_allclose(found.theta, truth.theta, atol=1e-9)
 
@@ -229,10 +232,10 @@ def test_refinement_comes_back_from_a_start_that_diverges():
 @pytest.mark.parametrize(
     "method",
     [
-        idn.OutputError(),
-        idn.OutputError(initial="measured"),
-        idn.BoxJenkins(ar=2, ma=1),
-        idn.ARMAX(ar=1, ma=2),
+        idn.methods.OutputError(),
+        idn.methods.OutputError(initial="measured"),
+        idn.methods.BoxJenkins(ar=2, ma=1),
+        idn.methods.ARMAX(ar=1, ma=2),
     ],
 )
 def test_sensitivities_are_the_derivatives_of_the_prediction_error(method):
@@ -244,7 +247,9 @@ def test_sensitivities_are_the_derivatives_of_the_prediction_error(method):
     )  # a measurement, and a scheduling value: the run breaks there
     t[45:] += 9.0
     record = FlightRecord(t, values, record.signals)
-    white = isinstance(method, idn.OutputError) and not isinstance(method, idn.BoxJenkins)
+    white = isinstance(method, idn.methods.OutputError) and not isinstance(
+        method, idn.methods.BoxJenkins
+    )
     problem = Residuals(truth.arx, stretches(truth.arx, [record], outputs=not white), method)
     x = problem.start(0.9 * truth.theta)
     exact = problem.jacobian(x)
@@ -280,14 +285,14 @@ def test_an_option_beside_the_method_is_refused(option):
 
 
 def test_a_new_estimator_is_a_subclass_and_nothing_else():
-    class Nothing(idn.Method):
+    class Nothing(idn.methods.Method):
         """Every coefficient zero."""
 
         shorthand = "nothing"
         needs_excitation = False
 
         def estimate(self, arx, records, data):
-            return idn.Estimate(
+            return idn.methods.Estimate(
                 theta=np.zeros((arx.n_regressors, arx.ny)),
                 details={"rows": len(data.phi)},
                 remarks=(ConvergenceWarning("nothing to settle"),),
@@ -308,9 +313,16 @@ def test_a_new_estimator_is_a_subclass_and_nothing_else():
 def test_forgetting_is_an_option_of_the_recursion():
     record = oscillator(600, 0)
     batch = idn.fit(ARX, record)
-    np.testing.assert_allclose(idn.fit(ARX, record, idn.Recursion()).theta, batch.theta, atol=1e-9)
-    for forgetting in (0.98, idn.Constant(0.98), idn.Variable(), idn.Directional(0.9)):
-        found = idn.fit(ARX, record, idn.Recursion(forgetting))
+    np.testing.assert_allclose(
+        idn.fit(ARX, record, idn.methods.Recursion()).theta, batch.theta, atol=1e-9
+    )
+    for forgetting in (
+        0.98,
+        idn.forgetting.Constant(0.98),
+        idn.forgetting.Variable(),
+        idn.forgetting.Directional(0.9),
+    ):
+        found = idn.fit(ARX, record, idn.methods.Recursion(forgetting))
         history = idn.RecursiveLeastSquares(ARX, forgetting).run(record)
         assert np.abs(found.theta - batch.theta).max() > 1e-3
         np.testing.assert_allclose(found.theta, history.model.theta, atol=1e-12)
@@ -319,12 +331,12 @@ def test_forgetting_is_an_option_of_the_recursion():
 @pytest.mark.parametrize(
     "make",
     [
-        lambda: idn.Ridge(weight=-1.0),
-        lambda: idn.Ridge(towards="one"),
-        lambda: idn.Lasso(weight=1.5),
-        lambda: idn.RefinedInstruments(iterations=0),
-        lambda: idn.OutputError(initial="guessed"),
-        lambda: idn.OutputError(tolerance=0.0),
+        lambda: idn.methods.Ridge(weight=-1.0),
+        lambda: idn.methods.Ridge(towards="one"),
+        lambda: idn.methods.Lasso(weight=1.5),
+        lambda: idn.methods.RefinedInstruments(iterations=0),
+        lambda: idn.methods.OutputError(initial="guessed"),
+        lambda: idn.methods.OutputError(tolerance=0.0),
     ],
 )
 def test_options_out_of_range_are_refused_when_made(make):

@@ -5,6 +5,7 @@ import pytest
 from known_systems import Truth, flown, moving, moving_box, structure
 
 import identification as idn
+from symheli import lpv
 from symheli.errors import ExcitationError, InputError
 
 # 1e-9: the condition of these regressors stays below 1e4, and rounding enters at 1e-16 of signals
@@ -47,23 +48,23 @@ SHAPES = {
 ONE, SEVERAL = moving(400), moving_box(600)
 BASES = {
     "legendre 3": (idn.Polynomial(3, 0.0, 13.0), ONE),
-    "cubic b-spline": (idn.BSpline(3, (0.0, 4.0, 9.0, 13.0)), ONE),
-    "hats": (idn.PiecewiseLinear((0.0, 5.0, 13.0)), ONE),
-    "spline": (idn.CubicSpline((0.0, 4.0, 9.0, 13.0)), ONE),
+    "cubic b-spline": (lpv.BSpline(3, (0.0, 4.0, 9.0, 13.0)), ONE),
+    "hats": (lpv.PiecewiseLinear((0.0, 5.0, 13.0)), ONE),
+    "spline": (lpv.CubicSpline((0.0, 4.0, 9.0, 13.0)), ONE),
     "brought along": (
-        idn.UserFunctions((np.ones_like, np.cos, lambda p: 1 / (1 + p)), 0.0, 13.0),
+        lpv.UserFunctions((np.ones_like, np.cos, lambda p: 1 / (1 + p)), 0.0, 13.0),
         ONE,
     ),
     "tensor product": (
-        idn.Product((idn.Polynomial(1, 0.0, 13.0), idn.Polynomial(2, 0.9, 1.3))),
+        lpv.Product((idn.Polynomial(1, 0.0, 13.0), idn.Polynomial(2, 0.9, 1.3))),
         SEVERAL,
     ),
     "total degree": (
-        idn.Product((idn.Polynomial(2, 0.0, 13.0), idn.Polynomial(2, 0.9, 1.3)), total_degree=2),
+        lpv.Product((idn.Polynomial(2, 0.0, 13.0), idn.Polynomial(2, 0.9, 1.3)), total_degree=2),
         SEVERAL,
     ),
     "mixed product": (
-        idn.Product((idn.BSpline(2, (0.0, 6.0, 13.0)), idn.Polynomial(1, 0.9, 1.3))),
+        lpv.Product((lpv.BSpline(2, (0.0, 6.0, 13.0)), idn.Polynomial(1, 0.9, 1.3))),
         SEVERAL,
     ),
 }

@@ -10,7 +10,7 @@ from symheli.errors import ExcitationError, InputError, UnknownNameError
 P_OF_THE_PAPER = 6.5 * (1 + np.sin(np.pi * np.arange(400) / 3))
 
 
-@pytest.mark.parametrize("method", ["ls", "rls", idn.InstrumentalVariables("u")])
+@pytest.mark.parametrize("method", ["ls", "rls", idn.methods.InstrumentalVariables("u")])
 def test_three_scheduling_values_never_determine_a_cubic(method):
     arx = structure(basis=idn.Polynomial(3, 0.0, 13.0))
     record = Truth(arx).record(P_OF_THE_PAPER)
@@ -74,9 +74,9 @@ def test_wrong_requests_get_the_promised_sentence():
     with pytest.raises(TypeError, match="forgetting"):
         idn.fit(arx, record, method="ls", forgetting=0.9)
     with pytest.raises(InputError, match="or a method with its options"):
-        idn.fit(arx, record, method=idn.Ridge)
+        idn.fit(arx, record, method=idn.methods.Ridge)
     with pytest.raises(InputError, match="expected a factor in"):
-        idn.Recursion(1.1)
+        idn.methods.Recursion(1.1)
     with pytest.raises(InputError, match="expected a FlightRecord"):
         idn.fit(arx, [])
     with pytest.raises(InputError, match="either an output or an input"):

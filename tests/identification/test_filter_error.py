@@ -26,7 +26,7 @@ def vehicle():
 
 
 def fitted(vehicle, records, source, **options):
-    return idn.fit(vehicle.kin, records, idn.FilterError(source, noise=NOISE, **options))
+    return idn.fit(vehicle.kin, records, idn.methods.FilterError(source, noise=NOISE, **options))
 
 
 class Cut:
@@ -183,7 +183,7 @@ def test_it_is_closer_than_instruments_and_these_than_least_squares(vehicle):
         np.sqrt(np.mean(((m.theta - vehicle.theta) / spread) ** 2))
         for m in (
             found,
-            idn.fit(vehicle.kin, record, idn.InstrumentalVariables(source)),
+            idn.fit(vehicle.kin, record, idn.methods.InstrumentalVariables(source)),
             idn.fit(vehicle.kin, record),
         )
     )
@@ -219,15 +219,15 @@ def test_white_noise_is_measured_above_the_signals():
 def test_what_it_cannot_do_is_refused(vehicle):
     source, record = vehicle.without_noise(seed=1), vehicle.record(200, sensors=SENSORS)
     with pytest.raises(UnknownNameError, match="sensor in noise"):
-        idn.FilterError(source, noise={"thetta": 0.1})
+        idn.methods.FilterError(source, noise={"thetta": 0.1})
     with pytest.raises(InputError, match="must be positive"):
-        idn.FilterError(source, noise={"theta": 0.0})
+        idn.methods.FilterError(source, noise={"theta": 0.0})
     with pytest.raises(InputError, match="expected a source of flights"):
-        idn.FilterError("e_d_lon")
+        idn.methods.FilterError("e_d_lon")
     with pytest.raises(InputError, match="needs a simulator"):
         idn.fit(vehicle.kin, record, "filter error")
     plain = idn.LPVARX(
         "q", "d_lon", "airspeed_command", na=1, nb=1, delay=1, basis=idn.Polynomial(1, 0.0, 10.0)
     )
     with pytest.raises(InputError, match="fit a KinematicARX"):
-        idn.fit(plain, record, idn.FilterError(source))
+        idn.fit(plain, record, idn.methods.FilterError(source))

@@ -263,7 +263,9 @@ def test_the_bias_of_the_structure_is_added_and_the_whole_margin_counts(noisy):
     """Gains a and b are |a - b| / sqrt((1 + a^2)(1 + b^2)) apart, behind a delay too."""
     model, joint = fitted(noisy)
     there = LinearModel([[0.0]], [[1.0]], [[2.0]], [[0.0]], ["x"], ["u"], ["y"], dt=DT)
-    bias = idn.StructureBias(with_gain(model, 2.5 / float(model.theta[0, 0])), {0.0: there})
+    bias = idn.judge.response_regions.StructureBias(
+        with_gain(model, 2.5 / float(model.theta[0, 0])), {0.0: there}
+    )
     options = {"scales": SCALES, "covariance": joint, **SHORT}
     alone = idn.fit_for_control(model, noisy, LOOP, **options)
     found = idn.fit_for_control(model, noisy, LOOP, bias=bias, **options)
@@ -273,7 +275,9 @@ def test_the_bias_of_the_structure_is_added_and_the_whole_margin_counts(noisy):
     row = found["nu-gap over margin"]
     assert (row.value, row.threshold) == (pytest.approx(found.bound[0] / found.margin[0]), 1.0)
     assert [r.name for r in found.criteria] == ["unstable loops", row.name, "J", "TIC"]
-    far = idn.StructureBias(with_gain(model, -0.3 / float(model.theta[0, 0])), {0.0: there})
+    far = idn.judge.response_regions.StructureBias(
+        with_gain(model, -0.3 / float(model.theta[0, 0])), {0.0: there}
+    )
     assert idn.fit_for_control(model, noisy, LOOP, bias=far, **options).verdict == "not known"
     with pytest.raises(InputError, match="bias: expected a model at every point"):
         idn.fit_for_control(model, noisy, LOOP, bias=bias, **{**options, "points": [0.5]})

@@ -13,9 +13,9 @@ from identification.recursive import kernel
 from symheli.errors import InputError
 
 WAYS = {
-    "constant": idn.Constant(0.99),
-    "variable": idn.Variable(longest=1000, shortest=30),
-    "directional": idn.Directional(0.9),
+    "constant": idn.forgetting.Constant(0.99),
+    "variable": idn.forgetting.Variable(longest=1000, shortest=30),
+    "directional": idn.forgetting.Directional(0.9),
 }
 SILENCE = 100_000 if kernel.compiled_kernel("double") else 3_000
 
@@ -84,9 +84,9 @@ SEEDS = range(
     21 if kernel.compiled_kernel("double") else 1
 )  # the NumPy twin has the same bits, a hundred times slower
 VARIABLE, SHORT, LONG = (
-    idn.Variable(longest=1000, shortest=30),
-    idn.Constant(1 - 1 / 60),
-    idn.Constant(1 - 1 / 1000),
+    idn.forgetting.Variable(longest=1000, shortest=30),
+    idn.forgetting.Constant(1 - 1 / 60),
+    idn.forgetting.Constant(1 - 1 / 1000),
 )
 
 
@@ -193,8 +193,8 @@ def test_what_never_moves_again_is_remembered_by_directional_forgetting_alone():
     truth = Truth(structure(basis=idn.Polynomial(1, 0.0, 13.0)))
     kept = {}
     for name, way in (
-        ("constant", idn.Constant(0.98, floor=0.0)),
-        ("directional", idn.Directional(0.98)),
+        ("constant", idn.forgetting.Constant(0.98, floor=0.0)),
+        ("directional", idn.forgetting.Directional(0.98)),
     ):
         online = idn.RecursiveLeastSquares(truth.arx, way).online()
         online.run(rows(truth.record(moving(400), noise=0.01)), history=False)
@@ -208,15 +208,18 @@ def test_what_never_moves_again_is_remembered_by_directional_forgetting_alone():
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: idn.Constant(0.0), r"factor in \(0, 1\]"),
-        (lambda: idn.Constant(0.9, floor=-1), "floor: expected a number of samples"),
-        (lambda: idn.Constant(0.9, floor=np.inf), "floor"),
-        (lambda: idn.Variable(longest=10, shortest=20), "shortest <= longest"),
-        (lambda: idn.Variable(longest=np.nan), "longest: expected a number of samples > 1"),
-        (lambda: idn.Directional(1.5), "factor"),
-        (lambda: idn.Directional(0.9, quiet=1.0), "quiet"),
+        (lambda: idn.forgetting.Constant(0.0), r"factor in \(0, 1\]"),
+        (lambda: idn.forgetting.Constant(0.9, floor=-1), "floor: expected a number of samples"),
+        (lambda: idn.forgetting.Constant(0.9, floor=np.inf), "floor"),
+        (lambda: idn.forgetting.Variable(longest=10, shortest=20), "shortest <= longest"),
         (
-            lambda: idn.RecursiveLeastSquares(structure(), idn.Directional(), floor=0.1),
+            lambda: idn.forgetting.Variable(longest=np.nan),
+            "longest: expected a number of samples > 1",
+        ),
+        (lambda: idn.forgetting.Directional(1.5), "factor"),
+        (lambda: idn.forgetting.Directional(0.9, quiet=1.0), "quiet"),
+        (
+            lambda: idn.RecursiveLeastSquares(structure(), idn.forgetting.Directional(), floor=0.1),
             "belongs to a forgetting factor",
         ),
         (

@@ -5,16 +5,11 @@ import pytest
 from known_systems import moving, structure
 from scipy.signal import lfilter
 
-from identification import (
-    choose_experiments,
-    compare_experiments,
-    fit,
-    frequency_response,
-    uncertainty,
-)
+from identification import choose_experiments, fit, frequency_response, uncertainty
+from identification.design import compare_experiments
 from identification.judge.frequency_response import FrequencyResponse
+from symheli import LinearModel
 from symheli.errors import ExcitationError, InputError
-from symheli.lpv import LinearModel
 from symheli.records import FlightRecord
 
 DT = 0.02

@@ -31,7 +31,7 @@ def test_the_band_is_that_of_the_coefficient(model):
     sqrt(f' C f)/(|a| dt).
     """
     points = [-0.9, 0.0, 0.9]
-    found = idn.frozen_stability(model, points, draws=300)
+    found = idn.judge.frozen_stability(model, points, draws=300)
     C = model.covariance[0, :2, 0, :2]
     for p, growth, low, high in zip(points, found.growth, found.low, found.high, strict=True):
         f = ARX.basis(p)
@@ -43,11 +43,11 @@ def test_the_band_is_that_of_the_coefficient(model):
 
 
 def test_where_the_band_crosses_the_axis_nothing_is_known(model):
-    found = idn.frozen_stability(model, [-0.9, 0.0, 0.9])
+    found = idn.judge.frozen_stability(model, [-0.9, 0.0, 0.9])
     assert found.calls == ("stable", "not known", "unstable")
     assert "not known at 1: p = 0" in str(found)
 
 
 def test_a_model_without_covariance_is_refused(model):
     with pytest.raises(InputError, match="gives none"):
-        idn.frozen_stability(model.with_theta(model.theta), [0.0])
+        idn.judge.frozen_stability(model.with_theta(model.theta), [0.0])

@@ -53,7 +53,7 @@ def errors(method, *, at, seeds=(1, 2, 3)):
 
 @pytest.mark.parametrize("at", ["lag", "now"])
 def test_least_squares_is_badly_biased_by_closed_loop_noise_and_instruments_are_not(at):
-    biased, unbiased = errors("ls", at=at), errors(idn.InstrumentalVariables("r"), at=at)
+    biased, unbiased = errors("ls", at=at), errors(idn.methods.InstrumentalVariables("r"), at=at)
     # the same sign and size in every realization: a bias, not scatter. Measured 0.28 with a scatter
     # of 0.008; A_1 is about 1.8
     assert np.abs(biased.mean(axis=0)).max() > 0.2
@@ -66,7 +66,10 @@ def test_least_squares_is_badly_biased_by_closed_loop_noise_and_instruments_are_
 def test_without_noise_instruments_give_the_exact_coefficients():
     arx = structure(nb=1, basis=idn.Polynomial(1, 0.0, 13.0), offset=True, offset_rate=True)
     record = closed_loop(1500, noise=0.0, seed=4)
-    exact, found = idn.fit(arx, record), idn.fit(arx, record, idn.InstrumentalVariables("r"))
+    exact, found = (
+        idn.fit(arx, record),
+        idn.fit(arx, record, idn.methods.InstrumentalVariables("r")),
+    )
     # projecting on instruments loses a few digits of a condition of 1e3
     np.testing.assert_allclose(found.theta, exact.theta, atol=1e-8)
 
@@ -75,16 +78,20 @@ def test_too_few_or_blind_instruments_are_refused():
     arx = structure(nb=1, basis=idn.Polynomial(1, 0.0, 13.0))
     record = closed_loop(800, noise=0.1, seed=5)
     with pytest.raises(ExcitationError, match="at least as many"):
-        idn.fit(arx, record, idn.InstrumentalVariables(idn.LaggedSignals("r", window=0.1, lags=2)))
+        idn.fit(
+            arx,
+            record,
+            idn.methods.InstrumentalVariables(idn.structure.LaggedSignals("r", window=0.1, lags=2)),
+        )
     silent = record.with_signals({"r": "1"}, r=np.zeros(800))
     with pytest.raises(ExcitationError, match="do not determine"):
-        idn.fit(arx, silent, idn.InstrumentalVariables("r"))
+        idn.fit(arx, silent, idn.methods.InstrumentalVariables("r"))
     with pytest.raises(InputError, match="window"):
-        idn.LaggedSignals(("r",), window=-1.0)
+        idn.structure.LaggedSignals(("r",), window=-1.0)
     with pytest.raises(InputError, match="expected names of signals of the record"):
-        idn.InstrumentalVariables(7.0)
+        idn.methods.InstrumentalVariables(7.0)
     with pytest.raises(InputError, match="expected names of signals"):
-        idn.InstrumentalVariables(())
+        idn.methods.InstrumentalVariables(())
 
 
 def test_what_instruments_leave_of_the_bias_is_foreseen_by_their_strength():
@@ -97,7 +104,7 @@ def test_what_instruments_leave_of_the_bias_is_foreseen_by_their_strength():
         record = closed_loop(6000, noise=noise, seed=1)
         with warnings.catch_warnings(record=True) as said:
             warnings.simplefilter("always")
-            model = idn.fit(arx, record, idn.InstrumentalVariables("r"))
+            model = idn.fit(arx, record, idn.methods.InstrumentalVariables("r"))
         biased = idn.fit(arx, record).coefficients.at(6.5).A.ravel() - true
         left.append(
             float((model.coefficients.at(6.5).A.ravel() - true) @ biased / (biased @ biased))
@@ -169,7 +176,7 @@ def test_a_simulated_flight_is_a_source_of_instruments():
         name: np.abs(idn.fit(arx, record, method).coefficients.at(nodes).A[:, :, 0, 0] - true).max()
         for name, method in (
             ("ls", "ls"),
-            ("iv", idn.InstrumentalVariables(NoiseFreeFlight())),
+            ("iv", idn.methods.InstrumentalVariables(NoiseFreeFlight())),
         )
     }
     assert off["ls"] > 0.2
@@ -188,5 +195,5 @@ def test_a_source_of_instruments_with_another_number_of_samples_is_refused():
         idn.fit(
             structure(nb=1),
             closed_loop(800, noise=0.1, seed=6),
-            idn.InstrumentalVariables(Short()),
+            idn.methods.InstrumentalVariables(Short()),
         )

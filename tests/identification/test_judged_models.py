@@ -97,9 +97,9 @@ def transition():
 
 
 def test_the_model_that_flew_predicts_itself_whatever_its_signals_are_called(transition):
-    own = idn.BaselineModel(model=aeroplane(), scheduling="tas")
-    blind = idn.BaselineModel(model=aeroplane(), scheduling="tas", drift=False)
-    found = idn.beside_baseline(
+    own = idn.judge.BaselineModel(model=aeroplane(), scheduling="tas")
+    blind = idn.judge.BaselineModel(model=aeroplane(), scheduling="tas", drift=False)
+    found = idn.judge.compare_baseline(
         {}, {"own": own, "blind": blind}, transition, ("load", "alpha", "pitch_rate")
     )
     itself, still = found.predictions
@@ -111,16 +111,16 @@ def test_the_model_that_flew_predicts_itself_whatever_its_signals_are_called(tra
 
 def test_identified_and_baseline_are_judged_on_the_same_samples(transition):
     model = identified(flown(aeroplane()))
-    found = idn.beside_baseline(
+    found = idn.judge.compare_baseline(
         {"identified": model},
-        {"equations": idn.BaselineModel(model=aeroplane(), scheduling="tas")},
+        {"equations": idn.judge.BaselineModel(model=aeroplane(), scheduling="tas")},
         transition,
         ("pitch_rate",),
         horizon=0.5,
     )
     one, two = found.predictions
     assert (one.identified, two.identified) == (True, False)
-    assert one.scores == idn.Scores(
+    assert one.scores == idn.judge.Scores(
         horizon=0.5,
         one_step={"pitch_rate": float(model.score(transition, 1)["pitch_rate"])},
         ahead={"pitch_rate": float(model.score(transition, 25)["pitch_rate"])},
@@ -136,10 +136,10 @@ def test_a_model_without_trim_and_a_sampled_one_predict_too():
     lpv = aeroplane(trimmed=False)
     record = flown(lpv)
     sampled = lpv.discretize(DT, degree=4)
-    found = idn.beside_baseline(
+    found = idn.judge.compare_baseline(
         {},
         {
-            name: idn.BaselineModel(model=model, scheduling="tas")
+            name: idn.judge.BaselineModel(model=model, scheduling="tas")
             for name, model in {"continuous": lpv, "sampled": sampled}.items()
         },
         record,
@@ -148,12 +148,14 @@ def test_a_model_without_trim_and_a_sampled_one_predict_too():
     assert [round(p.scores.ahead["alpha"], 3) for p in found.predictions] == [100.0, 100.0]
     late = lpv.discretize(2 * DT, degree=4)
     with pytest.raises(InputError, match=r"sampled at 0.04 s, the record at 0.02 s"):
-        idn.BaselinePredictor(late, record, scheduling="tas")
+        idn.judge.BaselinePredictor(late, record, scheduling="tas")
 
 
 def test_an_input_that_the_record_does_not_hold_stays_at_its_trim(transition):
-    alone = idn.BaselinePredictor(aeroplane(), transition, scheduling="tas", inputs=("elevator",))
-    both = idn.BaselinePredictor(aeroplane(), transition, scheduling="tas")
+    alone = idn.judge.BaselinePredictor(
+        aeroplane(), transition, scheduling="tas", inputs=("elevator",)
+    )
+    both = idn.judge.BaselinePredictor(aeroplane(), transition, scheduling="tas")
     one, two = (along.predict(["alpha"], 5)[5:] for along in (alone, both))
     assert one.shape == two.shape
     assert np.abs(one - two).max() > 1e-5
@@ -163,7 +165,7 @@ def test_a_gap_in_the_record_is_no_fast_trim(transition):
     """The first samples behind a gap are predicted as if the record began there."""
     cut = np.arange(len(transition)) < 100
     late = np.arange(len(transition)) >= 260
-    predictor = lambda record: idn.BaselinePredictor(aeroplane(), record, scheduling="tas")  # noqa: E731
+    predictor = lambda record: idn.judge.BaselinePredictor(aeroplane(), record, scheduling="tas")  # noqa: E731
     gap = predictor(transition.rows(cut | late)).predict(["alpha"], 5)[100:]
     alone = predictor(transition.rows(late)).predict(["alpha"], 5)
     np.testing.assert_allclose(gap[5:], alone[5:], atol=1e-12)
@@ -179,16 +181,16 @@ def test_a_gap_in_the_record_is_no_fast_trim(transition):
 )
 def test_what_drives_a_baseline_is_asked_for_by_name(transition, options, error, message):
     with pytest.raises(error, match=message):
-        idn.BaselinePredictor(aeroplane(), transition, **options)
+        idn.judge.BaselinePredictor(aeroplane(), transition, **options)
 
 
 def test_an_output_no_model_has_is_named(transition):
-    own = idn.BaselineModel(model=aeroplane(), scheduling="tas")
+    own = idn.judge.BaselineModel(model=aeroplane(), scheduling="tas")
     with pytest.raises(UnknownNameError, match="unknown output 'flap'"):
-        idn.beside_baseline({}, {"own": own}, transition, ("flap",))
+        idn.judge.compare_baseline({}, {"own": own}, transition, ("flap",))
     with pytest.raises(InputError, match="nothing to compare"):
-        idn.beside_baseline({}, {}, transition, ("alpha",))
-    found = idn.beside_baseline({}, {"own": own}, transition, ("alpha",))
+        idn.judge.compare_baseline({}, {}, transition, ("alpha",))
+    found = idn.judge.compare_baseline({}, {"own": own}, transition, ("alpha",))
     with pytest.raises(InputError, match="among alpha, own"):
         found.best("load")
 
@@ -242,10 +244,10 @@ def test_scheduling_pays_where_the_aeroplane_is_told_by_it():
         delay=1,
         basis=idn.Polynomial(1, 20.0, 40.0),
     )
-    found = idn.against_constant(arx, *record.split(0.6))
+    found = idn.judge.compare_constant(arx, *record.split(0.6))
     assert [scored.label for scored in found.models] == ["LPV, degree 1", "LTI"]
     assert found.pays("pitch_rate")
-    alone = idn.against_constant(arx, record, None)
+    alone = idn.judge.compare_constant(arx, record, None)
     assert "nothing was held out" in alone.verdict()[0]
     with pytest.raises(InputError, match="nothing was held out"):
         alone.pays("pitch_rate")
@@ -273,5 +275,7 @@ def test_a_free_run_on_its_own_measured_past_is_warned_of(own, lag):
 
 def test_instruments_reach_over_ten_samples_where_a_second_holds_fewer():
     """A record of 5 s a sample had two lags, too few for any model."""
-    assert idn.LaggedSignals("u").instrument_lags(dt=5.0, first=1, memory=1) == (*range(1, 11),)
-    assert idn.LaggedSignals("u").instrument_lags(dt=0.02, first=1, memory=1)[-1] == 50
+    assert idn.structure.LaggedSignals("u").instrument_lags(dt=5.0, first=1, memory=1) == (
+        *range(1, 11),
+    )
+    assert idn.structure.LaggedSignals("u").instrument_lags(dt=0.02, first=1, memory=1)[-1] == 50

@@ -101,7 +101,7 @@ def test_in_a_simulated_flight_it_is_closer_than_the_sensors(ideal):
         for db, seed, excited in ((None, 1, 1), (30.0, 1, 1), (30.0, 2, 2))
     )
     kin = idn.KinematicARX(ideal.inputs, "airspeed_command", basis=idn.Polynomial(1, 2.0, 6.0))
-    source = idn.InstrumentalVariables(symheli.SimulatedFlight(ideal))
+    source = idn.methods.InstrumentalVariables(symheli.flight.SimulatedFlight(ideal))
     model = idn.fit(kin, training, source)
     truth, measured = clean.columns(STATES), noisy.columns(STATES)
     sensors = np.std(measured - truth, axis=0)

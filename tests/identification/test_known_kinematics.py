@@ -386,7 +386,7 @@ def test_scores_are_those_of_its_predictions_at_every_horizon(vehicle, flight):
     found = idn.scores(model, flight, horizon=10 * DT)
     for fits, horizon in ((found.one_step, 1), (found.ahead, 10), (found.free_run, None)):
         assert fits == {str(y): v for y, v in model.score(flight, horizon).items()}
-    beside = idn.beside_baseline({"own": model}, {}, flight, ("phi", "u"), horizon=10 * DT)
+    beside = idn.judge.compare_baseline({"own": model}, {}, flight, ("phi", "u"), horizon=10 * DT)
     (own,) = beside.predictions
     assert own.scores.ahead == {y: found.ahead[y] for y in ("phi", "u")}
     with pytest.raises(InputError, match="hold_p: a KinematicModel"):

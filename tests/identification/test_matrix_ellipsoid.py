@@ -6,7 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from identification import matrix_ellipsoid
+from identification.model import matrix_ellipsoid
 from identification.model.matrix_ellipsoid import spectral_radius
 from symheli.errors import InputError
 from synthesis.numerics.polynomial.exact import exact, positive_definite

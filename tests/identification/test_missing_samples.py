@@ -5,6 +5,7 @@ import pytest
 from known_systems import Truth, moving, moving_box, structure
 
 import identification as idn
+from symheli import lpv
 from symheli.records import FlightRecord
 
 
@@ -16,15 +17,15 @@ def holed(record, name, rows):
 
 
 JUDGES = {
-    "slow modes": lambda model, record: idn.slow_modes(model, record),
+    "slow modes": lambda model, record: idn.judge.slow_modes(model, record),
     "excitation": lambda model, record: idn.excitation_report(model.structure, record),
     "residuals": lambda model, record: idn.residual_analysis(model, record, 10),
     "scores": lambda model, record: idn.scores(model, record),
-    "dependence": lambda model, record: idn.dependence_report(model, record),
+    "dependence": lambda model, record: idn.judge.dependence_report(model, record),
     "orders": lambda model, record: idn.order_scan(
         model.structure, *record.split(0.7), orders=(1,), degrees=(0, 1)
     ),
-    "against a constant": lambda model, record: idn.against_constant(
+    "against a constant": lambda model, record: idn.judge.compare_constant(
         model.structure, record, None
     ).verdict(),
 }
@@ -36,7 +37,7 @@ JUDGES = {
 def test_every_judge_of_a_model_answers_in_numbers(name, several, at):
     box = dict(
         scheduling=("p", "density"),
-        basis=idn.Product((idn.Polynomial(1, 0.0, 13.0), idn.Polynomial(1, 0.9, 1.3))),
+        basis=lpv.Product((idn.Polynomial(1, 0.0, 13.0), idn.Polynomial(1, 0.9, 1.3))),
     )
     arx = structure(scheduling_at=at, nb=1, **(box if several else {}))
     record = Truth(arx).record(moving_box(700) if several else moving(700), noise=0.05)
@@ -55,7 +56,7 @@ def test_scheduling_that_is_there_every_second_sample_only_is_enough():
     record = holed(whole, "p", slice(1, None, 2))
     model = idn.fit(arx, record)
     assert model.excitation.occupancy.sum() == model.rows_used
-    assert "nan" not in str(idn.slow_modes(model, record))
+    assert "nan" not in str(idn.judge.slow_modes(model, record))
 
 
 def test_slow_modes_are_those_of_the_record_without_holes():
@@ -68,7 +69,7 @@ def test_slow_modes_are_those_of_the_record_without_holes():
     whole = FlightRecord.from_arrays(0.02 * k, dict.fromkeys("yup", "1"), y=y, u=u, p=p)
     arx = structure(na=1, nb=1, basis=idn.Polynomial(1, -1.0, 1.0))
     answers = [
-        idn.slow_modes(idn.fit(arx, record), record, points=3).modes
+        idn.judge.slow_modes(idn.fit(arx, record), record, points=3).modes
         for record in (whole, holed(whole, "p", rng.choice(3000, 100, replace=False)))
     ]
     assert len(answers[0]) == 3

@@ -28,7 +28,7 @@ def test_instruments_know_the_scatter_of_their_coefficients(flights):
     for seed in range(flights):
         record = vehicle.record(800, seed=seed, sensors=sensors)
         clean = vehicle.without_noise(seed=seed)
-        found = idn.fit(vehicle.kin, record, idn.InstrumentalVariables(clean))
+        found = idn.fit(vehicle.kin, record, idn.methods.InstrumentalVariables(clean))
         spread = np.sqrt(np.einsum("onon->no", found.covariance))
         off.append((found.theta - vehicle.theta) / spread)
     # 25 of 800 samples tapered leave a few percent out

@@ -9,6 +9,7 @@ import pytest
 from known_systems import Truth, moving, structure
 
 import identification as idn
+from symheli import lpv
 from symheli.errors import DataWarning, ExcitationError, InputError
 from symheli.records import FlightRecord
 
@@ -121,8 +122,8 @@ def test_an_output_that_would_predict_itself_is_refused(flag):
     "basis",
     [
         idn.Polynomial(2, -9.0, 9.0),
-        idn.BSpline(2, (-9.0, 0.0, 9.0)),
-        idn.PiecewiseLinear((-9.0, 0.0, 9.0)),
+        lpv.BSpline(2, (-9.0, 0.0, 9.0)),
+        lpv.PiecewiseLinear((-9.0, 0.0, 9.0)),
     ],
 )
 @pytest.mark.parametrize("twice", ["y", "u"])

@@ -24,7 +24,7 @@ def flown(enters, n=2000, seed=0):
     return FlightRecord.from_arrays(np.arange(n) * 1.0, {"y": "1", "u": "1"}, y=y, u=u), e
 
 
-METHOD = {"output": idn.BoxJenkins(ar=1, ma=1), "equation": idn.ARMAX(ar=1, ma=1)}
+METHOD = {"output": idn.methods.BoxJenkins(ar=1, ma=1), "equation": idn.methods.ARMAX(ar=1, ma=1)}
 
 
 @pytest.mark.parametrize("enters", METHOD)
@@ -60,7 +60,7 @@ def test_predictions_ahead_are_conditional_means(enters):
 def test_the_model_is_saved_with_its_noise(tmp_path):
     flight, _ = flown("output", n=300)
     found = idn.fit(PLANT, flight, METHOD["output"])
-    again = idn.LPVARXModel.load(found.save(tmp_path / "bj.json"))
+    again = idn.model.LPVARXModel.load(found.save(tmp_path / "bj.json"))
     np.testing.assert_array_equal(again.predict(flight, 3), found.predict(flight, 3))
     with pytest.raises(InputError, match="hold_p"):
         found.predict(flight, 3, hold_p=True)

@@ -8,6 +8,7 @@ import identification as idn
 from identification.estimators.lasso import lasso_path
 from identification.estimators.ridge import GRID
 from identification.structure.regressors import regression
+from symheli import lpv
 from symheli.errors import ExcitationError
 
 
@@ -20,27 +21,27 @@ def test_ridge_without_weight_is_least_squares_and_with_all_weight_the_lti_fit()
     truth, record = noisy(outputs=("a", "b"), na={"a": 2, "b": 1})
     free, none = (
         idn.fit(truth.arx, record),
-        idn.fit(truth.arx, record, idn.Ridge(weight=0.0)),
+        idn.fit(truth.arx, record, idn.methods.Ridge(weight=0.0)),
     )
     np.testing.assert_allclose(none.theta, free.theta, atol=1e-10)
     lti = idn.fit(truth.arx.lti(), record).coefficients.at(4.0)
-    flat = idn.fit(truth.arx, record, idn.Ridge(weight=1e8)).coefficients
+    flat = idn.fit(truth.arx, record, idn.methods.Ridge(weight=1e8)).coefficients
     for p in (0.0, 13.0):
         for found, constant in zip(flat.at(p), lti, strict=True):
             np.testing.assert_allclose(
                 found, constant, atol=1e-6
             )  # 1e-8 of the data left against the penalty, times a few
-    zero = idn.fit(truth.arx, record, idn.Ridge(weight=1e8, towards="zero"))
+    zero = idn.fit(truth.arx, record, idn.methods.Ridge(weight=1e8, towards="zero"))
     assert np.abs(zero.theta).max() < 1e-6
 
 
 @pytest.mark.parametrize("towards", ["constant", "zero"])
 def test_ridge_does_not_care_how_the_functions_are_written_nor_about_units(towards):
     truth, record = noisy(basis=idn.Polynomial(1, 0.0, 13.0))
-    options = idn.Ridge(weight=0.1, towards=towards)
+    options = idn.methods.Ridge(weight=0.1, towards=towards)
     hats, own = (
-        idn.PiecewiseLinear((0.0, 13.0)),
-        idn.UserFunctions((np.ones_like, lambda p: 1e3 * p), 0.0, 13.0),
+        lpv.PiecewiseLinear((0.0, 13.0)),
+        lpv.UserFunctions((np.ones_like, lambda p: 1e3 * p), 0.0, 13.0),
     )
     fits = [
         idn.fit(structure(basis=b), record, options).predict(record, 1)
@@ -104,7 +105,7 @@ def test_ridge_fits_where_least_squares_must_refuse_and_says_what_the_data_lack(
     assert model.excitation is not None
     assert "needs 4" in model.excitation.reason
     with pytest.raises(ExcitationError, match="data and penalty do not determine"):
-        idn.fit(truth.arx, record, idn.Ridge(weight=0.0))
+        idn.fit(truth.arx, record, idn.methods.Ridge(weight=0.0))
 
 
 def test_every_corner_of_the_lasso_path_meets_the_optimality_conditions():
@@ -148,7 +149,7 @@ def test_lasso_keeps_what_is_there_and_drops_what_is_not():
 
 def test_lasso_at_the_ends_of_the_path():
     truth, record = noisy()
-    none = idn.fit(truth.arx, record, idn.Lasso(weight=1.0))
+    none = idn.fit(truth.arx, record, idn.methods.Lasso(weight=1.0))
     assert not none.theta.any()
-    full = idn.fit(truth.arx, record, idn.Lasso(weight=0.0, refit=False))
+    full = idn.fit(truth.arx, record, idn.methods.Lasso(weight=0.0, refit=False))
     np.testing.assert_allclose(full.theta, idn.fit(truth.arx, record).theta, atol=1e-8)

@@ -110,12 +110,12 @@ def test_fifty_steps_on_six_thousand_samples_take_well_under_a_second():
 
 def test_fit_percent_is_100_for_the_data_and_0_for_their_mean():
     y = np.array([[1.0, 2.0], [3.0, 5.0], [np.nan, 1.0], [2.0, 2.0]])
-    np.testing.assert_array_equal(idn.fit_percent(y, y), [100.0, 100.0])
+    np.testing.assert_array_equal(idn.judge.fit_percent(y, y), [100.0, 100.0])
     mean = np.broadcast_to(np.nanmean(y, axis=0), y.shape)
-    np.testing.assert_allclose(idn.fit_percent(y, mean), [0.0, 0.0], atol=1e-12)
-    assert np.isnan(idn.fit_percent(np.full(3, np.nan), np.zeros(3)))
+    np.testing.assert_allclose(idn.judge.fit_percent(y, mean), [0.0, 0.0], atol=1e-12)
+    assert np.isnan(idn.judge.fit_percent(np.full(3, np.nan), np.zeros(3)))
     with pytest.raises(InputError, match="one shape"):
-        idn.fit_percent(y, y[:, 0])
+        idn.judge.fit_percent(y, y[:, 0])
 
 
 def test_another_sample_period_or_horizon_is_refused():

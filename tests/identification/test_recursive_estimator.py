@@ -6,6 +6,7 @@ from known_systems import Truth, moving, structure
 
 import identification as idn
 from identification.structure.regressors import regression
+from symheli import lpv
 from symheli.errors import InputError
 
 
@@ -38,7 +39,7 @@ def test_recursive_and_batch_estimates_agree_on_noisy_data():
     ],
 )
 @pytest.mark.parametrize(
-    "basis", [idn.Polynomial(5, 0.0, 13.0), idn.BSpline(3, (0.0, 4.0, 9.0, 13.0))]
+    "basis", [idn.Polynomial(5, 0.0, 13.0), lpv.BSpline(3, (0.0, 4.0, 9.0, 13.0))]
 )
 def test_recursive_coefficients_differ_from_batch_by_rounding_times_condition(basis, over):
     truth = Truth(structure(basis=basis, **over))

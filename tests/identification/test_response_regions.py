@@ -37,7 +37,7 @@ def test_a_vehicle_of_the_structure_has_no_bias(vehicle, record, model):
     models is that of another flight, and is what is left.
     """
     there = exact(vehicle, vehicle.record(500, seed=1), 3.0, 7.0)
-    off = idn.structure_bias(model, record, vehicle.without_noise(seed=1), there)
+    off = idn.judge.structure_bias(model, record, vehicle.without_noise(seed=1), there)
     off = off.responses(OMEGA, STATES, CONTROLS)
     size = np.abs(np.stack([m.frequency_response(OMEGA) for m in there.values()])).max()
     assert np.abs(off).max() < 1e-6 * size
@@ -51,7 +51,7 @@ def test_a_structure_of_too_low_a_degree_has_one(record):
     )
     model = idn.fit(still, record)
     there = exact(vehicle, record, 1.0)
-    off = idn.structure_bias(model, record, vehicle.without_noise(seed=1), there)
+    off = idn.judge.structure_bias(model, record, vehicle.without_noise(seed=1), there)
     off = off.responses(OMEGA, ["p"], ["d_lat"])
     own = there[1.0].select(inputs=["d_lat"], outputs=["p"]).frequency_response(OMEGA)
     assert np.abs(off[0] / own).min() > 0.02
@@ -59,17 +59,19 @@ def test_a_structure_of_too_low_a_degree_has_one(record):
 
 def test_bias_widens_regions_by_its_power_and_moves_no_centre(model):
     points = [2.0, 5.0, 8.0]
-    plain = idn.response_regions(model, points, OMEGA, ["p"], ["d_lat"], draws=20)
+    plain = idn.judge.response_regions(model, points, OMEGA, ["p"], ["d_lat"], draws=20)
     there = {p: model.at(p, outputs=["p"], inputs=["d_lat"]) for p in points}
-    off = idn.StructureBias(model, {p: replace(one, D=one.D + 0.5) for p, one in there.items()})
-    wide = idn.response_regions(model, points, OMEGA, ["p"], ["d_lat"], bias=off, draws=20)
+    off = idn.judge.response_regions.StructureBias(
+        model, {p: replace(one, D=one.D + 0.5) for p, one in there.items()}
+    )
+    wide = idn.judge.response_regions(model, points, OMEGA, ["p"], ["d_lat"], bias=off, draws=20)
     assert np.array_equal(wide.centre, plain.centre)
     assert wide.width**2 == pytest.approx(plain.width**2 + 0.25)
     assert wide.contains(wide.centre + 0.4 + 0.3j).all()
 
 
 def test_regions_hold_draws_as_often_as_they_say(vehicle, model):
-    regions = idn.response_regions(model, [5.0], OMEGA, ["p"], ["d_lat"], draws=400)
+    regions = idn.judge.response_regions(model, [5.0], OMEGA, ["p"], ["d_lat"], draws=400)
     values, vectors = np.linalg.eigh(model.covariance.reshape(2 * (model.theta.size,)))
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     rng, held = np.random.default_rng(3), []
@@ -82,16 +84,18 @@ def test_regions_hold_draws_as_often_as_they_say(vehicle, model):
 
 def test_what_is_missing_is_said(vehicle, record, model):
     with pytest.raises(InputError, match="no covariance"):
-        idn.response_regions(model.with_theta(model.theta), [5.0], OMEGA)
+        idn.judge.response_regions(model.with_theta(model.theta), [5.0], OMEGA)
     with pytest.raises(InputError, match="at least one value"):
-        idn.response_regions(model, [], OMEGA)
+        idn.judge.response_regions(model, [], OMEGA)
     own = model.at(3.0)
     with pytest.raises(InputError, match="bias: expected"):
-        idn.response_regions(model, [5.0], OMEGA, bias=idn.StructureBias(model, {3.0: own}))
+        idn.judge.response_regions(
+            model, [5.0], OMEGA, bias=idn.judge.response_regions.StructureBias(model, {3.0: own})
+        )
     with pytest.raises(InputError, match="sampled every"):
-        idn.StructureBias(model, {3.0: replace(own, dt=2 * own.dt)})
+        idn.judge.response_regions.StructureBias(model, {3.0: replace(own, dt=2 * own.dt)})
     with pytest.raises(InputError, match="source of flights"):
-        idn.structure_bias(model, record, record, {3.0: own})
+        idn.judge.structure_bias(model, record, record, {3.0: own})
 
 
 @pytest.mark.slow
@@ -112,7 +116,7 @@ def test_the_bound_of_the_nu_gap_holds_where_the_covariance_alone_does_not(seed)
         {("d_lat", "phi"): -0.5, ("d_lon", "theta"): -0.6},
         scales={**dict.fromkeys(STATES, 1.0), **dict.fromkeys(CONTROLS, 0.1)},
         covariance=model.covariance,
-        bias=idn.structure_bias(model, record, other.without_noise(seed=seed), there),
+        bias=idn.judge.structure_bias(model, record, other.without_noise(seed=seed), there),
         truth=exact(own, record, *points),
         draws=40,
     )

@@ -12,10 +12,11 @@ from scipy.io import loadmat
 
 import identification as idn
 from identification.model import saved_kinematic_model
+from symheli import lpv
 from symheli.errors import InputError
 from symheli.values import plain_file
 
-OWN = idn.UserFunctions((np.ones_like, np.cos), 0.0, 10.0, ("1", "cos p"))
+OWN = lpv.UserFunctions((np.ones_like, np.cos), 0.0, 10.0, ("1", "cos p"))
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +39,7 @@ def test_it_comes_back_to_the_last_bit(model, flight, tmp_path):
     n = model.structure.n_regressors
     covariance = np.arange(36.0 * n * n).reshape(6, n, 6, n) / 7
     model = replace(model, aerodynamics=replace(model.aerodynamics, covariance=covariance))
-    back = idn.KinematicModel.load(model.save(tmp_path / "folder" / "m.json"))
+    back = idn.model.KinematicModel.load(model.save(tmp_path / "folder" / "m.json"))
     assert back.structure == model.structure
     for name in ("theta", "trim", "covariance"):
         np.testing.assert_array_equal(getattr(back, name), getattr(model, name))
@@ -57,32 +58,32 @@ def test_a_covariance_under_its_name_of_before_is_read(model, tmp_path):
     content = plain_file.read(path, saved_kinematic_model.SCHEMA)
     content["coefficient_covariance"], content["covariance"] = content["covariance"], None
     plain_file.write(path, saved_kinematic_model.SCHEMA, content)
-    np.testing.assert_array_equal(idn.KinematicModel.load(path).covariance, model.covariance)
+    np.testing.assert_array_equal(idn.model.KinematicModel.load(path).covariance, model.covariance)
     content["coefficient_covariance"] = None
     plain_file.write(path, saved_kinematic_model.SCHEMA, content)
-    assert idn.KinematicModel.load(path).covariance is None
+    assert idn.model.KinematicModel.load(path).covariance is None
 
 
 def test_functions_brought_along_must_be_brought_again(flight, tmp_path):
     kin = idn.KinematicARX(CONTROLS, "airspeed_command", basis=OWN)
     path = idn.fit(kin, flight).save(tmp_path / "m.json")
     with pytest.raises(InputError, match="give the basis"):
-        idn.KinematicModel.load(path)
-    assert idn.KinematicModel.load(path, basis=OWN).structure.basis == OWN
+        idn.model.KinematicModel.load(path)
+    assert idn.model.KinematicModel.load(path, basis=OWN).structure.basis == OWN
 
 
 @pytest.mark.slow
 def test_another_kind_of_file_is_refused(model, flight, tmp_path):
     path = model.save(tmp_path / "m.json")
     with pytest.raises(InputError, match="expected a file of 'symheli LPV-ARX model'"):
-        idn.LPVARXModel.load(path)
+        idn.model.LPVARXModel.load(path)
     with pytest.raises(InputError, match="expected a file of 'symheli model with known"):
-        idn.KinematicModel.load(model.aerodynamics.save(tmp_path / "a.json"))
+        idn.model.KinematicModel.load(model.aerodynamics.save(tmp_path / "a.json"))
     content = json.loads(path.read_text())
     content["trim"][0][0] += 1.0
     path.write_text(json.dumps(content))
     with pytest.raises(InputError, match="does not match its digest"):
-        idn.KinematicModel.load(path)
+        idn.model.KinematicModel.load(path)
 
 
 def test_the_matlab_file_steps_as_the_model_does(model, flight, tmp_path):

@@ -10,10 +10,11 @@ from scipy.io import loadmat
 
 import identification as idn
 from identification.model import saved_model
+from symheli import lpv
 from symheli.errors import InputError, SymheliError
 from symheli.values import plain_file
 
-OWN = idn.UserFunctions((np.ones_like, np.cos), 0.0, 13.0, ("1", "cos p"))
+OWN = lpv.UserFunctions((np.ones_like, np.cos), 0.0, 13.0, ("1", "cos p"))
 CASES = {
     "one output": dict(),
     "orders by signal": dict(
@@ -24,14 +25,14 @@ CASES = {
         offset=True,
     ),
     "b-spline": dict(
-        basis=idn.BSpline(2, (0.0, 5.0, 13.0)), offset=True, offset_rate=True, scheduling_at="now"
+        basis=lpv.BSpline(2, (0.0, 5.0, 13.0)), offset=True, offset_rate=True, scheduling_at="now"
     ),
-    "spline": dict(basis=idn.CubicSpline((0.0, 3.0, 8.0, 13.0))),
-    "hats": dict(basis=idn.PiecewiseLinear((0.0, 8.0, 13.0)), inputs=(), nb=0, offset=True),
+    "spline": dict(basis=lpv.CubicSpline((0.0, 3.0, 8.0, 13.0))),
+    "hats": dict(basis=lpv.PiecewiseLinear((0.0, 8.0, 13.0)), inputs=(), nb=0, offset=True),
     "brought along": dict(basis=OWN),
     "two parameters": dict(
         scheduling=("p", "q"),
-        basis=idn.Product((idn.Polynomial(1, 0.0, 13.0), idn.Polynomial(1, 0.9, 1.3)), 1),
+        basis=lpv.Product((idn.Polynomial(1, 0.0, 13.0), idn.Polynomial(1, 0.9, 1.3)), 1),
         offset_rate=True,
     ),
 }
@@ -48,7 +49,7 @@ def fitted(case, method="ls"):
 def test_a_model_comes_back_to_the_last_bit(case, tmp_path):
     model, record = fitted(case)
     path = model.save(tmp_path / "folder" / "model.json")
-    back = idn.LPVARXModel.load(path, basis=OWN if case == "brought along" else None)
+    back = idn.model.LPVARXModel.load(path, basis=OWN if case == "brought along" else None)
     assert back.structure == model.structure
     assert (back.outputs, back.inputs, back.parameters) == (
         model.outputs,
@@ -70,14 +71,14 @@ def test_units_details_and_covariance_travel_along(tmp_path):
     model, record = fitted("one output", "ridge")
     n = model.structure.n_regressors
     carried = replace(model, covariance=np.arange(n * n, dtype=float).reshape(1, n, 1, n) / 7)
-    back = idn.LPVARXModel.load(carried.save(tmp_path / "b.json"))
+    back = idn.model.LPVARXModel.load(carried.save(tmp_path / "b.json"))
     np.testing.assert_array_equal(back.covariance, carried.covariance)
     assert back.details == model.details
     in_knots = type(record).from_arrays(
         record.time, {"y": "deg", "u": "1", "p": "kt"}, y=record["y"], u=record["u"], p=record["p"]
     )
     with_units = idn.fit(structure(basis=idn.Polynomial(1, 0.0, 7.0)), in_knots)
-    back = idn.LPVARXModel.load(with_units.save(tmp_path / "c.json"))
+    back = idn.model.LPVARXModel.load(with_units.save(tmp_path / "c.json"))
     assert (back.outputs[0].unit, back.parameters[0].unit) == ("rad", "m/s")
 
 
@@ -89,7 +90,7 @@ def test_an_earlier_covariance_an_equation_at_a_time_is_read_where_it_is_all(tmp
         content = plain_file.read(path, saved_model.SCHEMA)
         content["covariance"] = np.einsum("yiyj->yij", model.covariance).tolist()
         plain_file.write(path, saved_model.SCHEMA, content)
-        back = idn.LPVARXModel.load(path)
+        back = idn.model.LPVARXModel.load(path)
         if model.structure.ny == 1:
             np.testing.assert_array_equal(back.covariance, model.covariance)
         else:
@@ -105,7 +106,7 @@ def test_damaged_foreign_and_newer_files_are_refused_in_words(tmp_path):
     def refused(text, message, **options):
         path.write_text(text)
         with pytest.raises(InputError, match=message):
-            idn.LPVARXModel.load(path, **options)
+            idn.model.LPVARXModel.load(path, **options)
 
     refused(whole[: len(whole) // 2], "not a whole file.*take an older copy")
     content = json.loads(whole)
@@ -117,12 +118,12 @@ def test_damaged_foreign_and_newer_files_are_refused_in_words(tmp_path):
     refused("[1, 2]", "got 'list'")
     refused(whole, "has another basis", basis=idn.Polynomial(1, 0.0, 13.0))
     with pytest.raises(InputError, match="No such file"):
-        idn.LPVARXModel.load(tmp_path / "nothing.json")
+        idn.model.LPVARXModel.load(tmp_path / "nothing.json")
     own, _ = fitted("brought along")
     with pytest.raises(
         InputError, match="the functions 1, cos p are not in the file; give the basis"
     ):
-        idn.LPVARXModel.load(own.save(tmp_path / "own.json"))
+        idn.model.LPVARXModel.load(own.save(tmp_path / "own.json"))
 
 
 def test_a_file_that_cannot_be_written_leaves_the_old_one(tmp_path):

@@ -11,7 +11,9 @@ from symheli.errors import InputError
 
 
 @pytest.mark.parametrize("precision", ["double", "single"])
-@pytest.mark.parametrize("way", [1.0, idn.Variable(100, 20), idn.Directional(0.97)], ids=str)
+@pytest.mark.parametrize(
+    "way", [1.0, idn.forgetting.Variable(100, 20), idn.forgetting.Directional(0.97)], ids=str
+)
 def test_a_saved_estimator_goes_on_as_if_nothing_had_happened(tmp_path, way, precision):
     truth = Truth(structure(outputs=("a", "b"), offset=True))
     rls = idn.RecursiveLeastSquares(truth.arx, way, precision=precision)

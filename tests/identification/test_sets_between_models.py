@@ -90,12 +90,12 @@ def test_an_emphasized_ellipsoid_keeps_its_probability_and_is_tight_where_asked(
     P = np.einsum("ij,ab->iajb", np.eye(m), np.eye(n))
     S = np.zeros((n, n))
     S[0, 0] = 1.0
-    found = idn.matrix_ellipsoid(P, probability, draws=draws, emphasis=S)
+    found = idn.model.matrix_ellipsoid(P, probability, draws=draws, emphasis=S)
     errors = np.random.default_rng(5).normal(size=(4000, n, m))
     assert found.contains(errors).mean() > probability - 0.015  # three deviations of 4000 draws
     edge = np.zeros((n, m))
     edge[0, 0] = 1.0
-    ball = idn.matrix_ellipsoid(P, probability, draws=draws)
+    ball = idn.model.matrix_ellipsoid(P, probability, draws=draws)
     steps = np.arange(0.1, 20.0, 0.1)
     reach = [one.contains(steps[:, None, None] * edge).sum() for one in (found, ball)]
     assert reach[0] < 0.85 * reach[1]
@@ -133,4 +133,4 @@ def test_sets_that_make_no_sense_are_refused(models):
     with pytest.raises(InputError, match="same structure"):
         models[0].uncertain(0.95, OUTPUTS, INPUTS, other=replace(model, aerodynamics=known))
     with pytest.raises(InputError, match="positive semidefinite"):
-        idn.matrix_ellipsoid(np.eye(4).reshape(2, 2, 2, 2), 0.9, emphasis=-np.eye(2))
+        idn.model.matrix_ellipsoid(np.eye(4).reshape(2, 2, 2, 2), 0.9, emphasis=-np.eye(2))

@@ -25,7 +25,7 @@ def flight(ideal):
 def test_the_flight_again_is_the_one_without_noise(ideal, flight):
     plan = flight.meta["plan"]
     calm = symheli.fly(ideal, plan.schedule, excitation=plan.excitation)
-    clean = symheli.SimulatedFlight(ideal).flown(flight)
+    clean = symheli.flight.SimulatedFlight(ideal).flown(flight)
     np.testing.assert_array_equal(clean.time, flight.time)
     for name in ("u", "p", "theta", "d_lon"):
         np.testing.assert_array_equal(clean[name], calm[name])
@@ -33,7 +33,7 @@ def test_the_flight_again_is_the_one_without_noise(ideal, flight):
 
 
 def test_a_part_of_the_flight_gets_its_own_samples(ideal, flight):
-    source = symheli.SimulatedFlight(ideal)
+    source = symheli.flight.SimulatedFlight(ideal)
     whole = source.flown(flight)
     keep = (flight.time > 1.0) & ((flight.time < 1.5) | (flight.time > 2.0))
     part = source.flown(flight.rows(keep))
@@ -43,7 +43,7 @@ def test_a_part_of_the_flight_gets_its_own_samples(ideal, flight):
 
 
 def test_samples_that_are_not_those_of_the_plan_are_refused(ideal, flight):
-    source = symheli.SimulatedFlight(ideal)
+    source = symheli.flight.SimulatedFlight(ideal)
     for other in (
         flight.resample(0.03),
         replace(flight, time=flight.time + 0.007),
@@ -55,15 +55,15 @@ def test_samples_that_are_not_those_of_the_plan_are_refused(ideal, flight):
 
 def test_a_record_without_its_plan_is_told_what_is_missing(ideal, flight):
     with pytest.raises(InputError, match=r"need the plan of the record, meta\['plan'\]"):
-        symheli.SimulatedFlight(ideal).flown(replace(flight, meta={}))
+        symheli.flight.SimulatedFlight(ideal).flown(replace(flight, meta={}))
     with pytest.raises(InputError, match="expected a Helicopter"):
-        symheli.SimulatedFlight("xcell60")
+        symheli.flight.SimulatedFlight("xcell60")
 
 
 def test_another_vehicle_may_fly_it(ideal, flight):
     other = symheli.Helicopter.load("xcell_kahn_hudson", governor="ideal")
-    source = symheli.SimulatedFlight(other)
-    flown, own = source.flown(flight), symheli.SimulatedFlight(ideal).flown(flight)
+    source = symheli.flight.SimulatedFlight(other)
+    flown, own = source.flown(flight), symheli.flight.SimulatedFlight(ideal).flown(flight)
     assert len(flown) == len(flight)
     assert np.abs(flown["p"] - own["p"]).max() > 1e-3
     np.testing.assert_array_equal(flown["airspeed_command"], own["airspeed_command"])
@@ -97,7 +97,7 @@ def test_more_flights_bring_instruments_to_the_truth_and_least_squares_to_its_bi
         theta = idn.fit(vehicle.kin, record, *method).theta
         return np.sqrt(np.mean((theta - vehicle.theta) ** 2)) / scale
 
-    iv = idn.InstrumentalVariables(Source())
+    iv = idn.methods.InstrumentalVariables(Source())
     one_iv = np.sqrt(np.mean([error(r, iv) ** 2 for r in records]))
     assert error(records, iv) < 2 * one_iv / np.sqrt(8)
     assert error(records) > 2 * error(records, iv)

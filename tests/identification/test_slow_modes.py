@@ -40,7 +40,7 @@ def found(record, delay):
         ),
         record,
     )
-    report = idn.slow_modes(model, record, points=1)
+    report = idn.judge.slow_modes(model, record, points=1)
     return min(report.modes, key=lambda m: abs(m.s)), report
 
 
@@ -109,7 +109,9 @@ def test_the_standard_error_of_a_pole_is_its_scatter():
         )
         model = idn.fit(arx, record)
         mode = max(
-            idn.slow_modes(model, record, points=1).modes, key=lambda m: abs(m.s), default=None
+            idn.judge.slow_modes(model, record, points=1).modes,
+            key=lambda m: abs(m.s),
+            default=None,
         )
         if mode is not None:
             poles.append(mode.s)
@@ -129,6 +131,6 @@ def test_fast_modes_are_none_and_other_estimators_are_refused():
     record = FlightRecord.from_arrays(
         0.1 * np.arange(600), dict.fromkeys("yup", "1"), y=y, u=u, p=p
     )
-    assert str(idn.slow_modes(idn.fit(truth, record), record)) == "slow modes: none"
+    assert str(idn.judge.slow_modes(idn.fit(truth, record), record)) == "slow modes: none"
     with pytest.raises(InputError, match="least squares"):
-        idn.slow_modes(idn.fit(truth, record, method="ridge"), record)
+        idn.judge.slow_modes(idn.fit(truth, record, method="ridge"), record)

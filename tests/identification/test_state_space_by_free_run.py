@@ -37,7 +37,7 @@ def structure(own, **options):
 @pytest.mark.parametrize("own", [False, True])
 def test_a_system_of_the_structure_is_recovered_exactly(own):
     """The states may have any basis: poles and the free run on another record are compared."""
-    found = idn.fit(structure(own), record(own, 1), idn.OutputError(tolerance=1e-13))
+    found = idn.fit(structure(own), record(own, 1), idn.methods.OutputError(tolerance=1e-13))
     # the search ends where the squares of residuals no longer change: 1e-13, so that errors of the
     # response are below the square root of that
     assert found.score(record(own, 2))["y"] == pytest.approx(100.0, abs=1e-3)
@@ -84,7 +84,7 @@ def test_its_own_schedule_is_what_a_free_run_is_judged_on():
     measured = structure(False)
     measured = idn.StateSpace("y", "u", "y", order=2, basis=measured.basis)
     own, other = idn.fit(structure(True), noisy), idn.fit(measured, noisy)
-    alone = idn.StateSpaceModel(
+    alone = idn.model.StateSpaceModel(
         structure=structure(True),
         unknowns=other.unknowns,
         state_space=other.state_space,
@@ -100,7 +100,7 @@ def test_a_missing_output_is_bridged_and_a_missing_input_cuts_the_run():
         "u": np.where(np.arange(100) == 70, np.nan, whole["u"]),
     }
     holed = whole.with_signals({"y": "m", "u": "1"}, **columns)
-    found = idn.fit(structure(False), holed, idn.OutputError(evaluations=300))
+    found = idn.fit(structure(False), holed, idn.methods.OutputError(evaluations=300))
     run = found.simulate(holed)
     assert np.isfinite(run[30]).all()
     assert np.isnan(run[70]).all()

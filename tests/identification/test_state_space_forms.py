@@ -6,7 +6,8 @@ from known_systems import Truth, moving, structure
 
 import identification as idn
 from symheli.errors import InputError
-from symheli.lpv import CubicSpline, Polynomial, Product, simulate
+from symheli.lpv import CubicSpline, Polynomial, Product
+from symheli.lpv.tools import simulate
 
 TWO = dict(
     basis=Product((Polynomial(2, 0.0, 13.0), Polynomial(1, -2.0, 2.0)), total_degree=2),

@@ -7,10 +7,11 @@ import pytest
 from known_systems import structure
 
 import identification as idn
+from symheli import lpv
 from symheli.errors import InputError, UnknownNameError
 
 TWO = dict(outputs=("a", "b"), inputs=("u", "v"))
-BOX = idn.Product((idn.Polynomial(1, 0.0, 13.0), idn.Polynomial(2, 0.9, 1.3)))
+BOX = lpv.Product((idn.Polynomial(1, 0.0, 13.0), idn.Polynomial(2, 0.9, 1.3)))
 
 
 def test_the_same_orders_written_three_ways_are_the_same_structure():

@@ -14,15 +14,15 @@ from identification.design.determined import determined_columns, largest
 from identification.recursive import kernel
 from identification.recursive.kernel import configuration as at
 from identification.structure.regressors import regression
-from symheli import FlightRecord
+from symheli import FlightRecord, lpv
 
 WAYS = {
-    "all": idn.Constant(1.0),
-    "constant": idn.Constant(0.97),
-    "no floor": idn.Constant(0.95, floor=0.0),
-    "variable": idn.Variable(200, 20),
-    "directional": idn.Directional(0.9),
-    "directional, loud or not": idn.Directional(0.8, quiet=0.0),
+    "all": idn.forgetting.Constant(1.0),
+    "constant": idn.forgetting.Constant(0.97),
+    "no floor": idn.forgetting.Constant(0.95, floor=0.0),
+    "variable": idn.forgetting.Variable(200, 20),
+    "directional": idn.forgetting.Directional(0.9),
+    "directional, loud or not": idn.forgetting.Directional(0.8, quiet=0.0),
 }
 LOW, HIGH = 0.0, 13.0
 
@@ -75,9 +75,9 @@ def experiments(draw, small=False):
     elif draw(st.booleans()):
         basis = idn.Polynomial(draw(st.integers(0, 6)), LOW, HIGH)
     elif draw(st.booleans()):
-        basis = idn.BSpline(draw(st.integers(1, 3)), knots)
+        basis = lpv.BSpline(draw(st.integers(1, 3)), knots)
     else:
-        basis = idn.Product(
+        basis = lpv.Product(
             (idn.Polynomial(draw(st.integers(0, 2)), LOW, HIGH), idn.Polynomial(1, LOW, HIGH)), None
         )
     names = ("p",) if basis.dimension == 1 else ("p", "q")

@@ -86,7 +86,7 @@ def test_the_covariance_is_its_double_sum():
 @pytest.mark.slow
 def test_response_errors_are_the_scatter_of_repeated_experiments():
     truth = Truth(TWO, size=1.2)
-    exact = idn.LPVARXModel(
+    exact = idn.model.LPVARXModel(
         structure=TWO,
         theta=truth.theta,
         dt=0.1,

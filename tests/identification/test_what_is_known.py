@@ -7,15 +7,8 @@ import pytest
 from known_systems import Truth, flown, moving, structure
 from scipy.signal import lfilter
 
-from identification import (
-    LPVARX,
-    Polynomial,
-    fit,
-    order_scan,
-    residual_analysis,
-    theil,
-    uncertainty,
-)
+from identification import LPVARX, Polynomial, fit, order_scan, residual_analysis, uncertainty
+from identification.judge import theil
 from symheli.errors import InputError
 from symheli.records import FlightRecord
 

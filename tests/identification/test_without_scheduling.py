@@ -33,7 +33,7 @@ def test_a_plant_that_nothing_schedules_is_recovered(tanks, method):
 
 def test_the_model_goes_through_files_recursion_and_reports(tanks, tmp_path):
     found = idn.fit(TANKS, tanks)
-    again = idn.LPVARXModel.load(found.save(tmp_path / "tanks.json"))
+    again = idn.model.LPVARXModel.load(found.save(tmp_path / "tanks.json"))
     assert again.structure == TANKS
     np.testing.assert_array_equal(again.simulate(tanks), found.simulate(tanks))
     assert "samples over" not in str(found.excitation)

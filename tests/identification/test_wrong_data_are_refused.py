@@ -24,7 +24,7 @@ def with_columns(dt=0.1, units=None, **over):
     )
 
 
-@pytest.mark.parametrize("method", ["ls", "rls", "ridge", idn.InstrumentalVariables("u")])
+@pytest.mark.parametrize("method", ["ls", "rls", "ridge", idn.methods.InstrumentalVariables("u")])
 @pytest.mark.parametrize(
     "over",
     [dict(y=np.full(300, np.nan)), dict(y=np.zeros(2)), dict(p=np.full(300, np.nan))],
@@ -51,8 +51,8 @@ def test_sizes_whose_squares_no_float_holds_are_refused(size, method):
     "method",
     [
         *("ls", "rls", "ridge", "lasso", "oe"),
-        idn.InstrumentalVariables("u"),
-        idn.RefinedInstruments("u"),
+        idn.methods.InstrumentalVariables("u"),
+        idn.methods.RefinedInstruments("u"),
     ],
 )
 def test_sizes_of_signals_do_not_matter_to_any_method(method):
@@ -82,7 +82,7 @@ def test_a_model_is_not_applied_to_records_of_another_unit_or_step():
         lambda r: model.predict(r, 1),
         lambda r: idn.residual_analysis(model, r),
         lambda r: idn.uncertainty(model, r),
-        lambda r: idn.dependence_report(model, r),
+        lambda r: idn.judge.dependence_report(model, r),
     )
     for use in uses:
         with pytest.raises(

@@ -22,13 +22,13 @@ def held(heli, seconds, airspeed=6.0, dt=0.02):
     feedback.
     """
     n = round(seconds / dt)
-    autopilot = symheli.gain_scheduled_lqr(heli, airspeed - 1, airspeed + 1, dt, points=3)
+    autopilot = symheli.flight.gain_scheduled_lqr(heli, airspeed - 1, airspeed + 1, dt, points=3)
     gain = np.zeros((4, len(heli.states)))
     for name, column in zip(autopilot.states, autopilot.gain(airspeed).T, strict=True):
         gain[:, heli.states.index(name)] = column
     x0, u = manoeuvre(heli, airspeed, n, dt=dt)
     reference = np.tile(symheli.trim(heli, airspeed).x.array, (n, 1))
-    return x0, u, symheli.Feedback(np.tile(gain, (n, 1, 1)), reference, heli.travel)
+    return x0, u, symheli.integrate.Feedback(np.tile(gain, (n, 1, 1)), reference, heli.travel)
 
 
 def transition(heli):

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from flights import manoeuvre, without_compiler
 
-from symheli import InputError, simulate, simulate_batch
+from symheli import simulate
 from symheli.codegen.numeric import Numeric
-from symheli.integrate import Feedback, runge_kutta
+from symheli.errors import InputError
+from symheli.integrate import Feedback, runge_kutta, simulate_batch
 from symheli.physics.attitude import euler_state
 
 

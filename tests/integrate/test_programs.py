@@ -9,11 +9,10 @@ import casadi
 import numpy as np
 import pytest
 
-from symheli import InputError
 from symheli.codegen import Layout, as_casadi, c_function, compile, evaluate, program
 from symheli.codegen.branches import branches
 from symheli.codegen.compile import compiler, library
-from symheli.errors import CompilerWarning
+from symheli.errors import CompilerWarning, InputError
 
 needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 

@@ -8,7 +8,8 @@ from flights import manoeuvre, without_compiler
 from scipy.linalg import expm
 
 import symheli
-from symheli import InputError, simulate
+from symheli import simulate
+from symheli.errors import InputError
 from symheli.integrate import CashKarp, DormandPrince, Radau, RungeKutta4, gradient, tangent
 from symheli.physics.attitude import euler_state, flight_state
 

@@ -7,8 +7,9 @@ import pytest
 from flights import held, manoeuvre, transition, without_compiler
 
 import symheli
-from symheli import InputError, SymheliError, simulate
+from symheli import simulate
 from symheli.codegen.numeric import Numeric
+from symheli.errors import InputError, SymheliError
 from symheli.integrate import CashKarp, DormandPrince, Feedback, Radau, RungeKutta4, runge_kutta
 from symheli.physics.attitude import euler_state, flight_state
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from symheli.lpv import LPVStateSpace, Scheduling
+from symheli import LPVStateSpace, Scheduling
 
 SPEED = Scheduling("airspeed", "m/s", 0.0, 13.0, 3.0)
 

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from symheli import LinearModel, LPVStateSpace, Scheduling
 from symheli.errors import InputError
-from symheli.lpv import LinearModel, LPVStateSpace, Scheduling, balanced_truncation, nu_gap
+from symheli.lpv import balanced_truncation, nu_gap
 
 P = Scheduling("p", "1", 0.0, 1.0)
 

@@ -7,17 +7,10 @@ import pytest
 from scipy import interpolate
 from scipy.interpolate import BPoly
 
+from symheli import Scheduling
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv import (
-    BSpline,
-    CubicSpline,
-    Patches,
-    PiecewiseLinear,
-    Polynomial,
-    Product,
-    Scheduling,
-    UserFunctions,
-)
+from symheli.lpv import BSpline, CubicSpline, PiecewiseLinear, Polynomial, Product, UserFunctions
+from symheli.lpv.bases import Patches
 from symheli.values.units import to_si
 
 NODES = (0.0, 1.0, 3.0, 7.0, 13.0)

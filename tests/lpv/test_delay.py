@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from symheli.errors import InputError
-from symheli.lpv import pade_delay
+from symheli.lpv.tools import pade_delay
 
 
 @pytest.mark.parametrize("order", [1, 2, 4, 7])

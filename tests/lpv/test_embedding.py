@@ -33,7 +33,7 @@ def states(count, seed=1):
 @pytest.mark.parametrize("f", [MIXED, VAN_DER_POL])
 @pytest.mark.parametrize("at", [{}, {"x1": 0.3, "x2": 1.0, "u": 0.2}])
 def test_the_embedding_is_the_nonlinear_model(f, at):
-    found = symheli.embed(f, BOX, INPUT, at=at)
+    found = symheli.embedding.embed(f, BOX, INPUT, at=at)
     for x, u in zip(*states(50), strict=True):
         np.testing.assert_allclose(
             found.derivative(x, u), np.array(f(x, u)).ravel(), rtol=1e-11, atol=1e-12
@@ -44,7 +44,7 @@ def test_the_embedding_is_the_nonlinear_model(f, at):
 
 def test_the_parameters_may_be_told_to_depend_on_some_variables_only():
     """Van der Pol's equation is affine in x2 and u: (1 - x1^2) is the one parameter of A."""
-    found = symheli.embed(VAN_DER_POL, BOX, INPUT, scheduled_by=["x1"])
+    found = symheli.embedding.embed(VAN_DER_POL, BOX, INPUT, scheduled_by=["x1"])
     p = found.parameters([0.7, -0.5], [0.3])
     np.testing.assert_array_equal(p, found.parameters([0.7, 2.5], [-0.9]))
     names = [s.name for s in found.model.parameters]
@@ -54,37 +54,37 @@ def test_the_parameters_may_be_told_to_depend_on_some_variables_only():
     assert low <= 1 - 4.0
     assert high >= 1.0
     with pytest.raises(InputError, match="x2 cannot be factored: it is not affine in x2"):
-        symheli.embed(MIXED, BOX, INPUT, scheduled_by=["x1"])
+        symheli.embedding.embed(MIXED, BOX, INPUT, scheduled_by=["x1"])
     with pytest.raises(UnknownNameError, match="state or input"):
-        symheli.embed(MIXED, BOX, INPUT, scheduled_by=["x3"])
+        symheli.embedding.embed(MIXED, BOX, INPUT, scheduled_by=["x3"])
 
 
 def test_parameters_depend_on_the_fewest_variables():
     """A cart's pendulum, 9.81 sin x1 + u cos x1: affine in u and x2, so the parameters are
     9.81 sin(x1)/x1 and cos x1; x1 x2 asks for one of both, u x2 for the state.
     """
-    found = symheli.embed(
+    found = symheli.embedding.embed(
         function(X[1], 9.81 * casadi.sin(X[0]) + casadi.cos(X[0]) * U), BOX, INPUT
     )
     assert [s.name for s in found.model.parameters] == ["A[x2, x1]", "B[x2, u]"]
     for x1, x2, u in ((0.7, -0.5, 0.3), (-1.9, 2.0, -1.0)):
         p = found.parameters([x1, x2], [u])
         assert p == pytest.approx([9.81 * np.sin(x1) / x1, np.cos(x1)], rel=1e-12)
-    product = symheli.embed(function(X[0] * X[1], U), BOX, INPUT)
+    product = symheli.embedding.embed(function(X[0] * X[1], U), BOX, INPUT)
     assert len(product.model.parameters) == 1
-    by_state = symheli.embed(function(X[0], U * X[1]), BOX, INPUT)
+    by_state = symheli.embedding.embed(function(X[0], U * X[1]), BOX, INPUT)
     assert [s.name for s in by_state.model.parameters] == ["B[x2, u]"]
 
 
 def test_ranges_are_asked_for_by_name():
     for given in (["u"], {"u": 1.0}, {"u": (-1.0, 0.0, 1.0)}):
         with pytest.raises(InputError, match="two numbers a name"):
-            symheli.embed(VAN_DER_POL, BOX, given)
+            symheli.embedding.embed(VAN_DER_POL, BOX, given)
 
 
 def test_outputs_are_embedded_too():
     f = function(X[1], -X[0] + U, outputs=[casadi.sin(X[0]), X[1]])
-    found = symheli.embed(f, BOX, INPUT, outputs=["height", "speed"])
+    found = symheli.embedding.embed(f, BOX, INPUT, outputs=["height", "speed"])
     model = found.model
     assert model.outputs == ("height", "speed")
     p = found.parameters([1.2, 0.4], [0.0])
@@ -103,7 +103,7 @@ def test_outputs_are_embedded_too():
 )
 def test_what_cannot_be_embedded_is_refused_with_the_reason(f, message):
     with pytest.raises(InputError, match=message):
-        symheli.embed(f, BOX, INPUT)
+        symheli.embedding.embed(f, BOX, INPUT)
 
 
 @pytest.mark.slow
@@ -115,7 +115,7 @@ def test_the_helicopter_is_embedded_about_a_trim(ideal):
     x, u = SX.sym("x", 10), SX.sym("u", 4)
     f = casadi.Function("f", [x, u], [ideal.rhs(x, u, casadi.DM.zeros(3))])
     at = {**{s: point.x[s] for s in ideal.states}, **{s: point.u[s] for s in ideal.inputs}}
-    found = symheli.embed(
+    found = symheli.embedding.embed(
         f,
         {s: (at[s] - size[s], at[s] + size[s]) for s in ideal.states},
         {s: (at[s] - 0.003, at[s] + 0.003) for s in ideal.inputs},

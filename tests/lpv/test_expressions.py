@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 import sympy
 
+from symheli import LFT, LPVStateSpace, Scheduling
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv import LFT, LPVStateSpace, Scheduling, UserFunctions
+from symheli.lpv import UserFunctions
 from synthesis import l2_gain
 
 P = Scheduling("rho", "1", low=-0.5, high=2.0, rate=1.0)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import symheli
+from symheli import LinearFamily, LinearModel, LPVStateSpace
 from symheli.errors import InputError
 from symheli.export import write_family_mat
-from symheli.lpv import LinearFamily, LinearModel, LPVStateSpace
 from symheli.values import NamedVector, OperatingPoint, Signal, signals
 
 BY_HAND = {
@@ -53,7 +53,7 @@ def test_a_family_comes_back_to_the_last_bit_with_its_trims(family, tmp_path, en
 
 @pytest.mark.parametrize("ending", ["json", "npz"])
 def test_a_family_over_two_axes_comes_back_and_has_no_single_parameter(ideal, tmp_path, ending):
-    grid = symheli.sweep_grid(ideal, [6.0, 8.0], acceleration=[-1.0, 0.0, 1.0])
+    grid = symheli.steady.sweep_grid(ideal, [6.0, 8.0], acceleration=[-1.0, 0.0, 1.0])
     path = grid.save(tmp_path / f"grid.{ending}")
     back = LinearFamily.load(path)
     same(back, grid)
@@ -164,7 +164,7 @@ def test_an_airspeed_that_a_trim_has_is_kept_and_never_taken_from_another_unit(t
 def test_what_is_over_airspeed_refuses_a_family_over_something_else(ideal, tmp_path):
     made = over_mach()
     for call in (
-        lambda: symheli.StitchedModel.from_family(made),
+        lambda: symheli.flight.StitchedModel.from_family(made),
         lambda: symheli.derivatives(made),
         lambda: symheli.sweep(ideal, MACH, start=made),
         lambda: write_family_mat(made, tmp_path / "mach.mat", "over Mach"),

@@ -6,8 +6,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from symheli import LFT, LPVStateSpace, Scheduling
 from symheli.errors import PrecisionWarning
-from symheli.lpv import LFT, LPVStateSpace, Polynomial, Scheduling
+from symheli.lpv import Polynomial
 
 FAR = [(1e5, 1e5 + 1), (-3e8, -3e8 + 7.0), (0.0, 13.0), (101325.0, 103000.0)]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from families import random_lpv
 
-from symheli import lpv
+from symheli import LinearFamily, lpv
 from symheli.errors import InputError, UnknownNameError
 
 mpl.use("Agg")
@@ -42,10 +42,10 @@ def test_singular_values_poles_and_nyquist_are_those_of_the_frozen_models():
     expected = np.linalg.svd(MODEL.at(5.0).frequency_response([0.3, 2.0]), compute_uv=False)
     for k, one in enumerate((line, other)):
         np.testing.assert_allclose(one.get_ydata(), 20 * np.log10(expected[:, k]))
-    drawn = lpv.nyquist(MODEL, "u1", "y2", [5.0], omega=[0.3, 2.0]).lines[0]
+    drawn = lpv.tools.nyquist(MODEL, "u1", "y2", [5.0], omega=[0.3, 2.0]).lines[0]
     G = MODEL.at(5.0).frequency_response([0.3, 2.0])[:, 1, 0]
     np.testing.assert_allclose(drawn.get_xdata() + 1j * drawn.get_ydata(), G)
-    ax = lpv.pole_map(MODEL)
+    ax = lpv.tools.pole_map(MODEL)
     shown = np.concatenate(
         [x.get_xdata() + 1j * x.get_ydata() for x in ax.lines if x.get_marker() == "x"]
     )
@@ -56,7 +56,7 @@ def test_singular_values_poles_and_nyquist_are_those_of_the_frozen_models():
 
 @pytest.mark.parametrize("model", [MODEL, SAMPLED])
 def test_damping_is_that_of_python_control(model):
-    table = lpv.damping(model, [2.0, 9.0])
+    table = lpv.tools.damping(model, [2.0, 9.0])
     for p in (2.0, 9.0):
         frequency, ratio, poles = control.damp(model.at(p).to_control(), doprint=False)
         upper = np.imag(poles) >= 0 if model.dt is None else np.imag(np.log(poles + 0j)) >= 0
@@ -80,13 +80,13 @@ def test_a_step_along_a_history_that_stands_is_the_frozen_one():
 
 def test_families_and_linear_models_are_shown_and_other_things_refused():
     models = [MODEL.at(p) for p in (0.0, 6.0, 13.0)]
-    family = lpv.LinearFamily.from_models([0.0, 6.0, 13.0], models)
+    family = LinearFamily.from_models([0.0, 6.0, 13.0], models)
     assert len(lpv.bode(family, "u1", "y1")[0].lines) == 3
     assert len(lpv.bode(models[0], "u1", "y1")[0].lines) == 1
     with pytest.raises(InputError, match="leave p out"):
         lpv.sigma(models[0], [1.0])
     with pytest.raises(InputError, match="got str"):
-        lpv.pole_map("roll")
+        lpv.tools.pole_map("roll")
     with pytest.raises(UnknownNameError, match="did you mean 'u1'"):
         lpv.bode(MODEL, "u11", "y1")
     with pytest.raises(InputError, match="not on the grid"):

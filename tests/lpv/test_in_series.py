@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from families import SPEED, random_lpv
 
+from symheli import LinearModel, LPVStateSpace
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv import CubicSpline, LinearModel, LPVStateSpace, pade_delay, sample_delay
+from symheli.lpv import CubicSpline
 from symheli.lpv.mixing import mixed
+from symheli.lpv.tools import pade_delay, sample_delay
 from symheli.values.signal import Signal, signals
 
 OMEGA = np.array([0.3, 2.0, 9.0, 40.0])

@@ -7,21 +7,10 @@ import numpy as np
 import pytest
 from families import SPEED, random_lpv
 
+from symheli import LFT, LinearModel, LPVStateSpace, Scheduling, UncertainStateSpace
 from symheli.errors import InputError
-from symheli.lpv import (
-    LFT,
-    CubicSpline,
-    LinearModel,
-    LPVStateSpace,
-    Scheduling,
-    UncertainStateSpace,
-    append,
-    connect,
-    feedback,
-    lower_feedback,
-    parallel,
-    series,
-)
+from symheli.lpv import CubicSpline, append, connect, feedback, parallel, series
+from symheli.lpv.tools import lower_feedback
 from symheli.values import Signal
 from synthesis import hinf
 

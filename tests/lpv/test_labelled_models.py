@@ -42,7 +42,7 @@ def test_a_dataset_names_every_axis(family, xr):
 
 
 def test_a_grid_keeps_its_axes(ideal, xr):
-    grid = symheli.sweep_grid(ideal, [4.0, 6.0], acceleration=[-1.0, 0.0, 1.0])
+    grid = symheli.steady.sweep_grid(ideal, [4.0, 6.0], acceleration=[-1.0, 0.0, 1.0])
     data = grid.to_xarray()
     found = data["A"].sel(airspeed=6.0, acceleration=1.0, equation="q", state="u")
     assert float(found) == grid[1, 2].A[grid.states.index("q"), 0]
@@ -67,7 +67,9 @@ def test_an_lpv_model_is_a_frame_of_its_entries_over_its_parameter(family, pd):
 
 
 def test_an_lpv_model_of_two_parameters_is_a_frame_over_both(ideal, pd):
-    lpv = symheli.sweep_grid(ideal, [4.0, 6.0], acceleration=[-1.0, 1.0]).interpolate(degree=1)
+    lpv = symheli.steady.sweep_grid(ideal, [4.0, 6.0], acceleration=[-1.0, 1.0]).interpolate(
+        degree=1
+    )
     frame = lpv.to_frame()
     assert frame.index.names == ["airspeed", "acceleration"]
     assert len(frame) == 21**2
@@ -82,7 +84,7 @@ def test_an_lpv_model_of_two_parameters_is_a_frame_over_both(ideal, pd):
 
 
 def test_a_grid_is_drawn_a_curve_a_value_of_its_other_axes(ideal):
-    grid = symheli.sweep_grid(ideal, [4.0, 6.0, 8.0], acceleration=[-2.0, 0.0, 2.0])
+    grid = symheli.steady.sweep_grid(ideal, [4.0, 6.0, 8.0], acceleration=[-2.0, 0.0, 2.0])
     ax = grid.plot(entries=["A[q, u]", "B[q, d_lon]"])
     curves = [line for line in ax.lines if len(line.get_xdata()) == 3]
     assert len(curves) == 2 * 3
@@ -184,7 +186,7 @@ def test_a_model_over_p_is_drawn_and_one_of_several_is_refused(ideal, ax):
     lpv, _ = random_lpv()
     assert lpv.plot(ax) is ax
     assert len(drawn(ax)) == 4
-    grid = symheli.sweep_grid(ideal, [4.0, 6.0], acceleration=[-1.0, 0.0, 1.0])
+    grid = symheli.steady.sweep_grid(ideal, [4.0, 6.0], acceleration=[-1.0, 0.0, 1.0])
     with pytest.raises(InputError, match=r"use \.parameters"):
         grid.interpolate(degree=1).plot(ax)
 

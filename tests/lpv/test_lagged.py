@@ -5,8 +5,10 @@ import math
 import numpy as np
 import pytest
 
+from symheli import LPVStateSpace, Scheduling
 from symheli.errors import InputError
-from symheli.lpv import LPVStateSpace, PiecewiseLinear, Scheduling, lagged
+from symheli.lpv import PiecewiseLinear
+from symheli.lpv.tools import lagged
 
 T, RATE = 0.2, 0.5
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from families import SPEED, random_lpv, stacked
 
+from symheli import LFT, LPVStateSpace, Scheduling
 from symheli.errors import InputError
-from symheli.lpv import LFT, LPVStateSpace, Scheduling
 
 POINTS = (0.0, 1.7, 6.5, 11.0, 13.0)
 

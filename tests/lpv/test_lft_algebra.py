@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 from families import random_lpv
 
+from symheli import LFT, LinearModel, Scheduling
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv import LFT, LinearModel, Scheduling, append, connect, feedback, parallel, series
+from symheli.lpv import append, connect, feedback, parallel, series
 from symheli.values import Signal
 
 OMEGA = np.array([0.05, 0.7, 9.0])

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from families import random_lpv, stacked
 
+from symheli import LFT, LinearModel, Scheduling
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv import LFT, LinearModel, Polynomial, Scheduling, connect
+from symheli.lpv import Polynomial, connect
 
 SPEED, MASS = (
     Scheduling("airspeed", "m/s", 0.0, 13.0, 3.0),

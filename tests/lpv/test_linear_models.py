@@ -5,8 +5,8 @@ import pytest
 from scipy.linalg import expm
 
 import symheli
+from symheli import LinearModel
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv import LinearModel
 from symheli.values import Signal, signals
 
 

@@ -12,23 +12,13 @@ import numpy as np
 import pytest
 from families import SPEED
 
+from symheli import LinearModel, LPVStateSpace, Scheduling, UncertainStateSpace
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv import (
-    BSpline,
-    CubicSpline,
-    LinearModel,
-    LPVStateSpace,
-    Patches,
-    PiecewiseLinear,
-    Polynomial,
-    Product,
-    Scheduling,
-    UncertainStateSpace,
-    UserFunctions,
-    lower_feedback,
-)
+from symheli.lpv import BSpline, CubicSpline, PiecewiseLinear, Polynomial, Product, UserFunctions
+from symheli.lpv.bases import Patches
 from symheli.lpv.bases.polynomials import factors_of
 from symheli.lpv.lower_feedback import apart
+from symheli.lpv.tools import lower_feedback
 from symheli.values.signal import signals
 
 ACCELERATION = Scheduling("acceleration", "m/s^2", -3.0, 3.0, 5.0)

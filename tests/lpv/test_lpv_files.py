@@ -6,18 +6,10 @@ import numpy as np
 import pytest
 
 import symheli
+from symheli import LPVStateSpace, Scheduling
 from symheli.errors import InputError
-from symheli.lpv import (
-    BSpline,
-    CubicSpline,
-    LPVStateSpace,
-    Patches,
-    PiecewiseLinear,
-    Polynomial,
-    Product,
-    Scheduling,
-    UserFunctions,
-)
+from symheli.lpv import BSpline, CubicSpline, PiecewiseLinear, Polynomial, Product, UserFunctions
+from symheli.lpv.bases import Patches
 
 SPEED = Scheduling("V", "m/s", 0.0, 10.0, rate="a")
 ACCELERATION = Scheduling("a", "m/s^2", -2.0, 2.0)
@@ -42,7 +34,7 @@ def random(basis, states=("p", "phi"), dt=None):
         several if basis.dimension == 2 else one,
         states,
         ("d_lat",),
-        ("p", symheli.Signal("z", "rad/s^2")),
+        ("p", symheli.values.Signal("z", "rad/s^2")),
         dt,
     )
 

@@ -7,21 +7,13 @@ import pytest
 from families import SPEED, random_lpv, stacked
 from scipy.integrate import solve_ivp
 
+from symheli import LPVStateSpace, Scheduling
 from symheli.errors import InputError
-from symheli.lpv import (
-    BSpline,
-    CubicSpline,
-    LPVStateSpace,
-    Patches,
-    PiecewiseLinear,
-    Polynomial,
-    Scheduling,
-    TrimSchedule,
-    UserFunctions,
-    simulate,
-)
+from symheli.lpv import BSpline, CubicSpline, PiecewiseLinear, Polynomial, UserFunctions
+from symheli.lpv.bases import Patches
 from symheli.lpv.lpv_matrices import Matrices
 from symheli.lpv.scheduling import parameters
+from symheli.lpv.tools import TrimSchedule, simulate
 
 
 def stable(dt=None):

@@ -6,15 +6,8 @@ import numpy as np
 import pytest
 
 from symheli.errors import InputError
-from symheli.lpv import (
-    BSpline,
-    CubicSpline,
-    Patches,
-    PiecewiseLinear,
-    Polynomial,
-    Product,
-    UserFunctions,
-)
+from symheli.lpv import BSpline, CubicSpline, PiecewiseLinear, Polynomial, Product, UserFunctions
+from symheli.lpv.bases import Patches
 from symheli.lpv.bases.spaces import product_space, sum_space
 from symheli.lpv.matrix_function import MatrixFunction, block
 

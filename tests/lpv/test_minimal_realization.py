@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 from families import random_lpv
 
+from symheli import LFT, LinearModel, LPVStateSpace
 from symheli.errors import InputError
-from symheli.lpv import LFT, LinearModel, LPVStateSpace, minimal_realization, parallel, series
+from symheli.lpv import minimal_realization, parallel, series
 
 OMEGA = np.array([0.05, 0.7, 9.0])
 

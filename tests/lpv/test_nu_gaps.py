@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from symheli import InputError, LinearModel
-from symheli.lpv import LinearModels, nu_gap, nu_gaps
+from symheli import LinearModel
+from symheli.errors import InputError
+from symheli.lpv import nu_gap
+from symheli.lpv.tools import LinearModels, nu_gaps
 from symheli.values import signals
 
 SCALES = {"input_scale": np.array([0.5, 2.0]), "output_scale": np.array([1.0, 0.2, 3.0])}

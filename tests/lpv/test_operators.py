@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from families import random_lpv
 
-from symheli import LFT, InputError, LinearModel, LPVStateSpace, UncertainStateSpace
-from symheli.errors import UnknownNameError
+from symheli import LFT, LinearModel, LPVStateSpace, UncertainStateSpace
+from symheli.errors import InputError, UnknownNameError
 from symheli.lpv import append, feedback, parallel, series
 from symheli.values import NamedVector, OperatingPoint, Signal
 

@@ -9,8 +9,9 @@ import pytest
 import sympy
 from scipy.integrate import solve_ivp
 
+from symheli import LPVStateSpace, Scheduling
 from symheli.errors import InputError
-from symheli.lpv import LPVStateSpace, Scheduling, TrimSchedule, simulate
+from symheli.lpv.tools import TrimSchedule, simulate
 
 EXACT = {"rtol": 1e-11, "atol": 1e-12}
 CLOSE = {"rtol": 0, "atol": 1e-7}

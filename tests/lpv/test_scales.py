@@ -10,8 +10,8 @@ from families import random_lpv
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from symheli import LFT, LPVStateSpace, Scheduling
 from symheli.errors import InputError
-from symheli.lpv import LFT, LPVStateSpace, Scheduling
 from symheli.lpv.equilibration import equilibrate, is_singular
 from symheli.lpv.lft import expanded
 

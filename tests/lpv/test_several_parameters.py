@@ -7,17 +7,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import symheli
+from symheli import LPVStateSpace, Scheduling
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv import (
-    CubicSpline,
-    LPVStateSpace,
-    PiecewiseLinear,
-    Polynomial,
-    Product,
-    Scheduling,
-    nu_gap,
-    simulate,
-)
+from symheli.lpv import CubicSpline, PiecewiseLinear, Polynomial, Product, nu_gap
+from symheli.lpv.tools import simulate
 
 V = Scheduling("airspeed", "m/s", 0.0, 13.0, rate=3.0)
 A_X = Scheduling("acceleration", "m/s^2", -4.0, 4.0, rate=10.0)
@@ -178,7 +171,7 @@ def test_a_line_through_the_box_is_the_model_on_it_splines_too():
 
 
 def test_a_moving_trim_drifts_by_its_slopes_and_by_its_own_rates():
-    grid = symheli.sweep_grid(
+    grid = symheli.steady.sweep_grid(
         symheli.Helicopter.load("xcell60", governor="ideal"),
         [4.0, 5.0, 6.0, 7.0],
         acceleration=[-2.0, -1.0, 0.0, 1.0, 2.0],
@@ -206,7 +199,9 @@ def test_a_moving_trim_drifts_by_its_slopes_and_by_its_own_rates():
 
 def test_a_declared_drift_does_what_the_moving_trim_does():
     heli = symheli.Helicopter.load("xcell60", governor="ideal")
-    grid = symheli.sweep_grid(heli, [4.0, 5.0, 6.0, 7.0], acceleration=[-2.0, -1.0, 0.0, 1.0, 2.0])
+    grid = symheli.steady.sweep_grid(
+        heli, [4.0, 5.0, 6.0, 7.0], acceleration=[-2.0, -1.0, 0.0, 1.0, 2.0]
+    )
     t = 0.02 * np.arange(100)
     p = np.column_stack([5 + t, np.sin(t)])
     rate = np.column_stack([p[:, 1], np.cos(t)])
@@ -325,7 +320,10 @@ def test_a_grid_is_met_at_its_nodes_and_its_misfit_is_known(kind):
     """Models of a polynomial plant: each kind meets the nodes, the polynomial everything."""
     speeds, mass = np.linspace(0, 13, 6), np.linspace(-4, 4, 4)
     models = [model().at(v, a) for v in speeds for a in mass]
-    axes = (symheli.Signal("airspeed", "m/s"), symheli.Signal("acceleration", "m/s^2"))
+    axes = (
+        symheli.values.Signal("airspeed", "m/s"),
+        symheli.values.Signal("acceleration", "m/s^2"),
+    )
     lpv = symheli.LinearFamily(axes, (speeds, mass), models).interpolate(kind, degree=(2, 1))
     for v in speeds:
         for a in mass:

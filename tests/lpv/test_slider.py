@@ -5,8 +5,10 @@ import importlib.util
 import numpy as np
 import pytest
 
+from symheli import LinearFamily, LPVStateSpace, Scheduling
 from symheli.errors import InputError
-from symheli.lpv import LinearFamily, LinearModels, LPVStateSpace, Scheduling, bode, damping, slider
+from symheli.lpv import bode
+from symheli.lpv.tools import LinearModels, damping, slider
 from symheli.values import Signal
 
 P = Scheduling("p", "m/s", low=0.0, high=2.0)

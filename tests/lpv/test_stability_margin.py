@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from symheli import InputError, LinearModel
-from symheli.errors import UnknownNameError
+from symheli import LinearModel
+from symheli.errors import InputError, UnknownNameError
 from symheli.lpv import nu_gap, stability_margin
 from symheli.lpv.stability_margin import as_controller, closed_loop
 from symheli.values import signals

@@ -10,20 +10,10 @@ import numpy as np
 import pytest
 from families import SPEED, random_lpv, stacked
 
+from symheli import LFT, LinearFamily, LinearModel, LPVStateSpace
 from symheli.errors import InputError, UnknownNameError
 from symheli.flight.stitched_model import StitchedModel
-from symheli.lpv import (
-    LFT,
-    LinearFamily,
-    LinearModel,
-    LPVStateSpace,
-    PiecewiseLinear,
-    append,
-    connect,
-    feedback,
-    parallel,
-    series,
-)
+from symheli.lpv import PiecewiseLinear, append, connect, feedback, parallel, series
 
 PLANT = LinearModel([[-1.0]], [[1.0]], [[1.0]], [[0.0]], ("v",), ("d_col",), ("q",))
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from families import SPEED
 
-from symheli import UncertainStateSpace
+from symheli import LPVStateSpace, Scheduling, UncertainStateSpace
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv import LPVStateSpace, PiecewiseLinear, Scheduling
+from symheli.lpv import PiecewiseLinear
 
 P = np.linspace(0.0, 13.0, 7)
 

@@ -33,7 +33,7 @@ def test_a_used_helicopter_is_copied_and_flies_as_before(used, travel):
         other.numeric("rhs")(point.x.array, point.u.array, 0.0)[0],
         used.numeric("rhs")(point.x, point.u, 0.0)[0],
     )
-    stitched = symheli.StitchedModel.from_family(symheli.sweep(other, [0.0, 5.0]))
+    stitched = symheli.flight.StitchedModel.from_family(symheli.sweep(other, [0.0, 5.0]))
     assert len(pickle.loads(pickle.dumps(stitched)).states) == len(other.states)
 
 

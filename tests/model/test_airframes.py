@@ -157,7 +157,7 @@ def test_scaling_follows_the_units_of_the_entries(ideal):
     assert "Froude-scaled by 4" in copy.title
     assert copy.values("tail_wake")["rotor_radius"] == copy.values("main_rotor")["radius"]
     for wrong in (0.0, -1.0, np.inf):
-        with pytest.raises(symheli.InputError, match="factor > 0"):
+        with pytest.raises(symheli.errors.InputError, match="factor > 0"):
             ideal.scaled(wrong)
 
 
@@ -165,7 +165,7 @@ def test_r50_in_hover_keeps_the_constraints_of_its_identification():
     """X_a = -g, Y_b = g, N_rfb = -N_ped and K_rfb = 2 N_r were held; the roll mode follows
     sqrt(L_b) where flapping is slow.
     """
-    model = symheli.identified_model("r50_hover")
+    model = symheli.airframe.identified_model("r50_hover")
     par = {name: quantity.value for name, quantity in model.parameters.items()}
     assert par["X_a"] == -par["g"]
     assert par["Y_b"] == par["g"]
@@ -192,7 +192,7 @@ def test_r50_in_feet_and_in_si_have_the_same_poles(tmp_path):
     """Every length in ft or m: the same motion."""
     path = tmp_path / "r50.toml"
     path.write_text(R50)
-    model = symheli.identified_model(path)
+    model = symheli.airframe.identified_model(path)
     feet = np.array([1 / 0.3048 if s.unit == "m/s" else 1.0 for s in model.states])
     A = model.A * feet[:, None] / feet
     assert A[0, 0] == pytest.approx(-0.0505)
@@ -230,8 +230,8 @@ def test_a_wrong_model_file_says_what_is_wrong(tmp_path, old, new, message):
     path = tmp_path / "wrong.linear.toml"
     assert old in R50
     path.write_text(R50.replace(old, new, 1))
-    with pytest.raises(symheli.InputError, match=message):
-        symheli.identified_model(path)
+    with pytest.raises(symheli.errors.InputError, match=message):
+        symheli.airframe.identified_model(path)
 
 
 MISTAKES = (
@@ -268,8 +268,8 @@ def test_ten_mistakes_in_a_model_file_are_one_message_of_ten(tmp_path):
         text = text.replace(right, typed, 1)
     path = tmp_path / "typed.linear.toml"
     path.write_text(text)
-    with pytest.raises(symheli.InputError) as caught:
-        symheli.identified_model(path)
+    with pytest.raises(symheli.errors.InputError) as caught:
+        symheli.airframe.identified_model(path)
     head, *said = str(caught.value).split("\n  ")
     assert head == f"{path}: {len(MISTAKES)} things to put right"
     assert len(said) == len(MISTAKES)
@@ -284,7 +284,7 @@ def test_ten_mistakes_in_a_model_file_are_one_message_of_ten(tmp_path):
         text = text.replace(typed, right, 1)
     path.write_text(text)
     np.testing.assert_array_equal(
-        symheli.identified_model(path).A, symheli.identified_model("r50_hover").A
+        symheli.airframe.identified_model(path).A, symheli.airframe.identified_model("r50_hover").A
     )
 
 
@@ -292,8 +292,8 @@ def test_ten_mistakes_in_a_model_file_are_one_message_of_ten(tmp_path):
 def test_each_mistake_alone_is_said_alone(tmp_path, right, typed, words):
     path = tmp_path / "typed.linear.toml"
     path.write_text(R50.replace(right, typed, 1))
-    with pytest.raises(symheli.InputError) as caught:
-        symheli.identified_model(path)
+    with pytest.raises(symheli.errors.InputError) as caught:
+        symheli.airframe.identified_model(path)
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -314,18 +314,18 @@ def test_each_mistake_alone_is_said_alone(tmp_path, right, typed, words):
 def test_what_else_a_model_file_may_say(tmp_path, old, new, message):
     path = tmp_path / "typed.linear.toml"
     path.write_text(R50.replace(old, new, 1))
-    with pytest.raises(symheli.InputError, match=message):
-        symheli.identified_model(path)
+    with pytest.raises(symheli.errors.InputError, match=message):
+        symheli.airframe.identified_model(path)
 
 
 def test_the_equations_may_stand_in_any_order(tmp_path):
     first = next(line for line in R50.splitlines(True) if line.startswith('u = "X_u'))
     path = tmp_path / "turned.linear.toml"
     path.write_text(R50.replace(first, "").replace("\n[parameters]", first + "\n[parameters]"))
-    model = symheli.identified_model(path)
-    np.testing.assert_array_equal(model.A, symheli.identified_model("r50_hover").A)
+    model = symheli.airframe.identified_model(path)
+    np.testing.assert_array_equal(model.A, symheli.airframe.identified_model("r50_hover").A)
 
 
 def test_an_unknown_model_is_named():
-    with pytest.raises(symheli.UnknownNameError, match="r50_hover"):
-        symheli.identified_model("r50")
+    with pytest.raises(symheli.errors.UnknownNameError, match="r50_hover"):
+        symheli.airframe.identified_model("r50")

@@ -92,7 +92,8 @@ def test_a_trim_holds_or_says_what_is_missing(
     assert np.all(np.isfinite(point.residual.array))
     if not point.success:
         with pytest.raises(
-            symheli.TrimError, match=r"no trim at .* the best point leaves d\w+/dt = .* (m|rad)/s"
+            symheli.errors.TrimError,
+            match=r"no trim at .* the best point leaves d\w+/dt = .* (m|rad)/s",
         ) as caught:
             symheli.trim(heli, airspeed, **asked)
         assert str(caught.value).count("/dt = ") == len(heli.states)
@@ -132,7 +133,7 @@ def test_a_control_beyond_its_travel_is_said_not_hidden(ideal):
 
 def test_where_nothing_holds_the_best_point_stays_within_the_travel(ideal):
     with pytest.raises(
-        symheli.TrimError,
+        symheli.errors.TrimError,
         match=r"no trim at 60 m/s: .* du/dt = -\d.*m/s\^2.* at or beyond the stop: d_col",
     ) as caught:
         symheli.trim(ideal, 60.0)
@@ -141,7 +142,7 @@ def test_where_nothing_holds_the_best_point_stays_within_the_travel(ideal):
 
 def test_altitude_is_density_and_models_are_taken_in_the_air_of_their_point(ideal):
     high = symheli.trim(ideal, 6.0, altitude=2000.0)
-    thin = ideal.in_air(symheli.standard_atmosphere(2000.0).density)
+    thin = ideal.in_air(symheli.environment.standard_atmosphere(2000.0).density)
     same = symheli.trim(thin, 6.0)
     np.testing.assert_array_equal(high.x.array, same.x.array)
     np.testing.assert_array_equal(symheli.linearize(ideal, high).A, symheli.linearize(thin, same).A)
@@ -178,7 +179,7 @@ def test_wind_shifts_velocity_over_ground_and_nothing_else(ideal):
     ],
 )
 def test_conditions_that_cannot_be_are_refused(ideal, bad):
-    with pytest.raises(symheli.InputError):
+    with pytest.raises(symheli.errors.InputError):
         symheli.trim(ideal, **bad)
 
 
@@ -186,9 +187,9 @@ def test_autorotation_and_lack_of_power_are_named(pi):
     """A closed throttle cannot hold the rotor back in a steep descent; an engine of 300 W cannot
     hover.
     """
-    with pytest.raises(symheli.TrimError, match="throttle closed: the air drives the rotor"):
+    with pytest.raises(symheli.errors.TrimError, match="throttle closed: the air drives the rotor"):
         symheli.trim(pi, 18.0, climb_rate=-16.2)
-    with pytest.raises(symheli.TrimError, match="full throttle: the engine lacks power"):
+    with pytest.raises(symheli.errors.TrimError, match="full throttle: the engine lacks power"):
         symheli.trim(pi.with_parameters({"drivetrain.max_power": 300.0}), 0.0)
     assert symheli.trim(
         symheli.Helicopter(pi.vehicle, "ideal"), 18.0, climb_rate=-16.2
@@ -203,6 +204,6 @@ def test_where_the_equations_jump_a_failure_says_so(ideal):
     assert above.success
     assert below.success
     with pytest.raises(
-        symheli.TrimError, match="equations jump here, as the flow turns at the disc"
+        symheli.errors.TrimError, match="equations jump here, as the flow turns at the disc"
     ):
         symheli.trim(ideal, 20.0, climb_rate=-7.0)

@@ -102,15 +102,15 @@ def test_quotients_and_roots_follow_the_floating_point_rules():
 
 def test_unknown_operations_wrong_shapes_and_opaque_functions_are_refused_by_name():
     x = casadi.SX.sym("x")
-    with pytest.raises(symheli.InputError, match="OP_ERF"):
+    with pytest.raises(symheli.errors.InputError, match="OP_ERF"):
         evaluate(casadi.Function("f", [x], [casadi.erf(x)], ["x"], ["y"]), 0.1)
     f = casadi.Function("g", [x], [x])
-    with pytest.raises(symheli.InputError, match=r"shape \(1, 1\)"):
+    with pytest.raises(symheli.errors.InputError, match=r"shape \(1, 1\)"):
         evaluate(f, [1.0, 2.0])
-    with pytest.raises(symheli.InputError, match="takes 1 arguments"):
+    with pytest.raises(symheli.errors.InputError, match="takes 1 arguments"):
         to_sympy(f, 1, 2)
     table = casadi.interpolant("table", "linear", [[0, 1, 2, 3, 4]], [0, 1, 4, 9, 16])
-    with pytest.raises(symheli.InputError, match="no scalar operation"):
+    with pytest.raises(symheli.errors.InputError, match="no scalar operation"):
         evaluate(table, 0.5)
 
 

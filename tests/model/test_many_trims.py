@@ -67,7 +67,7 @@ ASKED = (
 def test_a_batch_holds_the_trims_found_one_after_another(name, asked):
     """Eight at a time from one that is eight airspeeds away, the same branch as from the next."""
     heli, speeds = airframe(name), SPEEDS[SPEEDS >= 0.5] if "climb_rate" in asked else SPEEDS
-    found = symheli.trim_batch(heli, speeds, **asked)
+    found = symheli.steady.trim_batch(heli, speeds, **asked)
     expected = one_after_another(heli, [{"airspeed": v, **asked} for v in speeds])
     # each is solved to 1e-9 in its accelerations, to 1e-13 where Newton's last step is taken
     np.testing.assert_allclose(np.hstack([found.x, found.u]), expected, rtol=1e-9, atol=1e-9)
@@ -79,7 +79,7 @@ def test_conditions_may_jump_about(pi):
     speeds = rng.uniform(0.0, 18.0, 60)
     climb, push = speeds * rng.uniform(-0.2, 0.2, 60), rng.uniform(-3.0, 3.0, 60)
     winds = rng.uniform(-3.0, 3.0, (60, 3)) * [1.0, 1.0, 0.2]
-    found = symheli.trim_batch(pi, speeds, climb_rate=climb, acceleration=push, wind=winds)
+    found = symheli.steady.trim_batch(pi, speeds, climb_rate=climb, acceleration=push, wind=winds)
     for k in range(0, 60, 7):
         alone = symheli.trim(
             pi, speeds[k], climb_rate=climb[k], acceleration=push[k], wind=winds[k]
@@ -92,7 +92,7 @@ def test_conditions_may_jump_about(pi):
 @pytest.mark.slow(but="ideal")
 def test_the_residual_of_every_trim_holds_in_the_equations_with_their_numbers_written_in(heli):
     """`Helicopter.rhs` is another function than the one the batch solved."""
-    found = symheli.trim_batch(heli, SPEEDS, acceleration=1.5)
+    found = symheli.steady.trim_batch(heli, SPEEDS, acceleration=1.5)
     for point in found:
         xdot = np.array(heli.rhs(point.x.array, point.u.array, point.wind.array)).ravel()
         np.testing.assert_allclose(xdot, point.xdot.array, atol=1e-11)
@@ -104,13 +104,13 @@ def test_the_residual_of_every_trim_holds_in_the_equations_with_their_numbers_wr
 
 @pytest.mark.slow(but="ideal")
 def test_a_trim_has_the_same_bits_whatever_is_computed_beside_it(heli):
-    near = symheli.trim_batch(heli, SPEEDS[:13])
+    near = symheli.steady.trim_batch(heli, SPEEDS[:13])
     speeds = SPEEDS[:13] + 0.2
-    together = symheli.trim_batch(heli, speeds, start=near)
+    together = symheli.steady.trim_batch(heli, speeds, start=near)
     backwards = np.arange(13)[::-1]
-    turned = symheli.trim_batch(heli, speeds[backwards], start=near[backwards])
+    turned = symheli.steady.trim_batch(heli, speeds[backwards], start=near[backwards])
     for k in range(13):
-        alone = symheli.trim_batch(heli, speeds[k], start=near[k])
+        alone = symheli.steady.trim_batch(heli, speeds[k], start=near[k])
         for name in ("x", "u", "xdot", "residual", "wind", "torque"):
             expected = getattr(alone, name)[0]
             np.testing.assert_array_equal(getattr(together, name)[k], expected)
@@ -153,19 +153,19 @@ def test_linear_models_are_the_derivative_with_the_numbers_written_in(pi):
         np.testing.assert_allclose(family.B[k], B, rtol=1e-11, atol=1e-11 * abs(family.B[k]).max())
 
 
-@pytest.mark.filterwarnings("ignore::symheli.CompilerWarning")
+@pytest.mark.filterwarnings("ignore::symheli.errors.CompilerWarning")
 def test_without_a_compiler_the_same_trims_and_models(monkeypatch):
     speeds, asked = SPEEDS[::3], {"acceleration": -1.0}
     heli = symheli.Helicopter.load("xcell60", governor="pi")
     fast, fast_grid = (
         symheli.sweep(heli, speeds, **asked),
-        symheli.sweep_grid(heli, [2.0, 6.0], mass=[7.5, 9.0], acceleration=[-1.0, 2.0]),
+        symheli.steady.sweep_grid(heli, [2.0, 6.0], mass=[7.5, 9.0], acceleration=[-1.0, 2.0]),
     )
     monkeypatch.setattr("symheli.steady.equations.library", lambda source, name: None)
     heli = symheli.Helicopter.load("xcell60", governor="pi")
     slow, slow_grid = (
         symheli.sweep(heli, speeds, **asked),
-        symheli.sweep_grid(heli, [2.0, 6.0], mass=[7.5, 9.0], acceleration=[-1.0, 2.0]),
+        symheli.steady.sweep_grid(heli, [2.0, 6.0], mass=[7.5, 9.0], acceleration=[-1.0, 2.0]),
     )
     assert steady_equations(heli).machine_code is None
     for a, b in ((fast, slow), (fast_grid, slow_grid)):
@@ -202,32 +202,32 @@ def test_a_trim_from_the_command_line_loads_no_scipy():
 @pytest.mark.filterwarnings("ignore::symheli.errors.ValidityWarning")
 def test_one_that_fails_among_many_says_so_and_harms_no_other(ideal):
     speeds = [5.0, 60.0, 6.0, 61.0, *np.linspace(7.0, 12.0, 20)]
-    with pytest.raises(symheli.TrimError, match="no trim at 60 m/s") as caught:
-        symheli.trim_batch(ideal, speeds)
+    with pytest.raises(symheli.errors.TrimError, match="no trim at 60 m/s") as caught:
+        symheli.steady.trim_batch(ideal, speeds)
     assert caught.value.result.airspeed == 60.0
-    found = symheli.trim_batch(ideal, speeds, throw=False)
+    found = symheli.steady.trim_batch(ideal, speeds, throw=False)
     assert found.success.tolist() == [True, False, True, False] + [True] * 20
     assert (found.attainable <= found.success).all()
     assert not found[1].success
     good = np.delete(np.arange(24), [1, 3])
-    alone = symheli.trim_batch(ideal, np.array(speeds)[good])
+    alone = symheli.steady.trim_batch(ideal, np.array(speeds)[good])
     np.testing.assert_allclose(found.x[good], alone.x, atol=1e-9)
 
 
 @pytest.mark.filterwarnings("ignore::symheli.errors.ValidityWarning")
 def test_the_first_may_fail(ideal):
-    found = symheli.trim_batch(ideal, [60.0, 5.0, 6.0], throw=False)
+    found = symheli.steady.trim_batch(ideal, [60.0, 5.0, 6.0], throw=False)
     assert found.success.tolist() == [False, True, True]
 
 
 @pytest.mark.filterwarnings("ignore::symheli.errors.ValidityWarning")
 def test_flags_of_a_batch_are_those_of_its_points(ideal):
     """The stops of a control, and a rotor in its own wake."""
-    found = symheli.trim_batch(ideal, [4.0, 4.0, 8.0], climb_rate=[0.0, -4.0, 0.0])
+    found = symheli.steady.trim_batch(ideal, [4.0, 4.0, 8.0], climb_rate=[0.0, -4.0, 0.0])
     assert found.vortex_ring.tolist() == [False, True, False]
     assert [p.vortex_ring for p in found] == found.vortex_ring.tolist()
     short = ideal.with_parameters({"controls.d_ped": 0.19})
-    found = symheli.trim_batch(short, [0.0, 6.0, 18.0])
+    found = symheli.steady.trim_batch(short, [0.0, 6.0, 18.0])
     expected = [symheli.trim(short, v).on_stops for v in (0.0, 6.0, 18.0)]
     assert [point.on_stops for point in found] == expected
     assert expected[0] == ("d_ped",)
@@ -235,7 +235,7 @@ def test_flags_of_a_batch_are_those_of_its_points(ideal):
 
 
 def test_the_air_of_an_altitude_is_that_of_a_trim(pi):
-    found = symheli.trim_batch(pi, [3.0, 9.0], altitude=1500.0)
+    found = symheli.steady.trim_batch(pi, [3.0, 9.0], altitude=1500.0)
     alone = symheli.trim(pi, 9.0, altitude=1500.0)
     np.testing.assert_allclose(found.x[1], alone.x.array, atol=1e-9)
     assert found[1].density == alone.density
@@ -254,19 +254,21 @@ def test_the_air_of_an_altitude_is_that_of_a_trim(pi):
     ],
 )
 def test_conditions_that_are_none_are_refused(ideal, asked, said):
-    with pytest.raises(symheli.InputError, match=said):
-        symheli.trim_batch(ideal, **asked)
+    with pytest.raises(symheli.errors.InputError, match=said):
+        symheli.steady.trim_batch(ideal, **asked)
 
 
 def test_starts_that_do_not_fit_are_refused(ideal, pi):
-    with pytest.raises(symheli.InputError, match="trim this helicopter"):
-        symheli.trim_batch(ideal, [2.0, 3.0], start=symheli.trim(pi, 2.0))
-    with pytest.raises(symheli.InputError, match="expected a start for each of 2"):
-        symheli.trim_batch(ideal, [2.0, 3.0], start=symheli.trim_batch(ideal, [1.0, 2.0, 3.0]))
+    with pytest.raises(symheli.errors.InputError, match="trim this helicopter"):
+        symheli.steady.trim_batch(ideal, [2.0, 3.0], start=symheli.trim(pi, 2.0))
+    with pytest.raises(symheli.errors.InputError, match="expected a start for each of 2"):
+        symheli.steady.trim_batch(
+            ideal, [2.0, 3.0], start=symheli.steady.trim_batch(ideal, [1.0, 2.0, 3.0])
+        )
 
 
 def test_no_condition_is_an_empty_batch(ideal):
-    found = symheli.trim_batch(ideal, [])
+    found = symheli.steady.trim_batch(ideal, [])
     assert len(found) == 0
     assert list(found) == []
 
@@ -287,7 +289,7 @@ def test_nobody_changes_a_trim_behind_the_back_of_a_family(ideal):
 
 def test_a_grid_over_two_more_axes_is_the_sweep_at_each_pair(ideal):
     masses, pushes, speeds = [7.5, 9.0], [-2.0, 0.0, 2.0], [3.0, 8.0, 12.0]
-    grid = symheli.sweep_grid(ideal, speeds, mass=masses, acceleration=pushes)
+    grid = symheli.steady.sweep_grid(ideal, speeds, mass=masses, acceleration=pushes)
     assert grid.axes == ("airspeed", "acceleration", "mass")
     for i, push in enumerate(pushes):
         for j, mass in enumerate(masses):
@@ -334,18 +336,18 @@ def test_the_batch_compiles_once_for_all_airframes_of_one_arrangement(ideal, mon
         SteadyEquations, "_program", lambda self, name: pytest.fail("compiled anew")
     )
     symheli.sweep(ideal.scaled(2.0), [3.0, 4.0])
-    symheli.sweep_grid(ideal, [3.0], mass=[8.0, 9.0])
-    symheli.sweep_grid(ideal, [3.0], altitude=[0.0, 1000.0])
+    symheli.steady.sweep_grid(ideal, [3.0], mass=[8.0, 9.0])
+    symheli.steady.sweep_grid(ideal, [3.0], altitude=[0.0, 1000.0])
 
 
 def test_tables_of_a_batch_are_those_of_its_points(ideal):
-    found = symheli.trim_batch(ideal, SPEEDS[:7], acceleration=1.0)
+    found = symheli.steady.trim_batch(ideal, SPEEDS[:7], acceleration=1.0)
     listed = OperatingPoints.of(list(found))
     states, inputs = ["theta", "u", "b1"], ["d_col", "v_w", "d_lat"]
     np.testing.assert_array_equal(found.state(states), listed.state(states))
     np.testing.assert_array_equal(found.rate(states), listed.rate(states))
     np.testing.assert_array_equal(found.input(inputs), listed.input(inputs))
-    with pytest.raises(symheli.UnknownNameError, match="theta"):
+    with pytest.raises(symheli.errors.UnknownNameError, match="theta"):
         found.state(["thet"])
 
 

@@ -170,7 +170,7 @@ def test_the_printed_names_stay_for_one_rotor(heli):
     ],
 )
 def test_a_section_that_cannot_be_says_where_and_why(tmp_path, section, message):
-    with pytest.raises(symheli.InputError, match=message):
+    with pytest.raises(symheli.errors.InputError, match=message):
         load(write(tmp_path, section))
 
 
@@ -181,12 +181,12 @@ def test_a_component_file_that_fails_is_named(tmp_path):
         (WING_COMPONENT.replace('"area"', '"x"'), "place x y z already"),
     ):
         (tmp_path / "wing.py").write_text(content)
-        with pytest.raises(symheli.InputError, match=message):
+        with pytest.raises(symheli.errors.InputError, match=message):
             load(write(tmp_path, WING))
 
 
 def test_flow_that_nobody_makes_is_named(tmp_path):
-    with pytest.raises(symheli.InputError, match="V_imr_front"):
+    with pytest.raises(symheli.errors.InputError, match="V_imr_front"):
         _ = load(
             write(tmp_path, replace={"[fuselage]": "[fuselage]\nflow = { V_imr = 'V_imr_front' }"})
         ).states
@@ -208,9 +208,9 @@ def test_other_numbers_share_the_compiled_equations(ideal):
         rhs, heavy.numeric("rhs")(point.x.array, point.u.array, 0.0)[0], atol=1e-12
     )
     assert point.u["d_col"] > symheli.trim(ideal, 4.0).u["d_col"]
-    with pytest.raises(symheli.UnknownNameError, match=r"body\.mass"):
+    with pytest.raises(symheli.errors.UnknownNameError, match=r"body\.mass"):
         ideal.with_parameters({"body.mas": 1.0})
-    with pytest.raises(symheli.InputError, match=r"mass.*must be > 0"):
+    with pytest.raises(symheli.errors.InputError, match=r"mass.*must be > 0"):
         ideal.with_parameters({"body.mass": -1.0})
-    with pytest.raises(symheli.InputError, match="finite"):
+    with pytest.raises(symheli.errors.InputError, match="finite"):
         ideal.with_parameters({"body.mass": math.nan})

@@ -195,7 +195,7 @@ def test_linear_tail_rotor_asks_for_the_trim_pitch(tmp_path):
         encoding="utf-8",
     )
     assert symheli.trim(symheli.Helicopter.load(path), 3.0).success
-    with pytest.raises(symheli.InputError, match="trim_pitch"):
+    with pytest.raises(symheli.errors.InputError, match="trim_pitch"):
         _ = symheli.Helicopter.load(path, printed=["tail_rotor_linear"]).rhs
 
 
@@ -217,5 +217,5 @@ def test_printed_tail_sign_pitches_down_further_in_fast_flight():
 
 
 def test_unknown_form_names_the_nearest():
-    with pytest.raises(symheli.UnknownNameError, match="lateral_flapping"):
+    with pytest.raises(symheli.errors.UnknownNameError, match="lateral_flapping"):
         load("lateral_flaping")

@@ -45,7 +45,7 @@ def test_turn_descent_sideways_rearward_and_wind_trim(heli, asked):
 
 @pytest.mark.filterwarnings("ignore::symheli.errors.ValidityWarning")
 def test_an_impossible_trim_says_why_and_keeps_the_best_point(ideal):
-    with pytest.raises(symheli.TrimError, match="du/dt") as caught:
+    with pytest.raises(symheli.errors.TrimError, match="du/dt") as caught:
         symheli.trim(ideal, 60.0)
     assert caught.value.result.airspeed == 60.0
     assert not symheli.trim(ideal, 60.0, throw=False).success
@@ -55,7 +55,7 @@ def test_an_impossible_trim_says_why_and_keeps_the_best_point(ideal):
     "bad", [{"airspeed": -1.0}, {"airspeed": math.nan}, {"airspeed": 2.0, "climb_rate": 3.0}]
 )
 def test_bad_conditions_are_refused(ideal, bad):
-    with pytest.raises(symheli.InputError):
+    with pytest.raises(symheli.errors.InputError):
         symheli.trim(ideal, **bad)
 
 
@@ -114,7 +114,7 @@ def test_linear_model_keeps_names_units_and_refuses_a_point_that_is_no_equilibri
     assert lin.inputs == ("d_lat", "v_w")
     assert [s.unit for s in lin.inputs] == ["rad", "m/s"]
     assert lin.to_control().state_labels == list(map(str, ideal.states))
-    with pytest.raises(symheli.InputError, match="equilibrium"):
+    with pytest.raises(symheli.errors.InputError, match="equilibrium"):
         symheli.linearize(ideal, symheli.trim(ideal, 5.0, acceleration=2.0))
 
 

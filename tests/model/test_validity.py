@@ -71,25 +71,29 @@ def test_nothing_is_said_within_the_limits(ideal):
         symheli.trim(ideal, 5.0, climb_rate=-1.5)  # slower than half the inflow in hover, 4.4 m/s
         symheli.sweep(ideal, np.linspace(0.0, 20.0, 6))
         symheli.trim_map(ideal, [5.0, 20.0], [-3.0, 3.0])
-        symheli.sweep_grid(ideal, [5.0, 18.0], altitude=[0.0, 2000.0])
+        symheli.steady.sweep_grid(ideal, [5.0, 18.0], altitude=[0.0, 2000.0])
         symheli.trim(ideal.scaled(0.45), 2.0)  # Reynolds number 1.2e5
         symheli.trim(ideal.scaled(3.0), 2.0)  # 224 m/s at the tip, Mach 0.66
         start = symheli.trim(ideal, 18.0)
         symheli.simulate(ideal, start, held(start, 25), dt=0.02)
-        symheli.simulate_batch(ideal, start.x.array[None], held(start, 25), dt=0.02, keep=5)
+        symheli.integrate.simulate_batch(
+            ideal, start.x.array[None], held(start, 25), dt=0.02, keep=5
+        )
 
     assert not said(work)
 
 
 CALLS = {
     "trim": lambda heli, fast: symheli.trim(heli, SWIFT),
-    "trim_batch": lambda heli, fast: symheli.trim_batch(heli, [10.0, 22.0, SWIFT]),
+    "trim_batch": lambda heli, fast: symheli.steady.trim_batch(heli, [10.0, 22.0, SWIFT]),
     "linearize": lambda heli, fast: symheli.linearize(heli, fast),
     "sweep": lambda heli, fast: symheli.sweep(heli, [10.0, 22.0, SWIFT]),
-    "sweep_grid": lambda heli, fast: symheli.sweep_grid(heli, [10.0, SWIFT], mass=[8.0, 9.0]),
+    "sweep_grid": lambda heli, fast: symheli.steady.sweep_grid(
+        heli, [10.0, SWIFT], mass=[8.0, 9.0]
+    ),
     "trim_map": lambda heli, fast: symheli.trim_map(heli, [10.0, SWIFT], [0.0, 3.0]),
     "simulate": lambda heli, fast: symheli.simulate(heli, fast, held(fast, 10), dt=0.02),
-    "simulate_batch": lambda heli, fast: symheli.simulate_batch(
+    "simulate_batch": lambda heli, fast: symheli.integrate.simulate_batch(
         heli, np.tile(fast.x.array, (3, 1)), held(fast, 10), dt=0.02
     ),
 }
@@ -122,7 +126,7 @@ def test_a_flight_says_how_fast_it_was(ideal, many):
 
     def work():
         given = {"seeds": range(3), "noise_db": 30.0} if many else {}
-        flown.append((symheli.fly_batch if many else symheli.fly)(ideal, SWIFTLY, **given))
+        flown.append((symheli.flight.fly_batch if many else symheli.fly)(ideal, SWIFTLY, **given))
 
     (text,) = said(work)
     speed = float(re.search(r"at (\S+) m/s, flown", text)[1])
@@ -132,7 +136,9 @@ def test_a_flight_says_how_fast_it_was(ideal, many):
 
 
 def test_a_campaign_says_what_it_is_commanded_and_not_again_in_its_flights(ideal, tmp_path):
-    (text,) = said(lambda: symheli.fly_campaign(ideal, SWIFTLY, tmp_path / "a.zarr", seeds=[1, 2]))
+    (text,) = said(
+        lambda: symheli.flight.fly_campaign(ideal, SWIFTLY, tmp_path / "a.zarr", seeds=[1, 2])
+    )
     assert "at 22 m/s, commanded in flight 0 (2 of 2)" in text
 
 
@@ -148,7 +154,7 @@ def test_gusts_count_in_simulations(ideal):
 def test_the_vortex_ring_is_said(ideal):
     (text,) = said(lambda: symheli.trim(ideal, 3.0, climb_rate=-3.0))
     assert "a rotor in a vortex ring at 3 m/s, descending at 3 m/s" in text
-    (text,) = said(lambda: symheli.trim_batch(ideal, [3.0, 9.0], climb_rate=[-3.0, -1.0]))
+    (text,) = said(lambda: symheli.steady.trim_batch(ideal, [3.0, 9.0], climb_rate=[-3.0, -1.0]))
     assert "(1 of 2)" in text
     flagged = symheli.trim_map(ideal, [3.0], [-3.0])
     assert flagged.vortex_ring.all()
@@ -170,7 +176,7 @@ def test_flights_are_judged_by_their_own_parameters(ideal):
     start = symheli.trim(ideal, 19.0)
     radii = np.array([0.775, 0.7, 0.8])
     (text,) = said(
-        lambda: symheli.simulate_batch(
+        lambda: symheli.integrate.simulate_batch(
             ideal,
             start.x.array,
             held(start, 2),

@@ -119,7 +119,7 @@ def test_a_wrong_entry_is_named_with_its_line_and_what_was_expected(
     tmp_path, entry, instead, message
 ):
     path = write(tmp_path, replace={entry: instead})
-    with pytest.raises(symheli.InputError, match=re.escape(message)) as caught:
+    with pytest.raises(symheli.errors.InputError, match=re.escape(message)) as caught:
         load_vehicle(path)
     assert str(caught.value).startswith(str(path))
     assert f"line {line_of(entry)}, " in str(caught.value)
@@ -128,7 +128,7 @@ def test_a_wrong_entry_is_named_with_its_line_and_what_was_expected(
 def test_a_missing_entry_is_named_with_its_section_and_the_unknown_one_beside_it(tmp_path):
     path = write(tmp_path, replace={RADIUS: RADIUS.replace("radius", "radios")})
     with pytest.raises(
-        symheli.InputError,
+        symheli.errors.InputError,
         match=(
             f"line {line_of(RADIUS)}, main_rotor.radios: unknown entry 'radios'; did you mean"
             " 'radius'"
@@ -137,13 +137,13 @@ def test_a_missing_entry_is_named_with_its_section_and_the_unknown_one_beside_it
         load_vehicle(path)
     path = write(tmp_path, replace={RADIUS: ""})
     with pytest.raises(
-        symheli.InputError,
+        symheli.errors.InputError,
         match=rf"line {line_of('[main_rotor]')}, main_rotor.radius: missing .*; add radius = .*'m'",
     ):
         load_vehicle(path)
     path = write(tmp_path, replace={"[body]": "[boddy]"})
     with pytest.raises(
-        symheli.InputError, match=r"section \[body\] is missing|unknown component 'boddy'"
+        symheli.errors.InputError, match=r"section \[body\] is missing|unknown component 'boddy'"
     ):
         load_vehicle(path)
 
@@ -151,7 +151,8 @@ def test_a_missing_entry_is_named_with_its_section_and_the_unknown_one_beside_it
 def test_broken_toml_says_line_and_column(tmp_path):
     path = write(tmp_path, replace={MASS: "mass = {"})
     with pytest.raises(
-        symheli.InputError, match=rf"line {line_of(MASS)}, not valid TOML: .*column \d+.*ends in }}"
+        symheli.errors.InputError,
+        match=rf"line {line_of(MASS)}, not valid TOML: .*column \d+.*ends in }}",
     ):
         load_vehicle(path)
 
@@ -161,14 +162,15 @@ def test_lines_are_found_in_every_way_toml_writes_an_entry(tmp_path):
     for instead in ("[ body ]  # of the airframe", '[fuselage.more]\nx = 1\n["body"]'):
         path = write(tmp_path, replace={"[body]": instead, MASS: MASS.replace("8.2", "-1")})
         with pytest.raises(
-            symheli.InputError, match=r"line \d+, (body\.mass: must be|fuselage\.more)"
+            symheli.errors.InputError, match=r"line \d+, (body\.mass: must be|fuselage\.more)"
         ):
             load_vehicle(path)
     own = XCELL.replace(MASS, "") + '\n[body.mass]\nvalue = -3.0\nunit = "kg"\nsource = "x"\n'
     path = tmp_path / "own.toml"
     path.write_text(own)
     with pytest.raises(
-        symheli.InputError, match=rf"line {1 + own.splitlines().index('[body.mass]')}, body\.mass"
+        symheli.errors.InputError,
+        match=rf"line {1 + own.splitlines().index('[body.mass]')}, body\.mass",
     ):
         load_vehicle(path)
 
@@ -217,10 +219,10 @@ def test_quotients_of_units_and_ambiguous_products():
     assert quotient("rad/s^2", "rad") == "1/s^2"
     assert quotient("m/s^2", "m/s") == "1/s"
     assert to_si("ft/s^2/rad")[0] == pytest.approx(0.3048)
-    with pytest.raises(symheli.InputError, match="brackets"):
+    with pytest.raises(symheli.errors.InputError, match="brackets"):
         to_si("m/s rad")
     for wrong in ("foo/s", "m^", "m^x", "", "m//s"):
-        with pytest.raises(symheli.InputError, match="unit"):
+        with pytest.raises(symheli.errors.InputError, match="unit"):
             to_si(wrong)
 
 
@@ -243,7 +245,7 @@ TEN_MISTAKES = {
 def test_one_message_lists_ten_different_mistakes_and_the_corrected_file_loads(tmp_path):
     """A vehicle file written from the documentation once took a new user 47 runs."""
     path = write(tmp_path, replace=TEN_MISTAKES)
-    with pytest.raises(symheli.InputError) as caught:
+    with pytest.raises(symheli.errors.InputError) as caught:
         load_vehicle(path)
     first, *said = str(caught.value).splitlines()
     assert first == f"{path}: 10 things to put right"
@@ -289,7 +291,7 @@ def test_a_number_in_the_wrong_unit_is_doubted_with_the_unit_that_would_do(
 ):
     old = next(line for line in XCELL.splitlines() if line.startswith(f"{entry} ="))
     new = f'{entry} = {{ value = {value}, unit = "{unit}", source = "x" }}'
-    with pytest.raises(symheli.InputError, match=re.escape(meant)):
+    with pytest.raises(symheli.errors.InputError, match=re.escape(meant)):
         load_vehicle(write(tmp_path, replace={old: new}))
     told = write(tmp_path, replace={old: new.replace("source", "unusual = true, source")})
     if entry != "radius":  # with which everything else is compared
@@ -367,7 +369,7 @@ def test_files_of_other_editors_are_read(tmp_path, encoded):
 def test_a_file_in_another_encoding_says_in_which_line(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_bytes(XCELL.replace("G15 text", "Müller", 1).encode("latin-1"))
-    with pytest.raises(symheli.InputError, match=r"line \d+: not a text file in UTF-8"):
+    with pytest.raises(symheli.errors.InputError, match=r"line \d+: not a text file in UTF-8"):
         load_vehicle(path)
 
 

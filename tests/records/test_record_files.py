@@ -24,7 +24,11 @@ def record():
     rng = np.random.default_rng(0)
     values = rng.standard_normal((50, 3)) * [1e-300, 1.0, 1e300]
     values[7, 1] = np.nan
-    signals = (symheli.Signal("q", "rad/s"), symheli.Signal("log.θ", "rad"), "my, own")
+    signals = (
+        symheli.values.Signal("q", "rad/s"),
+        symheli.values.Signal("log.θ", "rad"),
+        "my, own",
+    )
     return FlightRecord(
         np.cumsum(rng.uniform(0.01, 0.02, 50)),
         values,

@@ -20,14 +20,20 @@ EXEMPT: dict[str, str] = {
     },
     **dict.fromkeys(
         (
-            *("symheli.PureController", "symheli.StatefulController"),
-            *("identification.FlightSource", "identification.InstrumentSource"),
-            "identification.Method",
+            *("symheli.flight.PureController", "symheli.flight.StatefulController"),
+            *("identification.methods.FlightSource", "identification.methods.InstrumentSource"),
+            "identification.methods.Method",
         ),
         PROTOCOL,
     ),
     **dict.fromkeys(
-        (*("synthesis.Status", "synthesis.DesignStatus", "identification.Variable"),),
+        (
+            *(
+                "synthesis.analysis.Status",
+                "synthesis.designs.DesignStatus",
+                "identification.forgetting.Variable",
+            ),
+        ),
         CHOICE,
     ),
     **{
@@ -90,47 +96,64 @@ EXEMPT: dict[str, str] = {
             ),
         )
     },
-    "synthesis.DynamicBlock": BY_ITS_USERS,
-    "synthesis.PolynomialMatrix": ARITHMETIC,
-    "symheli.watched": CONTEXT,
+    "synthesis.robust.DynamicBlock": BY_ITS_USERS,
+    "synthesis.analysis.PolynomialMatrix": ARITHMETIC,
+    "symheli.progress.watched": CONTEXT,
 }
 """Public callables whose making is not fuzzed; their methods are, where an example calls them."""
 
 USUAL = 60
 FEW = 12
 SLOW = {
-    *("symheli.sweep", "symheli.sweep_grid", "symheli.fly", "symheli.fly_batch"),
-    *("symheli.fly_campaign", "symheli.trim_map", "symheli.gain_scheduled_lqr"),
-    *("identification.fit_for_control", "identification.order_scan", "identification.design_model"),
-    *("identification.unseen_flight", "identification.KinematicModel.observer"),
-    *("synthesis.l2_gain", "synthesis.output_feedback", "synthesis.Controller.certify"),
-    *("synthesis.Controller.discretize", "synthesis.estimator", "synthesis.Estimator.certify"),
-    *("synthesis.certify_sampled", "synthesis.lft_feedback", "synthesis.multiobjective"),
-    *("synthesis.proven_around", "synthesis.state_feedback", "synthesis.with_wrong_parameter"),
+    *("symheli.sweep", "symheli.steady.sweep_grid", "symheli.fly", "symheli.flight.fly_batch"),
+    *("symheli.flight.fly_campaign", "symheli.trim_map", "symheli.flight.gain_scheduled_lqr"),
     *(
-        "synthesis.frozen_box_gain",
-        "synthesis.generalized_h2",
+        "identification.fit_for_control",
+        "identification.order_scan",
+        "identification.design.design_model",
+    ),
+    *("identification.judge.validate", "identification.model.KinematicModel.observer"),
+    *("synthesis.l2_gain", "synthesis.output_feedback", "synthesis.Controller.certify"),
+    *(
+        "synthesis.Controller.discretize",
+        "synthesis.estimator",
+        "synthesis.design.lpv.estimator.Estimator.certify",
+    ),
+    *("synthesis.certify_sampled", "synthesis.designs.lft_feedback", "synthesis.multiobjective"),
+    *(
+        "synthesis.analysis.proven_around",
+        "synthesis.state_feedback",
+        "synthesis.analysis.with_scheduling_error",
+    ),
+    *(
+        "synthesis.analysis.frozen_box_gain",
+        "synthesis.analysis.energy_to_peak",
         "synthesis.h2_gain",
         "synthesis.decay_rate",
     ),
     *("synthesis.stability", "synthesis.lower_bound", "synthesis.lft_gain"),
-    *("synthesis.lqr", "synthesis.lqg", "synthesis.switched", "synthesis.dwell_time"),
-    *("synthesis.SwitchedController.certify", "synthesis.Controller.of"),
-    *("synthesis.Certificate.verify", "synthesis.lft_stability", "synthesis.structured"),
     *(
-        "synthesis.bounded_truncation",
-        "synthesis.robust_margin",
-        "synthesis.worst_case_gain",
-        "synthesis.mu_synthesis",
-        "synthesis.loop_shaping",
-        "synthesis.invariant_set",
-        "synthesis.low_complexity_set",
-        "synthesis.SwitchInside",
-        "synthesis.governor",
+        "synthesis.lqr",
+        "synthesis.lqg",
+        "synthesis.switching.switched",
+        "synthesis.switching.dwell_time",
+    ),
+    *("synthesis.switching.SwitchedController.certify", "synthesis.Controller.of"),
+    *("synthesis.Certificate.verify", "synthesis.analysis.lft_stability", "synthesis.structured"),
+    *(
+        "synthesis.designs.bounded_truncation",
+        "synthesis.robust.robust_margin",
+        "synthesis.robust.worst_case_gain",
+        "synthesis.robust.mu_synthesis",
+        "synthesis.designs.loop_shaping",
+        "synthesis.sets.invariant_set",
+        "synthesis.sets.low_complexity_set",
+        "synthesis.sets.SwitchInside",
+        "synthesis.sets.reference_governor",
     ),
 }
 """Entries that fly, sweep or solve: `FEW` inputs each."""
-LARGER = {"synthesis.multiobjective", "synthesis.output_feedback", "synthesis.lft_feedback"}
+LARGER = {"synthesis.multiobjective", "synthesis.output_feedback", "synthesis.designs.lft_feedback"}
 """Where a larger count is a larger problem, that takes its time: not asked."""
 
 

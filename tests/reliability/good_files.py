@@ -148,12 +148,12 @@ def ulog_of(t: np.ndarray) -> bytes:
 
 
 def _saved(folder: Path) -> list[Reader]:
-    entries = ("symheli.TableController", "identification.KinematicModel")
-    entries += ("identification.LPVARXModel", "identification.RecursiveLeastSquares")
+    entries = ("symheli.TableController", "identification.model.KinematicModel")
+    entries += ("identification.model.LPVARXModel", "identification.RecursiveLeastSquares")
     calls = {call.entry: call for call in caught(lambda entry: entry in entries)}
     table = calls["symheli.TableController.of"].repeated()
-    kinematic = calls["identification.KinematicModel.predict"].function.__self__  # type: ignore[attr-defined]
-    model = calls["identification.LPVARXModel.predict"].function.__self__  # type: ignore[attr-defined]
+    kinematic = calls["identification.model.KinematicModel.predict"].function.__self__  # type: ignore[attr-defined]
+    model = calls["identification.model.LPVARXModel.predict"].function.__self__  # type: ignore[attr-defined]
     recursion = calls["identification.RecursiveLeastSquares"].repeated()
     lag = symheli.LPVStateSpace.polynomial(
         A=[[[-2.0]], [[1.0]]],
@@ -187,13 +187,13 @@ def _saved(folder: Path) -> list[Reader]:
         Reader(
             "kinematic model",
             folder / "kinematic.json",
-            identification.KinematicModel.load,
+            identification.model.KinematicModel.load,
             content=pickle.dumps,
         ),
         Reader(
             "LPV-ARX model",
             folder / "model.json",
-            identification.LPVARXModel.load,
+            identification.model.LPVARXModel.load,
             content=pickle.dumps,
         ),
         Reader(
@@ -283,7 +283,7 @@ def folders(folder: Path) -> list[Reader]:
         return _rows(CampaignDataset.open(again, campaign, {}).path)
 
     flights = folder / "flights.zarr"
-    flown = symheli.FlightDataset.create(
+    flown = symheli.flight.FlightDataset.create(
         flights,
         flights=2,
         chunk=1,
@@ -323,7 +323,7 @@ def _what_was_asked(found: dict[str, Any]) -> bytes:
 
 
 def _flights(path: Path) -> dict[str, Any]:
-    dataset = symheli.FlightDataset(path)
+    dataset = symheli.flight.FlightDataset(path)
     return {
         "u": dataset["u"],
         "time": dataset.time,

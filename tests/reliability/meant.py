@@ -15,7 +15,8 @@ from verdict import NotANumber, not_a_number
 from identification.judge.scores import steps
 from identification.structure.kinematic_arx import STATES
 from identification.structure.regressors import as_records
-from synthesis import Certificate, Grid
+from synthesis import Certificate
+from synthesis.impose import Grid
 
 Arguments = Mapping[str, Any]
 Rule = Callable[[NotANumber, Arguments], bool]
@@ -235,15 +236,17 @@ BY_FIELD: dict[str, Rule] = {
 """By class and field, whatever returns it."""
 
 BY_ENTRY: dict[str, tuple[tuple[str, Rule], ...]] = {
-    "symheli.NamedVector": ((r"\[.*\]", _as_given),),
-    "symheli.StitchedModel.rhs": (("", _not_finite_given),),
-    "identification.BaselinePredictor.predict": (("", _first_of_the_horizon),),
-    "identification.LPVARXModel.predict": (("", _past_is_incomplete),),
-    "identification.KinematicModel.predict": (("", _past_is_incomplete),),
-    "identification.LPVARXModel.score": ((r"\['\w+'\]", _nothing_predicted),),
-    "identification.KinematicModel.score": ((r"\['\w+'\]", _nothing_predicted),),
+    "symheli.values.NamedVector": ((r"\[.*\]", _as_given),),
+    "symheli.flight.StitchedModel.rhs": (("", _not_finite_given),),
+    "identification.judge.BaselinePredictor.predict": (("", _first_of_the_horizon),),
+    "identification.model.LPVARXModel.predict": (("", _past_is_incomplete),),
+    "identification.model.KinematicModel.predict": (("", _past_is_incomplete),),
+    "identification.model.LPVARXModel.score": ((r"\['\w+'\]", _nothing_predicted),),
+    "identification.model.KinematicModel.score": ((r"\['\w+'\]", _nothing_predicted),),
     "synthesis.specifications": ((r"\.values\['.*'\]", _where_unstable),),
-    "identification.Scores.of": ((r"\.(one_step|ahead|free_run)\['\w+'\]", _nothing_to_compare),),
+    "identification.judge.Scores.of": (
+        (r"\.(one_step|ahead|free_run)\['\w+'\]", _nothing_to_compare),
+    ),
     "identification.scores": ((r"\.(one_step|ahead|free_run)\['\w+'\]", _nothing_predicted),),
 }
 """By entry and place, where the result is no class of its own."""

@@ -13,6 +13,7 @@ import identification as idn
 import symheli
 import synthesis
 from identification.estimators.block_banded import Whitening
+from symheli import LinearModel, lpv
 from symheli.errors import (
     AccuracyError,
     DataWarning,
@@ -21,7 +22,7 @@ from symheli.errors import (
     SolverError,
     UnknownNameError,
 )
-from symheli.lpv import LinearModel, LinearModels
+from symheli.lpv.tools import LinearModels
 from symheli.values import plain_file
 from symheli.values.text_file import text_of
 from synthesis.design.plant.refusals import levels_above
@@ -59,7 +60,7 @@ def test_a_seed_is_a_whole_number(seed):
     for make in (
         lambda: symheli.Wind(seed=seed),
         lambda: symheli.Excitation({"d_lon": 0.01}, seed=seed),
-        lambda: symheli.Dryden(wind=5.0, altitude=50.0).history(T, 5.0, seed),
+        lambda: symheli.environment.Dryden(wind=5.0, altitude=50.0).history(T, 5.0, seed),
         lambda: symheli.FlightPlan(symheli.AirspeedSchedule.transition(4.0, 5.0), seed=seed),
     ):
         with pytest.raises(InputError, match="seed"):
@@ -90,7 +91,7 @@ def test_laps_are_counted():
 
 def test_a_wind_has_three_components():
     with pytest.raises(InputError, match="north, east, down"):
-        symheli.FlightCondition(5.0, wind=(0.0, 0.0))
+        symheli.steady.FlightCondition(5.0, wind=(0.0, 0.0))
 
 
 def test_noise_in_decibels_is_a_number_that_can_be_raised_to():
@@ -104,7 +105,7 @@ def test_a_sample_of_a_billion_years_is_refused_and_not_begun(ideal):
     x0 = np.tile(point.x.array, (2, 1))
     for dt in (4.3e16, 1e300):
         with pytest.raises(InputError, match="steps"):
-            symheli.simulate_batch(ideal, x0, [point.u.array] * 2, dt=dt)
+            symheli.integrate.simulate_batch(ideal, x0, [point.u.array] * 2, dt=dt)
 
 
 def test_rows_outside_a_record_are_refused(record):
@@ -125,7 +126,7 @@ def test_an_order_of_a_trillion_lags_is_refused_at_once():
 
 
 def test_derivatives_of_a_basis_have_an_order():
-    basis = idn.BSpline(2, (0.0, 0.5, 1.0))
+    basis = lpv.BSpline(2, (0.0, 0.5, 1.0))
     for order in (math.nan, math.inf, 1.5, -1):
         with pytest.raises(InputError, match="derivative"):
             basis([0.5], order)
@@ -135,13 +136,13 @@ def test_derivatives_of_a_basis_have_an_order():
 @pytest.mark.parametrize("dt", [0.0, -1.0, 1e-300, math.nan, math.inf])
 def test_lags_need_a_sample_period(dt):
     with pytest.raises(InputError, match="dt"):
-        idn.LaggedSignals("u").instrument_lags(dt, 1, 1)
+        idn.structure.LaggedSignals("u").instrument_lags(dt, 1, 1)
 
 
 def test_counts_of_the_judges_are_whole(model, record):
     for judge in (
         lambda n: idn.residual_analysis(model, record, lags=n),
-        lambda n: idn.slow_modes(model, record, points=n),
+        lambda n: idn.judge.slow_modes(model, record, points=n),
         lambda n: idn.choose_experiments((), n),
     ):
         for count in (math.nan, 0, 1.5):
@@ -151,9 +152,12 @@ def test_counts_of_the_judges_are_whole(model, record):
 
 def test_a_verdict_is_on_an_output_of_models_that_can_differ(model, record):
     """KeyError for a name that is none, ValueError for a structure that is itself constant."""
-    found = idn.against_constant(model.structure, *record.split(0.7))
-    constant = idn.against_constant(model.structure.lti(), *record.split(0.7))
-    for ask in (idn.AgainstConstant.pays, idn.AgainstConstant.verdict_on):
+    found = idn.judge.compare_constant(model.structure, *record.split(0.7))
+    constant = idn.judge.compare_constant(model.structure.lti(), *record.split(0.7))
+    for ask in (
+        idn.judge.against_constant.AgainstConstant.pays,
+        idn.judge.against_constant.AgainstConstant.verdict_on,
+    ):
         with pytest.raises(UnknownNameError, match="unknown output 'yx'; did you mean 'y'"):
             ask(found, "yx")
         with pytest.raises(InputError, match="basis of degree 1"):
@@ -161,11 +165,11 @@ def test_a_verdict_is_on_an_output_of_models_that_can_differ(model, record):
 
 
 def test_iterations_are_counted():
-    simulator = symheli.SimulatedFlight(symheli.Helicopter.load("xcell60", governor="ideal"))
+    simulator = symheli.flight.SimulatedFlight(symheli.Helicopter.load("xcell60", governor="ideal"))
     for make in (
-        lambda n: idn.RefinedInstruments(iterations=n),
-        lambda n: idn.OutputError(evaluations=n),
-        lambda n: idn.FilterError(simulator, steps=n),
+        lambda n: idn.methods.RefinedInstruments(iterations=n),
+        lambda n: idn.methods.OutputError(evaluations=n),
+        lambda n: idn.methods.FilterError(simulator, steps=n),
     ):
         for count in (math.nan, 1.5, 0):
             with pytest.raises(InputError, match="whole number"):
@@ -191,7 +195,7 @@ def test_grids_and_tolerances_of_the_analysis_are_checked():
     lag = LinearModel([[-1.0]], [[1.0]], [[1.0]], [[0.0]], ["x"], ["u"], ["y"])
     for points in (math.nan, 0, 1.5):
         with pytest.raises(InputError, match="points"):
-            synthesis.bandwidth(lag, points=points)
+            synthesis.analysis.attitude_bandwidth(lag, points=points)
     p = symheli.Scheduling("p", "1", 0.0, 1.0)
     lpv = symheli.LPVStateSpace.polynomial([[[-1.0]], [[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], p)
     for points in (0, -1):
@@ -199,7 +203,7 @@ def test_grids_and_tolerances_of_the_analysis_are_checked():
             synthesis.frozen_gain(lpv, points=points)
     for tolerance in (math.nan, 0.0, 1.0, 1e300):
         with pytest.raises(InputError, match="tolerance"):
-            synthesis.frozen_box_gain(lpv.to_lft(), tolerance=tolerance)
+            synthesis.analysis.frozen_box_gain(lpv.to_lft(), tolerance=tolerance)
         with pytest.raises(InputError, match="tolerance"):
             synthesis.frozen_gain(lpv, tolerance=tolerance)
 
@@ -244,24 +248,24 @@ def test_a_topic_of_a_ulog_without_time_stamps_is_left_out_and_said(tmp_path):
 def test_a_miss_is_that_of_a_finite_pole(model):
     for pole in (math.nan, math.inf, 0.0):
         with pytest.raises(InputError, match="pole"):
-            idn.pole_miss(model.at(0.0), pole)
+            idn.judge.pole_distance(model.at(0.0), pole)
 
 
 def test_a_fit_is_that_of_measurements_that_can_be_squared():
     for y in (math.inf, -1e300):
         with pytest.raises(InputError, match="mark bad samples"):
-            idn.fit_percent([1.0, 2.0, y], [1.0, 2.0, 3.0])
-    assert idn.fit_percent([1.0, 2.0], [1.0, 1e300]) == -math.inf
+            idn.judge.fit_percent([1.0, 2.0, y], [1.0, 2.0, 3.0])
+    assert idn.judge.fit_percent([1.0, 2.0], [1.0, 1e300]) == -math.inf
 
 
 def test_scores_have_a_name_a_column():
     y = np.arange(5.0)[:, None]
     for names in ([], ["y", "y"]):
         with pytest.raises(InputError, match="outputs"):
-            idn.Scores.of(y, names, one_step=y, ahead=y, free_run=y)
+            idn.judge.Scores.of(y, names, one_step=y, ahead=y, free_run=y)
     for horizon in (math.nan, 0.0, -1.0, math.inf):
         with pytest.raises(InputError, match="horizon"):
-            idn.Scores.of(y, ["y"], one_step=y, ahead=y, free_run=y, horizon=horizon)
+            idn.judge.Scores.of(y, ["y"], one_step=y, ahead=y, free_run=y, horizon=horizon)
 
 
 @pytest.mark.parametrize(
@@ -276,13 +280,13 @@ def test_lags_of_a_vehicle_are_counted(lags):
 def test_designs_refuse_what_they_cannot_mean():
     lag = LinearModel([[-1.0]], [[1.0]], [[1.0]], [[0.0]], ["x"], ["u"], ["y"])
     for design in (
-        lambda: synthesis.ncf(lag, W1=0.0),
-        lambda: synthesis.ncf(lag, W2=-0.0),
-        lambda: synthesis.ncf(lag, back_off=1e300),
-        lambda: synthesis.mixed_sensitivity(lag, 1.0, 1.0, back_off=1e300),
+        lambda: synthesis.designs.ncfsyn(lag, W1=0.0),
+        lambda: synthesis.designs.ncfsyn(lag, W2=-0.0),
+        lambda: synthesis.designs.ncfsyn(lag, back_off=1e300),
+        lambda: synthesis.designs.mixed_sensitivity(lag, 1.0, 1.0, back_off=1e300),
         lambda: synthesis.h2(lag, ["u"], ["y", "y"]),
-        lambda: synthesis.bandwidth(lag, band=(1.0,)),  # type: ignore[arg-type]
-        lambda: synthesis.Search(levels=math.nan),  # type: ignore[arg-type]
+        lambda: synthesis.analysis.attitude_bandwidth(lag, band=(1.0,)),  # type: ignore[arg-type]
+        lambda: synthesis.analysis.LowerBoundSearch(levels=math.nan),  # type: ignore[arg-type]
     ):
         with pytest.raises(InputError, match="expected"):
             design()
@@ -359,7 +363,10 @@ def sampled_plant():
 
 @pytest.mark.parametrize("order", [math.nan, math.inf, 1.5, 0, 11])
 def test_a_delay_has_an_order(slow_plant, order):
-    for delayed in (slow_plant.with_delay, lambda t, order: symheli.lpv.pade_delay("u", t, order)):
+    for delayed in (
+        slow_plant.with_delay,
+        lambda t, order: symheli.lpv.tools.pade_delay("u", t, order),
+    ):
         with pytest.raises(InputError, match="order"):
             delayed(0.1, order=order)
 
@@ -367,21 +374,21 @@ def test_a_delay_has_an_order(slow_plant, order):
 @pytest.mark.parametrize("samples", [math.nan, math.inf, 1.5, 0, True])
 def test_a_delay_in_samples_is_counted(samples):
     with pytest.raises(InputError, match="samples: expected a whole number"):
-        symheli.lpv.sample_delay("u", samples, 0.1)
+        symheli.lpv.tools.sample_delay("u", samples, 0.1)
 
 
 @pytest.mark.parametrize("tolerance", [1e-300, 0.0, -1.0, 1.0, math.nan, math.inf])
 def test_how_far_a_proof_reaches_is_found_to_a_tolerance(slow_plant, tolerance):
     """1e-300 was bisected to, a proof each time."""
     with pytest.raises(InputError, match="tolerance"):
-        synthesis.proven_around(slow_plant, {("u", "y1"): -1.0}, 0.5, tolerance=tolerance)
+        synthesis.analysis.proven_around(slow_plant, {("u", "y1"): -1.0}, 0.5, tolerance=tolerance)
 
 
 @pytest.mark.parametrize("size", [1e100, -1e300, 1.7e308])
 def test_residuals_that_cannot_be_squared_are_refused(model, record, size):
     """Coefficients of 1e300 made NaN of the share that p explains, and of standard errors."""
     large = replace(model, theta=np.full(model.theta.shape, size))
-    for judge in (idn.dependence_report, idn.uncertainty, idn.slow_modes):
+    for judge in (idn.judge.dependence_report, idn.uncertainty, idn.judge.slow_modes):
         with pytest.raises(InputError, match="residuals of"):
             judge(large, record)
 
@@ -392,7 +399,7 @@ def test_records_that_determine_nothing_say_nothing_of_certainty(model, record):
     rest = record.with_signals(dict.fromkeys("yup", "1"), y=p, u=p, p=p)
     held = record.with_signals(dict.fromkeys("yup", "1"), y=y, u=u, p=p)
     for one in (rest, held):
-        for judge in (idn.uncertainty, idn.slow_modes):
+        for judge in (idn.uncertainty, idn.judge.slow_modes):
             with pytest.raises(ExcitationError, match="distinct values"):
                 judge(model, one)
 
@@ -435,12 +442,12 @@ def test_theils_coefficient_is_that_of_numbers_that_can_be_squared():
     """1e300 beside 1 counted as rounding, a perfect prediction; nothing at all as NaN."""
     for y, guess in (([1.0, 2.0], [1e300, 2.0]), ([1e300, 2.0], [1.0, 2.0]), ([], [])):
         with pytest.raises(InputError, match="two finite arrays"):
-            idn.theil(np.array(y), np.array(guess))
+            idn.judge.theil(np.array(y), np.array(guess))
 
 
 def test_a_listener_can_be_called():
     """TypeError in the middle of the work that was told of."""
-    with pytest.raises(InputError, match="listener"), symheli.watched("progress"):  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="listener"), symheli.progress.watched("progress"):  # type: ignore[arg-type]
         pytest.fail("entered")
 
 
@@ -459,7 +466,7 @@ def test_a_reading_is_wrong_by_the_range_at_most(sampled_plant, error):
         inputs=["y"],
         outputs=["u"],
     )
-    wrong = synthesis.with_wrong_parameter(sampled_plant, gain, error)
+    wrong = synthesis.analysis.with_scheduling_error(sampled_plant, gain, error)
     _, B, C, _ = wrong.model.matrices(0.5)
     assert abs(float(C[1, 0] * B[0, 1])) == pytest.approx(0.1 * 3.0)
 
@@ -488,7 +495,7 @@ def test_a_damaged_description_of_flights_is_refused(tmp_path, file, content):
     path = next(one for one in good_files.folders(tmp_path) if one.entry == "flights").path
     (path / file).write_bytes(content)
     with pytest.raises(InputError, match="damaged"):
-        symheli.FlightDataset(path)
+        symheli.flight.FlightDataset(path)
 
 
 def test_damaged_parameters_of_a_campaign_are_refused_and_damaged_descriptions_said_anew(tmp_path):
@@ -512,7 +519,7 @@ def test_a_reason_that_is_no_text_is_refused(tmp_path):
 
 def test_gusts_are_forgotten_however_far_apart_the_samples_are():
     """inf exp(-inf), NaN, at 1e300 m/s; what lies 1000 lengths apart is white already."""
-    gust = symheli.Dryden(wind=5.0, altitude=50.0)
+    gust = symheli.environment.Dryden(wind=5.0, altitude=50.0)
     far, farther = (gust.history(T, speed, 1) for speed in (1e12, 1.7e308))
     np.testing.assert_array_equal(far, farther)
     assert np.all(np.isfinite(far))
@@ -522,13 +529,13 @@ def test_information_of_an_experiment_is_finite():
     """LinAlgError where experiments were chosen among."""
     for factor, seconds in ((np.full((2, 2), np.nan), 1.0), (np.eye(2)[:1], 1.0), (np.eye(2), 0.0)):
         with pytest.raises(InputError, match=r"factor|duration"):
-            idn.Experiment("one", seconds, factor, {})
+            idn.design.Experiment("one", seconds, factor, {})
 
 
 @pytest.mark.slow
 def test_trims_are_numbers_with_controls_on_their_stops_or_not(ideal):
     """NaN was carried on, as true."""
-    trims = symheli.trim_batch(ideal, airspeed=[4.0, 5.0])
+    trims = symheli.steady.trim_batch(ideal, airspeed=[4.0, 5.0])
     for name in ("x", "u", "xdot", "residual", "wind", "density", "torque"):
         for wrong in (np.full(getattr(trims, name).shape, np.nan), np.zeros((1, 1))):
             with pytest.raises(InputError, match=name):
@@ -568,7 +575,7 @@ def test_an_operating_point_has_an_airspeed(ideal):
 
 @pytest.mark.slow
 def test_the_misfit_of_a_table_is_a_number(ideal):
-    lqr = symheli.gain_scheduled_lqr(ideal, 0.0, 4.0, dt=0.02, points=3)
+    lqr = symheli.flight.gain_scheduled_lqr(ideal, 0.0, 4.0, dt=0.02, points=3)
     table = symheli.TableController.of(lqr.scheduled_controller.model, 5)
     for misfit in (math.nan, -1.0):
         with pytest.raises(InputError, match="misfit"):
@@ -596,7 +603,7 @@ def test_designs_refuse_weights_that_cannot_be_squared(size):
     """LinAlgError and OverflowError; the least H2 norm of a plant of 1e300 was 0."""
     lag = LinearModel([[-1.0]], [[1.0]], [[1.0]], [[0.0]], ["x"], ["u"], ["y"])
     with pytest.raises(InputError, match=r"other units|whose square underflows"):
-        synthesis.mixed_sensitivity(lag, 1.0, size)
+        synthesis.designs.mixed_sensitivity(lag, 1.0, size)
     D = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, size], [0.0, 1.0, 0.0]])
     B, C = np.array([[1.0, 0.0, 3.0]]), np.array([[1.0], [0.0], [2.0]])
     plant = LinearModel([[0.0]], B, C, D, ["x"], ["w1", "w2", "u"], ["z1", "z2", "y"])
@@ -613,8 +620,8 @@ def test_gaps_are_those_of_channels_in_some_scale(size):
     for scales in ({"input_scale": size}, {"output_scale": size}):
         for gap in (
             lambda **s: symheli.lpv.nu_gap(lag, lag, **s),
-            lambda **s: symheli.lpv.nu_gaps(lag, many, **s),
-            lambda **s: symheli.lpv.chordal_distance(lag, lag, [1.0], **s),
+            lambda **s: symheli.lpv.tools.nu_gaps(lag, many, **s),
+            lambda **s: symheli.lpv.tools.chordal_distance(lag, lag, [1.0], **s),
             lambda **s: symheli.lpv.stability_margin(lag, {("u", "y"): -0.1}, **s),
         ):
             with pytest.raises(InputError, match="scale"):
@@ -638,13 +645,13 @@ def test_a_model_is_judged_over_a_band_of_two_ends(model, record, band):
 @pytest.mark.parametrize("dt", [5e-324, 1e-300])
 def test_an_autopilot_samples_at_a_pace_of_the_plant(ideal, dt):
     with pytest.raises(InputError, match="dt = "):
-        symheli.gain_scheduled_lqr(ideal, 0.0, 4.0, dt=dt, points=2)
+        symheli.flight.gain_scheduled_lqr(ideal, 0.0, 4.0, dt=dt, points=2)
 
 
 def test_no_flights_are_refused(ideal):
     point = symheli.trim(ideal, airspeed=5.0)
     with pytest.raises(InputError, match="N >= 1"):
-        symheli.simulate_batch(ideal, np.zeros((0, 10)), [point.u.array] * 2, dt=0.02)
+        symheli.integrate.simulate_batch(ideal, np.zeros((0, 10)), [point.u.array] * 2, dt=0.02)
 
 
 @pytest.mark.parametrize("A", [1.0, np.zeros((2, 2)), np.zeros((0, 3, 3))])
@@ -658,7 +665,7 @@ def test_matrices_of_models_stand_in_a_row(A):
 def test_designs_want_channels_of_every_group(slow_plant, group):
     bare = replace(slow_plant, **{group: ()})
     for design in (
-        lambda: synthesis.multiobjective(bare, synthesis.L2()),
+        lambda: synthesis.multiobjective(bare, synthesis.objectives.L2()),
         lambda: synthesis.output_feedback(bare),
     ):
         with pytest.raises(InputError, match=f"the plant has no {group}"):

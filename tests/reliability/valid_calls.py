@@ -23,8 +23,8 @@ PACKAGES = ("symheli", "identification", "synthesis")
 EXAMPLE = "<doctest"
 INSIDE = {
     *("symheli.LFT", "symheli.LinearFamily", "symheli.FlightRecord"),
-    *("symheli.NamedVector", "symheli.StitchedModel"),
-    *("symheli.TableController", "synthesis.PolynomialMatrix"),
+    *("symheli.values.NamedVector", "symheli.flight.StitchedModel"),
+    *("symheli.TableController", "synthesis.analysis.PolynomialMatrix"),
 }
 """Values that the examples make by other functions: caught where those make them."""
 

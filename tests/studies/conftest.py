@@ -15,9 +15,10 @@ from studies.transition import known_kinematics
 from studies.transition import study as stages
 from studies.transition.effort import Effort
 from symheli import Helicopter
-from synthesis import Search, output_feedback
+from synthesis import output_feedback
+from synthesis.analysis import LowerBoundSearch
 
-GLIMPSE = Search(levels=2, dwells=1, starts=1, nodes=8, evaluations=1, samples=100)
+GLIMPSE = LowerBoundSearch(levels=2, dwells=1, starts=1, nodes=8, evaluations=1, samples=100)
 
 
 @pytest.fixture

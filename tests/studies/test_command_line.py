@@ -13,7 +13,7 @@ import pytest
 from scipy.io import loadmat
 
 import symheli
-from identification import LPVARXModel
+from identification.model import LPVARXModel
 from studies import cli
 from studies.commands import study as study_command
 from studies.output import as_json

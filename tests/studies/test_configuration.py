@@ -11,7 +11,8 @@ from studies import cli
 from studies.transition.configuration import Configuration
 from studies.transition.effort import Effort
 from symheli.errors import InputError
-from synthesis import Search, Spline
+from synthesis.analysis import LowerBoundSearch
+from synthesis.forms import Spline
 
 
 def entries(thing):
@@ -72,7 +73,7 @@ def test_what_is_kept_comes_back_whatever_it_was(tmp_path):
         }
     )
     assert asked.effort.robust_form == Spline(degree=2, segments=(2, 4))
-    assert asked.effort.search == Search(seconds=0.1, samples=10_000)
+    assert asked.effort.search == LowerBoundSearch(seconds=0.1, samples=10_000)
     path = asked.write(tmp_path / "kept.toml")
     assert Configuration.read(path, {}) == Configuration.of(
         {"vehicle": "r50", "seed": 7, "out": tmp_path, "effort": asked.effort}

@@ -6,7 +6,7 @@ import pytest
 import synthesis
 from studies.loops.exact_lateral import ExactLateral
 from symheli import UncertainStateSpace
-from synthesis import Spline
+from synthesis.forms import Spline
 
 
 @pytest.fixture(scope="module")

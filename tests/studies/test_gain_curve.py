@@ -6,7 +6,9 @@ import pytest
 
 from studies.transition import gain_tables, guarantees
 from symheli import LPVStateSpace, Scheduling
-from synthesis import GainCurve, Search, Spline
+from synthesis.analysis import LowerBoundSearch
+from synthesis.certify.questions.gain_curve import GainCurve
+from synthesis.forms import Spline
 
 NOTHING = {"constant P": math.inf, "LFT D/G": math.inf}
 STEEP = GainCurve(
@@ -52,7 +54,7 @@ def test_the_table_shows_every_form_and_what_a_jumping_airspeed_costs():
     lpv = LPVStateSpace.polynomial(
         [[[-2.0]], [[1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], Scheduling("p", "1", 0.0, 1.0)
     )
-    quick = Search(levels=2, dwells=1, starts=1, nodes=8, evaluations=1, samples=100)
+    quick = LowerBoundSearch(levels=2, dwells=1, starts=1, nodes=8, evaluations=1, samples=100)
     form = Spline(segments=(2,))
     asked = guarantees.bounds("baseline", "gust", lpv, (0.0, 1.0, math.inf), form, quick)
     found = guarantees.answered([*asked, *guarantees.lft_bounds("baseline", "gust", lpv)])
@@ -81,7 +83,7 @@ def test_a_proof_of_a_model_that_the_exact_one_exceeds_is_said_not_to_hold_for_t
                 lag(gain),
                 (1.0,),
                 Spline(segments=(2,)),
-                Search(levels=2, dwells=1, starts=1, nodes=8, evaluations=1),
+                LowerBoundSearch(levels=2, dwells=1, starts=1, nodes=8, evaluations=1),
             )
         )
 

@@ -3,7 +3,8 @@
 import pytest
 
 import symheli
-from identification import InstrumentalVariables, fit
+from identification import fit
+from identification.methods import InstrumentalVariables
 from studies.setup.axes import LONGITUDINAL
 from studies.setup.flights import TransitionPlan, autopilot_for
 from symheli.errors import DataWarning

@@ -60,17 +60,17 @@ arx = idn.LPVARX(
 WORK = {
     "trims by the hundred thousand": (
         HELI
-        + "symheli.trim_batch(heli, airspeed=[5.0, 6.0])\n"
+        + "symheli.steady.trim_batch(heli, airspeed=[5.0, 6.0])\n"
         + BEGIN
         + "speeds = np.linspace(0, 15, 300_000)\n"
-        + "while True:\n    symheli.trim_batch(heli, airspeed=speeds)"
+        + "while True:\n    symheli.steady.trim_batch(heli, airspeed=speeds)"
     ),
     "a sweep": (
         HELI
         + "symheli.sweep(heli, [5.0, 6.0])\n"
         + BEGIN
         + "speeds, accelerations = np.linspace(0, 15, 200), np.linspace(-2, 2, 300)\n"
-        + "while True:\n    symheli.sweep_grid(heli, speeds, acceleration=accelerations)"
+        + "while True:\n    symheli.steady.sweep_grid(heli, speeds, acceleration=accelerations)"
     ),
     "one long flight": (
         HELI
@@ -81,17 +81,17 @@ WORK = {
     ),
     "flights by the thousand": (
         HELI
-        + "symheli.fly_batch(heli, short, seeds=range(8))\n"
+        + "symheli.flight.fly_batch(heli, short, seeds=range(8))\n"
         + BEGIN
         + "calm = symheli.AirspeedSchedule.transition(0, 13, acceleration=1.0, laps=40)\n"
-        + "symheli.fly_batch(heli, calm, seeds=range(5000), noise_db=30.0)"
+        + "symheli.flight.fly_batch(heli, calm, seeds=range(5000), noise_db=30.0)"
     ),
     "flights under a controller in Python": (
         HELI
         + "class Idle:\n    dt = 0.02\n    def reset(self): pass\n"
         + "    def step(self, measured, reference, p): return [0.0] * 4\n"
         + "def lost():\n    try:\n        symheli.fly(heli, short, controller=Idle())\n"
-        + "    except symheli.FlightLostError:\n        pass\n"
+        + "    except symheli.errors.FlightLostError:\n        pass\n"
         + "lost()\n"
         + BEGIN
         + "while True:\n    lost()"
@@ -100,9 +100,9 @@ WORK = {
         HELI
         + "point = symheli.trim(heli, airspeed=5.0)\n"
         + "x0, u = np.tile(point.x.array, (20_000, 1)), np.tile(point.u.array, (5000, 1))\n"
-        + "symheli.simulate_batch(heli, x0[:9], u[:9], dt=0.02)\n"
+        + "symheli.integrate.simulate_batch(heli, x0[:9], u[:9], dt=0.02)\n"
         + BEGIN
-        + "symheli.simulate_batch(heli, x0, u, dt=0.02)"
+        + "symheli.integrate.simulate_batch(heli, x0, u, dt=0.02)"
     ),
     "a compiler": (
         "import os, tempfile\n"
@@ -113,7 +113,9 @@ WORK = {
         + "compile.library('double f(double x, double y) {' + body + 'return x; }', 'long')"
     ),
     "a certificate, proof and trajectories": (
-        LATERAL + BEGIN + "synthesis.l2_gain(loop, rate=3.0, form=synthesis.Spline(segments=64))"
+        LATERAL
+        + BEGIN
+        + "synthesis.l2_gain(loop, rate=3.0, form=synthesis.forms.Spline(segments=64))"
     ),
     "the lasso of an hour": RECORD
     + BEGIN
@@ -148,7 +150,7 @@ WORK = {
         + "flight = symheli.fly(heli, long, noise_db=30.0, excitation=excitation)\n"
         + "basis = idn.Polynomial(2, 0.0, 13.0)\n"
         + "kin = idn.KinematicARX(heli.inputs, 'airspeed_command', nb=2, basis=basis)\n"
-        + "method = idn.FilterError(symheli.SimulatedFlight(heli))\n"
+        + "method = idn.FilterError(symheli.flight.SimulatedFlight(heli))\n"
         + BEGIN
         + "while True:\n    idn.fit(kin, flight, method=method)"
     ),

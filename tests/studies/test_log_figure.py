@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from identification import LPVARX, Polynomial, against_constant
+from identification import LPVARX, Polynomial
+from identification.judge import compare_constant
 from studies.log.figure import COLOURS, figure
 from symheli.records import FlightRecord
 
@@ -16,7 +17,7 @@ def test_the_picture_holds_the_predictions_that_were_scored():
         y[k] = (0.9 - 0.05 * np.sin(t[k - 1])) * y[k - 1] + u[k - 1] + 0.1 * rng.standard_normal()
     record = FlightRecord.from_arrays(t, {"y": "rad", "u": "1", "p": "m/s"}, y=y, u=u, p=np.sin(t))
     training, test = record.split(0.7)
-    result = against_constant(
+    result = compare_constant(
         LPVARX("y", "u", "p", na=1, nb=1, delay=1, basis=Polynomial(1, -1.0, 1.0)), training, test
     )
     drawn, close, scheduling, _ = figure(result).axes

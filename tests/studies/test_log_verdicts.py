@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 import symheli
-from identification import LPVARX, AgainstConstant, Polynomial, Scores, against_constant, fit
-from identification.judge.against_constant import Scored, difference
+from identification import LPVARX, Polynomial, fit
+from identification.judge import Scores, compare_constant
+from identification.judge.against_constant import AgainstConstant, Scored, difference
 from studies import cli
 from symheli.errors import DataWarning
 from symheli.records import FlightRecord
@@ -354,7 +355,7 @@ def test_the_moving_trim_is_not_tried_where_the_data_cannot_tell_it():
         0.1 * np.arange(300), dict.fromkeys("yup", "1"), y=y, u=u, p=p
     )
     arx = LPVARX("y", "u", "p", na=1, nb=1, delay=1, basis=Polynomial(2, 1.0, 3.0), offset=True)
-    found = against_constant(arx, record, None, trim="auto")
+    found = compare_constant(arx, record, None, trim="auto")
     assert found.trim_note.startswith("offset_rate is not tried: the regressors have rank")
     assert len(found.models) == 2
 

@@ -37,7 +37,7 @@ def test_margins_of_a_family_from_a_file_are_those_of_its_models(answer, family_
     got = answer("margins", "--model", family_file, *ROLL, "--points", 2)
     family = symheli.LinearFamily.load(family_file).select(["v", "p", "r", "phi", "b1"])
     model = family.interpolate(degree=3).at(9.0)
-    own = synthesis.margins(synthesis.loop(model, {("d_lat", "phi"): -0.02}, "d_lat"))
+    own = synthesis.margins(synthesis.analysis.open_loop(model, {("d_lat", "phi"): -0.02}, "d_lat"))
     assert got["values"] == [4.0, 9.0]
     assert got["margins"]["d_lat"][1]["phase"] == pytest.approx(own.phase, rel=1e-9)
     assert got["units"]["parameter"] == "m/s"

@@ -18,9 +18,10 @@ from studies.report import pages
 from studies.transition import figures, gain_tables, guarantees, report
 from studies.transition.outcome import Outcome
 from symheli import LPVStateSpace, Scheduling
-from synthesis import Search, Spline
+from synthesis.analysis import LowerBoundSearch
+from synthesis.forms import Spline
 
-GLIMPSE = Search(levels=2, dwells=1, starts=1, nodes=8, evaluations=1, samples=100)
+GLIMPSE = LowerBoundSearch(levels=2, dwells=1, starts=1, nodes=8, evaluations=1, samples=100)
 STAGES = [
     f.name
     for f in fields(Outcome)

@@ -22,13 +22,14 @@ from studies.transition.outcome import Outcome
 from studies.transition.results import to_dict
 from studies.transition.shortfalls import shortfalls
 from symheli import LPVStateSpace, Scheduling
-from synthesis import Search, Spline
+from synthesis.analysis import LowerBoundSearch
+from synthesis.forms import Spline
 
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]\d+)?")
 WANTED = ("mark", "seeds better")
 """Columns that are no results, by how they begin, or counted from others."""
 
-GLIMPSE = Search(levels=2, dwells=1, starts=1, nodes=8, evaluations=1, samples=100)
+GLIMPSE = LowerBoundSearch(levels=2, dwells=1, starts=1, nodes=8, evaluations=1, samples=100)
 
 
 @pytest.fixture(scope="module")

@@ -23,7 +23,8 @@ from studies.transition.recovery import Recoveries
 from studies.transition.stage_keys import stage_keys
 from symheli import Helicopter
 from symheli.errors import InputError
-from synthesis import Search, Spline
+from synthesis.analysis import LowerBoundSearch
+from synthesis.forms import Spline
 
 FIRST = ("baseline", "paper_experiment", "exact_recovery")
 """The stages that are quick."""
@@ -196,7 +197,7 @@ AFTER_KINEMATICS = {"robust", "controllers", "flown_controllers", "certified_con
     [
         ({"servo_rates": (0.0, 3.1)}, {"servo"}),
         ({"exact_rates": (0.0, 1.0)}, {"gust"}),
-        ({"search": replace(Search(), nodes=99)}, {"gust"}),
+        ({"search": replace(LowerBoundSearch(), nodes=99)}, {"gust"}),
         ({"longitudinal_rates": (0.0, 3.1)}, {"longitudinal"}),
         ({"gust_segments": (16, 32)}, {"gust", "longitudinal"}),
         ({"robust_form": Spline(segments=(9,))}, {"robust"}),

@@ -13,9 +13,11 @@ from studies.transition.proofs import GustProofs
 from studies.transition.saved_proofs import proof_file
 from symheli import LPVStateSpace, Scheduling
 from symheli.lpv.bases import Patches
-from synthesis import Certificate, Search, Spline
+from synthesis import Certificate
+from synthesis.analysis import LowerBoundSearch
+from synthesis.forms import Spline
 
-QUICK = Search(levels=2, dwells=1, starts=1, nodes=8, evaluations=1, samples=100)
+QUICK = LowerBoundSearch(levels=2, dwells=1, starts=1, nodes=8, evaluations=1, samples=100)
 
 
 @pytest.fixture(scope="module")

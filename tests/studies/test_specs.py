@@ -16,16 +16,10 @@ from studies.specs.flown import at_a_switch, flown, measured, quickness
 from studies.specs.of_vehicle import OfVehicle, share_met
 from studies.transition import study
 from studies.transition.configuration import Configuration
-from symheli import (
-    AirspeedSchedule,
-    Helicopter,
-    TableController,
-    fly_batch,
-    gain_scheduled_lqr,
-)
+from symheli import AirspeedSchedule, Helicopter, TableController
 from symheli.errors import InputError
-from symheli.flight import XCELL_SERVOS
-from synthesis import Sheet
+from symheli.flight import XCELL_SERVOS, fly_batch, gain_scheduled_lqr
+from synthesis.sheet import Sheet
 from synthesis.sheet.evaluation import worst
 
 NAME = "mine"

@@ -12,7 +12,8 @@ import pytest
 
 from studies.setup import stage_file
 from studies.setup.stored_stages import NotUsable, Stored, StoredStages
-from symheli import LinearModel, Scheduling, Signal
+from symheli import LinearModel, Scheduling
+from symheli.values import Signal
 
 
 def again(value):

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import symheli
-from identification import Criterion, FitForControl
+from identification.judge import Criterion
+from identification.judge.fit_for_control import FitForControl
 from studies.controllers.certified import CertifiedControllers, bounded
 from studies.controllers.covered import NO_TUBE
 from studies.controllers.design_choices import (
@@ -56,16 +57,9 @@ from studies.setup.bounds import PLAIN, Bound
 from studies.setup.stored_stages import Stored, StoredStages
 from studies.transition import controller_tables as tables
 from studies.transition.outcome import Outcome
-from symheli import (
-    AirspeedSchedule,
-    LPVStateSpace,
-    Scheduling,
-    Sensor,
-    ValidityWarning,
-    fly_batch,
-)
-from symheli.errors import SynthesisError
-from symheli.flight import XCELL_SERVOS
+from symheli import AirspeedSchedule, LPVStateSpace, Scheduling, Sensor
+from symheli.errors import SynthesisError, ValidityWarning
+from symheli.flight import XCELL_SERVOS, fly_batch
 from synthesis.design.lpv.point_schedule import hinf_schedule
 from synthesis.design.plant.sampling import tustin
 from synthesis.numerics.linear.norm import norm

@@ -209,7 +209,7 @@ def test_a_controller_for_a_saved_identified_model_is_proven_around_that_model(t
     proof = synthesis.Certificate.load(tmp_path / "made" / "certificate.json")
     assert proof.verify()
     asked = DesignChoices.read(tmp_path / "my.toml", {})
-    given = identification.LPVARXModel.load(tmp_path / "model.json")
+    given = identification.model.LPVARXModel.load(tmp_path / "model.json")
     _, plant = plants(model_of(asked, given), asked)
     worst = 0.0
     for V in (0.0, 3.0, 8.0):
@@ -250,7 +250,10 @@ def test_a_file_that_holds_no_model_over_airspeed_is_refused(tmp_path, capsys, f
     for content in ("u v w", '{"schema": "symheli table controller"}', "[1, 2]"):
         path.write_text(content)
         assert "model.json: expected a model of symheli identify" in said_of(tmp_path, capsys)
-    axes, speeds = (symheli.Signal("airspeed", "m/s"), symheli.Signal("altitude", "m")), (0.0, 8.0)
+    axes, speeds = (
+        (symheli.values.Signal("airspeed", "m/s"), symheli.values.Signal("altitude", "m")),
+        (0.0, 8.0),
+    )
     models = [family.models[0]] * 4
     symheli.LinearFamily(axes, (speeds, (0.0, 100.0)), models).save(path)
     said = said_of(tmp_path, capsys)
@@ -313,25 +316,25 @@ def with_known_kinematics():
     own[[0, 1, 1], [4, 3, 5]] = [0.3, -0.4, 0.2]  # speed to pitch, roll and yaw
     own[[6, 7, 8, 9], [4, 3, 2, 5]] = [30.0, 40.0, -50.0, 25.0]
     V = np.array([0.0, 5.0, 10.0])
-    aerodynamics = identification.LPVARXModel(
+    aerodynamics = identification.model.LPVARXModel(
         structure=kin.aerodynamics,
         theta=np.vstack([basis.fit(V, np.tile(0.02 * row, (3, 1))) for row in own]),
         dt=0.02,
         outputs=kin.aerodynamics.outputs,
         inputs=kin.aerodynamics.inputs,
-        scheduling=symheli.Signal("airspeed_command", "m/s"),
+        scheduling=symheli.values.Signal("airspeed_command", "m/s"),
         residual_covariance=np.eye(6),
         rows_used=100,
     )
     trim = basis.fit(V, np.outer(V, np.eye(8)[0]))
-    return identification.KinematicModel(structure=kin, aerodynamics=aerodynamics, trim=trim)
+    return identification.model.KinematicModel(structure=kin, aerodynamics=aerodynamics, trim=trim)
 
 
 def test_to_a_model_with_known_kinematics_a_gust_is_the_opposite_velocity(tmp_path):
     """In its forces: what a gust adds to velocities is what they lose of the same velocity."""
     path = with_known_kinematics().save(tmp_path / "model.json")
     asked = DesignChoices(vehicle="", model=str(path), airspeeds=(0.0, 8.0), delay=0.0, servos={})
-    model = model_of(asked, identification.KinematicModel.load(path))
+    model = model_of(asked, identification.model.KinematicModel.load(path))
     at = model.at(3.0)
     gust = [list(map(str, model.inputs)).index(name) for name in ("u_w", "v_w", "w_w")]
     np.testing.assert_allclose(at.B[:, gust], np.eye(8)[:, :3] - at.A[:, :3], atol=1e-12)

@@ -10,7 +10,7 @@ import pytest
 
 import symheli
 import synthesis
-from identification import beside_baseline
+from identification.judge import compare_baseline
 from studies.campaigns.runners import runner
 from studies.setup import accelerating_baseline, axes
 from studies.setup.accelerating_baseline import ALONE, BOTH, along_the_command
@@ -134,7 +134,7 @@ def test_a_moving_trim_needs_its_drift(ideal, baseline, flown):
         "with": along_the_command(lpv, ideal),
         "without": along_the_command(lpv, ideal, drift=False),
     }
-    good, bad = beside_baseline({}, rivals, test, LONGITUDINAL.outputs).predictions
+    good, bad = compare_baseline({}, rivals, test, LONGITUDINAL.outputs).predictions
     assert good.scores.ahead["u"] > 90 > 80 > bad.scores.ahead["u"]
 
 
@@ -170,7 +170,7 @@ def test_a_median_meets_the_mark_where_single_flights_may_scatter():
 @pytest.mark.slow
 def test_gust_loop_is_proven_for_slow_airspeed_and_grows_when_it_may_jump(baseline):
     loop = guarantees.gust_loop(baseline.nodes)
-    slow = synthesis.l2_gain(loop, rate=1.0, form=synthesis.Spline(segments=8), search=None)
+    slow = synthesis.l2_gain(loop, rate=1.0, form=synthesis.forms.Spline(segments=8), search=None)
     assert slow.verified
     assert slow.verify(rigorous=True)
     assert slow.frozen == pytest.approx(

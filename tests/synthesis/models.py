@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import brentq
 
-from symheli.lpv import LPVStateSpace, Scheduling, UncertainStateSpace
+from symheli import LPVStateSpace, Scheduling, UncertainStateSpace
 from synthesis.certify.questions.certify import route
 from synthesis.certify.questions.problem import pose
 

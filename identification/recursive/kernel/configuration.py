@@ -14,7 +14,8 @@ from identification.design.determined import largest
 from identification.recursive.forgetting import Forgetting, numbers
 from identification.structure.lpvarx import LPVARX, EquationGroup
 from symheli.errors import InputError
-from symheli.lpv import Basis, Product
+from symheli.lpv import Product
+from symheli.lpv.bases import Basis
 from symheli.values.arrays import Array
 
 LANES = 8

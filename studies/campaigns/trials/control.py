@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 
 import symheli
-from identification import KinematicModel
+from identification.model import KinematicModel
 from studies.campaigns.trial import Trial
 from studies.campaigns.trials.vehicle import autopilot, helicopter, scattered
 from studies.controllers import designs

@@ -10,9 +10,10 @@ import numpy as np
 from studies.campaigns.trial import Trial
 from studies.campaigns.trials.vehicle import helicopter, scattered
 from studies.setup.flights import ABOVE_GROUND, BREEZE, TOP
-from symheli import AirspeedSchedule, Dryden, Wind, fly_batch, gain_scheduled_lqr
+from symheli import AirspeedSchedule, Wind
+from symheli.environment import Dryden
 from symheli.errors import UnknownNameError, ValidityWarning
-from symheli.flight import XCELL_SERVOS, Autopilot
+from symheli.flight import XCELL_SERVOS, Autopilot, fly_batch, gain_scheduled_lqr
 from symheli.steady.validity import Validity
 
 CONTROLLERS = ("lqr", "lqr with servos", "lqr of hover")

@@ -33,7 +33,7 @@ def gain(
     family = sweep(heli, speeds, inputs=INPUTS).select(STATES, INPUTS)
     gains = {name: hold for name in ATTITUDE_HOLD}
     loop = close(family.interpolate("polynomial", degree), "gust", gains)
-    form = synthesis.Spline(segments=segments)
+    form = synthesis.forms.Spline(segments=segments)
     found = synthesis.l2_gain(loop, rate=rate, form=form, search=None)
     return {"proven gain": found.gamma, "frozen gain": synthesis.frozen_gain(loop).gain}
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification import LPVARX, BSpline, PiecewiseLinear, Polynomial, fit, scores
+from identification import LPVARX, Polynomial, fit, scores
 from identification.judge.against_constant import HORIZONS
 from studies.campaigns.trial import Trial
 from studies.campaigns.trials.vehicle import autopilot, helicopter
 from studies.setup.axes import ALL, LATERAL, LONGITUDINAL, SCHEDULING, Axis, mode_misses
 from studies.setup.flights import ACCELERATIONS, TOP, TransitionPlan
 from symheli.errors import UnknownNameError
+from symheli.lpv import BSpline, PiecewiseLinear
 
 AXES: dict[str, Axis] = {"longitudinal": LONGITUDINAL, "lateral": LATERAL, "all": ALL}
 BASES = {

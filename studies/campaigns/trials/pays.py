@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from identification import against_constant
+from identification.judge import compare_constant
 from identification.judge.against_constant import HORIZONS
 from studies.campaigns.trial import Trial
 from studies.campaigns.trials.vehicle import autopilot, helicopter
@@ -31,7 +31,7 @@ def pays(
     plan = TransitionPlan(seed, ramps=ramps, noise_db=noise, windy=windy)
     training, test = plan.training(heli, pilot), plan.test(heli, pilot)
     for axis in AXES:
-        found = against_constant(axis.structure(), training, test, trim="moving")
+        found = compare_constant(axis.structure(), training, test, trim="moving")
         for model, one in zip(MODELS, found.models, strict=True):
             if one.held_out is not None:
                 for h, fits in one.held_out.by_horizon.items():

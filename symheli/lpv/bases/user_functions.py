@@ -96,7 +96,8 @@ class UserFunctions(Basis):
         Examples
         --------
         >>> import sympy
-        >>> from symheli.lpv import Scheduling, UserFunctions
+        >>> from symheli import Scheduling
+        >>> from symheli.lpv import UserFunctions
         >>> angle = Scheduling("angle", "rad", low=0.0, high=1.5)
         >>> basis = UserFunctions.from_expressions([1, sympy.cos(angle.symbol)], angle)
         >>> basis(0.0), basis(0.0, 1) + 0.0

@@ -152,9 +152,9 @@ class LFT(Operators, LFTMatrices):
 
         Examples
         --------
-        >>> rho = lpv.Scheduling("rho", "1", low=0.0, high=1.0, rate=0.5)
+        >>> rho = symheli.Scheduling("rho", "1", low=0.0, high=1.0, rate=0.5)
         >>> p = rho.symbol
-        >>> plant = lpv.LFT.from_expressions([[-1 / (1 + p)]], [[1]], [[1]], [[0]], rho)
+        >>> plant = symheli.LFT.from_expressions([[-1 / (1 + p)]], [[1]], [[1]], [[0]], rho)
         >>> plant.order, plant.at(0.25).A.round(12)
         (1, array([[-0.8]]))
         """
@@ -305,7 +305,7 @@ class LFT(Operators, LFTMatrices):
         self, p: object, u: object, x0: object | None = None, *, dt: float | None = None
     ) -> tuple[Array, Array]:
         """States (n, nx) and outputs (n, ny) along p (n,) or (n, d), or with p(t, x, u) a function;
-        see `symheli.lpv.simulate`.
+        see `symheli.lpv.tools.simulate`.
         """
         from symheli.lpv.simulate import simulate
 

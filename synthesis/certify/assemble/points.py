@@ -9,8 +9,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from symheli.lpv import Matrices
 from symheli.lpv.bases.polynomials import lobatto_points
+from symheli.lpv.tools import Matrices
 from synthesis.certify.assemble.box import Shape, coefficients_of
 from synthesis.certify.assemble.lyapunov_blocks import of_state
 from synthesis.certify.statement.demand import Demand

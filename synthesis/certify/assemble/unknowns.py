@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symheli.lpv import LPVStateSpace, UncertainStateSpace
+from symheli import LPVStateSpace, UncertainStateSpace
 from synthesis.certify.assemble.bounded_real import (
     BlockMultipliers,
     Blocks,
@@ -24,7 +24,7 @@ from synthesis.certify.assemble.bounded_real import (
 from synthesis.certify.assemble.lyapunov_blocks import continuous_products, discrete_products
 from synthesis.certify.assemble.memory_blocks import memory_blocks
 from synthesis.certify.proof.one_parameter import IntervalEvidence
-from synthesis.certify.statement.forms import HigherOrder, LyapunovForm, Memory, Spline
+from synthesis.certify.statement.forms import HigherOrder, LaggedParameter, LyapunovForm, Spline
 from synthesis.certify.statement.lag import LagRegion
 from synthesis.certify.statement.norm_bounded import NormBounded
 from synthesis.certify.statement.opened import open_block
@@ -311,7 +311,7 @@ def unknowns(problem: ScaledProblem, form: LyapunovForm) -> Iterator[Unknown]:
     n, sampled = len(problem.lpv.states), problem.discrete
     many = isinstance(form, Spline) and n > MANY_STATES
     higher = isinstance(form, HigherOrder)
-    remembers = isinstance(form, Memory) and 0 < problem.rate < math.inf
+    remembers = isinstance(form, LaggedParameter) and 0 < problem.rate < math.inf
     (own,) = form.degrees(1)
     constant = math.isinf(problem.rate) or own == 0
     usual_degree = (1 if sampled else 2) if many else (2 if higher or sampled else 3)
@@ -324,7 +324,7 @@ def unknowns(problem: ScaledProblem, form: LyapunovForm) -> Iterator[Unknown]:
         usual = (4, 8) if higher or many else (8, 16) if sampled else (16, 32)
     for (segments,) in form.segments_tried(1) or [[k] for k in usual]:
         knots = _knots(problem, form, segments, degree)
-        if isinstance(form, Memory) and remembers:
+        if isinstance(form, LaggedParameter) and remembers:
             region = LagRegion.reached(knots, problem.rate, float(form.seconds))
             region = replace(region, time=region.time / problem.units.time)
             across = np.linspace(0.0, 1.0, form.across_segments + 1)

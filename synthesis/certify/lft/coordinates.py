@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy import linalg
 
-from symheli.lpv import LFT, Matrices
+from symheli import LFT
 from symheli.lpv.lft_matrices import parts
+from symheli.lpv.tools import Matrices
 from synthesis.certify.lft.proof import Coordinates
 from synthesis.certify.statement.scaling import model_scaling
 

@@ -12,11 +12,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy import linalg
 
-from symheli.lpv import LPVStateSpace
+from symheli import LPVStateSpace
 from symheli.progress import tracked
 from synthesis.certify.lower_bounds.frozen import FrozenGain, grid_of, worst_over
 from synthesis.certify.lower_bounds.lines import Line, alone, directions, growing_on, shared
-from synthesis.certify.lower_bounds.lower_bound import Search, lower_bound
+from synthesis.certify.lower_bounds.lower_bound import LowerBoundSearch, lower_bound
 from synthesis.certify.lower_bounds.paths import Budget, WaveFamily, samples, steps
 from synthesis.certify.lower_bounds.periodic import multiplier
 from synthesis.certify.lower_bounds.tied import tied_lower_bound
@@ -150,7 +150,7 @@ def worst_moving(
     model: LPVStateSpace,
     demand: Demand,
     frozen: Worst,
-    search: Search | None,
+    search: LowerBoundSearch | None,
 ) -> Worst:
     """Return the worst found along p that moves on lines through the box within its rates; `frozen`
     where nothing is worse.
@@ -180,7 +180,7 @@ def worst_moving(
 
 
 def growing(
-    model: LPVStateSpace, demand: Demand, search: Search | None
+    model: LPVStateSpace, demand: Demand, search: LowerBoundSearch | None
 ) -> SchedulingTrajectory | None:
     """Return a p(t) on such a line along which the state grows, None where none was found."""
     if demand.motion.tied:
@@ -188,7 +188,9 @@ def growing(
     return growing_on(_lines(model, demand.rates), search)
 
 
-def worst_tied(model: LPVStateSpace, demand: Demand, frozen: Worst, search: Search | None) -> Worst:
+def worst_tied(
+    model: LPVStateSpace, demand: Demand, frozen: Worst, search: LowerBoundSearch | None
+) -> Worst:
     """Return the worst found along cycles within rate and jerk limits; for gains and growth
     only.
     """
@@ -203,7 +205,7 @@ def worst_tied(model: LPVStateSpace, demand: Demand, frozen: Worst, search: Sear
 
 
 def _peaks(
-    line: LPVStateSpace, rate: float, search: Search, kind: Kind
+    line: LPVStateSpace, rate: float, search: LowerBoundSearch, kind: Kind
 ) -> tuple[float, SchedulingTrajectory | None]:
     """Return the energy-to-peak or H2 gain along waves: the Gramian of inputs held over each step,
     from rest over some cycles.
@@ -236,7 +238,7 @@ def _peaks(
 
 
 def _slowest(
-    line: LPVStateSpace, rate: float, search: Search
+    line: LPVStateSpace, rate: float, search: LowerBoundSearch
 ) -> tuple[float, SchedulingTrajectory | None]:
     """Return minus the slowest decay, 1/s, over whole cycles of waves, by Floquet multipliers, less
     the error of the time steps.

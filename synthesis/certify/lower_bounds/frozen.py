@@ -13,8 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.optimize import minimize, minimize_scalar
 
+from symheli import LFT, LPVStateSpace
 from symheli.errors import InputError
-from symheli.lpv import LFT, LPVStateSpace, UserFunctions
+from symheli.lpv import UserFunctions
 from symheli.values.numbers import whole
 from synthesis.certify.lower_bounds.paths import Scheduled
 from synthesis.numerics.linear.norm import gain_at_poles, norm
@@ -61,7 +62,7 @@ def frozen_gain(
 
     Examples
     --------
-    >>> from symheli.lpv import LPVStateSpace, Scheduling
+    >>> from symheli import LPVStateSpace, Scheduling
     >>> p = Scheduling("p", "1", 0.0, 1.0)
     >>> lag = LPVStateSpace.polynomial([[[-1.0]], [[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], p)
     >>> frozen_gain(lag)  # 1/(1 + p), at p = 0

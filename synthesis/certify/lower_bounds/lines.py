@@ -12,14 +12,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from symheli import LFT, Scheduling
 from symheli.errors import InputError
-from symheli.lpv import LFT, Scheduling
 from symheli.lpv.lft import Block
 from symheli.progress import tracked
 from synthesis.certify.lower_bounds.frozen import FrozenGain, grid_of, worst_over
 from synthesis.certify.lower_bounds.lower_bound import (
     LowerBound,
-    Search,
+    LowerBoundSearch,
     growing_trajectory,
     lower_bound,
 )
@@ -57,7 +57,9 @@ def alone(p: Array) -> Array:
     return p[:, 0] if p.shape[1] == 1 else p
 
 
-def shared(lines: Iterable[Line], search: Search | None) -> Iterator[tuple[Line, Search]]:
+def shared(
+    lines: Iterable[Line], search: LowerBoundSearch | None
+) -> Iterator[tuple[Line, LowerBoundSearch]]:
     """Yield every line with its share of the remaining time, while there is time; none without a
     search.
     """
@@ -70,7 +72,9 @@ def shared(lines: Iterable[Line], search: Search | None) -> Iterator[tuple[Line,
         yield line, replace(search, seconds=budget.left / (len(lines) - k))
 
 
-def growing_on(lines: Iterable[Line], search: Search | None) -> SchedulingTrajectory | None:
+def growing_on(
+    lines: Iterable[Line], search: LowerBoundSearch | None
+) -> SchedulingTrajectory | None:
     """Return a p(t) on one of the lines along which the free state grows, None where none was
     found.
     """
@@ -108,7 +112,7 @@ def frozen_box_gain(lft: LFT, *, tolerance: float = 1e-8) -> BoxGain:
 
     Examples
     --------
-    >>> from symheli.lpv import LPVStateSpace, Scheduling
+    >>> from symheli import LPVStateSpace, Scheduling
     >>> p = Scheduling("p", "1", 0.0, 1.0)
     >>> lag = LPVStateSpace.polynomial([[[-1.0]], [[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], p)
     >>> frozen_box_gain(lag.to_lft()).p
@@ -136,7 +140,7 @@ def _at_poles(lft: LFT, grid: Array) -> Array:
     return gain_at_poles(M[:, :x, :x], M[:, :x, x:], M[:, x:, :x], M[:, x:, x:], lft.dt)
 
 
-def box_lower_bound(lft: LFT, frozen: BoxGain, search: Search | None) -> LowerBound:
+def box_lower_bound(lft: LFT, frozen: BoxGain, search: LowerBoundSearch | None) -> LowerBound:
     """Return the best lower bound over p that moves along a line through the box, its diagonals and
     its axes: jumping, and at rate limits.
 
@@ -157,7 +161,9 @@ def box_lower_bound(lft: LFT, frozen: BoxGain, search: Search | None) -> LowerBo
     return best
 
 
-def box_growing_trajectory(lft: LFT, search: Search | None) -> SchedulingTrajectory | None:
+def box_growing_trajectory(
+    lft: LFT, search: LowerBoundSearch | None
+) -> SchedulingTrajectory | None:
     """Return a p(t) along such a line on which the free state grows, None where none was found."""
     return growing_on(_lines(lft, math.inf), search)
 

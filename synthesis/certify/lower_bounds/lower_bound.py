@@ -47,7 +47,7 @@ Array = np.ndarray
 
 
 @dataclass(frozen=True)
-class Search:
+class LowerBoundSearch:
     """Effort of the search for bad trajectories.
 
     Parameters
@@ -108,7 +108,7 @@ class Search:
             raise InputError(f"expected cycles > 0 and seconds > 0, got {self}")
 
 
-THOROUGH = Search()
+THOROUGH = LowerBoundSearch()
 """Default effort: some seconds for five states, ten at most."""
 
 
@@ -135,7 +135,7 @@ def lower_bound(
     rate: Rate = None,
     *,
     frozen: FrozenGain | None = None,
-    search: Search | None = THOROUGH,
+    search: LowerBoundSearch | None = THOROUGH,
 ) -> LowerBound:
     """Compute a lower bound on the L2 gain, from the worst trajectory of p that is found.
 
@@ -170,7 +170,7 @@ def lower_bound(
 
     Examples
     --------
-    >>> from symheli.lpv import LPVStateSpace, Scheduling
+    >>> from symheli import LPVStateSpace, Scheduling
     >>> p = Scheduling("p", "1", 0.0, 1.0, rate=0.5)
     >>> lag = LPVStateSpace.polynomial([[[-1.0]], [[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], p)
     >>> lower_bound(lag, search=None).gain
@@ -205,7 +205,7 @@ def lower_bound(
 
 
 def growing_trajectory(
-    lpv: Scheduled, rate: float, search: Search | None = THOROUGH
+    lpv: Scheduled, rate: float, search: LowerBoundSearch | None = THOROUGH
 ) -> SchedulingTrajectory | None:
     """Return one cycle of a p(t) within the limits along which the free state grows if repeated;
     None where none was found.
@@ -216,7 +216,9 @@ def growing_trajectory(
     return growing.trajectory if growing else None
 
 
-def along_cycle(lpv: Scheduled, cycle: SchedulingTrajectory, search: Search) -> LowerBound:
+def along_cycle(
+    lpv: Scheduled, cycle: SchedulingTrajectory, search: LowerBoundSearch
+) -> LowerBound:
     """Return the bound of one cycle, repeated: growth, or the gain of an explicit input
     from rest.
     """
@@ -227,7 +229,7 @@ def along_cycle(lpv: Scheduled, cycle: SchedulingTrajectory, search: Search) -> 
 class _TrajectorySearch:
     """The search along one model at one rate."""
 
-    def __init__(self, lpv: Scheduled, rate: float, search: Search):
+    def __init__(self, lpv: Scheduled, rate: float, search: LowerBoundSearch):
         self.lpv, self.rate, self.search = lpv, rate, search
         self.budget = Budget(search.seconds)
         self.family = WaveFamily(lpv, rate, search)

@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
-from symheli.lpv import Matrices, Scheduling
+from symheli import Scheduling
 from symheli.lpv.exponential import expm
+from symheli.lpv.tools import Matrices
 from synthesis.certify.statement.trajectory import SchedulingTrajectory
 
 if TYPE_CHECKING:
-    from synthesis.certify.lower_bounds.lower_bound import Search
+    from synthesis.certify.lower_bounds.lower_bound import LowerBoundSearch
 
 Array = np.ndarray
 
@@ -188,7 +189,7 @@ class WaveFamily:
     `longest`: the longest time step that resolves the fastest mode, s.
     """
 
-    def __init__(self, lpv: Scheduled, rate: float, search: Search):
+    def __init__(self, lpv: Scheduled, rate: float, search: LowerBoundSearch):
         self.lpv, self.rate, self.search = lpv, rate, search
         s = lpv.scheduling
         poles = np.linalg.eigvals(lpv.matrices(np.linspace(s.low, s.high, search.levels + 1)).A)

@@ -14,7 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symheli.lpv import Matrices, UncertainStateSpace
+from symheli import UncertainStateSpace
+from symheli.lpv.tools import Matrices
 from symheli.values.signal import indices
 from synthesis.certify.lower_bounds.frozen import worst_over
 from synthesis.numerics.linear.norm import gain_at_poles, norm, surely_unstable

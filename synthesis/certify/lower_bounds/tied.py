@@ -15,9 +15,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import minimize
 
+from symheli import LPVStateSpace, Scheduling
 from symheli.errors import InputError
-from symheli.lpv import LPVStateSpace, Matrices, Scheduling
-from synthesis.certify.lower_bounds.lower_bound import LowerBound, Search, along_cycle
+from symheli.lpv.tools import Matrices
+from synthesis.certify.lower_bounds.lower_bound import LowerBound, LowerBoundSearch, along_cycle
 from synthesis.certify.lower_bounds.paths import Budget, Wave, WaveFamily
 from synthesis.certify.statement.trajectory import SchedulingTrajectory
 from synthesis.numerics.polynomial.motion import Motion
@@ -87,7 +88,9 @@ class AlongPath:
         return self.lpv.matrices(self.points(np.asarray(t, dtype=float)))
 
 
-def tied_lower_bound(lpv: LPVStateSpace, motion: Motion, search: Search) -> LowerBound | None:
+def tied_lower_bound(
+    lpv: LPVStateSpace, motion: Motion, search: LowerBoundSearch
+) -> LowerBound | None:
     """Return the largest gain found along such cycles, inf where the state grows; None where none
     was found. Its trajectory has p (n, 2).
     """
@@ -119,7 +122,7 @@ def tied_lower_bound(lpv: LPVStateSpace, motion: Motion, search: Search) -> Lowe
 
 
 def _candidates(
-    lpv: LPVStateSpace, tie: tuple[int, int], top: float, search: Search
+    lpv: LPVStateSpace, tie: tuple[int, int], top: float, search: LowerBoundSearch
 ) -> Iterator[Wave]:
     """Yield the fastest growing trapezoids with the rate parameter held at zero, and slow ones."""
     i = tie[0]
@@ -135,7 +138,9 @@ def _candidates(
         )
 
 
-def _flown(lpv: LPVStateSpace, tie: tuple[int, int], path: Smooth, search: Search) -> LowerBound:
+def _flown(
+    lpv: LPVStateSpace, tie: tuple[int, int], path: Smooth, search: LowerBoundSearch
+) -> LowerBound:
     """Return the gain along the repeated path, by an explicit input from rest."""
     along = AlongPath(lpv, tie, path)
     period = path.wave.period
@@ -157,7 +162,7 @@ def _moved(
     wave: Wave,
     top: float,
     window: float,
-    search: Search,
+    search: LowerBoundSearch,
     budget: Budget,
 ) -> LowerBound:
     """Return the best wave near this one, by Nelder and Mead's search on levels, rests and

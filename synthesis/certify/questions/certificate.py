@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self, get_args
 
 import numpy as np
 
+from symheli import Scheduling
 from symheli.errors import CertificateError, InputError
-from symheli.lpv import Scheduling
 from symheli.values.summary import as_table, summarized
 from synthesis.certify.statement.kind import Kind
 from synthesis.certify.statement.outcome import Attempt, Seconds, Status
@@ -81,7 +81,7 @@ class Certificate:
     """A bound that holds for every p(t) within its range and rates, with its proof and its
     hypotheses.
 
-    Made by `l2_gain`, `stability`, `decay_rate`, `generalized_h2`, `h2_gain`, `lft_gain` and
+    Made by `l2_gain`, `stability`, `decay_rate`, `energy_to_peak`, `h2_gain`, `lft_gain` and
     `lft_stability`.
 
     Attributes
@@ -136,7 +136,7 @@ class Certificate:
 
     Examples
     --------
-    >>> from symheli.lpv import LPVStateSpace, Scheduling
+    >>> from symheli import LPVStateSpace, Scheduling
     >>> p = Scheduling("p", "1", 0.0, 1.0, rate=0.5)
     >>> lag = LPVStateSpace.polynomial([[[-1.0]], [[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], p)
     >>> cert = l2_gain(lag)

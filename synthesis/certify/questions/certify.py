@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from symheli import LFT, LPVStateSpace, Scheduling, UncertainStateSpace
 from symheli.errors import InputError
-from symheli.lpv import LFT, LPVStateSpace, Scheduling, UncertainStateSpace
 from synthesis.certify.lower_bounds.box import Worst, growing, unstable_at, worst_by, worst_moving
 from synthesis.certify.lower_bounds.paths import search_hypothesis
 from synthesis.certify.lower_bounds.perturbation import worst_perturbation

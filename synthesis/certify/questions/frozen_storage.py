@@ -14,7 +14,7 @@ from collections.abc import Iterable
 import numpy as np
 from scipy import linalg
 
-from symheli.lpv import Matrices
+from symheli.lpv.tools import Matrices
 from symheli.progress import task
 from synthesis.certify.assemble.unknowns import ScaledProblem
 from synthesis.certify.proof.inequalities import Statement, lmi_polynomials

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from symheli import LPVStateSpace, Scheduling, UncertainStateSpace
 from symheli.errors import InputError
-from symheli.lpv import LPVStateSpace, Scheduling, UncertainStateSpace
 from symheli.threads import with_one_thread
 from symheli.values.labelled import per
 from symheli.values.signal import Signal
-from synthesis.certify.lower_bounds.lower_bound import THOROUGH, Search
+from synthesis.certify.lower_bounds.lower_bound import THOROUGH, LowerBoundSearch
 from synthesis.certify.questions.gain_curve import GainCurve
 from synthesis.certify.questions.lft_gain import lft_gain
 from synthesis.certify.questions.questions import l2_gain
@@ -38,7 +38,7 @@ def gain_against_rate(
     form: LyapunovForm | None = None,
     impose: Imposed | None = None,
     solver: Solver | str | None = None,
-    search: Search | None = THOROUGH,
+    search: LowerBoundSearch | None = THOROUGH,
 ) -> GainCurve:
     """Certify the L2 gain of a model over a list of rate bounds of its parameter, each with a lower
     bound.
@@ -72,7 +72,7 @@ def gain_against_rate(
 
     Examples
     --------
-    >>> from symheli.lpv import LPVStateSpace, Scheduling
+    >>> from symheli import LPVStateSpace, Scheduling
     >>> p = Scheduling("p", "1", 0.0, 1.0)
     >>> lag = LPVStateSpace.polynomial([[[-1.0]], [[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], p)
     >>> curve = gain_against_rate(lag, [0.0, 0.5], lft=["DG"], search=None)

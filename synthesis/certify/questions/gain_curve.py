@@ -48,7 +48,7 @@ class GainCurve:
 
     Examples
     --------
-    >>> from symheli.lpv import LPVStateSpace, Scheduling
+    >>> from symheli import LPVStateSpace, Scheduling
     >>> p = Scheduling("p", "1", 0.0, 1.0)
     >>> lag = LPVStateSpace.polynomial([[[-1.0]], [[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], p)
     >>> curve = gain_against_rate(lag, [0.0, 0.5], search=None)

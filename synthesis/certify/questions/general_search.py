@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symheli.lpv import LinearModel, Matrices
+from symheli import LinearModel
+from symheli.lpv.tools import Matrices
 from synthesis.certify.assemble.box import Shape, affine_inequalities, assemble
 from synthesis.certify.assemble.points import at_points, points_of
 from synthesis.certify.proof.box import BoxEvidence

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from symheli.lpv import LPVStateSpace, Scheduling, UncertainStateSpace
+from symheli import LPVStateSpace, Scheduling, UncertainStateSpace
 from symheli.lpv.bases.function_space import tensor_grid
 from symheli.lpv.trim_drift import PREFIX
 from synthesis.certify.statement.kind import Kind

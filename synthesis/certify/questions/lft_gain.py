@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from symheli import LFT, Scheduling
 from symheli.errors import InputError
-from symheli.lpv import LFT, Scheduling
 from synthesis.certify.lft.coordinates import coordinates, scaled
 from synthesis.certify.lft.multipliers import Multiplier, check_scaling, multiplier_class
 from synthesis.certify.lft.program import (
@@ -26,7 +26,7 @@ from synthesis.certify.lower_bounds.lines import (
     box_lower_bound,
     frozen_box_gain,
 )
-from synthesis.certify.lower_bounds.lower_bound import THOROUGH, Search
+from synthesis.certify.lower_bounds.lower_bound import THOROUGH, LowerBoundSearch
 from synthesis.certify.lower_bounds.paths import search_hypothesis
 from synthesis.certify.questions.certificate import Certificate, Proof
 from synthesis.certify.questions.certify import Beaten, Report
@@ -56,7 +56,7 @@ def lft_gain(
     scaling: str = "DG",
     *,
     solver: Solver | str = "CLARABEL",
-    search: Search | None = THOROUGH,
+    search: LowerBoundSearch | None = THOROUGH,
 ) -> Certificate:
     """Certify an upper bound on the L2 gain of an LFT for arbitrarily fast p(t) in its box.
 
@@ -93,7 +93,7 @@ def lft_gain(
 
     Examples
     --------
-    >>> from symheli.lpv import LPVStateSpace, Scheduling
+    >>> from symheli import LPVStateSpace, Scheduling
     >>> p = Scheduling("p", "1", 0.0, 1.0)
     >>> lag = LPVStateSpace.polynomial([[[-1.0]], [[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], p)
     >>> cert = lft_gain(lag.to_lft().reduce(), search=None)
@@ -108,7 +108,7 @@ def lft_stability(
     scaling: str = "DG",
     *,
     solver: Solver | str = "CLARABEL",
-    search: Search | None = THOROUGH,
+    search: LowerBoundSearch | None = THOROUGH,
 ) -> Certificate:
     """Certify that the state of an LFT decays for arbitrarily fast p(t) in its box.
 
@@ -145,7 +145,7 @@ def lft_stability(
 
     Examples
     --------
-    >>> from symheli.lpv import LPVStateSpace, Scheduling
+    >>> from symheli import LPVStateSpace, Scheduling
     >>> p = Scheduling("p", "1", 0.0, 1.0)
     >>> lag = LPVStateSpace.polynomial([[[-1.0]], [[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], p)
     >>> lft_stability(lag.to_lft().reduce()).verified
@@ -161,7 +161,7 @@ class LFTProblem(NamedTuple):
     scaling: str
     demand: Demand
     solver: Solver
-    search: Search | None
+    search: LowerBoundSearch | None
     form = Spline(degree=0)
     impose = Bernstein(margins=MARGINS)
 
@@ -172,7 +172,7 @@ class LFTProblem(NamedTuple):
 
 
 def _checked(
-    lft: LFT, scaling: str, kind: Kind, solver: Solver | str, search: Search | None
+    lft: LFT, scaling: str, kind: Kind, solver: Solver | str, search: LowerBoundSearch | None
 ) -> LFTProblem:
     if not isinstance(lft, LFT):
         raise InputError(

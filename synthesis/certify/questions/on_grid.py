@@ -11,10 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from symheli import LFT, LPVStateSpace, Scheduling
 from symheli.errors import InputError
-from symheli.lpv import LFT, FunctionSpace, LPVStateSpace, Matrices, Scheduling
+from symheli.lpv.bases import FunctionSpace
 from symheli.lpv.bases.function_space import tensor_grid
 from symheli.lpv.bases.polynomials import polynomials
+from symheli.lpv.tools import Matrices
 from synthesis.certify.questions.certificate import Certificate
 from synthesis.certify.questions.hypotheses import hypotheses
 from synthesis.certify.questions.problem import Model

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from symheli import LFT, LPVStateSpace, Scheduling, UncertainStateSpace
 from symheli.errors import InputError
-from symheli.lpv import LFT, LPVStateSpace, Scheduling, UncertainStateSpace
-from synthesis.certify.lower_bounds.lower_bound import Search
+from synthesis.certify.lower_bounds.lower_bound import LowerBoundSearch
 from synthesis.certify.statement.demand import Demand, Rate, limits
-from synthesis.certify.statement.forms import HigherOrder, LyapunovForm, Memory, Spline
+from synthesis.certify.statement.forms import HigherOrder, LaggedParameter, LyapunovForm, Spline
 from synthesis.certify.statement.impose import Bernstein, Grid, Imposed, SumOfSquares, Vertices
 from synthesis.certify.statement.kind import Kind
 from synthesis.numerics.polynomial.motion import Motion
@@ -31,7 +31,7 @@ class BoundProblem(NamedTuple):
     form: LyapunovForm
     impose: Imposed
     solver: Solver
-    search: Search | None
+    search: LowerBoundSearch | None
     uncertain: UncertainStateSpace | None = None
     usual: bool = False
 
@@ -81,7 +81,7 @@ def pose(
     form: LyapunovForm | None,
     impose: Imposed | None,
     solver: Solver | str | None,
-    search: Search | None,
+    search: LowerBoundSearch | None,
 ) -> BoundProblem:
     """Check the options against one another and against the model, and return the problem.
 
@@ -89,13 +89,13 @@ def pose(
     """
     usual = form is None and impose is None and solver is None
     form, impose = form or Spline(), impose or Bernstein()
-    if not isinstance(form, Spline | Memory | HigherOrder):
+    if not isinstance(form, Spline | LaggedParameter | HigherOrder):
         raise InputError(f"form must be a Spline, Memory or HigherOrder, got {form!r:.60}")
     if not isinstance(impose, Bernstein | SumOfSquares | Vertices | Grid):
         raise InputError(
             f"impose must be Bernstein, SumOfSquares, Vertices or Grid, got {impose!r:.60}"
         )
-    if search is not None and not isinstance(search, Search):
+    if search is not None and not isinstance(search, LowerBoundSearch):
         raise InputError(f"search must be a Search, or None for none, got {search!r:.60}")
     uncertain = model if isinstance(model, UncertainStateSpace) else None
     model = _accepted(model)

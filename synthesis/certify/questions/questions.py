@@ -4,9 +4,9 @@ rate, energy-to-peak gain (generalised H2 norm) and H2 norm.
 
 from __future__ import annotations
 
-from symheli.lpv import FunctionSpace
+from symheli.lpv.bases import FunctionSpace
 from symheli.threads import with_one_thread
-from synthesis.certify.lower_bounds.lower_bound import THOROUGH, Search
+from synthesis.certify.lower_bounds.lower_bound import THOROUGH, LowerBoundSearch
 from synthesis.certify.questions.certificate import Certificate
 from synthesis.certify.questions.certify import certify
 from synthesis.certify.questions.on_grid import gain_on_grid
@@ -25,7 +25,7 @@ def l2_gain(
     form: LyapunovForm | FunctionSpace | None = None,
     impose: Imposed | None = None,
     solver: Solver | str | None = None,
-    search: Search | None = THOROUGH,
+    search: LowerBoundSearch | None = THOROUGH,
 ) -> Certificate:
     """Certify an upper bound on the L2 gain over every p(t) within its range and rates.
 
@@ -74,7 +74,7 @@ def l2_gain(
 
     Examples
     --------
-    >>> from symheli.lpv import LPVStateSpace, Scheduling
+    >>> from symheli import LPVStateSpace, Scheduling
     >>> p = Scheduling("p", "1", 0.0, 1.0, rate=0.5)
     >>> lag = LPVStateSpace.polynomial([[[-1.0]], [[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], p)
     >>> cert = l2_gain(lag, search=None)
@@ -94,7 +94,7 @@ def stability(
     form: LyapunovForm | None = None,
     impose: Imposed | None = None,
     solver: Solver | str | None = None,
-    search: Search | None = THOROUGH,
+    search: LowerBoundSearch | None = THOROUGH,
 ) -> Certificate:
     """Certify that the free state decays for every p(t) within its range and rates.
 
@@ -126,7 +126,7 @@ def stability(
 
     Examples
     --------
-    >>> from symheli.lpv import LPVStateSpace, Scheduling
+    >>> from symheli import LPVStateSpace, Scheduling
     >>> p = Scheduling("p", "1", 0.0, 1.0, rate=0.5)
     >>> lag = LPVStateSpace.polynomial([[[-1.0]], [[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], p)
     >>> stability(lag).verified
@@ -143,7 +143,7 @@ def decay_rate(
     form: Spline | None = None,
     impose: Imposed | None = None,
     solver: Solver | str | None = None,
-    search: Search | None = THOROUGH,
+    search: LowerBoundSearch | None = THOROUGH,
 ) -> Certificate:
     """Certify a decay rate: the largest alpha found such that |x(t)| <= c exp(-alpha t) |x(0)| for
     every admissible p(t).
@@ -177,7 +177,7 @@ def decay_rate(
 
     Examples
     --------
-    >>> from symheli.lpv import LPVStateSpace, Scheduling
+    >>> from symheli import LPVStateSpace, Scheduling
     >>> p = Scheduling("p", "1", 0.0, 1.0, rate=0.5)
     >>> lag = LPVStateSpace.polynomial([[[-1.0]], [[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], p)
     >>> cert = decay_rate(lag, search=None)
@@ -188,14 +188,14 @@ def decay_rate(
 
 
 @with_one_thread
-def generalized_h2(
+def energy_to_peak(
     model: Model,
     rate: Rate = None,
     *,
     form: Spline | None = None,
     impose: Imposed | None = None,
     solver: Solver | str | None = None,
-    search: Search | None = THOROUGH,
+    search: LowerBoundSearch | None = THOROUGH,
 ) -> Certificate:
     """Certify an upper bound on max_t |y(t)| / |u|_2, from rest, over every admissible p(t).
 
@@ -226,7 +226,7 @@ def generalized_h2(
 
     Examples
     --------
-    >>> from symheli.lpv import LPVStateSpace, Scheduling
+    >>> from symheli import LPVStateSpace, Scheduling
     >>> p = Scheduling("p", "1", 0.0, 1.0, rate=0.5)
     >>> lag = LPVStateSpace.polynomial([[[-1.0]], [[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], p)
     >>> cert = generalized_h2(lag, search=None)  # exactly sqrt(1/2)
@@ -244,13 +244,13 @@ def h2_gain(
     form: Spline | None = None,
     impose: Imposed | None = None,
     solver: Solver | str | None = None,
-    search: Search | None = THOROUGH,
+    search: LowerBoundSearch | None = THOROUGH,
 ) -> Certificate:
     """Certify an upper bound on the root of the variance of the outputs in white noise, over every
     admissible p(t): of a frozen model the H2 norm.
 
     P(p)^-1 bounds the variance of the state, from zero at the start; gamma^2 that of all outputs
-    together at every time, and so their mean power. Of one output it is `generalized_h2`.
+    together at every time, and so their mean power. Of one output it is `energy_to_peak`.
 
     Parameters
     ----------
@@ -279,7 +279,7 @@ def h2_gain(
 
     Examples
     --------
-    >>> from symheli.lpv import LPVStateSpace, Scheduling
+    >>> from symheli import LPVStateSpace, Scheduling
     >>> p = Scheduling("p", "1", 0.0, 1.0, rate=0.5)
     >>> lag = LPVStateSpace.polynomial(
     ...     [[[-1.0]], [[-1.0]]], [[[1.0]]], [[[1.0], [1.0]]], [[[0.0], [0.0]]], p)

@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from symheli import Scheduling
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv import Scheduling
 from symheli.lpv.scheduling import Rates, with_rates
 from synthesis.certify.statement.kind import Kind
 from synthesis.numerics.polynomial.motion import Motion

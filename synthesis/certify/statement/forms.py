@@ -134,7 +134,7 @@ class Spline(_InP):
 
 
 @dataclass(frozen=True)
-class Memory(_InP):
+class LaggedParameter(_InP):
     """V = x' P(p, p - q) x with q a first-order lag of p: P depends on the recent history of p.
 
     For `l2_gain` and `stability` of one parameter in continuous time. A finite memory of the
@@ -221,5 +221,5 @@ class HigherOrder(_InP):
             raise InputError(f"expected order 2 or 3 (1 is a Spline), got {self.order!r}")
 
 
-LyapunovForm = Spline | Memory | HigherOrder
+LyapunovForm = Spline | LaggedParameter | HigherOrder
 """Type of `form`."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from symheli.lpv import LPVStateSpace, UncertainStateSpace
+from symheli import LPVStateSpace, UncertainStateSpace
 from synthesis.certify.statement.norm_bounded import NormBounded
 
 

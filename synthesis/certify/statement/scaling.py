@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 from scipy import linalg
 
+from symheli import LinearModel, LPVStateSpace
 from symheli.errors import InputError
-from symheli.lpv import LinearModel, LPVStateSpace, Matrices
+from symheli.lpv.tools import Matrices
 from synthesis.certify.statement.norm_bounded import NormBounded
 from synthesis.certify.statement.units import Scaling
 from synthesis.numerics.linear.balance import balance, size_of

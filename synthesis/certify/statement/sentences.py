@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from symheli.lpv import Scheduling
+from symheli import Scheduling
 
 
 def motion(s: Scheduling, rate: float) -> str:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symheli.lpv import Matrices
+from symheli.lpv.tools import Matrices
 from synthesis.certify.statement.norm_bounded import NormBounded
 from synthesis.numerics.polynomial import structure
 from synthesis.numerics.polynomial.pieces import ModelPiece

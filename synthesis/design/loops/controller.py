@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
+from symheli import LinearModel, LPVStateSpace, UncertainStateSpace
 from symheli.errors import InputError
-from symheli.lpv import LinearModel, LPVStateSpace, UncertainStateSpace
 from symheli.values.arrays import Array
 from symheli.values.named_vector import NamedVector
 from symheli.values.summary import as_table, summarized
@@ -281,7 +281,7 @@ class Controller:
         self, state: Any, measured: NamedVector, reference: NamedVector, p: NamedVector
     ) -> tuple[Array, Any]:
         """Return the commands (4,), rad, at one sample and the state at the next; see
-        `symheli.PureController`.
+        `symheli.flight.PureController`.
         """
         return self.scheduled_controller.step(state, measured, reference, p)
 

@@ -8,8 +8,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
+from symheli import LPVStateSpace
 from symheli.errors import InputError
-from symheli.lpv import LPVStateSpace
 from symheli.lpv.linear_model import LinearModel
 from symheli.threads import with_one_thread
 from synthesis.certify.questions.questions import stability
@@ -119,7 +119,7 @@ def proven_around(
     Examples
     --------
     >>> import synthesis
-    >>> from symheli.lpv import LPVStateSpace, Scheduling
+    >>> from symheli import LPVStateSpace, Scheduling
     >>> p = Scheduling("p", "1", 0.0, 1.0, rate=0.1)
     >>> lag = LPVStateSpace.polynomial(
     ...     [[[0.9]], [[0.3]]], [[[0.1, 0.1]]], [[[1.0]]], [[[0.0, 0.0]]], p, dt=0.1,

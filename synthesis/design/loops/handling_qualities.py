@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
+from symheli import LinearModel
 from symheli.errors import InputError
-from symheli.lpv import LinearModel
 from symheli.values.numbers import whole
 
 
@@ -36,7 +36,7 @@ class Bandwidth(NamedTuple):
         return self.phase_bandwidth
 
 
-def bandwidth(
+def attitude_bandwidth(
     model: LinearModel,
     band: tuple[float, float] = (1.0, 60.0),
     points: int = 2000,
@@ -75,7 +75,7 @@ def bandwidth(
 
     Examples
     --------
-    >>> from symheli.lpv import LinearModel
+    >>> from symheli import LinearModel
     >>> A, B = [[-4.0, 0.0], [1.0, 0.0]], [[1.0], [0.0]]  # 1/(s (s + 4)): 45 deg left at 4 rad/s
     >>> roll = LinearModel(A, B, [[0.0, 1.0]], [[0.0]], ["p", "phi"], ["d_lat"], ["phi"])
     >>> print(f"{bandwidth(roll).attitude_response:.2f} rad/s")

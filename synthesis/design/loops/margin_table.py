@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from symheli.lpv import LinearModel, LPVStateSpace
+from symheli import LinearModel, LPVStateSpace
 from symheli.lpv.frozen_plots import Model, frozen_at, parameters_of
 from symheli.values.drawing import label
 from symheli.values.labelled import frame
 from symheli.values.signal import Signal
-from synthesis.design.loops.margins import Margins, loop, margins
+from synthesis.design.loops.margins import Margins, margins, open_loop
 
 if TYPE_CHECKING:
     import pandas
@@ -95,7 +95,7 @@ def margin_table(
 
     Examples
     --------
-    >>> from symheli.lpv import LPVStateSpace, Scheduling
+    >>> from symheli import LPVStateSpace, Scheduling
     >>> p = Scheduling("p", "1", 0.0, 1.0)
     >>> lag = LPVStateSpace.polynomial([[[0.0]]], [[[1.0]], [[1.0]]], [[[1.0]]], [[[0.0]]], p)
     >>> found = margin_table(lag, {("u1", "y1"): -2.0}, "u1", [0.0, 1.0])  # 2(1 + p)/s
@@ -105,7 +105,7 @@ def margin_table(
     rows = []
     for one in frozen_at(model, p):
         there: Any = feedback.at(*one.p) if isinstance(feedback, LPVStateSpace) else feedback
-        rows.append((one.p, margins(loop(one.model, there, at))))
+        rows.append((one.p, margins(open_loop(one.model, there, at))))
     return MarginTable(parameters_of(model), tuple(rows))
 
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import eigvals
 
+from symheli import LinearModel
 from symheli.errors import InputError
-from symheli.lpv import LinearModel
 from symheli.lpv.linear_model import feedback_matrix
 from symheli.lpv.lower_feedback import PREFIX, apart
 from symheli.values.signal import indices
@@ -54,7 +54,7 @@ class Margins:
 UNSTABLE = Margins(False, (1.0, 1.0), 0.0, 0.0, 0.0, ())
 
 
-def loop(
+def open_loop(
     plant: LinearModel, feedback: Mapping[tuple[str, str], float] | LinearModel, at: str
 ) -> LinearModel:
     """Return the loop of u = feedback y broken at one input, as L of 1 + L (negative feedback).
@@ -83,9 +83,9 @@ def loop(
 
     Examples
     --------
-    >>> from symheli.lpv import LinearModel
+    >>> from symheli import LinearModel
     >>> plant = LinearModel([[0.0]], [[1.0]], [[1.0]], [[0.0]], ["y"], ["u"], ["y"])  # 1/s
-    >>> L = loop(plant, {("u", "y"): -2.0}, "u")  # 2/s
+    >>> L = open_loop(plant, {("u", "y"): -2.0}, "u")  # 2/s
     >>> float(L.C[0, 0])
     2.0
     """
@@ -179,17 +179,17 @@ def margins(loop: LinearModel) -> Margins:
 
     Examples
     --------
-    >>> from symheli.lpv import LinearModel
+    >>> from symheli import LinearModel
     >>> plant = LinearModel([[0.0]], [[1.0]], [[1.0]], [[0.0]], ["y"], ["u"], ["y"])  # 1/s
-    >>> from synthesis import loop
-    >>> found = margins(loop(plant, {("u", "y"): -2.0}, "u"))  # 2/s: 90 deg at 2 rad/s
+    >>> from synthesis.analysis import open_loop
+    >>> found = margins(open_loop(plant, {("u", "y"): -2.0}, "u"))  # 2/s: 90 deg at 2 rad/s
     >>> print(f"{found.phase:.4f} rad, {found.delay:.4f} s")
     1.5708 rad, 0.7854 s
     """
     if len(loop.inputs) != 1 or len(loop.outputs) != 1:
         raise InputError(
             f"margins need a loop of one input and one output, got {len(loop.inputs)} and"
-            f" {len(loop.outputs)}; break it with loop()"
+            f" {len(loop.outputs)}; break it with open_loop()"
         )
     closed = _closed(loop)
     if not closed.is_stable():
@@ -264,10 +264,10 @@ def disk_margin(loop: LinearModel) -> float:
 
     Examples
     --------
-    >>> from symheli.lpv import LinearModel
+    >>> from symheli import LinearModel
     >>> plant = LinearModel([[0.0]], [[1.0]], [[1.0]], [[0.0]], ["y"], ["u"], ["y"])  # 1/s
-    >>> from synthesis import loop
-    >>> print(f"{disk_margin(loop(plant, {('u', 'y'): -2.0}, 'u')):.3f}")
+    >>> from synthesis.analysis import open_loop
+    >>> print(f"{disk_margin(open_loop(plant, {('u', 'y'): -2.0}, 'u')):.3f}")
     2.000
     """
     if len(loop.inputs) != len(loop.outputs):

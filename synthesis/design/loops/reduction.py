@@ -16,8 +16,8 @@ from functools import cached_property
 
 import numpy as np
 
+from symheli import LPVStateSpace
 from symheli.errors import InputError, SynthesisError
-from symheli.lpv import LPVStateSpace
 from symheli.lpv.balanced_truncation import response_gramians
 from symheli.lpv.bases.polynomials import lobatto_points
 from synthesis.design.loops.controller import Controller

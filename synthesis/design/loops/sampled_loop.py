@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from symheli import LPVStateSpace, UncertainStateSpace
 from symheli.errors import InputError
-from symheli.lpv import LPVStateSpace, UncertainStateSpace
 from symheli.threads import with_one_thread
 from symheli.values.summary import summarized
 from synthesis.certify.questions.certificate import Certificate
@@ -134,7 +134,7 @@ def certify_sampled(
     Examples
     --------
     >>> import synthesis
-    >>> from symheli.lpv import LinearModel
+    >>> from symheli import LinearModel
     >>> lag = LinearModel([[0.9]], [[0.1, 0.1]], [[1.0]], [[0.0, 0.0]], ("x",), ("w", "u"), ("y",),
     ...                   dt=0.1)
     >>> plant = synthesis.Plant(lag, disturbances=["w"], performance=["y"], controls=["u"],

@@ -21,8 +21,9 @@ from typing import Any
 import numpy as np
 from scipy import linalg
 
+from symheli import LPVStateSpace, Scheduling, UncertainStateSpace
 from symheli.errors import InputError
-from symheli.lpv import LPVStateSpace, Patches, Scheduling, UncertainStateSpace
+from symheli.lpv.bases import Patches
 from symheli.lpv.bases.function_space import Piece
 from symheli.lpv.equilibration import equilibrate
 from symheli.lpv.linear_model import LinearModel
@@ -49,7 +50,7 @@ is not used.
 """
 
 
-def with_wrong_parameter(
+def with_scheduling_error(
     plant: Plant, controller: Any, error: float, *, divisions: int = 8
 ) -> UncertainStateSpace:
     """Return the loop of a controller that reads p + b instead of p, for every b(t) with |b| <=
@@ -85,7 +86,7 @@ def with_wrong_parameter(
     Examples
     --------
     >>> import synthesis
-    >>> from symheli.lpv import LPVStateSpace, Scheduling
+    >>> from symheli import LPVStateSpace, Scheduling
     >>> p = Scheduling("p", "1", 0.0, 1.0, rate=0.1)
     >>> lag = LPVStateSpace.polynomial(
     ...     [[[0.9]], [[0.3]]], [[[0.1, 0.1]]], [[[1.0]]], [[[0.0, 0.0]]], p, dt=0.1,
@@ -96,7 +97,7 @@ def with_wrong_parameter(
     >>> gain = LPVStateSpace.polynomial(  # u = -(1 + 3 p) y: the pole stays at 0.8
     ...     nothing, through, [np.zeros((1, 0))], [[[-1.0]], [[-3.0]]], p,
     ...     inputs=("y",), outputs=("u",))
-    >>> wrong = synthesis.with_wrong_parameter(plant, gain, 0.1)  # the pole within .77 and .83
+    >>> wrong = synthesis.analysis.with_scheduling_error(plant, gain, 0.1)  # pole: .77 to .83
     >>> print(round(synthesis.l2_gain(wrong, 0.1, search=None).gamma, 3), round(0.1 / 0.17, 3))
     0.588 0.588
     """

@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from symheli import LPVStateSpace
 from symheli.errors import InputError, SynthesisError
-from symheli.lpv import LPVStateSpace
 from symheli.lpv.balanced_truncation import (
     NEGLIGIBLE,
     Balance,
@@ -97,11 +97,11 @@ def bounded_truncation(
 
     Examples
     --------
-    >>> from symheli.lpv import LPVStateSpace, Scheduling
+    >>> from symheli import LPVStateSpace, Scheduling
     >>> p = Scheduling("p", "1", 0.0, 1.0)
     >>> A = [[[-1.0, 0.1], [0.1, -20.0]], [[0.5, 0.0], [0.0, 1.0]]]
     >>> model = LPVStateSpace.polynomial(A, [[[1.0], [1.0]]], [[[1.0, 1.0]]], [[[0.0]]], p)
-    >>> small = synthesis.bounded_truncation(model, 1, balance="response")
+    >>> small = synthesis.designs.bounded_truncation(model, 1, balance="response")
     >>> bool(small.error.max() < small.bound < 0.1)
     True
     """

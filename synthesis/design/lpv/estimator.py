@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from symheli.lpv import LPVStateSpace
+from symheli import LPVStateSpace
 from symheli.lpv.matrix_function import MatrixFunction, block, in_one_basis
 from symheli.threads import with_one_thread
 from symheli.values.signal import Signal

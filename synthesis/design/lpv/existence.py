@@ -17,7 +17,8 @@ from typing import NamedTuple
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv import FunctionSpace, UserFunctions
+from symheli.lpv import UserFunctions
+from symheli.lpv.bases import FunctionSpace
 from symheli.lpv.bases.function_space import tensor_grid
 from symheli.lpv.bases.polynomials import factors_of, piecewise_lobatto
 from symheli.values.numbers import whole

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from symheli.lpv import BSpline, FunctionSpace, LPVStateSpace, Scheduling
+from symheli import LPVStateSpace, Scheduling
+from symheli.lpv import BSpline
+from symheli.lpv.bases import FunctionSpace
 from symheli.lpv.bases.polynomials import lobatto_points, piecewise_lobatto, polynomials
 from symheli.values.signal import signals
 from synthesis.design.loops.controller import Controller

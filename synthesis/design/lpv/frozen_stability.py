@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import linalg
 
-from symheli.lpv import LPVStateSpace
+from symheli import LPVStateSpace
 from synthesis.numerics.polynomial.definite import negative_definite
 from synthesis.numerics.polynomial.matrix import PolynomialMatrix
 from synthesis.numerics.polynomial.pieces import pieces

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import linalg
 
+from symheli import UncertainStateSpace
 from symheli.errors import InputError, SynthesisError
-from symheli.lpv import UncertainStateSpace
 from symheli.lpv.bases import PiecewiseLinear
 from symheli.values.arrays import Array, frozen
 from symheli.values.signal import Signal, indices, signals

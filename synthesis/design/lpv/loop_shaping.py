@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
+from symheli import LinearModel, LPVStateSpace
 from symheli.errors import InputError
-from symheli.lpv import LinearModel, LPVStateSpace, series
+from symheli.lpv import series
 from symheli.lpv.mixing import itself, mixed
 from symheli.values.sample_period import same_period
 from symheli.values.signal import Signal
@@ -78,10 +79,10 @@ def loop_shaping(
     --------
     An integrator, whose optimum is sqrt(2) while its gain p is at rest:
 
-    >>> from symheli.lpv import LPVStateSpace, Scheduling
+    >>> from symheli import LPVStateSpace, Scheduling
     >>> p = Scheduling("p", "1", 1.0, 2.0, rate=0.1)
     >>> G = LPVStateSpace.polynomial([[[0.0]]], [[[0.0]], [[1.0]]], [[[1.0]]], [[[0.0]]], p)
-    >>> made = synthesis.loop_shaping(G, W1=0.5)
+    >>> made = synthesis.designs.loop_shaping(G, W1=0.5)
     >>> bool(1.414 < made.shaped.optimum < 1.5), made.controller.inputs == G.outputs
     (True, True)
     """

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv import FunctionSpace
+from symheli.lpv.bases import FunctionSpace
 from symheli.threads import with_one_thread
 from symheli.values.signal import indices
 from synthesis.certify.statement.demand import Rate, limits
@@ -120,7 +120,7 @@ def multiobjective(
 
     Examples
     --------
-    >>> from synthesis import H2, L2, PoleRegion
+    >>> from synthesis.objectives import H2, L2, PoleRegion
     >>> made = synthesis.multiobjective(
     ...     plant, [L2(bound=1.5), H2(performance=["z_x"], disturbances=["w"])],
     ...     region=PoleRegion(decay=1.2), gains=0)

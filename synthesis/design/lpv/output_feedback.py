@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from symheli import UncertainStateSpace
 from symheli.errors import SynthesisError
-from symheli.lpv import UncertainStateSpace
 from symheli.lpv.bases.polynomials import lobatto_points
 from symheli.threads import with_one_thread
 from synthesis.certify.statement.demand import Rate, limits
@@ -210,7 +210,7 @@ def lft_feedback(
 
     Examples
     --------
-    >>> made = synthesis.lft_feedback(plant)
+    >>> made = synthesis.designs.lft_feedback(plant)
     >>> proof = made.certify(math.inf, search=None)
     >>> proof.verified, bool(proof.gamma <= made.promised)
     (True, True)

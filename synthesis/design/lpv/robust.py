@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from symheli.lpv import UncertainStateSpace
+from symheli import UncertainStateSpace
 from symheli.values.signal import Signal
 
 if TYPE_CHECKING:

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.polynomial import chebyshev
 
+from symheli import LinearModel, LPVStateSpace, Scheduling
 from symheli.errors import InputError
-from symheli.lpv import FunctionSpace, LinearModel, LPVStateSpace, Matrices, Scheduling
+from symheli.lpv.bases import FunctionSpace
 from symheli.lpv.bases.function_space import tensor_grid
 from symheli.lpv.bases.polynomials import factors_of, interpolation_points
+from symheli.lpv.tools import Matrices
 from synthesis.certify.statement.scaling import model_scaling
 from synthesis.design.lti.linear_quadratic import control_gains
 from synthesis.design.plant.generalized import Generalized

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from symheli.lpv import Scheduling
+from symheli import Scheduling
 from symheli.lpv.bases.function_space import tensor_grid
 from symheli.progress import tracked
 from synthesis.certify.statement.outcome import Attempt

@@ -29,7 +29,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symheli.lpv import FunctionSpace
+from symheli.lpv.bases import FunctionSpace
 from symheli.progress import tracked
 from synthesis.certify.lower_bounds.box import of_gramian
 from synthesis.certify.statement.outcome import Attempt

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import signal
 
+from symheli import LinearModel
 from symheli.errors import InputError
-from symheli.lpv import LinearModel
 from symheli.lpv.equilibration import is_singular
 from symheli.values.arrays import Array, frozen
 from symheli.values.numbers import positive
@@ -34,7 +34,7 @@ def target(tau: float, order: int, indices: Sequence[float] = STANDARD) -> Array
     return np.array(a[order::-1])
 
 
-def cdm(
+def coefficient_diagram(
     G: LinearModel,
     tau: float,
     *,
@@ -79,10 +79,10 @@ def cdm(
 
     Examples
     --------
-    >>> from symheli.lpv import LinearModel
+    >>> from symheli import LinearModel
     >>> cart = LinearModel([[0.0, 1.0], [0.0, 0.0]], [[0.0], [1.0]], [[1.0, 0.0]], [[0.0]],
     ...                    ["s", "v"], ["u"], ["s"])
-    >>> K = synthesis.cdm(cart, 1.0)
+    >>> K = synthesis.designs.coefficient_diagram(cart, 1.0)
     >>> print(-K.D - K.C @ np.linalg.solve(-K.A, K.B))  # k_0 / l_0 = 1 / (tau^2 / gamma_1)
     [[2.5]]
     """

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import linalg
 
-from symheli.lpv import LinearModel
+from symheli import LinearModel
 from synthesis.design.lti.linear_quadratic import Matrices, given_direct_way, lqg
 from synthesis.design.lti.point_design import (
     DesignStatus,
@@ -90,7 +90,7 @@ def h2(
 
     Examples
     --------
-    >>> from symheli.lpv import LinearModel
+    >>> from symheli import LinearModel
     >>> plant = LinearModel(
     ...     [[-1.0]], [[1.0, 1.0]], [[1.0], [1.0]], [[0.0, 1.0], [1.0, 0.0]],
     ...     ["x"], ["w", "u"], ["z", "y"],

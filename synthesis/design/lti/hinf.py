@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy import linalg, optimize
 
+from symheli import LinearModel
 from symheli.errors import InputError
-from symheli.lpv import LinearModel
 from synthesis.design.lti.central import Normalised, Obstacle, RiccatiTrial
 from synthesis.design.lti.linear_quadratic import Matrices, lqg
 from synthesis.design.lti.point_design import DesignStatus, PointDesign, checked
@@ -116,7 +116,7 @@ def hinf(
     --------
     x' = 3u + w1, y = 2x + w2, z = (x, u): the optimum is sqrt(1/9 + 1/4).
 
-    >>> from symheli.lpv import LinearModel
+    >>> from symheli import LinearModel
     >>> plant = LinearModel(
     ...     [[0.0]], [[1.0, 0.0, 3.0]], [[1.0], [0.0], [2.0]],
     ...     [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]],

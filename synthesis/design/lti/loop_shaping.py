@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from symheli import LinearModel
 from symheli.errors import InputError
-from symheli.lpv import LinearModel, series
+from symheli.lpv import series
 from symheli.values.signal import Signal
 from synthesis.design.lti.point_design import DesignStatus, PointDesign, checked
 from synthesis.design.lti.weights import Weight, as_weight
@@ -22,7 +23,7 @@ from synthesis.numerics.linear.riccati import stabilising
 Array = np.ndarray
 
 
-def ncf(
+def ncfsyn(
     G: LinearModel, W1: Weight = 1.0, W2: Weight = 1.0, *, back_off: float = 1.01
 ) -> PointDesign:
     """Design the controller of the largest normalized coprime stability margin of the shaped plant
@@ -64,7 +65,9 @@ def ncf(
     --------
     For an integrator the optimum is sqrt(2):
 
-    >>> from symheli.lpv import LinearModel, series
+    >>> from symheli import LinearModel
+
+    >>> from symheli.lpv import series
     >>> integrator = LinearModel([[0.0]], [[1.0]], [[1.0]], [[0.0]], ["x"], ["u"], ["y"])
     >>> design = ncf(integrator)
     >>> print(f"{design.optimum:.6f} {design.hinf_norm:.3f} {design.controller.D[0, 0]:.1f}")

@@ -7,8 +7,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import block_diag
 
+from symheli import LinearModel
 from symheli.errors import InputError
-from symheli.lpv import LinearModel
 from symheli.values.signal import Signal
 from synthesis.design.lti.hinf import hinf
 from synthesis.design.lti.point_design import PointDesign
@@ -63,7 +63,7 @@ def mixed_sensitivity(
 
     Examples
     --------
-    >>> from symheli.lpv import LinearModel
+    >>> from symheli import LinearModel
     >>> lag = LinearModel([[-1.0]], [[1.0]], [[1.0]], [[0.0]], ["x"], ["u"], ["y"])
     >>> weight = LinearModel([[-0.001]], [[1.0]], [[1.0]], [[0.5]], ["e"], ["y"], ["S"])
     >>> design = mixed_sensitivity(lag, weight, 0.1)  # at least 0.5 of S at high frequency

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from symheli import LinearModel
 from symheli.errors import InputError
-from symheli.lpv import LinearModel
 from symheli.values.signal import Signal
 from symheli.values.summary import summarized
 from synthesis.design.plant.generalized import Channels, Generalized

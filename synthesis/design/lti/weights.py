@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from scipy.linalg import block_diag
 
+from symheli import LinearModel
 from symheli.errors import InputError
-from symheli.lpv import LinearModel
 from symheli.lpv.linear_model import is_control_system
 from symheli.values.sample_period import same_period
 from symheli.values.signal import Signal

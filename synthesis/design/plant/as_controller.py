@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from symheli import LinearModel, LPVStateSpace, UncertainStateSpace
 from symheli.errors import InputError
-from symheli.lpv import LinearModel, LPVStateSpace, UncertainStateSpace
 from symheli.lpv.linear_model import feedback_matrix, is_control_system
 from symheli.lpv.mixing import ERROR, turned
 from symheli.values.arrays import frozen

@@ -78,7 +78,7 @@ def reasons(
     Examples
     --------
     >>> import numpy as np
-    >>> from symheli.lpv import LinearModel
+    >>> from symheli import LinearModel
     >>> from synthesis.design.plant.generalized import Channels, Generalized
     >>> heave = LinearModel(
     ...     [[0.5, 0.0], [0.0, -1.0]], [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]], [[1, 1], [0, 0], [1, 0]],

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from symheli import LinearModel
 from symheli.errors import InputError
-from symheli.lpv import LinearModel
 from symheli.lpv.equilibration import is_singular
 from symheli.values.signal import Signal, indices
 from symheli.values.summary import summarized

@@ -11,10 +11,11 @@ from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 
+from symheli import LinearModel, LPVStateSpace, UncertainStateSpace
 from symheli.errors import InputError
-from symheli.lpv import LinearModel, LPVStateSpace, UncertainStateSpace, pade_delay, sample_delay
 from symheli.lpv.linear_model import is_control_system
 from symheli.lpv.mixing import itself, mixed
+from symheli.lpv.tools import pade_delay, sample_delay
 from symheli.values.sample_period import SAME
 from symheli.values.signal import Signal
 

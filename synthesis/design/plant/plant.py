@@ -8,21 +8,15 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from symheli import LinearModel, LPVStateSpace, Scheduling, UncertainStateSpace
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv import (
-    FunctionSpace,
-    LinearModel,
-    LPVStateSpace,
-    Scheduling,
-    UncertainStateSpace,
-    lagged,
-    lower_feedback,
-)
+from symheli.lpv.bases import FunctionSpace
 from symheli.lpv.linear_model import is_control_system
 from symheli.lpv.lower_feedback import Partition, Positions
 from symheli.lpv.matrix_function import functions_of
 from symheli.lpv.mixing import ERROR, itself, mixed
 from symheli.lpv.scheduling import Rates
+from symheli.lpv.tools import lagged, lower_feedback
 from symheli.values.signal import Signal, indices, signals
 from symheli.values.summary import as_table, summarized
 from symheli.values.units import per_second
@@ -332,7 +326,7 @@ class Plant:
 
     def lagged(self, seconds: float) -> Plant:
         """Return the plant scheduled by a lag of its parameter and the rate of that lag, both known
-        to a controller: X and Y may then depend on the lag; see `symheli.lpv.lagged`.
+        to a controller: X and Y may then depend on the lag; see `symheli.lpv.tools.lagged`.
         """
         if isinstance(self.model, UncertainStateSpace):
             raise InputError("an uncertain plant has no lagged parameter: take its .nominal")
@@ -348,7 +342,7 @@ class Plant:
 
     def close(self, controller: Any) -> Model:
         """Return the loop of u = K y from the disturbances to the performance; see
-        `symheli.lpv.lower_feedback`.
+        `symheli.lpv.tools.lower_feedback`.
 
         `controller`: {(control, measurement): gain}, an array (controls, measurements) of gains, a
         LinearModel, an LPVStateSpace, a python-control system (in the order of the plant where its

@@ -8,9 +8,10 @@ from typing import Literal
 
 import numpy as np
 
+from symheli import LinearModel, LPVStateSpace
 from symheli.errors import InputError
-from symheli.lpv import LinearModel, LPVStateSpace, Matrices
 from symheli.lpv.bases.polynomials import lobatto_points, piecewise_lobatto
+from symheli.lpv.tools import Matrices
 from symheli.values.numbers import positive
 from synthesis.design.plant.plant import Plant
 

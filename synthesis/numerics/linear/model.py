@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from symheli import LinearModel
 from symheli.errors import InputError
-from symheli.lpv import LinearModel
 from symheli.lpv.linear_model import is_control_system
 
 

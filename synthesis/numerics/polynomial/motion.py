@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symheli.lpv import Scheduling
+from symheli import Scheduling
 
 Array = np.ndarray
 

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
-from symheli.lpv import FunctionSpace
+from symheli.lpv.bases import FunctionSpace
 from symheli.lpv.bases.function_space import tensor_grid
 from symheli.lpv.bases.polynomials import interpolation_points
 from synthesis.numerics.polynomial.bernstein import blossom

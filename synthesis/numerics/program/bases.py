@@ -9,8 +9,9 @@ from itertools import product
 
 import numpy as np
 
+from symheli import Scheduling
 from symheli.errors import InputError
-from symheli.lpv import FunctionSpace, Scheduling
+from symheli.lpv.bases import FunctionSpace
 from symheli.lpv.bases.polynomials import factors_of, polynomials
 
 Array = np.ndarray

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symheli.lpv import FunctionSpace
+from symheli.lpv.bases import FunctionSpace
 from synthesis.numerics.program.lyapunov_program import LyapunovBlocks
 
 Array = np.ndarray

@@ -12,28 +12,21 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from models import lag, random_stable, spring
 
-from symheli.lpv import LPVStateSpace, Scheduling
-from synthesis import (
-    HigherOrder,
-    Memory,
-    Search,
-    Spline,
-    Status,
-    SumOfSquares,
-    decay_rate,
-    generalized_h2,
-    l2_gain,
-    lft_gain,
-    stability,
-)
+from symheli import LPVStateSpace, Scheduling
+from synthesis import decay_rate, l2_gain, lft_gain, stability
+from synthesis.analysis import LowerBoundSearch, Status, energy_to_peak
+from synthesis.forms import HigherOrder, LaggedParameter, Spline
+from synthesis.impose import SumOfSquares
 
-QUICK = Search(levels=4, dwells=4, starts=1, nodes=20, evaluations=4, steps=40, samples=1000)
+QUICK = LowerBoundSearch(
+    levels=4, dwells=4, starts=1, nodes=20, evaluations=4, steps=40, samples=1000
+)
 COARSE = Spline(segments=2, degree=2)
 SOS = {"form": Spline(segments=1, degree=1), "impose": SumOfSquares()}
 ROUTES = {
     "splines": lambda lpv, rate, search: l2_gain(lpv, rate, form=COARSE, search=search),
     "box": lambda lpv, rate, search: l2_gain(lpv, rate, **SOS, search=search),
-    "energy to peak": lambda lpv, rate, search: generalized_h2(
+    "energy to peak": lambda lpv, rate, search: energy_to_peak(
         replace(lpv, D=0 * lpv.D), rate, **SOS, search=search
     ),
     "decay": lambda lpv, rate, search: decay_rate(lpv, rate, **SOS, search=search),
@@ -122,7 +115,7 @@ def test_stability_under_jumps_is_stability_under_any_limit(rate):
     assert cert.verified
     assert cert.verify(rigorous=True)
     # with a higher degree and a memory too: their constant P is one
-    for form in (HigherOrder(2, segments=2), Memory(1.0, segments=3)):
+    for form in (HigherOrder(2, segments=2), LaggedParameter(1.0, segments=3)):
         assert stability(spring(damping=0.8), rate, form=form, search=None).verified
 
 

@@ -8,7 +8,8 @@ import pytest
 from symheli import LinearModel, LPVStateSpace, Scheduling, UncertainStateSpace
 from symheli.errors import InputError
 from symheli.lpv.uncertain_state_space import SAFETY
-from synthesis import Spline, l2_gain
+from synthesis import l2_gain
+from synthesis.forms import Spline
 
 PLAIN = Spline(degree=0)
 covering = UncertainStateSpace.covering

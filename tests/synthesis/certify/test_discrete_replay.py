@@ -10,10 +10,16 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from models import random_stable, spring
 
-from symheli.lpv import LPVStateSpace, Scheduling, simulate
-from synthesis import Search, Spline, SumOfSquares, decay_rate, generalized_h2, l2_gain, lower_bound
+from symheli import LPVStateSpace, Scheduling
+from symheli.lpv.tools import simulate
+from synthesis import decay_rate, l2_gain, lower_bound
+from synthesis.analysis import LowerBoundSearch, energy_to_peak
+from synthesis.forms import Spline
+from synthesis.impose import SumOfSquares
 
-QUICK = Search(levels=4, dwells=4, starts=1, nodes=20, evaluations=4, steps=40, samples=1000)
+QUICK = LowerBoundSearch(
+    levels=4, dwells=4, starts=1, nodes=20, evaluations=4, steps=40, samples=1000
+)
 SOS = {"form": Spline(segments=1, degree=1), "impose": SumOfSquares()}
 OPTIONS = [SOS, {"form": Spline(segments=1, degree=1)}]
 common = settings(
@@ -105,7 +111,7 @@ def test_no_input_has_less_than_the_claim_along_the_trajectory_of_a_certificate(
 @given(lpv=models, rate=rates)
 @pytest.mark.slow
 def test_the_repeated_cycle_shows_the_peak_and_the_decay(lpv, rate):
-    peak = generalized_h2(lpv, rate, **SOS, search=QUICK)
+    peak = energy_to_peak(lpv, rate, **SOS, search=QUICK)
     if peak.worst is not None and math.isfinite(peak.lower):
         within(lpv, rate, peak.worst)
         A, B, C, D = lpv.matrices(np.tile(peak.worst.p, 60))

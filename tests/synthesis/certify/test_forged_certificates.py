@@ -12,20 +12,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from models import forged, lag, random_stable, random_uncertain, spring
 
+from symheli import LPVStateSpace
 from symheli.errors import SymheliError
-from symheli.lpv import LPVStateSpace
-from synthesis import (
-    HigherOrder,
-    Memory,
-    Spline,
-    SumOfSquares,
-    decay_rate,
-    generalized_h2,
-    l2_gain,
-    lft_gain,
-    lft_stability,
-    stability,
-)
+from synthesis import decay_rate, l2_gain, lft_gain, stability
+from synthesis.analysis import energy_to_peak, lft_stability
+from synthesis.forms import HigherOrder, LaggedParameter, Spline
+from synthesis.impose import SumOfSquares
 
 COARSE = Spline(segments=2, degree=2)
 BOX = {"form": Spline(segments=2, degree=1), "impose": SumOfSquares()}
@@ -36,7 +28,9 @@ FORMS = {
     "sampled": lambda: l2_gain(random_stable(2, dt=0.1), form=COARSE, search=None),
     "stability": lambda: stability(damped, 0.1, form=COARSE, search=None),
     "degree four": lambda: stability(damped, 0.1, form=HigherOrder(2, segments=2), search=None),
-    "memory": lambda: l2_gain(damped, 0.5, form=Memory(1.0, segments=3, degree=2), search=None),
+    "memory": lambda: l2_gain(
+        damped, 0.5, form=LaggedParameter(1.0, segments=3, degree=2), search=None
+    ),
     "uncertain": lambda: l2_gain(random_uncertain(2, 0.3), form=COARSE, search=None),
     "uncertain, sampled": lambda: l2_gain(
         random_uncertain(2, 0.3, dt=0.1), form=COARSE, search=None
@@ -44,7 +38,7 @@ FORMS = {
     "uncertain stability": lambda: stability(random_uncertain(2, 0.3), form=COARSE, search=None),
     "box": lambda: l2_gain(damped, 0.1, **BOX, search=None),
     "box stability": lambda: stability(damped, 0.1, **BOX, search=None),
-    "energy to peak": lambda: generalized_h2(damped, 0.1, **BOX, search=None),
+    "energy to peak": lambda: energy_to_peak(damped, 0.1, **BOX, search=None),
     "decay": lambda: decay_rate(damped, 0.1, **BOX, search=None),
     "lft, small gain": lambda: lft_gain(lag().to_lft().reduce(), "small gain", search=None),
     "lft, D": lambda: lft_gain(lag().to_lft().reduce(), "D", search=None),

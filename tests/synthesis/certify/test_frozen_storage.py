@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from symheli.lpv import LPVStateSpace, Matrices, Scheduling
+from symheli import LPVStateSpace, Scheduling
 from symheli.lpv.bases.polynomials import interpolation_points, polynomials
-from synthesis import Spline
+from symheli.lpv.tools import Matrices
 from synthesis.certify.lower_bounds.box import measure, worst_frozen
 from synthesis.certify.questions.frozen_storage import analytic_centre
 from synthesis.certify.questions.one_parameter_search import OneParameter
 from synthesis.certify.questions.problem import pose
+from synthesis.forms import Spline
 
 DEGREE = 6
 """Of the polynomials in place of sine and cosine over two radians: within 1e-6 of them."""

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from models import constant, lag, lateral, random_stable
 
-from symheli.lpv import LPVStateSpace, Scheduling
-from synthesis import Spline, frozen_gain, l2_gain, stability
+from symheli import LPVStateSpace, Scheduling
+from synthesis import frozen_gain, l2_gain, stability
+from synthesis.forms import Spline
 
 COARSE = Spline(segments=4)
 

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from benchmarks.loops_over_decades import loop
+from symheli import LPVStateSpace, Scheduling
 from symheli.errors import InputError
-from symheli.lpv import LPVStateSpace, Scheduling
-from synthesis import Certificate, Spline, l2_gain
+from synthesis import Certificate, l2_gain
 from synthesis.certify.questions.apart import apart
+from synthesis.forms import Spline
 from synthesis.numerics.program.answer import Answer
 
 RATE = 0.1

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from models import lag, spring
 
-from symheli.lpv import LPVStateSpace
+from symheli import LPVStateSpace
 from symheli.lpv.lpv_state_space import FitResiduals
-from synthesis import Spline, SumOfSquares, decay_rate, l2_gain, lft_gain, stability
+from synthesis import decay_rate, l2_gain, lft_gain, stability
+from synthesis.forms import Spline
+from synthesis.impose import SumOfSquares
 
 COARSE = Spline(segments=2, degree=2)
 SOS = {"form": Spline(degree=1, segments=1), "impose": SumOfSquares()}

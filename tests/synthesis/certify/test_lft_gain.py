@@ -11,24 +11,15 @@ import numpy as np
 import pytest
 from models import constant, lag, lateral, random_stable, spring
 
+from symheli import LFT, LinearModel, Scheduling
 from symheli.errors import CertificateError, InputError, UnknownNameError
-from symheli.lpv import LFT, LinearModel, Scheduling, connect
-from synthesis import (
-    SCALINGS,
-    Bernstein,
-    Search,
-    Solver,
-    Status,
-    frozen_box_gain,
-    frozen_gain,
-    l2_gain,
-    lft_gain,
-    lft_stability,
-    lower_bound,
-)
+from symheli.lpv import connect
+from synthesis import Solver, frozen_gain, l2_gain, lft_gain, lower_bound
+from synthesis.analysis import SCALINGS, LowerBoundSearch, Status, frozen_box_gain, lft_stability
 from synthesis.certify.lft.multipliers import Multiplier
+from synthesis.impose import Bernstein
 
-QUICK = Search(levels=4, dwells=7, evaluations=8, steps=60)
+QUICK = LowerBoundSearch(levels=4, dwells=7, evaluations=8, steps=60)
 CLOSE = 1e-5
 """gamma is inflated by 5e-7, the solver's gap is 1e-8 of gamma^2, the margins take the rest."""
 
@@ -126,7 +117,7 @@ def test_a_lag_has_its_static_gain(scaling):
     cert = lft_gain(
         reduced(lag()),
         scaling,
-        search=Search(
+        search=LowerBoundSearch(
             levels=3, dwells=3, starts=1, nodes=16, evaluations=4, steps=24, samples=1000
         ),
     )
@@ -280,7 +271,9 @@ def test_growth_along_a_diagonal_of_two_parameters_is_found():
 @pytest.mark.slow
 def test_an_lft_and_its_polynomial_model_have_the_same_lower_bound():
     quick, lpv = (
-        Search(levels=4, dwells=4, starts=1, nodes=16, evaluations=4, steps=40, samples=2000),
+        LowerBoundSearch(
+            levels=4, dwells=4, starts=1, nodes=16, evaluations=4, steps=40, samples=2000
+        ),
         spring(damping=0.3),
     )
     # the same search on the same matrices, computed by another route: rounding, amplified a little
@@ -294,8 +287,12 @@ def test_an_lft_and_its_polynomial_model_have_the_same_lower_bound():
 @pytest.mark.parametrize(
     "search",
     [
-        Search(levels=4, dwells=5, starts=1, nodes=32, evaluations=6, steps=60, samples=20_000),
-        pytest.param(Search(levels=6, dwells=7, evaluations=12, steps=80), marks=pytest.mark.slow),
+        LowerBoundSearch(
+            levels=4, dwells=5, starts=1, nodes=32, evaluations=6, steps=60, samples=20_000
+        ),
+        pytest.param(
+            LowerBoundSearch(levels=6, dwells=7, evaluations=12, steps=80), marks=pytest.mark.slow
+        ),
     ],
     ids=["coarse", "fine"],
 )

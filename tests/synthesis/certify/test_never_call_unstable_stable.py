@@ -11,10 +11,12 @@ import pytest
 from models import forged, lag, random_stable, searched, spring
 
 import synthesis
+from symheli import LPVStateSpace, Scheduling
 from symheli.errors import InputError, SolverError
-from symheli.lpv import LPVStateSpace, Scheduling
-from synthesis import Solver, Spline, Status, installed_solvers, l2_gain, stability
+from synthesis import Solver, l2_gain, stability
+from synthesis.analysis import Status, installed_solvers
 from synthesis.certify.statement.spline import SplineLyapunov
+from synthesis.forms import Spline
 
 COARSE = Spline(segments=2, degree=2)
 EVERY = (*installed_solvers(), "LYAPUNOV")

@@ -8,16 +8,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from symheli import LPVStateSpace, Scheduling
 from symheli.errors import CertificateError, InputError
-from symheli.lpv import LPVStateSpace, Patches, PiecewiseLinear, Polynomial, Product, Scheduling
+from symheli.lpv import PiecewiseLinear, Polynomial, Product
+from symheli.lpv.bases import Patches
 from symheli.lpv.bases.spaces import product_space, sum_space
-from synthesis import Certificate, Spline, SumOfSquares, l2_gain, stability
+from synthesis import Certificate, l2_gain, stability
 from synthesis.certify.assemble.unknowns import scaled_problem
 from synthesis.certify.proof import box, one_parameter
 from synthesis.certify.statement.box import BoxLyapunov
 from synthesis.certify.statement.demand import Demand
 from synthesis.certify.statement.spline import SplineLyapunov
 from synthesis.certify.statement.units import Scaling
+from synthesis.forms import Spline
+from synthesis.impose import SumOfSquares
 from synthesis.numerics.polynomial.motion import Motion
 from synthesis.numerics.polynomial.pieces import model_pieces, pieces
 

@@ -10,11 +10,15 @@ import pytest
 from models import lag, lateral, random_stable, spring
 
 from symheli.errors import CertificateError
-from symheli.lpv import simulate
-from synthesis import Search, Spline, Status, l2_gain, lower_bound, stability
+from symheli.lpv.tools import simulate
+from synthesis import l2_gain, lower_bound, stability
+from synthesis.analysis import LowerBoundSearch, Status
+from synthesis.forms import Spline
 
 COARSE = Spline(segments=4)
-QUICK = Search(levels=6, dwells=7, starts=1, nodes=40, evaluations=12, steps=80, samples=2000)
+QUICK = LowerBoundSearch(
+    levels=6, dwells=7, starts=1, nodes=40, evaluations=12, steps=80, samples=2000
+)
 
 
 def response(lpv, time, p, u, x, step):

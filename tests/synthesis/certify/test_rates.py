@@ -5,8 +5,8 @@ import math
 import pytest
 from models import lag
 
+from symheli import Scheduling
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv import Scheduling
 from synthesis import l2_gain, lower_bound, stability
 from synthesis.certify.statement.demand import rates
 

@@ -15,19 +15,11 @@ from models import constant
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
-from symheli.lpv import LFT, LPVStateSpace, Scheduling
-from synthesis import (
-    HigherOrder,
-    Solver,
-    Spline,
-    Status,
-    SumOfSquares,
-    frozen_gain,
-    l2_gain,
-    lft_gain,
-    lft_stability,
-    stability,
-)
+from symheli import LFT, LPVStateSpace, Scheduling
+from synthesis import Solver, frozen_gain, l2_gain, lft_gain, stability
+from synthesis.analysis import Status, lft_stability
+from synthesis.forms import HigherOrder, Spline
+from synthesis.impose import SumOfSquares
 
 COARSE = Spline(segments=4)
 GOLDEN = (1 + math.sqrt(5)) / 2

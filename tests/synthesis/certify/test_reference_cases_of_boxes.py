@@ -12,18 +12,15 @@ from scipy.integrate import quad
 from scipy.optimize import minimize_scalar
 from test_reference_cases import GOLDEN, INFLATED, between, oscillator, scalar
 
-from symheli.lpv import LPVStateSpace, Scheduling
-from synthesis import (
-    Search,
-    Spline,
-    Status,
-    SumOfSquares,
-    generalized_h2,
-    l2_gain,
-    stability,
-)
+from symheli import LPVStateSpace, Scheduling
+from synthesis import l2_gain, stability
+from synthesis.analysis import LowerBoundSearch, Status, energy_to_peak
+from synthesis.forms import Spline
+from synthesis.impose import SumOfSquares
 
-QUICK = Search(levels=4, dwells=5, starts=1, nodes=40, evaluations=12, steps=120, samples=20_000)
+QUICK = LowerBoundSearch(
+    levels=4, dwells=5, starts=1, nodes=40, evaluations=12, steps=120, samples=20_000
+)
 
 
 def square(A, B, C, rate, dt=None):
@@ -71,7 +68,7 @@ def test_the_peak_of_a_first_order_model_lies_between_its_bounds(rate, above, be
     jump.
     """
     exact = {0.0: 2.25 / math.sqrt(2), math.inf: 2 * math.sqrt(2)}.get(rate) or peak_of_scalar(rate)
-    cert = generalized_h2(scalar(rate), form=Spline(segments=16))
+    cert = energy_to_peak(scalar(rate), form=Spline(segments=16))
     assert cert.frozen == pytest.approx(2.25 / math.sqrt(2), rel=1e-8)
     # `above`: the degree of P; `below`: how near the waves looked at come. Both are what was
     # reached, rounded up
@@ -85,7 +82,7 @@ def test_a_gyroscopic_term_does_not_change_the_peak(rate):
     """x' = (-I + w J) x + u, |w| <= 5: the Gramian is I/2 whatever w(t), so that the peak of |x| is
     1/sqrt 2.
     """
-    cert = generalized_h2(
+    cert = energy_to_peak(
         between([[-1, -5], [5, -1]], [[-1, 5], [-5, -1]]),
         rate,
         form=Spline(degree=1, segments=2),
@@ -100,7 +97,7 @@ def test_the_peak_of_a_frozen_oscillator_is_that_of_its_gramian():
     largest at the smallest q.
     """
     exact = 1 / math.sqrt(2 * 0.4 * 0.5)
-    cert = generalized_h2(oscillator(0.4, 0.5, 2.0), 0.0, form=Spline(segments=8))
+    cert = energy_to_peak(oscillator(0.4, 0.5, 2.0), 0.0, form=Spline(segments=8))
     assert cert.frozen == cert.lower == pytest.approx(exact, rel=1e-8)
     # a cubic P on eight segments: what was reached, rounded up
     assert exact <= cert.gamma <= exact * (1 + 1e-3)
@@ -134,7 +131,7 @@ def test_the_peak_of_a_sampled_first_order_model_lies_between_its_bounds(rate, a
             0.25 ** (j - 1) * (2 - np.maximum(0, ends - rate * j)) ** 2 for j in range(1, 60)
         )
         exact = float(((1 + ends) * np.sqrt(sums)).max())
-    cert = generalized_h2(discrete(rate), search=QUICK)
+    cert = energy_to_peak(discrete(rate), search=QUICK)
     assert cert.frozen == pytest.approx(2.25 / math.sqrt(0.75), rel=1e-8)
     # what was reached, rounded up
     assert exact * (1 - below) <= cert.lower <= exact * (1 + 1e-9)
@@ -175,7 +172,7 @@ def test_the_peak_of_two_parameters_lies_between_its_bounds(rate):
     B = {(0, 0): [[4.0]], (1, 0): [[-2.0]], (0, 1): [[-2.0]], (1, 1): [[1.0]]}
     C = {(0, 0): [[1.0]], (1, 0): [[1.0]], (0, 1): [[1.0]], (1, 1): [[1.0]]}
     exact = 16 / math.sqrt(2) if math.isinf(rate) else product_peak(rate)
-    cert = generalized_h2(
+    cert = energy_to_peak(
         square({(0, 0): [[-1.0]]}, B, C, rate), impose=SumOfSquares(), search=QUICK
     )
     assert cert.frozen == pytest.approx(2.25**2 / math.sqrt(2), rel=1e-7)

@@ -10,8 +10,10 @@ by a constant P, and 1.2968, later 1.2946, for |p'| <= 0.1 with P over 1, p, p^2
 import numpy as np
 import pytest
 
-from symheli.lpv import Matrices, Scheduling
-from synthesis import Search, frozen_gain, lower_bound
+from symheli import Scheduling
+from symheli.lpv.tools import Matrices
+from synthesis import frozen_gain, lower_bound
+from synthesis.analysis import LowerBoundSearch
 
 DELAY, RATE = 0.5, 0.1
 
@@ -124,7 +126,7 @@ def test_the_printed_gain_is_that_of_six_points_and_grows_with_their_number():
 @pytest.mark.slow
 def test_a_trajectory_replayed_on_the_exact_model_exceeds_what_was_printed():
     model = Loop()
-    found = lower_bound(model, RATE, search=Search(seconds=120.0))
+    found = lower_bound(model, RATE, search=LowerBoundSearch(seconds=120.0))
     time, p = found.trajectory
     assert np.all(np.abs(np.diff(p)) <= RATE * np.diff(time) * (1 + 1e-6))
     # flown once more by Runge and Kutta's rule, with Simpson's for the energy of e = C x + d

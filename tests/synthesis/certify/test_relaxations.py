@@ -10,25 +10,14 @@ import pytest
 from models import forged, lag, random_stable, searched, spring
 from test_never_call_unstable_stable import unstable
 
+from symheli import LFT, LPVStateSpace, Scheduling
 from symheli.errors import CertificateError, InputError, UnknownNameError
-from symheli.lpv import LFT, LPVStateSpace, Scheduling
-from synthesis import (
-    Bernstein,
-    Grid,
-    Memory,
-    Solver,
-    Spline,
-    Status,
-    SumOfSquares,
-    Vertices,
-    decay_rate,
-    generalized_h2,
-    installed_solvers,
-    l2_gain,
-    stability,
-)
+from synthesis import Solver, decay_rate, l2_gain, stability
+from synthesis.analysis import Status, energy_to_peak, installed_solvers
 from synthesis.certify.questions.finer import ABOVE_FROZEN
 from synthesis.certify.statement.demand import Demand
+from synthesis.forms import LaggedParameter, Spline
+from synthesis.impose import Bernstein, Grid, SumOfSquares, Vertices
 from synthesis.numerics.polynomial.pieces import pieces
 
 PROOFS = {"bernstein": Bernstein(), "sos": SumOfSquares(), "vertices": Vertices()}
@@ -76,7 +65,7 @@ def test_a_scalar_system_of_two_parameters_has_its_closed_forms(kind, dt):
     slow = 0.3 if dt is None else (1 - 0.03)
     expected = {
         l2_gain: 1 / 0.3,
-        generalized_h2: 1 / math.sqrt(0.6) if dt is None else dt / math.sqrt(1 - slow**2),
+        energy_to_peak: 1 / math.sqrt(0.6) if dt is None else dt / math.sqrt(1 - slow**2),
         decay_rate: slow if dt is None else -math.log(slow) / dt,
     }
     for analysis, value in expected.items():
@@ -95,7 +84,7 @@ def test_sums_of_squares_lie_between_grid_and_bernstein():
     grid.
     """
     model = mass_spring()
-    for analysis in (l2_gain, generalized_h2):
+    for analysis in (l2_gain, energy_to_peak):
         found = {
             kind: analysis(model, form=QUICK, impose=impose, search=None)
             for kind, impose in {**PROOFS, "grid": Grid()}.items()
@@ -193,7 +182,7 @@ def test_the_energy_to_peak_gain_of_an_oscillator():
     equation by hand).
     """
     model = mass_spring(spring=0.0)
-    cert = generalized_h2(model, {"k": 0.0, "d": 0.0}, form=Spline(degree=2), search=None)
+    cert = energy_to_peak(model, {"k": 0.0, "d": 0.0}, form=Spline(degree=2), search=None)
     assert cert.frozen == pytest.approx(1 / math.sqrt(2 * 0.4), rel=1e-7)
     assert cert.frozen <= cert.gamma <= 1.05 * cert.frozen
 
@@ -221,7 +210,7 @@ def never_proven(solver, scale, excess):
         model = unstable(excess, scale, dt)
         form = Spline(degree=1, segments=1)
         for impose in (Bernstein(subdivision=1), SumOfSquares(), Vertices(), Grid(4)):
-            for analysis in (l2_gain, generalized_h2, decay_rate, stability):
+            for analysis in (l2_gain, energy_to_peak, decay_rate, stability):
                 cert = analysis(model, form=form, impose=impose, solver=quick, search=None)
                 assert cert.status is Status.UNSTABLE
                 assert not cert.verified
@@ -242,7 +231,7 @@ def test_a_grid_sees_no_instability_between_its_points_and_says_so():
     assert not found.proof.exact(found.bound)
 
 
-@pytest.mark.parametrize("analysis", [l2_gain, generalized_h2, decay_rate, stability])
+@pytest.mark.parametrize("analysis", [l2_gain, energy_to_peak, decay_rate, stability])
 def test_a_grid_is_never_a_proof(analysis):
     cert = analysis(lag(), 1.0, form=Spline(degree=1), impose=Grid(), search=None)
     assert cert.status is Status.UNPROVEN
@@ -252,7 +241,7 @@ def test_a_grid_is_never_a_proof(analysis):
     if analysis is not stability:
         assert math.isinf(cert.proven)
         assert cert.indicative == pytest.approx(
-            {l2_gain: 1, generalized_h2: math.sqrt(0.5), decay_rate: 1}[analysis], rel=1e-3
+            {l2_gain: 1, energy_to_peak: math.sqrt(0.5), decay_rate: 1}[analysis], rel=1e-3
         )
     with pytest.raises(CertificateError):
         replace(cert, verified=True)
@@ -262,7 +251,7 @@ def test_a_grid_is_never_a_proof(analysis):
 @pytest.mark.parametrize("dt", [None, 0.2])
 def test_exact_arithmetic_rejects_a_tampered_certificate(dt):
     model = mass_spring(dt=dt, spring=0.3 if dt is None else 0.1)
-    for analysis in (l2_gain, generalized_h2, decay_rate):
+    for analysis in (l2_gain, energy_to_peak, decay_rate):
         cert = analysis(model, form=Spline(degree=1 if dt is None else 0), search=None)
         assert cert.verify()
         assert cert.verify(rigorous=True)
@@ -282,7 +271,7 @@ def test_exact_arithmetic_rejects_a_tampered_certificate(dt):
 @pytest.mark.slow
 def test_a_worst_trajectory_is_found_and_its_order_is_kept():
     model = mass_spring(0.8, spring=0.6)
-    peak = generalized_h2(model, form=QUICK)
+    peak = energy_to_peak(model, form=QUICK)
     assert peak.frozen <= peak.lower <= peak.gamma * (1 + 1e-6)
     slow = decay_rate(spring(damping=0.3), 0.5, form=Spline(degree=2, segments=2))
     assert slow.alpha <= slow.upper < slow.frozen
@@ -329,7 +318,7 @@ def test_wrong_input_gets_a_sentence():
     with pytest.raises(InputError, match="rate must be >= 0"):
         decay_rate(two_lags(), [1.0, -1.0])
     with pytest.raises(InputError, match="needs D = 0"):
-        generalized_h2(random_stable(0))
+        energy_to_peak(random_stable(0))
     with pytest.raises(InputError, match="or an LFT"):
         decay_rate(np.eye(2))  # type: ignore[arg-type]
     with pytest.raises(InputError, match="total degree of P needs one segment"):
@@ -376,9 +365,17 @@ def test_a_next_value_that_may_be_anywhere_costs_no_degree_in_p():
         (stability, {"form": Spline(accept=2.0)}, "stability has none"),
         (stability, {"impose": Bernstein(margins=(1e-3,))}, "margins and floor are for gains"),
         (decay_rate, {"impose": SumOfSquares(floor=1e-3)}, "margins and floor are for gains"),
-        (l2_gain, {"form": Memory(1.0), "impose": SumOfSquares()}, "plain Bernstein coefficients"),
-        (l2_gain, {"form": Memory(1.0), "impose": Bernstein(subdivision=1)}, "plain Bernstein"),
-        (generalized_h2, {"form": Memory(1.0)}, "for l2_gain and stability"),
+        (
+            l2_gain,
+            {"form": LaggedParameter(1.0), "impose": SumOfSquares()},
+            "plain Bernstein coefficients",
+        ),
+        (
+            l2_gain,
+            {"form": LaggedParameter(1.0), "impose": Bernstein(subdivision=1)},
+            "plain Bernstein",
+        ),
+        (energy_to_peak, {"form": LaggedParameter(1.0)}, "for l2_gain and stability"),
     ],
 )
 def test_an_option_without_a_meaning_for_the_question_is_refused(analysis, options, said):
@@ -391,7 +388,7 @@ def test_an_option_without_a_meaning_for_the_question_is_refused(analysis, optio
     [
         (lambda: Spline(segments=10**6), "segments must be an integer from 1 to 1024"),
         (lambda: Spline(segments=(4, (8, 10**6))), "segments must be an integer from 1 to 1024"),
-        (lambda: Memory(1.0, across_segments=10**6), "across_segments from 1 to 1024"),
+        (lambda: LaggedParameter(1.0, across_segments=10**6), "across_segments from 1 to 1024"),
         (lambda: Bernstein(subdivision=40), "subdivision must be an integer from 0 to 10"),
         (lambda: Bernstein(elevation=10**6), "elevation must be an integer from 0 to 64"),
         (lambda: SumOfSquares(elevation=10**6), "elevation must be an integer from 0 to 64"),

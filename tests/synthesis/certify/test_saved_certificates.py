@@ -15,10 +15,14 @@ from hypothesis import strategies as st
 from models import forged, lag, spring
 from test_forged_certificates import FORMS, genuine, same
 
+from symheli import LPVStateSpace, Scheduling
 from symheli.errors import CertificateError, InputError, SymheliError
-from symheli.lpv import LPVStateSpace, PiecewiseLinear, Scheduling, UserFunctions
-from synthesis import Certificate, Grid, Spline, Status, l2_gain, stability
+from symheli.lpv import PiecewiseLinear, UserFunctions
+from synthesis import Certificate, l2_gain, stability
+from synthesis.analysis import Status
 from synthesis.certify.statement.trajectory import SchedulingTrajectory
+from synthesis.forms import Spline
+from synthesis.impose import Grid
 
 QUICK = settings(
     max_examples=30, derandomize=True, deadline=None, suppress_health_check=list(HealthCheck)

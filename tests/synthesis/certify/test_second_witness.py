@@ -9,24 +9,17 @@ import numpy as np
 import pytest
 from models import random_stable, spring
 
+from symheli import LPVStateSpace, Scheduling
 from symheli.errors import CertificateError
-from symheli.lpv import LPVStateSpace, Scheduling
-from synthesis import (
-    HigherOrder,
-    Memory,
-    Spline,
-    SumOfSquares,
-    decay_rate,
-    generalized_h2,
-    h2_gain,
-    l2_gain,
-    stability,
-)
+from synthesis import decay_rate, h2_gain, l2_gain, stability
+from synthesis.analysis import energy_to_peak
 from synthesis.certify.assemble import box as program
 from synthesis.certify.assemble import unknowns as forms
 from synthesis.certify.proof import box as proof
 from synthesis.certify.proof import inequalities
 from synthesis.certify.proof import one_parameter as verify
+from synthesis.forms import HigherOrder, LaggedParameter, Spline
+from synthesis.impose import SumOfSquares
 from synthesis.numerics.polynomial import pieces, regions
 
 COARSE = Spline(segments=4, degree=2, grading=1.0)
@@ -129,7 +122,7 @@ CASES = {
 ANALYSES = {
     "splines": lambda lpv: l2_gain(lpv, form=COARSE, search=None),
     "box": lambda lpv: l2_gain(lpv, **BOX, search=None),
-    "energy to peak": lambda lpv: generalized_h2(no_feedthrough(lpv), **BOX, search=None),
+    "energy to peak": lambda lpv: energy_to_peak(no_feedthrough(lpv), **BOX, search=None),
     "variance": lambda lpv: h2_gain(no_feedthrough(lpv), **BOX, search=None),
 }
 
@@ -188,7 +181,7 @@ def test_the_witness_of_the_decay_and_of_higher_degrees_looks_too(monkeypatch):
     memory = l2_gain(
         spring(damping=0.4),
         0.5,
-        form=Memory(1.0, segments=3, degree=2),
+        form=LaggedParameter(1.0, segments=3, degree=2),
         search=None,
     )
     for cert in (decay, quartic, memory):

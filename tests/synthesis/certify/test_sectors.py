@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from symheli import InputError, LPVStateSpace, Scheduling, UncertainStateSpace
+from symheli import LPVStateSpace, Scheduling, UncertainStateSpace
+from symheli.errors import InputError
 from synthesis import l2_gain, stability
 
 p = Scheduling("p", "1", low=0.0, high=1.0, rate=0.2)

@@ -3,7 +3,7 @@
 import pytest
 
 from benchmarks.loops_over_decades import loop
-from symheli.lpv import LPVStateSpace, Scheduling
+from symheli import LPVStateSpace, Scheduling
 from synthesis import l2_gain
 
 CLOSE = 1.01

@@ -12,23 +12,14 @@ import pytest
 from models import fastest_growth, forged, lag, lateral, random_stable, searched, spring
 from scipy.optimize import brentq
 
+from symheli import LPVStateSpace, Scheduling
 from symheli.errors import InputError
-from symheli.lpv import LPVStateSpace, Scheduling
-from synthesis import (
-    HigherOrder,
-    Memory,
-    Search,
-    Spline,
-    Status,
-    decay_rate,
-    generalized_h2,
-    l2_gain,
-    lower_bound,
-    stability,
-)
+from synthesis import decay_rate, l2_gain, lower_bound, stability
+from synthesis.analysis import LowerBoundSearch, Status, energy_to_peak
 from synthesis.certify.proof.inequalities import Statement, lmi_polynomials
 from synthesis.certify.statement.lag import LagRegion
 from synthesis.certify.statement.spline import MemoryLyapunov
+from synthesis.forms import HigherOrder, LaggedParameter, Spline
 from synthesis.numerics.polynomial.pieces import pieces
 from synthesis.numerics.polynomial.symmetric_power import (
     generator,
@@ -39,7 +30,7 @@ from synthesis.numerics.polynomial.symmetric_power import (
     power,
 )
 
-MEMORY = Memory(1.5, segments=8, degree=2, grading=1.0, across_segments=2)
+MEMORY = LaggedParameter(1.5, segments=8, degree=2, grading=1.0, across_segments=2)
 QUARTIC = HigherOrder(2, segments=4)
 SHARPER = (MEMORY, QUARTIC)
 
@@ -168,7 +159,9 @@ def test_they_prove_a_spring_at_a_rate_at_which_a_quadratic_does_not(form):
 
 @pytest.mark.slow
 def test_memory_brings_the_gain_nearer_to_its_lower_bound():
-    search = Search(levels=4, dwells=5, starts=1, nodes=40, evaluations=12, steps=80, samples=5000)
+    search = LowerBoundSearch(
+        levels=4, dwells=5, starts=1, nodes=40, evaluations=12, steps=80, samples=5000
+    )
     below = lower_bound(spring(), 0.2, search=search).gain
     plain, memory = (
         l2_gain(spring(), 0.2, form=form, search=None)
@@ -187,7 +180,7 @@ def test_a_growing_spring_is_never_called_stable(form):
             spring(),
             rate,
             form=form,
-            search=Search(levels=4, dwells=7, starts=1, nodes=40, evaluations=12),
+            search=LowerBoundSearch(levels=4, dwells=7, starts=1, nodes=40, evaluations=12),
         )
         assert proof.status is Status.GROWING
         assert not proof.verified
@@ -257,7 +250,7 @@ def test_in_discrete_time_a_memory_or_an_order_is_refused_before_any_work(
             InputError, match=rf"{said} is for continuous time; this model is sampled every 0\.1 s"
         ):
             analysis(sampled, rate, form=form)
-    for analysis in (generalized_h2, decay_rate):
+    for analysis in (energy_to_peak, decay_rate):
         with pytest.raises(InputError, match=f"{said} is a form for l2_gain and stability"):
             analysis(sampled, rate, form=form)
 
@@ -278,13 +271,13 @@ def test_forms_that_do_not_suit_the_question_are_refused():
     with pytest.raises(InputError, match="order 2 or 3"):
         HigherOrder(1)
     with pytest.raises(InputError, match="seconds > 0"):
-        Memory(-1.0)
+        LaggedParameter(-1.0)
 
 
 @pytest.mark.slow
 def test_the_lateral_loop_is_bracketed_within_a_quarter():
     lpv = lateral()
-    cert = l2_gain(lpv, 3.0, form=Memory(0.6, grading=1.5))
+    cert = l2_gain(lpv, 3.0, form=LaggedParameter(0.6, grading=1.5))
     assert cert.verify(rigorous=True)
     assert cert.gap < 1.25
     assert cert.gamma < 0.8 * l2_gain(lpv, 3.0, search=None).gamma

@@ -7,18 +7,22 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from symheli import LPVStateSpace, Scheduling
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv import LPVStateSpace, Scheduling, simulate
-from synthesis import Bernstein, Search, Spline, Status, generalized_h2, l2_gain, stability
+from symheli.lpv.tools import simulate
+from synthesis import l2_gain, stability
+from synthesis.analysis import LowerBoundSearch, Status, energy_to_peak
 from synthesis.certify.lower_bounds.paths import Wave
 from synthesis.certify.lower_bounds.tied import Smooth
 from synthesis.certify.questions.certificate import Certificate
+from synthesis.forms import Spline
+from synthesis.impose import Bernstein
 from synthesis.numerics.polynomial.motion import Motion
 
 TOP = 0.3
 JERKS = (math.inf, 10.0, 1.0, 0.3, 0.1)
 ALONE, BOTH = Spline(degree=3, segments=6), Spline(degree=(3, 2), segments=((6, 1),))
-QUICK = Search(seconds=math.inf)
+QUICK = LowerBoundSearch(seconds=math.inf)
 
 
 def stiffening(dt=None):
@@ -248,7 +252,7 @@ def test_a_number_for_the_rate_takes_the_tie_away():
 
 @pytest.mark.slow
 def test_peaks_are_proven_too():
-    found = [generalized_h2(tied(j), form=BOTH, search=None).gamma for j in (math.inf, 0.3)]
+    found = [energy_to_peak(tied(j), form=BOTH, search=None).gamma for j in (math.inf, 0.3)]
     assert found[1] < found[0]
 
 

@@ -11,24 +11,15 @@ import pytest
 from models import constant, forged, random_uncertain, searched, uncertain_pole
 from scipy.optimize import minimize_scalar
 
-from symheli import UncertainStateSpace
+from symheli import LPVStateSpace, Scheduling, UncertainStateSpace
 from symheli.errors import CertificateError, InputError, UnknownNameError
-from symheli.lpv import LPVStateSpace, PiecewiseLinear, Product, Scheduling
-from synthesis import (
-    Certificate,
-    HigherOrder,
-    Memory,
-    Spline,
-    Status,
-    SumOfSquares,
-    decay_rate,
-    frozen_gain,
-    generalized_h2,
-    l2_gain,
-    stability,
-)
+from symheli.lpv import PiecewiseLinear, Product
+from synthesis import Certificate, decay_rate, frozen_gain, l2_gain, stability
+from synthesis.analysis import Status, energy_to_peak
 from synthesis.certify.assemble import bounded_real
 from synthesis.certify.proof import inequalities, one_parameter
+from synthesis.forms import HigherOrder, LaggedParameter, Spline
+from synthesis.impose import SumOfSquares
 from synthesis.numerics.linear.norm import norm
 
 COARSE = Spline(segments=2, degree=2)
@@ -331,11 +322,11 @@ def two_parameters():
     "ask",
     [
         lambda: l2_gain(two_parameters()),
-        lambda: l2_gain(uncertain_pole(-1.0, 0.2), form=Memory(1.0)),
+        lambda: l2_gain(uncertain_pole(-1.0, 0.2), form=LaggedParameter(1.0)),
         lambda: stability(uncertain_pole(-1.0, 0.2), form=HigherOrder(2)),
         lambda: l2_gain(uncertain_pole(-1.0, 0.2), impose=SumOfSquares()),
         lambda: decay_rate(uncertain_pole(-1.0, 0.2)),
-        lambda: generalized_h2(uncertain_pole(-1.0, 0.2)),
+        lambda: energy_to_peak(uncertain_pole(-1.0, 0.2)),
     ],
 )
 def test_what_is_not_asked_of_a_set_is_refused_with_what_to_do(ask):

@@ -5,9 +5,10 @@ what depends on p.
 import numpy as np
 import pytest
 
+from symheli import LFT, Scheduling
 from symheli.errors import InputError
-from symheli.lpv import LFT, Scheduling
-from synthesis import Status, l2_gain, stability
+from synthesis import l2_gain, stability
+from synthesis.analysis import Status
 
 
 def oscillator(softening, position=1.0, velocity=1.0, u=1.0, y=1.0, q=1.0):

@@ -9,22 +9,15 @@ import pytest
 from models import lag
 
 from symheli.errors import CertificateError
-from synthesis import (
-    Certificate,
-    Spline,
-    SumOfSquares,
-    decay_rate,
-    generalized_h2,
-    l2_gain,
-    lft_gain,
-    lft_stability,
-    stability,
-)
+from synthesis import Certificate, decay_rate, l2_gain, lft_gain, stability
+from synthesis.analysis import energy_to_peak, lft_stability
+from synthesis.forms import Spline
+from synthesis.impose import SumOfSquares
 
 ANALYSES = {
     "splines": lambda: l2_gain(lag(), form=Spline(segments=2), search=None),
     "box": lambda: l2_gain(lag(), form=Spline(degree=1), impose=SumOfSquares(), search=None),
-    "energy to peak": lambda: generalized_h2(lag(), form=Spline(degree=1, segments=1), search=None),
+    "energy to peak": lambda: energy_to_peak(lag(), form=Spline(degree=1, segments=1), search=None),
     "decay rate": lambda: decay_rate(lag(), form=Spline(degree=1, segments=1), search=None),
     "lft": lambda: lft_gain(lag().to_lft().reduce(), search=None),
     "stability, splines": lambda: stability(lag(), form=Spline(segments=2), search=None),

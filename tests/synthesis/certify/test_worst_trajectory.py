@@ -132,10 +132,11 @@ def test_the_ascent_keeps_range_and_rate_and_never_loses(dt):
 
 @pytest.mark.slow
 def test_the_search_finds_more_than_the_waves_it_starts_from():
-    from synthesis import Search, lower_bound
+    from synthesis import lower_bound
+    from synthesis.analysis import LowerBoundSearch
     from synthesis.certify.lower_bounds.lower_bound import _TrajectorySearch
 
-    search = Search(
+    search = LowerBoundSearch(
         levels=6, dwells=5, starts=1, nodes=40, evaluations=15, steps=80, samples=20_000
     )
     lpv = lateral().with_rate(3.0)
@@ -190,13 +191,14 @@ def test_corners_reach_the_fastest_pumping_of_a_spring_exactly():
 def test_a_bound_by_jumps_is_flown_as_it_is_reported():
     from test_order_of_bounds import response
 
-    from synthesis import Search, lower_bound
+    from synthesis import lower_bound
+    from synthesis.analysis import LowerBoundSearch
 
     lpv = spring(damping=0.4)
     found = lower_bound(
         lpv,
         math.inf,
-        search=Search(
+        search=LowerBoundSearch(
             levels=4, dwells=7, starts=1, nodes=20, evaluations=8, steps=60, samples=3000
         ),
     )
@@ -217,9 +219,12 @@ def test_a_slow_p_is_given_the_time_to_cross_its_range():
     """
     from test_reference_cases import scalar
 
-    from synthesis import Search, lower_bound
+    from synthesis import lower_bound
+    from synthesis.analysis import LowerBoundSearch
 
-    quick = Search(levels=4, dwells=4, starts=1, nodes=40, evaluations=6, steps=120, samples=20_000)
+    quick = LowerBoundSearch(
+        levels=4, dwells=4, starts=1, nodes=40, evaluations=6, steps=120, samples=20_000
+    )
     found = lower_bound(scalar(0.01), search=quick)
     # three times the slowest mode, 19 s, leave 2.2507; what was reached here, rounded down
     assert 2.2525 < found.gain < 2.25441
@@ -228,9 +233,12 @@ def test_a_slow_p_is_given_the_time_to_cross_its_range():
 
 @pytest.mark.slow
 def test_a_p_that_may_jump_is_never_better_than_one_with_a_limit():
-    from synthesis import Search, lower_bound
+    from synthesis import lower_bound
+    from synthesis.analysis import LowerBoundSearch
 
-    quick = Search(levels=4, dwells=7, starts=1, nodes=40, evaluations=12, steps=80, samples=4000)
+    quick = LowerBoundSearch(
+        levels=4, dwells=7, starts=1, nodes=40, evaluations=12, steps=80, samples=4000
+    )
     gains = [
         lower_bound(spring(damping=0.4), rate, search=quick).gain for rate in (1.0, 3.0, math.inf)
     ]

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 import sympy
 
-from symheli import InputError, LinearModel, LPVStateSpace, Scheduling
-from symheli.errors import SynthesisError
+from symheli import LinearModel, LPVStateSpace, Scheduling
+from symheli.errors import InputError, SynthesisError
 from symheli.lpv import UserFunctions, balanced_truncation, parallel, series
-from synthesis import bounded_truncation, l2_gain
+from synthesis import l2_gain
+from synthesis.designs import bounded_truncation
 
 P = Scheduling("p", "1", low=0.0, high=1.0, rate=1.0)
 

@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 from scheduled_plants import RATE, spring
 
-from symheli import Scheduling
+from symheli import LPVStateSpace, Scheduling
 from symheli.errors import InputError
-from symheli.lpv import LPVStateSpace
-from synthesis import Memory, Search, Spline, l2_gain, lower_bound, output_feedback
+from synthesis import l2_gain, lower_bound, output_feedback
+from synthesis.analysis import LowerBoundSearch
 from synthesis.certify.questions.adjoint import ADJOINT, FAR_ABOVE, backwards
 from synthesis.certify.questions.problem import pose
 from synthesis.certify.statement.spline import MemoryLyapunov
+from synthesis.forms import LaggedParameter, Spline
 
-GLANCE = Search(levels=6, dwells=5, starts=1, nodes=30, evaluations=8, samples=5000)
+GLANCE = LowerBoundSearch(levels=6, dwells=5, starts=1, nodes=30, evaluations=8, samples=5000)
 
 
 @pytest.fixture(scope="module")
@@ -129,6 +130,6 @@ def test_nor_where_the_rate_is_said_with_the_question():
 
 @pytest.mark.slow
 def test_another_form_or_solver_is_taken_as_it_is_asked_for(made):
-    proof = made.certify(RATE, search=None, form=Memory(0.5, segments=2))
+    proof = made.certify(RATE, search=None, form=LaggedParameter(0.5, segments=2))
     assert isinstance(proof.lyapunov, MemoryLyapunov)
     assert "CLARABEL" in made.certify(RATE, search=None, solver="CLARABEL").solver

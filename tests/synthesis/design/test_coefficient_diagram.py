@@ -60,7 +60,7 @@ def test_the_standard_form_is_manabes():
 def test_the_double_integrator_has_its_closed_form():
     """(l1 s + l0) s^2 + k1 s + k0 = P: K = -(tau s + 1) / (tau^3 s / 12.5 + tau^2 / 2.5)."""
     tau = 0.4
-    K = synthesis.cdm(of([1.0], [1.0, 0.0, 0.0]), tau)
+    K = synthesis.designs.coefficient_diagram(of([1.0], [1.0, 0.0, 0.0]), tau)
     b, a = signal.ss2tf(K.A, K.B, K.C, K.D)
     scale = (tau**3 / 12.5) / a[0]
     np.testing.assert_allclose(scale * b[0], [-tau, -1.0], rtol=1e-12)
@@ -79,7 +79,7 @@ def test_the_target_is_reached(integral, roll_off):
     ]
     for numerator, denominator in plants:
         G = of(numerator, denominator)
-        K = synthesis.cdm(G, 0.5, integral=integral, roll_off=roll_off)
+        K = synthesis.designs.coefficient_diagram(G, 0.5, integral=integral, roll_off=roll_off)
         n = len(G.states)
         assert len(K.states) == n - 1 + integral + roll_off
         assert not (roll_off and np.any(K.D))
@@ -98,7 +98,9 @@ def test_roll_of_a_helicopter_flies():
         hover, disturbances=["v_w"], performance=["phi"], controls=["d_lat"], measurements=["phi"]
     ).with_delay(0.02, order=1)
     G = plant.model.at(0.0).select(inputs=["d_lat"], outputs=["phi"])
-    made = synthesis.Controller.of(plant, synthesis.cdm(G, 0.5, roll_off=True), "CDM")
+    made = synthesis.Controller.of(
+        plant, synthesis.designs.coefficient_diagram(G, 0.5, roll_off=True), "CDM"
+    )
     assert made.certify(search=None).verified
     still = symheli.AirspeedSchedule((2.0,), (1.0,), (0.0,), lead=0.2)
     record = symheli.fly(heli, still, controller=made.discretize(0.02))
@@ -107,9 +109,9 @@ def test_roll_of_a_helicopter_flies():
 
 def test_what_has_no_design_is_refused_in_words():
     with pytest.raises(InputError, match=r"common factor, or nearly \(near -2"):
-        synthesis.cdm(of([1.0, 2.0], [1.0, 3.0, 2.0]), 1.0)
+        synthesis.designs.coefficient_diagram(of([1.0, 2.0], [1.0, 3.0, 2.0]), 1.0)
     with pytest.raises(InputError, match=r"common factor.*integrator"):
-        synthesis.cdm(of([1.0, 0.0], [1.0, 3.0, 2.0]), 1.0, integral=True)
+        synthesis.designs.coefficient_diagram(of([1.0, 0.0], [1.0, 3.0, 2.0]), 1.0, integral=True)
     lag = of([1.0], [1.0, 1.0])
     for given, words in (
         ({"G": of([1.0, 0.0], [1.0, 1.0]), "tau": 1.0}, "strictly proper"),
@@ -120,4 +122,4 @@ def test_what_has_no_design_is_refused_in_words():
         ({"G": of([1.0], [1.0, 0, 0, 0]), "tau": 1.0, "indices": (0.9,)}, "not stable"),
     ):
         with pytest.raises(InputError, match=words):
-            synthesis.cdm(**given)
+            synthesis.designs.coefficient_diagram(**given)

@@ -7,10 +7,11 @@ from design_plants import first_order, named, random_plant
 
 from symheli import LinearModel
 from symheli.errors import InputError
-from synthesis import DesignStatus, h2, hinf, mixed_sensitivity, ncf
+from synthesis import h2, hinf
 from synthesis.design.plant.diagnosis import reasons
 from synthesis.design.plant.generalized import Channels, Generalized
 from synthesis.design.plant.unreachable import unreachable_gain
+from synthesis.designs import DesignStatus, mixed_sensitivity, ncfsyn
 
 
 def said(model, controls, measurements, **how):
@@ -240,7 +241,7 @@ def test_a_gamma_that_one_frequency_decides_is_said_to_be_that():
 
 def test_nothing_is_said_of_a_gamma_that_the_loop_decides():
     assert hinf(*first_order(1.0, 2.0, 0.5)).reasons == ()
-    design = ncf(control.ss(control.tf([1.0], [1.0, -1.0])))
+    design = ncfsyn(control.ss(control.tf([1.0], [1.0, -1.0])))
     assert design.reasons == ()
     assert "gamma = " in str(design)
 
@@ -257,7 +258,7 @@ def test_levels_and_systems_that_cannot_be_are_refused():
         h2(np.eye(3), u, y)
     theirs = control.ss([[0.0]], [[1.0]], [[1.0]], [[np.nan]])
     with pytest.raises(InputError, match="must be a finite number"):
-        ncf(theirs)
+        ncfsyn(theirs)
     nyquist = LinearModel(
         [[-1.0]],
         [[1.0, 0, 1.0]],

@@ -33,7 +33,7 @@ def test_pd_by_stated_gains_places_the_poles_of_its_closed_form():
         sorted(plain.closed().at(0.0).poles()), sorted(np.roots([1, 8 + 120 * kd, 120 * kp]))
     )
     plant = roll(["phi"])
-    pd = synthesis.Structure.pid(plant, {("d_lat", "phi"): "PD"}, corner=c)
+    pd = synthesis.structures.TunableController.pid(plant, {("d_lat", "phi"): "PD"}, corner=c)
     gains = dict(zip([g.name for g in pd.gains], (-kp, -kd), strict=True))
     assert list(gains) == ["d_lat_phi_P", "d_lat_phi_D"]
     made = synthesis.Controller.of(plant, pd.controller(gains, plant.parameters), "PD")

@@ -9,9 +9,10 @@ from design_plants import matrices, named, random_plant
 from scipy import linalg
 
 from symheli import LinearModel
-from synthesis import DesignStatus, h2
+from synthesis import h2
 from synthesis.design.lti.h2 import h2_norm
 from synthesis.design.plant.generalized import Generalized
+from synthesis.designs import DesignStatus
 
 SEEDS = [pytest.param(k, marks=() if k % 2 else pytest.mark.slow) for k in range(10)]
 

@@ -10,9 +10,13 @@ import sympy
 from scheduled_plants import spring, turning
 from scipy.optimize import minimize
 
+from symheli import LPVStateSpace, Scheduling
 from symheli.errors import InputError
-from symheli.lpv import LPVStateSpace, Scheduling, UserFunctions
-from synthesis import Grid, Spline, Status, estimator, l2_gain, output_feedback, state_feedback
+from symheli.lpv import UserFunctions
+from synthesis import estimator, l2_gain, output_feedback, state_feedback
+from synthesis.analysis import Status
+from synthesis.forms import Spline
+from synthesis.impose import Grid
 
 EXACT = 0.354682
 """Least gain of `turning` at 1 rad/s for every controller."""

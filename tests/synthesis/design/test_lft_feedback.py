@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scheduled_plants import frozen, spring
 
-from synthesis import hinf, lft_feedback, lft_gain, output_feedback
+from synthesis import hinf, lft_gain, output_feedback
+from synthesis.designs import lft_feedback
 
 
 @pytest.mark.slow

@@ -7,8 +7,9 @@ from design_plants import named, random_plant
 from symheli import LinearModel
 from symheli.errors import InputError
 from symheli.lpv import stability_margin
-from synthesis import hinf, mixed_sensitivity, ncf
+from synthesis import hinf
 from synthesis.design.plant.generalized import Generalized
+from synthesis.designs import mixed_sensitivity, ncfsyn
 from synthesis.numerics.linear.norm import norm
 
 
@@ -26,7 +27,7 @@ def lead(gain, dt=None):
 def test_gamma_is_the_inverse_of_the_margin_of_the_loop(seed):
     """Against `stability_margin`, which takes it from the model and the controller on a grid."""
     G = plant(seed, 0.1)
-    design = ncf(G)
+    design = ncfsyn(G)
     assert 1 / design.hinf_norm == pytest.approx(stability_margin(G, design.controller), rel=1e-6)
     assert design.optimum <= design.hinf_norm <= 1.01 * design.optimum * (1 + 1e-6)
 
@@ -51,16 +52,16 @@ def test_the_closed_form_is_the_optimum_of_the_four_block_problem(seed, dt):
         ny,
         dt,
     )
-    assert hinf(*four).optimum == pytest.approx(ncf(G).optimum, rel=1e-6)
+    assert hinf(*four).optimum == pytest.approx(ncfsyn(G).optimum, rel=1e-6)
 
 
 def test_the_weights_are_in_the_controller():
     """W1 K W2 around the plant keeps W2 G W1 stable, with the gain of the shaped loop."""
     G = plant(3)
-    whole = ncf(G, lead(3.0), 0.2)
+    whole = ncfsyn(G, lead(3.0), 0.2)
     K = whole.controller
     assert (K.inputs, K.outputs) == (G.outputs, G.inputs)
-    bare = ncf(G, W2=0.2)
+    bare = ncfsyn(G, W2=0.2)
     assert bare.optimum != pytest.approx(whole.optimum, rel=1e-3)
     closed = Generalized.of(
         LinearModel(
@@ -96,7 +97,7 @@ def test_mixed_sensitivity_is_the_gain_of_its_three_functions():
 def test_weights_that_do_not_fit_are_refused():
     G = plant(3, 0.1)
     with pytest.raises(InputError, match=r"W1: its sample period is None s, the model's 0.1 s"):
-        ncf(G, lead(1.0))
+        ncfsyn(G, lead(1.0))
     with pytest.raises(InputError, match=r"W2: expected a weight of"):
         mixed_sensitivity(G, 1.0, [1.0] * (len(G.inputs) + 1))
     with pytest.raises(InputError, match="expected a number or a system"):
@@ -104,4 +105,4 @@ def test_weights_that_do_not_fit_are_refused():
     with pytest.raises(InputError, match="expected a weight on the outputs or the controls"):
         mixed_sensitivity(G, None)
     with pytest.raises(InputError, match="back_off"):
-        ncf(G, back_off=0.9)
+        ncfsyn(G, back_off=0.9)

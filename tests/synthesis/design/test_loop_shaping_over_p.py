@@ -5,9 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from symheli import InputError, LinearModel, LPVStateSpace, Scheduling
+from symheli import LinearModel, LPVStateSpace, Scheduling
+from symheli.errors import InputError
 from symheli.lpv import feedback
-from synthesis import loop_shaping, ncf
+from synthesis.designs import loop_shaping, ncfsyn
 
 
 def carriage(rate, low=0.5, high=2.0):
@@ -28,14 +29,14 @@ slow_integral = LinearModel([[-0.01]], [[1.0]], [[2.0]], [[4.0]], ["w"], ["in"],
 
 
 def worst_frozen(G, W1):
-    return max(ncf(G.at(p), W1).optimum for p in np.linspace(0.5, 2.0, 31))
+    return max(ncfsyn(G.at(p), W1).optimum for p in np.linspace(0.5, 2.0, 31))
 
 
 @pytest.mark.slow
 def test_of_one_model_it_is_the_closed_form():
     G = carriage(0.0, low=1.0, high=1.0 + 1e-6)
     made = loop_shaping(G, slow_integral, rate=0.0)
-    assert made.shaped.optimum == pytest.approx(ncf(G.at(1.0), slow_integral).optimum, rel=1e-3)
+    assert made.shaped.optimum == pytest.approx(ncfsyn(G.at(1.0), slow_integral).optimum, rel=1e-3)
 
 
 @pytest.mark.slow

@@ -7,7 +7,8 @@ import pytest
 
 from symheli import LPVStateSpace, Scheduling
 from symheli.errors import UnknownNameError
-from synthesis import loop, margin_table, margins
+from synthesis import margin_table, margins
+from synthesis.analysis import open_loop
 
 P = Scheduling("p", "1", low=0.0, high=2.0)
 p = P.symbol
@@ -21,7 +22,7 @@ def test_a_row_has_the_margins_of_its_frozen_loop():
     """(1 + p)/(s (s + 1)(s/2 + 1)) with gain 1 stays stable up to a gain of 3: by Routh."""
     table = margin_table(PLANT, GAIN, "u1", [0.0, 1.0, 2.5 - 1.0])
     for (at,), found in table.rows:
-        assert found == margins(loop(PLANT.at(at), GAIN, "u1"))
+        assert found == margins(open_loop(PLANT.at(at), GAIN, "u1"))
     values = table.values()
     np.testing.assert_allclose(10 ** (values[:, 2] / 20), 3 / (1 + values[:, 0]), rtol=1e-6)
     assert "gain up (dB)" in str(table)

@@ -8,7 +8,8 @@ import pytest
 
 from symheli import LinearModel
 from symheli.errors import InputError, UnknownNameError
-from synthesis import bandwidth, disk_margin, loop, margins
+from synthesis import disk_margin, margins
+from synthesis.analysis import attitude_bandwidth, open_loop
 
 
 def model(numerator, denominator, dt=None):
@@ -123,7 +124,7 @@ def test_loops_are_broken_one_at_a_time():
         ("y1", "y2"),
     )
     feedback = {("u1", "y1"): -1.0, ("u2", "y2"): -1.0}
-    alone = margins(loop(plant, feedback, "u1"))
+    alone = margins(open_loop(plant, feedback, "u1"))
     assert alone.gain == (0.0, math.inf)
     assert alone.disk == pytest.approx(2.0, rel=1e-6)  # L = 1/s
     both = LinearModel(
@@ -132,13 +133,13 @@ def test_loops_are_broken_one_at_a_time():
     # |S - I/2| with S = s/(s+1) [..]: the multivariable disk is about a tenth of it
     assert disk_margin(both) < 0.25
     with pytest.raises(UnknownNameError):
-        loop(plant, feedback, "u3")
+        open_loop(plant, feedback, "u3")
 
 
 def test_bandwidth_of_a_damped_response_behind_a_delay():
     """1/(s (s + a)) behind a lag of T: phase -90 - atan(w/a) - atan(w T)."""
     a, T = 8.0, 0.05
-    response = bandwidth(model([1.0], np.polymul([1, a, 0], [T, 1])))
+    response = attitude_bandwidth(model([1.0], np.polymul([1, a, 0], [T, 1])))
     w180 = math.sqrt(a / T)
     assert response.omega_180 == pytest.approx(w180)
     w135 = response.phase_bandwidth
@@ -149,11 +150,11 @@ def test_bandwidth_of_a_damped_response_behind_a_delay():
     w6 = response.gain_bandwidth
     assert abs(1 / (1j * w6 * (1j * w6 + a) * (1j * w6 * T + 1))) == pytest.approx(2 * size)
     turned = model([-1.0], np.polymul([1, a, 0], [T, 1]))
-    assert bandwidth(turned) == pytest.approx(response)
+    assert attitude_bandwidth(turned) == pytest.approx(response)
 
 
 def test_a_response_that_never_lags_180_degrees_has_no_such_frequency():
-    response = bandwidth(model([1.0], [1, 2.0, 0]))
+    response = attitude_bandwidth(model([1.0], [1, 2.0, 0]))
     assert math.isinf(response.omega_180)
     assert response.attitude_response == pytest.approx(2.0)  # atan(w/2) = 45 deg
 
@@ -180,10 +181,12 @@ def test_what_has_no_margin_is_refused():
     with pytest.raises(InputError, match="one input and one output"):
         margins(two)
     with pytest.raises(InputError, match="one attitude"):
-        bandwidth(two)
+        attitude_bandwidth(two)
     direct = LinearModel.from_control(control.ss([[-1.0]], [[1.0]], [[1.0]], [[1.0]]))
     with pytest.raises(InputError, match="directly"):
-        loop(direct, {(str(direct.inputs[0]), str(direct.outputs[0])): -1.0}, str(direct.inputs[0]))
+        open_loop(
+            direct, {(str(direct.inputs[0]), str(direct.outputs[0])): -1.0}, str(direct.inputs[0])
+        )
 
 
 def test_a_controller_that_is_a_gain_makes_the_loop_of_these_gains():
@@ -198,7 +201,7 @@ def test_a_controller_that_is_a_gain_makes_the_loop_of_these_gains():
     controller = LinearModel(*empty, K, [], list("zx"), list("vu"))
     omega = np.geomspace(0.1, 30, 7)
     for at in "uv":
-        got, static = loop(plant, controller, at), loop(plant, gains, at)
+        got, static = open_loop(plant, controller, at), open_loop(plant, gains, at)
         expected = static.frequency_response(omega)
         np.testing.assert_allclose(got.frequency_response(omega), expected, rtol=1e-9)
 
@@ -209,7 +212,7 @@ def test_a_loop_through_a_lag_has_its_closed_form():
     plant = LinearModel([[0.0]], [[1.0]], [[1.0]], [[0.0]], ["y"], ["u"], ["y"])
     lag = LinearModel([[-1 / T]], [[1 / T]], [[-k]], [[0.0]], ["l"], ["y"], ["u"])
     w = math.sqrt((math.sqrt(1 + 4 * (k * T) ** 2) - 1) / (2 * T**2))
-    m = margins(loop(plant, lag, "u"))
+    m = margins(open_loop(plant, lag, "u"))
     assert m.crossover == pytest.approx((w,))
     assert m.phase == pytest.approx(math.pi / 2 - math.atan(w * T))
     assert m.gain == (0.0, math.inf)
@@ -219,9 +222,9 @@ def test_a_dynamic_controller_that_does_not_fit_is_refused():
     plant = LinearModel([[0.5]], [[1.0]], [[1.0]], [[0.0]], ["y"], ["u"], ["y"], dt=0.02)
     lag = LinearModel([[0.5]], [[1.0]], [[1.0]], [[0.0]], ["l"], ["y"], ["u"], dt=0.01)
     with pytest.raises(InputError, match=r"plant has dt = 0.02 and the controller dt = 0.01"):
-        loop(plant, lag, "u")
+        open_loop(plant, lag, "u")
     direct = LinearModel([[0.5]], [[1.0]], [[1.0]], [[0.1]], ["y"], ["u"], ["y"], dt=0.01)
     with pytest.raises(InputError, match="directly"):
-        loop(direct, lag, "u")
+        open_loop(direct, lag, "u")
     with pytest.raises(UnknownNameError):
-        loop(plant, lag, "v")
+        open_loop(plant, lag, "v")

@@ -11,7 +11,7 @@ from design_plants import random_plant
 from scipy.optimize import brentq
 
 from symheli import LinearModel
-from synthesis import mixed_sensitivity
+from synthesis.designs import mixed_sensitivity
 
 
 def lag(pole):

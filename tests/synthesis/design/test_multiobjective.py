@@ -8,8 +8,9 @@ from design_plants import matrix, named, scherer_gahinet_chilali
 from scheduled_plants import lag, of, spring
 
 from symheli.errors import InputError, SynthesisError
-from synthesis import H2, L2, EnergyToPeak, PoleRegion, h2, hinf, multiobjective, output_feedback
+from synthesis import h2, hinf, multiobjective, output_feedback
 from synthesis.numerics.linear.norm import norm
+from synthesis.objectives import H2, L2, EnergyToPeak, PoleRegion
 
 PROVEN = 1 + 1e-5
 """Gains beside the bounds of inequalities solved to 1e-8."""

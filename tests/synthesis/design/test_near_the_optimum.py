@@ -11,7 +11,8 @@ from published_plants import spinning_disks, wu_1996
 from benchmarks.random_plants import random_plant
 from symheli.errors import SymheliError
 from symheli.lpv import UserFunctions
-from synthesis import Grid, output_feedback
+from synthesis import output_feedback
+from synthesis.impose import Grid
 
 CLOSE = 1.02
 BELOW = 1 - 2e-3

@@ -11,17 +11,10 @@ import pytest
 
 import symheli
 import synthesis
+from symheli import LinearModel, LPVStateSpace, Scheduling, UncertainStateSpace
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv import (
-    CubicSpline,
-    LinearModel,
-    LPVStateSpace,
-    Polynomial,
-    Product,
-    Scheduling,
-    UncertainStateSpace,
-    pade_delay,
-)
+from symheli.lpv import CubicSpline, Polynomial, Product
+from symheli.lpv.tools import pade_delay
 from symheli.values.signal import Signal
 from synthesis import Plant
 
@@ -340,7 +333,7 @@ def test_what_flies_is_closed_with_the_errors_of_a_design():
         outputs=["d_lat"],
         dt=0.02,
     )
-    flies = symheli.ScheduledController(K)
+    flies = symheli.flight.ScheduledController(K)
     assert flies.model.inputs == ("phi", "p")
     table = symheli.TableController.of(K, 2)
     for p in SPEEDS:
@@ -349,7 +342,7 @@ def test_what_flies_is_closed_with_the_errors_of_a_design():
         np.testing.assert_allclose(own.close(table).at(p).A, expected.A, atol=1e-6)
         np.testing.assert_allclose(own.close(table).at(p).B, expected.B, atol=1e-6)
     with pytest.raises(InputError, match="reads phi and phi_error: give it one of the two"):
-        symheli.ScheduledController(replace(K, inputs=("phi_error", "phi")))
+        symheli.flight.ScheduledController(replace(K, inputs=("phi_error", "phi")))
 
 
 def test_a_reference_makes_errors_of_signals():
@@ -667,11 +660,11 @@ def test_a_scheduled_gain_that_cancels_the_scheduling_leaves_a_constant_loop():
         synthesis.output_feedback,
         synthesis.state_feedback,
         synthesis.estimator,
-        synthesis.lft_feedback,
-        lambda plant: synthesis.multiobjective(plant, [synthesis.L2()]),
+        synthesis.designs.lft_feedback,
+        lambda plant: synthesis.multiobjective(plant, [synthesis.objectives.L2()]),
         lambda plant: synthesis.certify_sampled({}, plant),
-        lambda plant: synthesis.with_wrong_parameter(plant, {}, 0.1),
-        lambda plant: synthesis.proven_around(plant, {}, 3.0),
+        lambda plant: synthesis.analysis.with_scheduling_error(plant, {}, 0.1),
+        lambda plant: synthesis.analysis.proven_around(plant, {}, 3.0),
     ],
 )
 def test_a_design_of_a_model_says_that_it_needs_a_plant(design, given):

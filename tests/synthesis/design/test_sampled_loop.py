@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 import symheli
+from symheli import LPVStateSpace, Scheduling
 from symheli.errors import InputError
-from symheli.lpv import LPVStateSpace, Matrices, Scheduling
+from symheli.lpv.tools import Matrices
 from symheli.lpv.uncertain_state_space import SAFETY
-from synthesis import Plant, Spline, certify_sampled
+from synthesis import Plant, certify_sampled
+from synthesis.forms import Spline
 
 P = Scheduling("airspeed", "m/s", 0.0, 10.0, rate=1.0)
 PLAIN = Spline(degree=0)

@@ -168,7 +168,7 @@ def test_a_sampled_controller_flies(ideal, roll):
     travel.
     """
     made = roll.discretize(0.02)
-    assert isinstance(made, symheli.PureController)
+    assert isinstance(made, symheli.flight.PureController)
     schedule = symheli.AirspeedSchedule.transition(2.0, 3.0, acceleration=1.0, hold=0.3)
     record = symheli.fly(ideal, schedule, controller=made)
     error = np.stack([record[x] - record[f"{x}_reference"] for x in ("p", "phi")], axis=1)
@@ -190,7 +190,9 @@ def test_a_design_against_a_reference_flies_as_it_is(ideal, roll):
     schedule = symheli.AirspeedSchedule.transition(2.0, 3.0, acceleration=1.0, hold=0.3)
     table = symheli.TableController.of(made, 9)
     assert "phi" in table.inputs
-    windy = symheli.Wind((0.0, 2.0, 0.0), turbulence=symheli.Dryden(wind=6.0, altitude=20.0))
+    windy = symheli.Wind(
+        (0.0, 2.0, 0.0), turbulence=symheli.environment.Dryden(wind=6.0, altitude=20.0)
+    )
     flown = []
     for controller in (made, table):
         record = symheli.fly(ideal, schedule, controller=controller, wind=windy, seed=1)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from benchmarks.random_plants import random_plant
-from symheli.lpv import BSpline, Scheduling
+from symheli import Scheduling
+from symheli.lpv import BSpline
 from synthesis import output_feedback
 from synthesis.certify.statement.outcome import Attempt
 from synthesis.design.lpv.at_rest import at_rest

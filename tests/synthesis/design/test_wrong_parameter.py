@@ -6,13 +6,16 @@ import numpy as np
 import pytest
 
 import symheli
-from symheli import UncertainStateSpace
+from symheli import LPVStateSpace, Scheduling, UncertainStateSpace
 from symheli.errors import InputError
-from symheli.lpv import LPVStateSpace, Patches, PiecewiseLinear, Polynomial, Scheduling
-from synthesis import Plant, Spline, frozen_gain, l2_gain, proven_around, with_wrong_parameter
+from symheli.lpv import PiecewiseLinear, Polynomial
+from symheli.lpv.bases import Patches
+from synthesis import Plant, frozen_gain, l2_gain
+from synthesis.analysis import proven_around, with_scheduling_error
 from synthesis.design.loops.balanced_block import balanced
 from synthesis.design.loops.frozen_reading import largest
 from synthesis.design.loops.wrong_parameter import _reached, _slopes
+from synthesis.forms import Spline
 
 P = Scheduling("p", "1", 0.0, 1.0, rate=0.1)
 CLOSE = 1e-4
@@ -87,7 +90,7 @@ def scheduled(basis, seed=0, order=2):
 @pytest.mark.slow(but="0.0")
 @pytest.mark.parametrize("error", [0.0, 0.1, 0.3, 0.6])
 def test_of_an_affine_gain_on_one_state_the_bound_is_the_gain_of_the_worst_error(error):
-    wrong = with_wrong_parameter(lag(), gain(-1.0, -3.0), error)
+    wrong = with_scheduling_error(lag(), gain(-1.0, -3.0), error)
     certificate = l2_gain(wrong, search=None)
     assert certificate.gamma == pytest.approx(0.1 / (0.2 - 0.3 * error), rel=CLOSE)
     assert certificate.verified
@@ -132,7 +135,7 @@ def test_frozen_loops_of_wrong_readings_are_within_the_bound(basis, error):
     K = scheduled(basis, seed=5)
     K = replace(K, B=0.3 * K.B, D=0.2 * K.D - basis.constant()[:, None, None])
     plant = pendulum()
-    certificate = l2_gain(with_wrong_parameter(plant, K, error), search=None)
+    certificate = l2_gain(with_scheduling_error(plant, K, error), search=None)
     assert certificate.verified
     worst = 0.0
     for q in np.linspace(0.0, 1.0, 11):
@@ -150,7 +153,7 @@ def test_frozen_loops_of_wrong_readings_are_within_the_bound(basis, error):
 def test_the_bound_is_that_of_the_exact_analysis_over_parameter_and_error():
     """K(p + b) of an affine K is a model over p and b, where b may jump."""
     error, c0, c1, plant = 0.1, -1.0, 1.0, pendulum()
-    wrong = l2_gain(with_wrong_parameter(plant, gain(c0, c1), error), search=None)
+    wrong = l2_gain(with_scheduling_error(plant, gain(c0, c1), error), search=None)
     b = Scheduling("b", "1", -error, error)
     exact = LPVStateSpace.polynomial(
         {
@@ -177,7 +180,7 @@ def test_the_bound_is_that_of_the_exact_analysis_over_parameter_and_error():
 def test_an_error_of_zero_leaves_the_loop():
     K = scheduled(PiecewiseLinear((0.0, 0.4, 1.0)), seed=3)
     K = replace(K, D=np.full_like(K.D, -1.0))
-    plain, wrong = pendulum().close(K), with_wrong_parameter(pendulum(), K, 0.0)
+    plain, wrong = pendulum().close(K), with_scheduling_error(pendulum(), K, 0.0)
     p = np.linspace(0.0, 1.0, 7)
     for mine, theirs in zip(wrong.nominal.matrices(p), plain.matrices(p), strict=True):
         np.testing.assert_allclose(mine, theirs, atol=1e-14)
@@ -191,7 +194,7 @@ def test_the_block_of_an_uncertain_plant_is_kept():
     plant = lag()
     missed = np.array([[[0.01, 0.0, 0.0]]])
     uncertain = _plant(UncertainStateSpace.covering(plant.model, missed))
-    wrong = l2_gain(with_wrong_parameter(uncertain, gain(-1.0, -3.0), 0.1), search=None)
+    wrong = l2_gain(with_scheduling_error(uncertain, gain(-1.0, -3.0), 0.1), search=None)
     # pole 0.8, of which the plant leaves 0.02 open and the reading 0.03; the entry of the input
     # is open by a millionth
     truth = 0.1 / (0.2 - 0.03 - 0.02)
@@ -201,7 +204,7 @@ def test_the_block_of_an_uncertain_plant_is_kept():
 def test_a_controller_that_jumps_is_refused():
     jumps = scheduled(Patches(1, (0.0, 0.5, 1.0)))
     with pytest.raises(InputError, match=r"jumps at p = 0\.5"):
-        with_wrong_parameter(pendulum(), jumps, 0.1)
+        with_scheduling_error(pendulum(), jumps, 0.1)
 
 
 def two_lags(size):
@@ -249,12 +252,12 @@ def test_the_bound_covers_the_worst_reading_in_any_units_of_the_measurements(siz
     """Where p is 1 and read as 0.75 the first pole is 1.2 - 0.325: a gain of 0.8."""
     K = two_gains(-np.diag([1 / size, size / 2]), -np.diag([3 / size, size / 2]))
     found = l2_gain(
-        with_wrong_parameter(two_lags(size), K, 0.25), 0.1, form=Spline(degree=0), search=None
+        with_scheduling_error(two_lags(size), K, 0.25), 0.1, form=Spline(degree=0), search=None
     )
     assert found.verified
     assert found.gamma >= 0.8
     same = l2_gain(
-        with_wrong_parameter(
+        with_scheduling_error(
             two_lags(1.0), two_gains(-np.diag([1.0, 0.5]), -np.diag([3.0, 0.5])), 0.25
         ),
         0.1,
@@ -269,7 +272,7 @@ def test_a_jump_of_one_entry_is_seen_beside_any_other(beside):
     basis = Patches(0, (0.0, 0.5, 1.0))
     jumps = two_gains([[-1.0, 0.0], [0.0, beside]], [[-3.0, 0.0], [0.0, beside]], basis=basis)
     with pytest.raises(InputError, match=r"jumps at p = 0\.5"):
-        with_wrong_parameter(two_lags(1.0), jumps, 0.05)
+        with_scheduling_error(two_lags(1.0), jumps, 0.05)
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -295,13 +298,13 @@ def test_slopes_hold_every_entry_to_its_own_size(seed):
 
 def test_a_wrong_error_or_controller_is_refused():
     with pytest.raises(InputError, match="error: expected a number >= 0"):
-        with_wrong_parameter(lag(), gain(-1.0), -0.1)
+        with_scheduling_error(lag(), gain(-1.0), -0.1)
     other = replace(gain(-1.0, -1.0), parameters=(Scheduling("q", "1", 0.0, 1.0),))
     with pytest.raises(InputError, match="the same one parameter"):
-        with_wrong_parameter(lag(), other, 0.1)
+        with_scheduling_error(lag(), other, 0.1)
     through = replace(lag().model, D=lag().model.D + np.array([[[0.0, 1.0]]] * 2))
     with pytest.raises(InputError, match=r"enters\s+twice"):
-        with_wrong_parameter(_plant(through), gain(-1.0), 0.1)
+        with_scheduling_error(_plant(through), gain(-1.0), 0.1)
 
 
 def test_balancing_never_costs_and_finds_the_spectral_radius_of_one_matrix():
@@ -364,7 +367,7 @@ def test_the_lateral_loop_is_stable_however_its_airspeed_is_misread(ideal):
     controller = designed(ideal, 8.0, 11.0)
     flies = symheli.TableController.of(controller.discretize(DT).model, 2)
     plant = flying_plant(ideal, 8.0, 11.0)
-    wrong = with_wrong_parameter(plant, flies, 2.5)
+    wrong = with_scheduling_error(plant, flies, 2.5)
     assert stability(wrong, form=Spline(degree=0), search=None).verified
     for q in np.linspace(8.0, 11.0, 4):
         poles = np.linalg.eigvals(plant.close(flies.model.at(q)).matrices(np.linspace(8, 11, 9)).A)

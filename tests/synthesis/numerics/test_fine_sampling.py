@@ -5,7 +5,7 @@ import pytest
 from scipy import linalg
 
 from benchmarks.loops_over_decades import loop
-from symheli.lpv import LPVStateSpace, Scheduling
+from symheli import LPVStateSpace, Scheduling
 from synthesis import l2_gain
 from synthesis.numerics.linear.norm import norm
 

@@ -16,27 +16,16 @@ sys.path.append(str(Path(__file__).resolve().parents[3]))  # benchmarks/ is not 
 
 import synthesis.numerics.program.interior_point as method
 from benchmarks.closed_loops import DELAY, GUSTS, LOOPS, closed_loop, sampled_loop
+from symheli import LPVStateSpace, Scheduling
 from symheli.errors import InputError
-from symheli.lpv import LPVStateSpace, Scheduling
-from synthesis import (
-    Bernstein,
-    Certificate,
-    Memory,
-    Solver,
-    Spline,
-    Status,
-    SumOfSquares,
-    decay_rate,
-    frozen_gain,
-    generalized_h2,
-    l2_gain,
-    lft_gain,
-    stability,
-)
+from synthesis import Certificate, Solver, decay_rate, frozen_gain, l2_gain, lft_gain, stability
+from synthesis.analysis import Status, energy_to_peak
 from synthesis.certify.assemble.bounded_real import BlockMultipliers
 from synthesis.certify.assemble.unknowns import Quadratic, scaled_problem
 from synthesis.certify.questions.problem import pose
 from synthesis.certify.statement.spline import graded_knots
+from synthesis.forms import LaggedParameter, Spline
+from synthesis.impose import Bernstein, SumOfSquares
 from synthesis.numerics.polynomial import exact
 from synthesis.numerics.polynomial.symmetric import basis, length, svec, symmetrized
 from synthesis.numerics.program.answer import Answer
@@ -306,7 +295,7 @@ def test_many_states_take_it_unless_told_otherwise(tmp_path):
     assert stability(lpv, search=None).verify(rigorous=True)
     few = springs(4, 0.2)
     assert l2_gain(few, form=Spline(degree=0), search=None).solver.startswith("CLARABEL")
-    for form, impose in ((Memory(0.5, segments=1), None), (None, SumOfSquares())):
+    for form, impose in ((LaggedParameter(0.5, segments=1), None), (None, SumOfSquares())):
         asked = pose(lpv, None, "l2 gain", form, impose, None, None)
         assert asked.solver.name == "CLARABEL"
 
@@ -314,11 +303,11 @@ def test_many_states_take_it_unless_told_otherwise(tmp_path):
 @pytest.mark.parametrize(
     "call",
     [
-        lambda: l2_gain(spring(), form=Memory(0.5), solver="LYAPUNOV"),
+        lambda: l2_gain(spring(), form=LaggedParameter(0.5), solver="LYAPUNOV"),
         lambda: l2_gain(spring(), impose=SumOfSquares(), solver="LYAPUNOV"),
         lambda: l2_gain(spring(), impose=Bernstein(subdivision=1), solver="LYAPUNOV"),
         lambda: decay_rate(spring(), solver="LYAPUNOV"),
-        lambda: generalized_h2(spring(), solver=Solver("LYAPUNOV")),
+        lambda: energy_to_peak(spring(), solver=Solver("LYAPUNOV")),
         lambda: lft_gain(spring().to_lft(), solver="LYAPUNOV"),
     ],
 )

@@ -5,9 +5,10 @@ rationals.
 import numpy as np
 import pytest
 
+from symheli import LFT, LPVStateSpace, Scheduling
 from symheli.errors import InputError
-from symheli.lpv import LFT, LPVStateSpace, Scheduling
-from synthesis import PolynomialMatrix, l2_gain
+from synthesis import l2_gain
+from synthesis.analysis import PolynomialMatrix
 from synthesis.certify.assemble.imposed import (
     coefficient_conditions,
     sums_of_squares,

@@ -10,9 +10,8 @@ import sympy
 from scipy.optimize import brentq
 
 import symheli
-from symheli import InputError
-from synthesis import DynamicBlock, robust_margin, worst_case_gain
-from synthesis.robust import covers
+from symheli.errors import InputError
+from synthesis.robust import DynamicBlock, covers, robust_margin, worst_case_gain
 
 OMEGA = np.geomspace(1e-2, 1e4, 4001)
 SAME = 1 + 1e-9

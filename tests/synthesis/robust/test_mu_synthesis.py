@@ -6,9 +6,11 @@ import control
 import numpy as np
 import pytest
 
-from symheli import InputError, LinearModel, LPVStateSpace, Scheduling
-from symheli.lpv import LFT, connect
-from synthesis import DynamicBlock, hinf, mu_synthesis, robust_margin, worst_case_gain
+from symheli import LFT, LinearModel, LPVStateSpace, Scheduling
+from symheli.errors import InputError
+from symheli.lpv import connect
+from synthesis import hinf
+from synthesis.robust import DynamicBlock, mu_synthesis, robust_margin, worst_case_gain
 
 STILL = Scheduling("still", "1", 0.0, 1.0, rate=0.0)
 

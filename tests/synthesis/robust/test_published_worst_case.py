@@ -9,7 +9,9 @@ import sympy
 
 from symheli import LPVStateSpace, Scheduling, UncertainStateSpace
 from symheli.lpv import Polynomial
-from synthesis import DynamicBlock, Search, l2_gain
+from synthesis import l2_gain
+from synthesis.analysis import LowerBoundSearch
+from synthesis.robust import DynamicBlock
 from synthesis.robust.uncertain import uncertain
 
 DEGREE = 10
@@ -54,7 +56,7 @@ def test_one_model_of_the_set_has_the_gain_that_the_page_prints():
     ("rate", "printed", "known"), [(math.inf, 63.8659, 38), (0.1, 1.8925, 1.5)]
 )
 def test_the_bound_is_below_what_the_page_prints(rate, printed, known):
-    cert = l2_gain(loop(), rate, search=Search(seconds=2))
+    cert = l2_gain(loop(), rate, search=LowerBoundSearch(seconds=2))
     assert cert.verified
     assert cert.lower <= cert.gamma <= known < printed
 

@@ -4,10 +4,10 @@ import control
 import numpy as np
 import pytest
 
-from symheli import LFT, InputError, LPVStateSpace, Scheduling, UncertainStateSpace
+from symheli import LFT, LPVStateSpace, Scheduling, UncertainStateSpace
+from symheli.errors import InputError
 from symheli.lpv import connect
-from synthesis import DynamicBlock, robust_margin, worst_case_gain
-from synthesis.robust import upper_bound
+from synthesis.robust import DynamicBlock, robust_margin, upper_bound, worst_case_gain
 from synthesis.robust.structure import loop_of
 
 

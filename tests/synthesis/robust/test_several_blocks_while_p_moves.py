@@ -8,10 +8,13 @@ import pytest
 from scipy.optimize import minimize_scalar
 from test_several_uncertain_things import RING, two_lags
 
-from symheli import InputError, LinearModel, LPVStateSpace, Scheduling, UncertainStateSpace
+from symheli import LinearModel, LPVStateSpace, Scheduling, UncertainStateSpace
+from symheli.errors import InputError
 from symheli.lpv import connect
 from symheli.lpv.uncertain_state_space import DeltaPart
-from synthesis import DynamicBlock, Spline, frozen_gain, l2_gain, robust_margin, stability
+from synthesis import frozen_gain, l2_gain, stability
+from synthesis.forms import Spline
+from synthesis.robust import DynamicBlock, robust_margin
 from synthesis.robust.uncertain import uncertain
 
 QUICK = {"search": None, "form": Spline(degree=1, segments=2)}

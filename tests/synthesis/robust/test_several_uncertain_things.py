@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from test_robust_margin import page
 
-from symheli import LFT, InputError, LPVStateSpace, Scheduling
-from symheli.errors import UnknownNameError
-from synthesis import DynamicBlock, robust_margin, worst_case_gain
+from symheli import LFT, LPVStateSpace, Scheduling
+from symheli.errors import InputError, UnknownNameError
+from synthesis.robust import DynamicBlock, robust_margin, worst_case_gain
 
 TOLERANCE = 2e-3
 """The proven level is raised in steps of a part in a thousand."""

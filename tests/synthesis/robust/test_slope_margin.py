@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from symheli import InputError, LinearModel
-from symheli.errors import UnknownNameError
-from synthesis import slope_margin
+from symheli import LinearModel
+from symheli.errors import InputError, UnknownNameError
+from synthesis.robust import slope_margin
 
 SEARCH = 2e-3
 """The search ends a part in a thousand below what is not proven, or below the limit."""

@@ -12,9 +12,9 @@ from scipy.linalg import expm
 
 import symheli
 from studies.cli import main
+from symheli import LinearModel, LPVStateSpace, Scheduling
 from symheli.errors import InputError
-from symheli.lpv import LinearModel, LPVStateSpace, Scheduling
-from synthesis import InvariantSet, SwitchInside, governor, invariant_set
+from synthesis.sets import InvariantSet, SwitchInside, invariant_set, reference_governor
 
 matplotlib.use("agg")
 
@@ -279,7 +279,7 @@ def test_the_cut_touches_the_limit_that_binds(random_set):
 
 def test_the_governor_takes_the_largest_step_of_the_closed_form():
     found = invariant_set(CART, state_bounds={"x": 1.0, "v": 1.0}, input_bounds={"u": 1.0})
-    made = governor(found, [1.0, 0.0])
+    made = reference_governor(found, [1.0, 0.0])
     P, g = np.linalg.inv(found.gramian()), np.array([1.0, 0.0])
     rng = np.random.default_rng(0)
     for _ in range(20):
@@ -293,7 +293,7 @@ def test_the_governor_takes_the_largest_step_of_the_closed_form():
 
 def test_no_command_drives_a_governed_model_out_of_its_set():
     found = invariant_set(CART, state_bounds={"x": 1.0, "v": 1.0}, input_bounds={"u": 0.3})
-    made, rng, dt = governor(found, [1.0, 0.0]), np.random.default_rng(0), 0.1
+    made, rng, dt = reference_governor(found, [1.0, 0.0]), np.random.default_rng(0), 0.1
     A = CART.A + CART.B @ found.gain()
     step = expm(A * dt)
     wanted = rng.uniform(-20, 20, 500)
@@ -341,7 +341,7 @@ def test_a_governed_transition_of_another_helicopter_stays_inside():
     heli = symheli.Helicopter.load("xcell_kahn_hudson", governor="ideal")
     found = proven_set(heli)
     assert found.proven, found.why
-    steps = commands(governor(found), 10)
+    steps = commands(reference_governor(found), 10)
     assert flown(heli, found, *steps, governed=True).size.max() < 1
     assert flown(heli, found, *steps, governed=False).size.min() > 1
 
@@ -373,16 +373,16 @@ def test_a_set_without_a_bound_says_so():
     with pytest.raises(InputError, match="limit more states"):
         found.save("never.json")
     with pytest.raises(InputError, match="proof"):
-        governor(found, [1.0, 0.0])
+        reference_governor(found, [1.0, 0.0])
     with pytest.raises(InputError, match="proof"):
         SwitchInside([found])
 
 
 def test_a_governor_refuses_states_of_another_size():
     found = invariant_set(CART, state_bounds={"x": 1.0, "v": 1.0}, input_bounds={"u": 1.0})
-    made = governor(found, [1.0, 0.0])
+    made = reference_governor(found, [1.0, 0.0])
     for x in ([], [0.0], [0.0, 0.0, 0.0], [[0.0, 0.0]] * 3):
         with pytest.raises(InputError, match="2 states along the last axis"):
             made.next(x, [1.0, 2.0], 0.0)
     with pytest.raises(InputError, match="steady"):
-        governor(found)
+        reference_governor(found)

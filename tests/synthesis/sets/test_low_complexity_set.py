@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from studies.cli import main
+from symheli import LinearModel, LPVStateSpace, Scheduling
 from symheli.errors import InputError
-from symheli.lpv import LinearModel, LPVStateSpace, Scheduling
-from synthesis import InvariantSet, LowComplexitySet, low_complexity_set
+from synthesis.sets import InvariantSet, LowComplexitySet, low_complexity_set
 
 
 def autonomous(A):

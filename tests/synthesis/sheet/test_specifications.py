@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 import synthesis
-from symheli import LinearFamily, LinearModel, LPVStateSpace, Scheduling, Signal
+from symheli import LinearFamily, LinearModel, LPVStateSpace, Scheduling
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv import sample_delay
+from symheli.lpv.tools import sample_delay
+from symheli.values import Signal
 from synthesis.sheet.measures import (
     MEASURES,
     AxisLoop,
@@ -142,7 +143,7 @@ def test_phase_delay_of_a_late_response_is_its_definition():
     dt, late, a = 0.01, 8, 3.0
     lag = tf([a], [1, a]).discretize(dt)
     T = lag.driven_by({"u": sample_delay("u", late, dt)})
-    found = synthesis.bandwidth(T, (0.1, 80.0), command=True)
+    found = synthesis.analysis.attitude_bandwidth(T, (0.1, 80.0), command=True)
 
     def phase(w):
         z = np.exp(1j * w * dt)

@@ -14,8 +14,9 @@ from symheli import LinearModel, Scheduling
 from symheli.errors import InputError, SynthesisError, UnknownNameError
 from symheli.lpv import BSpline, Polynomial
 from symheli.progress import watched
-from synthesis import L2, Gain, Plant, Structure, hinf, structured
-from synthesis.structures import descent, design
+from synthesis import Plant, hinf, structured
+from synthesis.objectives import L2
+from synthesis.structures import TunableController, TunableGain, descent, design
 from synthesis.structures.peaks import StructureLoops
 
 
@@ -58,7 +59,7 @@ def test_slopes_are_those_of_differences(dt, what):
     """Of the largest gain with the penalties of bounds and decay, and of the largest pole."""
     plant = random_plant(3, dt)
     paths = {(u, y): "PID" for u in plant.controls for y in plant.measurements}
-    structure = Structure.pid(plant, paths, corner=5.0, bounds={"u1_y1_P": (-0.1, 0.1)})
+    structure = TunableController.pid(plant, paths, corner=5.0, bounds={"u1_y1_P": (-0.1, 0.1)})
     units = np.full(12, 0.5)
     one = np.array([[0.0]])
     loops = StructureLoops.of(
@@ -116,7 +117,7 @@ def test_descent_ends_at_the_kink_of_a_known_function():
 def test_an_integrator_with_a_bounded_gain_reaches_its_closed_form():
     """sqrt(1 + k^2)/|k| from w to (x, k x), least at the largest |k| that is allowed."""
     plant = integrator()
-    made = structured(plant, Structure.pid(plant, bounds={"": (-2.0, 2.0)}), starts=1)
+    made = structured(plant, TunableController.pid(plant, bounds={"": (-2.0, 2.0)}), starts=1)
     assert made.promised == pytest.approx(math.sqrt(5) / 2, rel=1e-5)
     assert abs(made.gains["u_y_P"][0]) <= 2.0
 
@@ -133,8 +134,8 @@ def test_no_structure_undercuts_the_optimum_of_every_order_and_a_richer_one_is_n
         performance=plant.performance,
     ).optimum
     paths = {(u, y): "PD" for u in plant.controls for y in plant.measurements}
-    static = structured(plant, Structure.pid(plant), starts=3)
-    richer = Structure.pid(plant, paths, corner=20.0)
+    static = structured(plant, TunableController.pid(plant), starts=3)
+    richer = TunableController.pid(plant, paths, corner=20.0)
     pd = structured(plant, richer, start=static.gains, starts=1)
     assert full <= pd.promised <= static.promised * (1 + 1e-6)
     assert pd.optimum == pytest.approx(full)
@@ -149,7 +150,7 @@ def test_no_structure_undercuts_the_optimum_of_every_order_and_a_richer_one_is_n
     ],
 )
 def test_the_promise_is_the_norm_of_the_loop_that_flies_and_is_proven(plant):
-    made = structured(plant, Structure.pid(plant, bounds={"": (-5.0, 5.0)}), starts=1)
+    made = structured(plant, TunableController.pid(plant, bounds={"": (-5.0, 5.0)}), starts=1)
     proof = made.certify(search=None)
     assert proof.verified
     # the level set of the promise is exact to 1e-8, the proof inflates by parts in a million
@@ -165,8 +166,10 @@ def test_surfaces_beat_numbers_and_hold_between_the_conditions():
     low, high = plant.nominal.box[0]
     basis = BSpline(1, (low, 0.5 * (low + high), high))
     paths = {(u, y): "PD"}
-    number = structured(plant, Structure.pid(plant, paths, corner=20.0), starts=2)
-    surface = structured(plant, Structure.pid(plant, paths, corner=20.0, basis=basis), starts=2)
+    number = structured(plant, TunableController.pid(plant, paths, corner=20.0), starts=2)
+    surface = structured(
+        plant, TunableController.pid(plant, paths, corner=20.0, basis=basis), starts=2
+    )
     assert number.structure.numbers == 2
     assert surface.structure.numbers == 6
     assert surface.promised <= number.promised * (1 + 1e-3)
@@ -182,7 +185,7 @@ def test_surfaces_beat_numbers_and_hold_between_the_conditions():
 @pytest.mark.slow
 def test_the_same_seed_gives_the_same_gains_and_another_start_may_not():
     plant = random_plant(5)
-    structure = Structure.pid(plant)
+    structure = TunableController.pid(plant)
     one, two = (structured(plant, structure, starts=2, seed=4) for _ in range(2))
     assert all(np.array_equal(one.gains[n], two.gains[n]) for n in one.gains)
     again = structured(plant, structure, start=one.gains, starts=1)
@@ -193,7 +196,7 @@ def test_the_same_seed_gives_the_same_gains_and_another_start_may_not():
 def test_specifications_are_ratios_to_their_bounds_and_each_has_its_controller():
     plant = random_plant(3)
     wanted = [L2(performance=["z1", "z2"], bound=5.0), L2(disturbances=["n1", "n2"], bound=2.0)]
-    made = structured(plant, Structure.pid(plant), wanted, starts=2)
+    made = structured(plant, TunableController.pid(plant), wanted, starts=2)
     for k, one in enumerate(wanted):
         own = made.on(k)
         assert own.promised == pytest.approx(made.reached[k] * one.bound)
@@ -209,7 +212,7 @@ def test_a_published_scheduled_plant_is_stabilised_over_its_whole_range():
     """
     plant = wu_1996(0.1, half=1.0)
     basis = Polynomial(4, -1.0, 1.0)
-    made = structured(plant, Structure.pid(plant, basis=basis), starts=4, decay=0.05)
+    made = structured(plant, TunableController.pid(plant, basis=basis), starts=4, decay=0.05)
     assert made.structure.numbers == 20
     assert made.optimum <= made.promised * 1.001
     assert made.certify(0.1, search=None).verified
@@ -220,7 +223,7 @@ def test_a_published_scheduled_plant_is_stabilised_over_its_whole_range():
 
 def test_pid_is_the_sum_of_its_terms_in_frequency():
     plant = integrator()
-    structure = Structure.pid(plant, {("u", "y"): "PID"}, corner=8.0)
+    structure = TunableController.pid(plant, {("u", "y"): "PID"}, corner=8.0)
     K = structure.controller({"u_y_P": -2.0, "u_y_I": -3.0, "u_y_D": -0.5}, plant.parameters).at(
         0.0
     )
@@ -232,7 +235,7 @@ def test_pid_is_the_sum_of_its_terms_in_frequency():
 def test_a_sampled_pid_is_that_of_backward_differences():
     dt = 0.1
     plant = integrator(dt)
-    structure = Structure.pid(plant, {("u", "y"): "PID"}, corner=8.0)
+    structure = TunableController.pid(plant, {("u", "y"): "PID"}, corner=8.0)
     K = structure.controller({"u_y_P": -2.0, "u_y_I": -3.0, "u_y_D": -0.5}, plant.parameters).at(
         0.0
     )
@@ -251,13 +254,13 @@ def test_a_sampled_pid_is_that_of_backward_differences():
 
 
 def test_gains_in_series_are_multiplied_at_every_value_of_the_parameter():
-    cascade = Structure(
+    cascade = TunableController(
         LinearModel.gain(
             [[0, 0, 0, 1], [0, 1, 0, 0], [1, 0, 1, 0]],
             ["p", "phi", "attitude", "rate"],
             ["d_lat", "attitude", "rate"],
         ),
-        [Gain("attitude"), Gain("rate", scheduled=True)],
+        [TunableGain("attitude"), TunableGain("rate", scheduled=True)],
         Polynomial(1, 0.0, 10.0),
     )
     basis = cascade.basis
@@ -270,11 +273,14 @@ def test_gains_in_series_are_multiplied_at_every_value_of_the_parameter():
 
 def test_the_numbers_are_counted():
     plant = random_plant(3)
-    assert Structure.pid(plant).numbers == 4
-    assert Structure.pid(plant, basis=Polynomial(2, 0.0, 1.0)).numbers == 12
-    mixed = Structure(
-        Structure.pid(plant).frame,
-        [Gain(g.name, scheduled=k > 0) for k, g in enumerate(Structure.pid(plant).gains)],
+    assert TunableController.pid(plant).numbers == 4
+    assert TunableController.pid(plant, basis=Polynomial(2, 0.0, 1.0)).numbers == 12
+    mixed = TunableController(
+        TunableController.pid(plant).frame,
+        [
+            TunableGain(g.name, scheduled=k > 0)
+            for k, g in enumerate(TunableController.pid(plant).gains)
+        ],
         Polynomial(2, 0.0, 1.0),
     )
     assert mixed.numbers == 10
@@ -285,15 +291,15 @@ def test_the_numbers_are_counted():
 
 def test_what_cannot_be_is_refused_in_words():
     plant = integrator()
-    static = Structure.pid(plant)
+    static = TunableController.pid(plant)
     with pytest.raises(InputError, match="some of the letters P, I, D, got 'PX'"):
-        Structure.pid(plant, {("u", "y"): "PX"})
+        TunableController.pid(plant, {("u", "y"): "PX"})
     with pytest.raises(InputError, match="derivative of y needs a filter"):
-        Structure.pid(plant, {("u", "y"): "PD"})
+        TunableController.pid(plant, {("u", "y"): "PD"})
     with pytest.raises(UnknownNameError, match="u_y_I"):
-        Structure.pid(plant, bounds={"u_y_I": (0.0, 1.0)})
+        TunableController.pid(plant, bounds={"u_y_I": (0.0, 1.0)})
     with pytest.raises(InputError, match="expected low < high"):
-        Gain("k", 1.0, 0.0)
+        TunableGain("k", 1.0, 0.0)
     with pytest.raises(InputError, match="u_y_P is missing"):
         static.controller({}, plant.parameters)
     with pytest.raises(InputError, match="expected synthesis"):
@@ -301,11 +307,11 @@ def test_what_cannot_be_is_refused_in_words():
     with pytest.raises(InputError, match="structure: expected"):
         structured(plant, np.eye(1))
     with pytest.raises(InputError, match=r"sample period is 0\.1 s"):
-        structured(plant, Structure.pid(integrator(0.1), {("u", "y"): "PI"}))
+        structured(plant, TunableController.pid(integrator(0.1), {("u", "y"): "PI"}))
     with pytest.raises(InputError, match="decay"):
         structured(plant, static, decay=-1.0)
     with pytest.raises(InputError, match="its basis is over"):
-        structured(plant, Structure.pid(plant, basis=Polynomial(1, 5.0, 6.0)))
+        structured(plant, TunableController.pid(plant, basis=Polynomial(1, 5.0, 6.0)))
 
 
 def test_without_a_stabilising_start_the_reason_is_said():
@@ -316,7 +322,7 @@ def test_without_a_stabilising_start_the_reason_is_said():
     )
     plant = Plant(lost, ["w"], ["z"], ["u"], ["y"])
     with pytest.raises(SynthesisError, match="u cannot stabilise it") as raised:
-        structured(plant, Structure.pid(plant), starts=2)
+        structured(plant, TunableController.pid(plant), starts=2)
     assert len(raised.value.reasons) >= 2
     double = LinearModel(
         [[0, 1], [0, 0]], [[0, 0], [1, 1]], np.eye(2), np.zeros((2, 2)),
@@ -324,7 +330,7 @@ def test_without_a_stabilising_start_the_reason_is_said():
     )  # fmt: skip
     plant = Plant(double, ["w"], ["z"], ["u"], ["y"])
     with pytest.raises(SynthesisError, match="or a richer structure"):
-        structured(plant, Structure.pid(plant), starts=2)
+        structured(plant, TunableController.pid(plant), starts=2)
 
 
 @pytest.mark.slow
@@ -336,7 +342,7 @@ def test_an_interrupted_search_returns_the_best_so_far_and_says_so():
             signal.raise_signal(signal.SIGINT)
 
     with watched(interrupt):
-        made = structured(plant, Structure.pid(plant), starts=3)
+        made = structured(plant, TunableController.pid(plant), starts=3)
     assert len(made.starts) == 1
     assert "interrupted" in str(made)
     assert made.closed().at(0.0).is_stable()
@@ -345,7 +351,7 @@ def test_an_interrupted_search_returns_the_best_so_far_and_says_so():
         raise KeyboardInterrupt
 
     with watched(at_once), pytest.raises(KeyboardInterrupt):
-        structured(plant, Structure.pid(plant), starts=3)
+        structured(plant, TunableController.pid(plant), starts=3)
 
 
 @pytest.mark.slow
@@ -353,7 +359,7 @@ def test_conditions_are_added_where_the_gain_between_is_larger():
     """With two conditions, at the ends, the middle is found."""
     plant = spring(0.5)
     u, y = plant.controls[0], plant.measurements[0]
-    structure = Structure.pid(plant, {(u, y): "PD"}, corner=20.0)
+    structure = TunableController.pid(plant, {(u, y): "PD"}, corner=20.0)
     search = design._StructureSearch.of(plant, structure, (), None, None, 0.0, 1)
     search.points = np.array([[v] for v in plant.nominal.box[0]])
     search.loops = search._loops(search.points)

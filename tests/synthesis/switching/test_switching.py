@@ -23,15 +23,17 @@ TRIPLED = {(0, 1): [[3.0]], (1, 0): [[3.0]]}
 def test_a_state_that_triples_at_every_switch_must_fall_by_as_much():
     """x' = -x: ln 3 seconds, as a minimum and as an average; with -x and -2x in turn ln(3)/3."""
     exact = math.log(3)
-    least = synthesis.dwell_time([[[-1.0]], [[-1.0]]], TRIPLED, parts=8)
-    mean = synthesis.dwell_time([[[-1.0]], [[-1.0]]], TRIPLED, average=True)
+    least = synthesis.switching.dwell_time([[[-1.0]], [[-1.0]]], TRIPLED, parts=8)
+    mean = synthesis.switching.dwell_time([[[-1.0]], [[-1.0]]], TRIPLED, average=True)
     assert least.verified
     assert mean.verified
     assert exact < least.seconds < 1.005 * exact  # `SPARE_DECAYS`, `ACCURACY`
     assert exact < mean.seconds < 1.02 * exact  # the last of `DECAYS`
-    two = synthesis.dwell_time([[[-1.0]], [[-2.0]]], {(0, 1): [[3.0]], (1, 0): [[1.0]]}, parts=8)
+    two = synthesis.switching.dwell_time(
+        [[[-1.0]], [[-2.0]]], {(0, 1): [[3.0]], (1, 0): [[1.0]]}, parts=8
+    )
     assert exact / 3 < two.seconds < 1.01 * exact / 3
-    sampled = synthesis.dwell_time([[[0.9]], [[0.9]]], TRIPLED, dt=0.1)
+    sampled = synthesis.switching.dwell_time([[[0.9]], [[0.9]]], TRIPLED, dt=0.1)
     assert sampled.seconds == pytest.approx(0.1 * math.ceil(exact / -math.log(0.9)))
 
 
@@ -39,7 +41,7 @@ def test_the_published_bound_is_met_and_not_undercut():
     """2.7508 s is the least of their inequalities; by our own bisection of these in cvxpy 2.75084.
     Below 2.70 s a periodic signal is unstable, and no proof may be found.
     """
-    found = synthesis.dwell_time(PUBLISHED, within=2.77)
+    found = synthesis.switching.dwell_time(PUBLISHED, within=2.77)
     assert found.verified
     assert found.verify()
     assert 0 < found.seconds <= 2.77
@@ -51,23 +53,23 @@ def test_the_published_bound_is_met_and_not_undercut():
     ]
     assert max(radius) > 1
     for short in (2.7, 2.74):
-        assert not synthesis.dwell_time(PUBLISHED, within=short).verified
-    mean = synthesis.dwell_time(PUBLISHED, average=True)
+        assert not synthesis.switching.dwell_time(PUBLISHED, within=short).verified
+    mean = synthesis.switching.dwell_time(PUBLISHED, average=True)
     assert mean.verified
     assert mean.seconds > 2.7508  # what an average allows a minimum does
 
 
 @pytest.mark.slow
 def test_the_least_published_dwell_time_is_found_by_bisection():
-    found = synthesis.dwell_time(PUBLISHED, parts=64)
+    found = synthesis.switching.dwell_time(PUBLISHED, parts=64)
     assert 2.7508 < found.seconds < 2.76
-    sampled = synthesis.dwell_time([expm(0.05 * np.array(A)) for A in PUBLISHED], dt=0.05)
+    sampled = synthesis.switching.dwell_time([expm(0.05 * np.array(A)) for A in PUBLISHED], dt=0.05)
     assert 2.75 < sampled.seconds <= 2.8001
 
 
 def test_a_forged_proof_is_not_verified():
     """Of a shorter time, of another model, with a P that is altered, or of a steeper decay."""
-    found = synthesis.dwell_time(PUBLISHED, within=2.8)
+    found = synthesis.switching.dwell_time(PUBLISHED, within=2.8)
     own = found.modes
     other = replace(found, modes=own._replace(A=own.A[::-1]))
     larger = {key: 1.2 * J for key, J in own.jumps.items()}
@@ -94,12 +96,12 @@ def test_a_mode_that_moves_with_p_is_proven_over_its_whole_range():
         outputs=[],
     )
     jumps = {(i, j): 3.0 * np.eye(2) for i in range(2) for j in range(2) if i != j}
-    found = synthesis.dwell_time([turning, turning], jumps, within=1.3)
+    found = synthesis.switching.dwell_time([turning, turning], jumps, within=1.3)
     assert found.verified
-    assert not synthesis.dwell_time(
+    assert not synthesis.switching.dwell_time(
         [turning, turning], jumps, within=1.05
     ).verified  # ln 3 = 1.0986
-    unstable = synthesis.dwell_time([turning, np.eye(2)])
+    unstable = synthesis.switching.dwell_time([turning, np.eye(2)])
     assert not unstable.verified
     assert "mode 1 is not stable" in str(unstable)
 
@@ -126,7 +128,7 @@ def heli():
 def made(heli):
     plant = lateral(heli)
     whole = synthesis.lqr(plant)
-    return synthesis.switched(plant, [whole.at(v) for v in (3.0, 10.0)], [6.5], 2.0)
+    return synthesis.switching.switched(plant, [whole.at(v) for v in (3.0, 10.0)], [6.5], 2.0)
 
 
 class Watched:
@@ -218,8 +220,8 @@ def test_what_cannot_switch_is_refused_in_words(made):
         ([synthesis.lqr(plant), two], [6.5], 1.0, "freeze it"),
     ):  # fmt: skip
         with pytest.raises(InputError, match=words):
-            synthesis.switched(plant, designs, edges, width)
+            synthesis.switching.switched(plant, designs, edges, width)
     with pytest.raises(InputError, match="same states"):
-        synthesis.dwell_time([[[-1.0]], -np.eye(2)])
+        synthesis.switching.dwell_time([[[-1.0]], -np.eye(2)])
     with pytest.raises(InputError, match="no pair of different modes"):
-        synthesis.dwell_time([[[-1.0]], [[-1.0]]], {(0, 2): [[1.0]]})
+        synthesis.switching.dwell_time([[[-1.0]], [[-1.0]]], {(0, 2): [[1.0]]})

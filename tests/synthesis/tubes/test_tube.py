@@ -16,9 +16,10 @@ from evidence.planar_vtol.tubes import proven as vtol_tube
 from evidence.tables import chosen, renewed
 from evidence.tube_flights import from_its_border, worst
 from studies.cli import main
-from symheli import Helicopter, trim, trim_batch
+from symheli import Helicopter, trim
 from symheli.errors import InputError
-from synthesis import Motions, Tube, tube
+from symheli.steady import trim_batch
+from synthesis.tubes import Motions, Tube, tube
 from synthesis.tubes.controllers import Choice
 from synthesis.tubes.deviations import CommandCell, Deviations, _covered
 from synthesis.tubes.enclosure import AffineForm, SegmentAverages, equations

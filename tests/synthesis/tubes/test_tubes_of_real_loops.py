@@ -15,7 +15,7 @@ from symheli.errors import InputError, UnknownNameError
 from symheli.flight import XCELL_SERVOS
 from symheli.lpv import connect
 from symheli.values.signal import Signal
-from synthesis import Tube, coverage, tube
+from synthesis.tubes import Tube, coverage, tube
 from synthesis.tubes.controllers import Choice
 from synthesis.tubes.deviations import CommandCell, Deviations
 from synthesis.tubes.equipment import LoopEquipment

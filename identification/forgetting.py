@@ -1,0 +1,5 @@
+"""Forgetting of a recursive estimator."""
+
+from symheli.lazy import lazily
+
+__getattr__, __dir__, __all__ = lazily(__name__, __file__)

@@ -1,0 +1,15 @@
+from identification.judge.against_constant import compare_constant as compare_constant
+from identification.judge.beside_baseline import BaselineModel as BaselineModel
+from identification.judge.beside_baseline import BaselinePredictor as BaselinePredictor
+from identification.judge.beside_baseline import compare_baseline as compare_baseline
+from identification.judge.criteria import Criterion as Criterion
+from identification.judge.dependence import dependence_report as dependence_report
+from identification.judge.frozen_models import pole_distance as pole_distance
+from identification.judge.frozen_stability import frozen_stability as frozen_stability
+from identification.judge.residuals import theil as theil
+from identification.judge.response_regions import response_regions as response_regions
+from identification.judge.response_regions import structure_bias as structure_bias
+from identification.judge.scores import Scores as Scores
+from identification.judge.slow_modes import slow_modes as slow_modes
+from identification.judge.unseen_flight import validate as validate
+from identification.model.prediction import fit_percent as fit_percent

@@ -1,0 +1,5 @@
+from identification.model.coefficients import Coefficients as Coefficients
+from identification.model.kinematic_model import KinematicModel as KinematicModel
+from identification.model.lpvarx_model import LPVARXModel as LPVARXModel
+from identification.model.matrix_ellipsoid import matrix_ellipsoid as matrix_ellipsoid
+from identification.model.state_space_model import StateSpaceModel as StateSpaceModel

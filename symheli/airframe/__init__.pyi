@@ -1,0 +1,2 @@
+from symheli.airframe.identified_models import identified_model as identified_model
+from symheli.airframe.identified_models import identified_models as identified_models

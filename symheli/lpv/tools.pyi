@@ -1,0 +1,15 @@
+from symheli.lpv.delay import pade_delay as pade_delay
+from symheli.lpv.delay import sample_delay as sample_delay
+from symheli.lpv.frozen_plots import damping as damping
+from symheli.lpv.frozen_plots import nyquist as nyquist
+from symheli.lpv.frozen_plots import pole_map as pole_map
+from symheli.lpv.lagged import lagged as lagged
+from symheli.lpv.lft_matrices import Block as Block
+from symheli.lpv.linear_models import LinearModels as LinearModels
+from symheli.lpv.lower_feedback import lower_feedback as lower_feedback
+from symheli.lpv.lpv_matrices import Matrices as Matrices
+from symheli.lpv.nu_gap import chordal_distance as chordal_distance
+from symheli.lpv.nu_gap import nu_gaps as nu_gaps
+from symheli.lpv.simulate import simulate as simulate
+from symheli.lpv.slider import slider as slider
+from symheli.lpv.trim_schedule import TrimSchedule as TrimSchedule

@@ -1,0 +1,13 @@
+from synthesis.certify.lft.multipliers import SCALINGS as SCALINGS
+from synthesis.certify.lower_bounds.lines import frozen_box_gain as frozen_box_gain
+from synthesis.certify.lower_bounds.lower_bound import LowerBoundSearch as LowerBoundSearch
+from synthesis.certify.questions.gain_against_rate import gain_against_rate as gain_against_rate
+from synthesis.certify.questions.lft_gain import lft_stability as lft_stability
+from synthesis.certify.questions.questions import energy_to_peak as energy_to_peak
+from synthesis.certify.statement.outcome import Status as Status
+from synthesis.design.loops.frozen_reading import proven_around as proven_around
+from synthesis.design.loops.handling_qualities import attitude_bandwidth as attitude_bandwidth
+from synthesis.design.loops.margins import open_loop as open_loop
+from synthesis.design.loops.wrong_parameter import with_scheduling_error as with_scheduling_error
+from synthesis.numerics.polynomial.matrix import PolynomialMatrix as PolynomialMatrix
+from synthesis.numerics.program.cone_program import installed_solvers as installed_solvers

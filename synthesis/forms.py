@@ -1,0 +1,5 @@
+"""Forms of a Lyapunov function, for `form=` of the questions."""
+
+from symheli.lazy import lazily
+
+__getattr__, __dir__, __all__ = lazily(__name__, __file__)

@@ -1,0 +1,5 @@
+"""How an inequality is imposed for every p, for `impose=` of questions and designs."""
+
+from symheli.lazy import lazily
+
+__getattr__, __dir__, __all__ = lazily(__name__, __file__)

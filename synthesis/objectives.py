@@ -1,0 +1,5 @@
+"""Objectives of `multiobjective` designs."""
+
+from symheli.lazy import lazily
+
+__getattr__, __dir__, __all__ = lazily(__name__, __file__)

@@ -1,0 +1,1 @@
+from synthesis.sheet.sheet import Sheet as Sheet
