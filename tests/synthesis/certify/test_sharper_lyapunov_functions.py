@@ -239,7 +239,7 @@ def test_tampered_proofs_fail_in_either_arithmetic():
 
 
 @pytest.mark.parametrize("rate", [0.0, 0.1, math.inf])
-@pytest.mark.parametrize(("form", "said"), [(MEMORY, "Memory"), (QUARTIC, "HigherOrder")])
+@pytest.mark.parametrize(("form", "said"), [(MEMORY, "LaggedParameter"), (QUARTIC, "HigherOrder")])
 def test_in_discrete_time_a_memory_or_an_order_is_refused_before_any_work(
     form, said, rate, monkeypatch
 ):
