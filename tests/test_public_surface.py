@@ -35,7 +35,7 @@ CONTRACT = {"identification": {"Polynomial"}}
 
 def public(package):
     """Names of a package; of a module that has more than public names those that moved there."""
-    return getattr(module(package), "__all__", None) or names(package)
+    return names(package) or module(package).__all__
 
 
 @pytest.mark.parametrize("package", FACES)

@@ -83,6 +83,7 @@ class StructureBias:
 
     Examples
     --------
+    >>> from identification.judge.response_regions import StructureBias
     >>> off = StructureBias(model, {0.0: model.at(0.0)})
     >>> bool(np.abs(off.responses([0.1, 1.0], model.outputs, model.inputs)).max() < 1e-12)
     True
