@@ -446,7 +446,7 @@ MUTANTS = (
     Mutant(
         "files of stages make objects of any package",
         "studies/transition/stage_file.py",
-        "if module.split(\".\")[0] not in PACKAGES:",
+        'if module.split(".")[0] not in PACKAGES:',
         "if False:",
         "tests/studies/test_stage_file.py",
     ),
@@ -460,7 +460,7 @@ MUTANTS = (
     Mutant(
         "an array that could not be changed can be when read again",
         "studies/transition/stage_file.py",
-        "array.flags.writeable = not node[\"fixed\"]",
+        'array.flags.writeable = not node["fixed"]',
         "array.flags.writeable = True",
         "tests/studies/test_stage_file.py",
     ),
@@ -488,8 +488,8 @@ MUTANTS = (
     Mutant(
         "whole numbers of a file of choices become integers",
         "studies/choices.py",
-        "return f\"{value:.1f}\" if abs(value) < 1e15 else repr(value)",
-        "return f\"{value:.0f}\"",
+        'return f"{value:.1f}" if abs(value) < 1e15 else repr(value)',
+        'return f"{value:.0f}"',
         "tests/studies/test_configuration.py",
     ),
 )

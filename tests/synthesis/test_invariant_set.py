@@ -159,11 +159,11 @@ def test_a_larger_disturbance_drives_it_out(random_set):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("dt", [None, 0.05])
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1])
 def test_no_motion_of_other_random_plants_leaves_their_sets(seed, dt):
     found = invariant_set(random_plant(seed, dt), **LIMITS)
     assert found.proven, found.why
-    most, used = furthest(found, 200, 1000, 1e-3)
+    most, used = furthest(found, 200, 300, 1e-3)
     assert most < 1 + 1e-5
     assert used < 1 + 1e-5
 
@@ -320,7 +320,7 @@ def test_laws_that_switch_inside_their_sets_keep_every_limit():
     law, dt, rng = SwitchInside(sets), 0.02, np.random.default_rng(0)
     steps = [expm((CART.A + CART.B @ np.array(K)) * dt) for K in gains]
     most, arrived, careless = 0.0, 0, 0.0
-    for _ in range(20):
+    for _ in range(5):
         z = rng.standard_normal(2)
         x, active = np.linalg.cholesky(sets[0].gramian()) @ z / np.linalg.norm(z), 0
         careless = max(careless, np.abs(np.array(gains[1]) @ x).item())
@@ -330,7 +330,7 @@ def test_laws_that_switch_inside_their_sets_keep_every_limit():
             x = steps[active] @ x
         arrived += active
     assert most < 1 + 1e-9
-    assert arrived == 20  # all have come to the fast law
+    assert arrived == 5  # all have come to the fast law
     assert careless > 1.0  # which would have exceeded its limit at once
 
 

@@ -57,8 +57,8 @@ def response(lpv, time, p, u, x, step):
 @pytest.mark.parametrize(
     ("seed", "dt"),
     [
-        pytest.param(k, dt, marks=() if k < 3 and k % 2 == (dt is None) else pytest.mark.slow)
-        for k in range(5)
+        pytest.param(k, dt, marks=() if k % 2 == (dt is None) else pytest.mark.slow)
+        for k in range(3)
         for dt in (None, 0.1)
     ],
 )

@@ -40,16 +40,6 @@ def test_the_least_gain_is_the_worst_frozen_optimum(seed, slow):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("slow", [False, True])
-@pytest.mark.parametrize("first", range(0, 40, 10))
-def test_most_random_plants_come_within_a_fiftieth(first, slow):
-    """What misses it is counted and printed by `benchmarks/designs_near_optimum.py`."""
-    found = [least(seed, slow) for seed in range(first, first + 10)]
-    assert min(found) >= BELOW
-    assert sum(ratio <= CLOSE for ratio in found) >= 8, found
-
-
-@pytest.mark.slow
 def test_a_slow_parameter_is_not_told_and_its_gain_is_still_proven():
     drawn = random_plant(10)
     made = output_feedback(drawn.plant, drawn.slow)
