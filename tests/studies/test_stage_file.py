@@ -13,6 +13,9 @@ from studies.transition import stage_file
 from symheli import LinearModel, Scheduling, Signal
 
 
+pytestmark = pytest.mark.guard
+
+
 def again(value):
     return stage_file.read(stage_file.written(value))
 

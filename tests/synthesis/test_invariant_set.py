@@ -229,6 +229,7 @@ FORGED = {
 }
 
 
+@pytest.mark.guard
 @pytest.mark.parametrize("forgery", FORGED)
 def test_a_forged_set_is_not_proven(random_set, tmp_path, forgery):
     path = random_set.save(tmp_path / "set.json")
@@ -238,6 +239,7 @@ def test_a_forged_set_is_not_proven(random_set, tmp_path, forgery):
     assert not InvariantSet.load(path).proven
 
 
+@pytest.mark.guard
 def test_a_saved_set_is_proven_again_from_its_file(random_set, tmp_path, capsys):
     path = random_set.save(tmp_path / "set.json")
     again = InvariantSet.load(path)
@@ -247,6 +249,7 @@ def test_a_saved_set_is_proven_again_from_its_file(random_set, tmp_path, capsys)
     assert "invariant ellipsoid, proven for every p" in capsys.readouterr().out
 
 
+@pytest.mark.guard
 @pytest.mark.parametrize(
     "damage",
     [

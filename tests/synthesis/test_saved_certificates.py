@@ -20,8 +20,10 @@ from symheli.lpv import LPVStateSpace, PiecewiseLinear, Scheduling, UserFunction
 from synthesis import Certificate, Grid, Spline, Status, l2_gain, stability
 from synthesis.worst.trajectory import SchedulingTrajectory
 
+pytestmark = pytest.mark.guard
+
 QUICK = settings(
-    max_examples=30, derandomize=True, deadline=None, suppress_health_check=list(HealthCheck)
+    max_examples=20, derandomize=True, deadline=None, suppress_health_check=list(HealthCheck)
 )
 
 
@@ -104,7 +106,6 @@ def changed(content, path, value):
 JUNK = (None, "P", -1, 1e300, 10**400, [], {}, True, {"float": "nan"}, {"type": "Certificate"})
 
 
-@pytest.mark.slow(only=("sampled", "memory", "uncertain, sampled"))
 @pytest.mark.parametrize("form", FORMS)
 @QUICK
 @given(data=st.data())
