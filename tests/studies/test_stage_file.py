@@ -12,7 +12,6 @@ import pytest
 from studies.transition import stage_file
 from symheli import LinearModel, Scheduling, Signal
 
-
 pytestmark = pytest.mark.guard
 
 

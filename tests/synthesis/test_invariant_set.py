@@ -337,18 +337,6 @@ def test_laws_that_switch_inside_their_sets_keep_every_limit():
     assert careless > 1.0  # which would have exceeded its limit at once
 
 
-@pytest.mark.slow
-def test_a_governed_transition_of_another_helicopter_stays_inside():
-    from evidence.sets import commands, flown, proven_set
-
-    heli = symheli.Helicopter.load("xcell_kahn_hudson", governor="ideal")
-    found = proven_set(heli)
-    assert found.proven, found.why
-    steps = commands(governor(found), 10)
-    assert flown(heli, found, *steps, governed=True).size.max() < 1
-    assert flown(heli, found, *steps, governed=False).size.min() > 1
-
-
 @pytest.mark.parametrize(
     ("options", "told"),
     [

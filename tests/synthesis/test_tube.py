@@ -94,16 +94,16 @@ def test_a_damaged_file_of_a_helicopter_is_refused(proven, tmp_path, damage):
         Tube.load(path)
 
 
-@pytest.mark.slow
+@pytest.mark.guard
 def test_where_there_is_no_tube_it_says_why(tmp_path):
-    heli = Helicopter.load("xcell60", governor="ideal")
-    large = tube(heli, 8.0, gust=3.0)
+    model, about = _pendulum()
+    large = tube(model, about, gust=5.0, sizes=(0.2, 0.3))
     assert not large.proven
     assert "no tube" in str(large)
     with pytest.raises(InputError, match="only a proven tube"):
         large.save(tmp_path / "none.json")
-    loose = tube(heli, 0.0, gust=0.1, gain=np.zeros((4, 10)))
-    assert not loose.proven
+    falls = tube(*_pendulum(gain=(0.0, 0.0)), gust=0.1, sizes=(0.2, 0.3))
+    assert not falls.proven
 
 
 def test_wrong_arguments_are_refused():
@@ -297,7 +297,7 @@ def test_along_a_range_the_feedback_spares_the_pitching_moment_of_the_tail():
 
 @pytest.mark.slow
 def test_the_set_of_a_cell_with_two_kinks_holds_the_jacobians_in_it():
-    heli, n, count = Helicopter.load("xcell60", governor="ideal"), 10, 4000
+    heli, n, count = Helicopter.load("xcell60", governor="ideal"), 10, 800
     loop = Deviations(heli, moving(heli, np.array([9.0, 10.0]), (1.0, 1.0, 1.0)), 0.15)
     cell, factor = CommandCell(0, (0.0, 1.0), (0.0, 0.5)), np.diag(0.2 * np.array(TUBE_SIZES[:n]))
     drifts = np.zeros((1, 4, n))
