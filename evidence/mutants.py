@@ -39,6 +39,8 @@ class Mutant(NamedTuple):
     tests: str
 
 
+SERVOS = "tests/flight/test_servos_sensors_and_gusts.py"
+
 MUTANTS = (
     Mutant(
         "pieces narrower than 1e-9 of the range are left out",
@@ -179,14 +181,14 @@ MUTANTS = (
         "symheli/flight/servo.py",
         "np.round(wanted[coarse] / grain)",
         "np.floor(wanted[coarse] / grain)",
-        "tests/flight/test_servos_sensors_and_gusts.py",
+        SERVOS + "::test_a_servo_keeps_its_travel_its_rate_and_its_steps",
     ),
     Mutant(
         "the lead of a servo has the other sign",
         "symheli/flight/servo.py",
         "[A, (1 - r) * B]",
         "[A, (r - 1) * B]",
-        "tests/flight/test_servos_sensors_and_gusts.py",
+        SERVOS + "::test_a_servo_has_the_printed_transfer_function",
     ),
     Mutant(
         "the exponential of a matrix lacks a term",
