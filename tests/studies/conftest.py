@@ -69,7 +69,7 @@ def full():
         exact_rates=(0.0,),
         longitudinal_rates=(0.0,),
         thorough=False,
-        aggressive=40.0,
+        aggressive=60.0,
         gentle_flight=False,
         robust_rates=(0.0,),
         robust_form=FORM,

@@ -1,4 +1,4 @@
-"""D-K iteration: what mu promises, and routes that agree; the distillation column: docs/gallery.md."""
+"""D-K iteration: what mu promises, and routes that agree; a published plant: docs/gallery.md."""
 
 from dataclasses import replace
 
