@@ -5,13 +5,10 @@ beats, and printed optima.
 import math
 
 import pytest
-import sympy
-from published_plants import wu_1996
 
 from benchmarks.random_plants import random_plant
 from symheli.errors import SymheliError
-from symheli.lpv import UserFunctions
-from synthesis import Grid, output_feedback
+from synthesis import output_feedback
 
 CLOSE = 1.02
 BELOW = 1 - 2e-3
@@ -37,25 +34,3 @@ def least(seed, slow):
 @pytest.mark.parametrize("seed", QUICK)
 def test_the_least_gain_is_the_worst_frozen_optimum(seed, slow):
     assert BELOW <= least(seed, slow) <= CLOSE
-
-
-@pytest.mark.slow
-def test_the_angle_on_the_grid_of_its_source_and_between_its_points():
-    """LPVTools' documentation: 7 points, rate 5, functions 1, cos, sin; .905 to .907, .9250 at a
-    back-off of 1.02. Here X is constant, and the controller needs no dp/dt.
-    """
-    plant = wu_1996(5.0)
-    (rho,) = plant.parameters
-    t = rho.symbol
-    made = output_feedback(
-        plant,
-        X=0,
-        Y=UserFunctions.from_expressions([1, sympy.cos(t), sympy.sin(t)], rho),
-        impose=Grid(7),
-        back_off=BACK_OFF,
-    )
-    assert 0.905 <= made.optimum <= 0.907
-    assert made.promised <= 0.9250
-    proof = made.certify(5.0, search=None)
-    assert proof.verified
-    assert proof.gamma <= 0.97
