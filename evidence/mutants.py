@@ -259,10 +259,10 @@ MUTANTS = (
         "tests/identification/test_unseen_flight.py",
     ),
     Mutant(
-        "what the regressors explain themselves counts as another dependence",
+        "the dependence on p that is tried is that of the model",
         "identification/judge/dependence.py",
-        "new = psi[:, regressors] - Q @ (Q.T @ psi[:, regressors])",
-        "new = psi[:, regressors]",
+        'scheduling_at="now" if arx.scheduling_at == "lag" else "lag"',
+        'scheduling_at="lag" if arx.scheduling_at == "lag" else "now"',
         "tests/identification/test_dependence_on_scheduling.py",
     ),
     Mutant(
@@ -295,10 +295,10 @@ MUTANTS = (
         "tests/synthesis/test_bernstein_and_cells.py tests/synthesis/test_polynomial_matrices.py",
     ),
     Mutant(
-        "entries on the diagonal of the null space of forms count twice",
+        "what is added to a form at will is not nothing",
         "synthesis/polynomial/symmetric_power.py",
-        "own[:, 1], 0.5, 1.0)",
-        "own[:, 1], 1.0, 1.0)",
+        "for sign, (a, b) in zip((1, -1), entries, strict=True):",
+        "for sign, (a, b) in zip((1, 1), entries, strict=True):",
         "tests/synthesis/test_sharper_lyapunov_functions.py",
     ),
     Mutant(
