@@ -313,7 +313,7 @@ MUTANTS = (
         "synthesis/polynomial/definite.py",
         "if promising and positive_definite(G):",
         "if promising:",
-        "tests/synthesis/test_no_false_proof.py tests/synthesis/test_polynomial_matrices.py",
+        "tests/synthesis/test_polynomial_matrices.py",
     ),
     Mutant(
         "a speed counts as out of reach from which p can stop",
@@ -365,10 +365,10 @@ MUTANTS = (
         "tests/synthesis/test_invariant_set.py",
     ),
     Mutant(
-        "a switched model decays half as fast as is said",
+        "a switch is compared with what it grows to",
         "synthesis/switching/inequality.py",
-        "last * (decay + decay)",
-        "last * decay",
+        "jump.T @ own[j][0] @ jump",
+        "jump.T @ own[j][-1] @ jump",
         "tests/synthesis/design/test_switching.py",
     ),
     Mutant(

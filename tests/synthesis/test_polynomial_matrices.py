@@ -10,7 +10,7 @@ from symheli.lpv import LFT, LPVStateSpace, Scheduling
 from synthesis import PolynomialMatrix, l2_gain
 from synthesis.assemble.imposed import coefficient_conditions, sums_of_squares, vertex_conditions
 from synthesis.polynomial.definite import negative_definite, negative_definite_exactly
-from synthesis.polynomial.exact import rational
+from synthesis.polynomial.exact import exact, rational
 from synthesis.polynomial.matrix import block
 from synthesis.polynomial.pieces import pieces
 from synthesis.polynomial.regions import convert
@@ -180,3 +180,17 @@ def test_wrong_input_gets_a_sentence():
         LPVStateSpace.polynomial(
             {(0,): -np.eye(2)}, {(0,): [[1.0]]}, {(0,): [[1.0, 0]]}, {(0,): [[0.0]]}, parameters
         )
+
+
+@pytest.mark.guard
+def test_a_matrix_that_is_definite_to_rounding_only_is_not_shown_to_be():
+    """Singular Gram matrices of integers less 1e-40: of either sign in doubles, indefinite."""
+    number, rng = rational(), np.random.default_rng(0)
+    tiny = number(1) / number(10) ** 40
+    signs = []
+    for _ in range(20):
+        V = rng.integers(-9, 10, (3, 2))
+        M = exact(V @ V.T, number) - tiny * np.eye(3, dtype=int).astype(object)
+        signs.append(np.linalg.eigvalsh((V @ V.T).astype(float))[0] > 0)
+        assert not negative_definite_exactly(PolynomialMatrix(((0.0, 1.0),), -M[None]))
+    assert any(signs)
