@@ -450,10 +450,10 @@ MUTANTS = (
     ),
     # --- studies -----------------------------------------------------------------------------
     Mutant(
-        "files of stages make objects of any package",
+        "values of any package are written into files of stages",
         "studies/transition/stage_file.py",
-        'if module.split(".")[0] not in PACKAGES:',
-        "if False:",
+        "        if not _ours(kind):\n            raise TypeError",
+        "        if False:\n            raise TypeError",
         "tests/studies/test_stage_file.py",
     ),
     Mutant(
@@ -492,11 +492,25 @@ MUTANTS = (
         "tests/studies/test_processes.py",
     ),
     Mutant(
-        "whole numbers of a file of choices become integers",
+        "a misspelt choice is not told its name",
         "studies/choices.py",
-        'return f"{value:.1f}" if abs(value) < 1e15 else repr(value)',
-        'return f"{value:.0f}"',
+        "cutoff=0.5)",
+        "cutoff=0.99)",
         "tests/studies/test_configuration.py",
+    ),
+    Mutant(
+        "wind turns the other way about the heading",
+        "studies/controllers/measures.py",
+        "[ct * cp, ct * sp, -st],",
+        "[ct * cp, -ct * sp, -st],",
+        "tests/studies/test_study_controllers.py",
+    ),
+    Mutant(
+        "an energy ratio is that of the energies, not its root",
+        "studies/controllers/measures.py",
+        "return float(np.sqrt((z**2).sum() / (w**2).sum()))",
+        "return float((z**2).sum() / (w**2).sum())",
+        "tests/studies/test_study_controllers.py",
     ),
 )
 
