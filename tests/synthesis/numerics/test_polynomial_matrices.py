@@ -7,19 +7,15 @@ import pytest
 
 from symheli import LFT, LPVStateSpace, Scheduling
 from symheli.errors import InputError
-from synthesis import l2_gain
-from synthesis.analysis import PolynomialMatrix
-from synthesis.certify.assemble.imposed import (
-    coefficient_conditions,
-    sums_of_squares,
-    vertex_conditions,
-)
-from synthesis.numerics.polynomial.definite import negative_definite, negative_definite_exactly
-from synthesis.numerics.polynomial.exact import rational
-from synthesis.numerics.polynomial.matrix import block
-from synthesis.numerics.polynomial.pieces import pieces
-from synthesis.numerics.polynomial.regions import convert
-from synthesis.numerics.polynomial.symmetric import smat, svec
+from symheli.lpv import LFT, LPVStateSpace, Scheduling
+from synthesis import PolynomialMatrix, l2_gain
+from synthesis.assemble.imposed import coefficient_conditions, sums_of_squares, vertex_conditions
+from synthesis.polynomial.definite import negative_definite, negative_definite_exactly
+from synthesis.polynomial.exact import exact, rational
+from synthesis.polynomial.matrix import block
+from synthesis.polynomial.pieces import pieces
+from synthesis.polynomial.regions import convert
+from synthesis.polynomial.symmetric import smat, svec
 
 BOX = ((-1.0, 2.0), (0.5, 3.0))
 POINTS = np.array([[-1.0, 0.5], [2.0, 3.0], [0.3, 1.7], [1.9, 0.6]])
@@ -185,3 +181,17 @@ def test_wrong_input_gets_a_sentence():
         LPVStateSpace.polynomial(
             {(0,): -np.eye(2)}, {(0,): [[1.0]]}, {(0,): [[1.0, 0]]}, {(0,): [[0.0]]}, parameters
         )
+
+
+@pytest.mark.guard
+def test_a_matrix_that_is_definite_to_rounding_only_is_not_shown_to_be():
+    """Singular Gram matrices of integers less 1e-40: of either sign in doubles, indefinite."""
+    number, rng = rational(), np.random.default_rng(0)
+    tiny = number(1) / number(10) ** 40
+    signs = []
+    for _ in range(20):
+        V = rng.integers(-9, 10, (3, 2))
+        M = exact(V @ V.T, number) - tiny * np.eye(3, dtype=int).astype(object)
+        signs.append(np.linalg.eigvalsh((V @ V.T).astype(float))[0] > 0)
+        assert not negative_definite_exactly(PolynomialMatrix(((0.0, 1.0),), -M[None]))
+    assert any(signs)
