@@ -6,7 +6,8 @@ import pytest
 
 from evidence.bracket.measured import Bracket, bracket
 from studies.loops.lateral import lateral_loop
-from synthesis import Memory, Search
+from synthesis.analysis import LowerBoundSearch
+from synthesis.forms import LaggedParameter
 
 QUICK = LowerBoundSearch(levels=6, dwells=5, starts=1, nodes=40, evaluations=8, samples=5000)
 

@@ -15,9 +15,9 @@ from studies.transition import study as stages
 from studies.transition.effort import Effort
 from symheli import Helicopter
 from symheli.errors import SynthesisError
-from synthesis import Search
-from synthesis.loops.controller import Controller
-from synthesis.lpv.point_schedule import hinf_at
+from synthesis.analysis import LowerBoundSearch
+from synthesis.design.loops.controller import Controller
+from synthesis.design.lpv.point_schedule import hinf_at
 
 GLIMPSE = LowerBoundSearch(levels=2, dwells=1, starts=1, nodes=8, evaluations=1, samples=100)
 

@@ -19,7 +19,7 @@ from synthesis.forms import Spline
 
 pytestmark = pytest.mark.guard
 
-QUICK = Search(levels=2, dwells=1, starts=1, nodes=8, evaluations=1, samples=100)
+QUICK = LowerBoundSearch(levels=2, dwells=1, starts=1, nodes=8, evaluations=1, samples=100)
 
 
 @pytest.fixture(scope="module")

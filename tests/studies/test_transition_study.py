@@ -9,14 +9,14 @@ import pytest
 
 import symheli
 import synthesis
-from identification import beside_baseline
-from studies.transition import accelerating_baseline, axes, guarantees
-from studies.transition.accelerating_baseline import ALONE, BOTH
-from studies.transition.axes import LATERAL, LONGITUDINAL
+from identification.judge import compare_baseline
+from studies.setup import accelerating_baseline, axes
+from studies.setup.accelerating_baseline import ALONE, BOTH, along_the_command
+from studies.setup.axes import LATERAL, LONGITUDINAL
+from studies.setup.flights import TransitionPlan, autopilot_for
+from studies.transition import guarantees
 from studies.transition.baseline import build_baseline
 from studies.transition.campaign import MarksOverSeeds, Row
-from studies.transition.comparison import along_the_command
-from studies.transition.flights import TransitionPlan, autopilot_for
 from studies.transition.paper_experiment import OUTPUTS, PaperExperiments, run_experiment
 from studies.transition.recovery import recover
 

@@ -9,9 +9,12 @@ import pytest
 from published_plants import noisy_spinning_disks
 from scipy import linalg
 
-from symheli import InputError, LPVStateSpace, Scheduling
-from synthesis import H2, Plant, SumOfSquares, h2, h2_gain, multiobjective
-from synthesis.lti.h2 import h2_norm
+from symheli import LPVStateSpace, Scheduling
+from symheli.errors import InputError
+from synthesis import Plant, h2, h2_gain, multiobjective
+from synthesis.design.lti.h2 import h2_norm
+from synthesis.impose import SumOfSquares
+from synthesis.objectives import H2
 
 
 def unstable_lag(rate, high=1.0):

@@ -7,15 +7,19 @@ import pytest
 
 from symheli import LFT, LPVStateSpace, Scheduling
 from symheli.errors import InputError
-from symheli.lpv import LFT, LPVStateSpace, Scheduling
-from synthesis import PolynomialMatrix, l2_gain
-from synthesis.assemble.imposed import coefficient_conditions, sums_of_squares, vertex_conditions
-from synthesis.polynomial.definite import negative_definite, negative_definite_exactly
-from synthesis.polynomial.exact import exact, rational
-from synthesis.polynomial.matrix import block
-from synthesis.polynomial.pieces import pieces
-from synthesis.polynomial.regions import convert
-from synthesis.polynomial.symmetric import smat, svec
+from synthesis import l2_gain
+from synthesis.analysis import PolynomialMatrix
+from synthesis.certify.assemble.imposed import (
+    coefficient_conditions,
+    sums_of_squares,
+    vertex_conditions,
+)
+from synthesis.numerics.polynomial.definite import negative_definite, negative_definite_exactly
+from synthesis.numerics.polynomial.exact import exact, rational
+from synthesis.numerics.polynomial.matrix import block
+from synthesis.numerics.polynomial.pieces import pieces
+from synthesis.numerics.polynomial.regions import convert
+from synthesis.numerics.polynomial.symmetric import smat, svec
 
 BOX = ((-1.0, 2.0), (0.5, 3.0))
 POINTS = np.array([[-1.0, 0.5], [2.0, 3.0], [0.3, 1.7], [1.9, 0.6]])

@@ -7,7 +7,6 @@ from symheli import LPVStateSpace, Scheduling, UncertainStateSpace
 from synthesis import Plant, l2_gain, output_feedback
 from synthesis.numerics.linear.norm import norm
 from synthesis.robust import DynamicBlock
-from synthesis.robust.uncertain import uncertain as around
 
 BACK_OFF = 1.02
 
