@@ -320,7 +320,7 @@ def flown(plan: Path, records: Sequence[FlightRecord], *, sweeps: bool = False) 
         )
     except (ValueError, KeyError, TypeError, StopIteration) as error:
         raise InputError(
-            f"{plan}: expected the plan.json that symheli design --write wrote ({error!r})"
+            f"{plan}: expected the plan.json that symheli experiment --write wrote ({error!r})"
         ) from error
     structure = axis.structure()
     if any(len(f.factor) != len(structure.regressor_names) for f in flights):
