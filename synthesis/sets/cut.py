@@ -28,7 +28,7 @@ def plot_cut(
     found: InvariantSet, first: str, second: str, p: Sequence[float], ax: Axes | None
 ) -> Axes:
     """See `InvariantSet.cut`."""
-    if not found.proven:
+    if not found.verified:
         raise InputError(f"there is no set to draw: {found.why}")
     i, j = indices([first, second], found.shape.states, "state")
     if i == j:

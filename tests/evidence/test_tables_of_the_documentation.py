@@ -259,7 +259,7 @@ def hover_of_the_r50():
 def tube_in_hover():
     airspeed, gust, _, attitude, *_ = KEPT["tubes.md", "amplitudes"].cells("xcell60")
     found = synthesis.tubes.tube(_xcell(), float(airspeed), gust=float(gust))
-    assert found.proven
+    assert found.verified
     assert attitude == " ".join(f"{w:.2g}" for w in found.half_widths[6:8])
 
 
@@ -268,7 +268,7 @@ def tube_of_a_loop(section, case):
     governor, _, airspeed, gust, states, _, attitude, *_ = cells
     assert (governor, airspeed, gust) == (case.governor, f"{case.airspeed:g}", f"{case.gust:g}")
     found = case.found()
-    assert found.proven
+    assert found.verified
     assert states == str(len(found.deviations.states))
     assert attitude == " ".join(f"{w:.2g}" for w in found.half_widths[6:8])
 
@@ -296,7 +296,7 @@ def tube_along_a_transition():
     found = synthesis.tubes.tube(
         heli, case[1:3], gust=case[3], acceleration=acceleration, jerk=jerk, snap=snap
     )
-    assert attitude == (" ".join(f"{w:.2g}" for w in found.half_widths[6:8]) * found.proven)
+    assert attitude == (" ".join(f"{w:.2g}" for w in found.half_widths[6:8]) * found.verified)
 
 
 def gains_on_one_tube():
