@@ -143,6 +143,11 @@ def residual_analysis(model: LPVARXModel, record: FlightRecord, lags: int = 25) 
     InputError
         Fewer than 10 `lags` residuals remain.
 
+    See Also
+    --------
+    identification.scores : one step ahead to free run
+    identification.uncertainty : covariance that coloured residuals allow
+
     References
     ----------
     Ljung (1999), System Identification, ch. 16.6; Ljung and Box, Biometrika 65 (1978).

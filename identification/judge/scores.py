@@ -122,6 +122,11 @@ def scores(
     DataWarning
         The scheduling is a function of the outputs or their past.
 
+    See Also
+    --------
+    identification.judge.validate : the verdict on flights not identified
+    identification.judge.compare_constant : against a model without scheduling
+
     Examples
     --------
     >>> import numpy as np, identification as idn, symheli

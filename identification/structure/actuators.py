@@ -26,7 +26,7 @@ SETTLING = 0.5
 
 @dataclass(frozen=True)
 class Actuators:
-    """What stands between command and deflection: a delay, then a servo for each control.
+    """Actuators stand between command and deflection: a delay (s), then a servo for each control.
 
     Parameters
     ----------
@@ -47,6 +47,11 @@ class Actuators:
     ------
     InputError
         A number out of range.
+
+    See Also
+    --------
+    identification.KinematicARX : a structure with known kinematics
+    symheli.Servo : lag, travel and rate of an actuator
 
     Examples
     --------

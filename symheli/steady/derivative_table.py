@@ -169,6 +169,11 @@ def derivatives(family: LinearFamily) -> DerivativeTable:
     InputError
         A discrete family, or trims that turn.
 
+    See Also
+    --------
+    symheli.sweep : trims and linear models over airspeed
+    symheli.linearize : the exact linear model about a trim
+
     Examples
     --------
     >>> table = symheli.derivatives(symheli.sweep(heli, [2.0, 8.0]))

@@ -324,6 +324,11 @@ def specifications(
     UnknownNameError
         A signal or a measure that is not there.
 
+    See Also
+    --------
+    synthesis.sheet.Sheet : the requirements
+    synthesis.margin_table : margins over the parameters
+
     Examples
     --------
     >>> import numpy as np, symheli, synthesis

@@ -79,8 +79,8 @@ class Proof(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Certificate:
-    """A bound that holds for every p(t) within its range and rates, with its proof and its
-    hypotheses.
+    """A certificate is a bound that holds for every p(t) within its range and rates, with its proof
+    and its hypotheses.
 
     Made by `l2_gain`, `stability`, `decay_rate`, `energy_to_peak`, `h2_gain`, `lft_gain` and
     `lft_stability`.
@@ -134,6 +134,10 @@ class Certificate:
         For an invalid field.
     CertificateError
         If two of its numbers contradict each other, or a verified certificate has no proof.
+
+    See Also
+    --------
+    synthesis.l2_gain, synthesis.stability, synthesis.decay_rate
 
     Examples
     --------

@@ -113,6 +113,12 @@ def multiobjective(
     InputError, SynthesisError
         As `output_feedback`; also where the bounds contradict each other.
 
+    See Also
+    --------
+    synthesis.objectives.L2 : a gain as an objective
+    synthesis.objectives.H2 : a variance as an objective
+    synthesis.output_feedback : a controller of the order of the plant
+
     References
     ----------
     Scherer, Gahinet and Chilali, IEEE Trans. Automatic Control 42 (1997); with X(p) or Y(p):
