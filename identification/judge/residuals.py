@@ -1,4 +1,4 @@
-"""What a model leaves unexplained: are the residuals white, do inputs still show in them, where
+"""The unexplained part of a model: are the residuals white, do inputs still show in them, where
 does the error come from.
 """
 

@@ -82,7 +82,7 @@ class Actuators:
 
     @property
     def unknown(self) -> tuple[str, ...]:
-        """What is estimated: "bandwidth", a factor of it, and "delay" (s)."""
+        """Unknowns that are estimated: "bandwidth", a factor of it, and "delay" (s)."""
         given = {"bandwidth": self.bandwidth_deviation, "delay": self.delay_deviation}
         return tuple(name for name, deviation in given.items() if deviation)
 

@@ -94,7 +94,7 @@ class Aerodynamics(LPVARX):
 
     @property
     def parts(self) -> dict[str, Part]:
-        """What stands between the record and the regression, by name of its field."""
+        """Parts between the record and the regression, by name of its field."""
         every = {"actuators": self.actuators, "wind": self.wind, "sensors": self.sensors}
         return {name: part for name, part in every.items() if part is not None}
 

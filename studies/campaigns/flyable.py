@@ -103,7 +103,7 @@ class Sweeps:
 
     @property
     def excitation(self) -> Excitation:
-        """What is added to the inputs."""
+        """Signals that are added to the inputs."""
         sizes = {name: self.amplitude * AMPLITUDE[name] for name in self.axis.inputs}
         return Excitation(sizes, "sweep", SWEPT, period=SWEEP)
 

@@ -184,8 +184,8 @@ class ServoBank:
         return moved, self.deflection(moved)
 
     def follow(self, commands: np.ndarray) -> np.ndarray:
-        """What the linear parts follow (k, n), rad, of commands (k, n): limited, quantised, and no
-        faster than the servos.
+        """Commands that the linear parts follow (k, n), rad, of commands (k, n): limited,
+        quantised, and no faster than the servos.
         """
         out = np.empty_like(commands)
         last = commands[0]

@@ -300,7 +300,7 @@ def connect(
             raise InputError(f"sums: {name!r} is the name of an output or an external input")
 
     def row(name: str, above: tuple[str, ...] = ()) -> Array:
-        """What a signal is of the outputs and the external inputs."""
+        """Row of a signal in terms of the outputs and the external inputs."""
         if name in single:
             return single[name]
         if name in above:
@@ -314,7 +314,7 @@ def connect(
         return np.sum([np.zeros(len(known)), *terms], axis=0)
 
     def source(u: Signal) -> Array:
-        """What feeds an input of a system."""
+        """Source of an input of a system."""
         if str(u) in sums:
             return total(str(u), (str(u),) if u not in known else ())
         if u in given and u in external:

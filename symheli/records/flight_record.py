@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from symheli.records.kinematic_check import KinematicCheck
 
 CONDITIONS = ("wind", "mass", "governor", "servos")
-"""What `meta["flown"]` of a record may say."""
+"""Conditions that `meta["flown"]` of a record may state."""
 
 GAP = 1.5
 """Two samples further apart than this many median steps have a gap between them."""

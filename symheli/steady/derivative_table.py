@@ -39,7 +39,7 @@ A[u, q] = X_q - w0.
 """
 
 SHOWN = ("X_u", "Z_w", "M_u", "M_w", "Y_v", "L_v", "N_v", "N_r")
-"""Those that shape the transition."""
+"""Derivatives that shape the transition."""
 
 if TYPE_CHECKING:
     import pandas

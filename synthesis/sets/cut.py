@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from synthesis.sets.invariant_set import InvariantSet
 
 POINTS = 361
-"""Of the border."""
+"""Points of the border."""
 CLOSE = 0.99
 """Part of the largest share of a limit from which on a limit counts as binding too."""
 ROOM = 1.3

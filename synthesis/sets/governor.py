@@ -17,7 +17,7 @@ from symheli.values.summary import summarized
 from synthesis.sets.invariant_set import InvariantSet
 
 HALVINGS = 40
-"""Of the share of the way to the wanted reference."""
+"""Halvings of the share of the way to the wanted reference."""
 
 
 @dataclass(frozen=True, eq=False)

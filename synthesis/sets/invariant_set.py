@@ -95,7 +95,7 @@ class InvariantSet(ProvenSet):
 
     @property
     def stored(self) -> Mapping[str, Any]:
-        """What a file holds of the set beside its statement."""
+        """Values that a file holds of the set beside its statement."""
         return {"shape": self.shape, "alpha": self.alpha, "shares": self.shares}
 
     def gramian(self, *p: float) -> Array:

@@ -85,7 +85,7 @@ class LowComplexitySet(ProvenSet):
 
     @property
     def stored(self) -> Mapping[str, Any]:
-        """What a file holds of the set beside its statement."""
+        """Values that a file holds of the set beside its statement."""
         return {"V": self.V}
 
     @cached_property

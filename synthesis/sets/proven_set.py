@@ -1,4 +1,4 @@
-"""What sets of states with a proof have in common: membership, their files and their words."""
+"""Sets of states with a proof: membership, files and words that they have in common."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class ProvenSet(ABC):
     @property
     @abstractmethod
     def stored(self) -> Mapping[str, Any]:
-        """What a file holds of the set beside its statement."""
+        """Values that a file holds of the set beside its statement."""
 
     @abstractmethod
     def level(self, x: Any, *p: float) -> Array:

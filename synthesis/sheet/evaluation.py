@@ -1,4 +1,4 @@
-"""What controllers reach of a specification sheet over a scheduling parameter."""
+"""Controllers held against a specification sheet over a scheduling parameter."""
 
 from __future__ import annotations
 

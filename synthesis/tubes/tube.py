@@ -76,7 +76,7 @@ INSIDE = 1 - 1e-6
 """Share of the enclosed deviations that the tube may fill, for rounding of the search."""
 UNDEFINED = "the reference is not defined for all commands, as the root of a negative number"
 TOLERANCE = 1e-6
-"""Of the semidefinite programs: the exact check decides."""
+"""Tolerance of the semidefinite programs: the exact check decides."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +134,7 @@ class Tube:
 
     @property
     def nodes(self) -> Array:
-        """Of the commanded airspeed, m/s, or of another scheduling command; one where it is
+        """Nodes of the commanded airspeed, m/s, or of another scheduling command; one where it is
         held.
         """
         return self.deviations.reference.nodes
@@ -163,7 +163,7 @@ class Tube:
 
     @property
     def hypotheses(self) -> tuple[str, ...]:
-        """What the statement rests on, in sentences."""
+        """Hypotheses of the statement, in sentences."""
         d = self.deviations
         travel = (
             "shown, not assumed: commands and blade pitch stay within their travel, servos below"

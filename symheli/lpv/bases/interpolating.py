@@ -49,7 +49,7 @@ class Cardinal(PiecewisePolynomial):
 
     @property
     def distinct_values(self) -> int:
-        """As many as there are nodes."""
+        """The number of nodes."""
         return self.size
 
 

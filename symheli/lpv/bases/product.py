@@ -90,7 +90,7 @@ class Product(FunctionSpace):
 
     @property
     def distinct_values(self) -> int:
-        """As many points as functions (in general position)."""
+        """The number of functions (in general position)."""
         return self.size
 
     @property

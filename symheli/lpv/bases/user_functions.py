@@ -145,7 +145,7 @@ class UserFunctions(Basis):
 
     @property
     def distinct_values(self) -> int:
-        """As many as there are functions."""
+        """The number of functions."""
         return self.size
 
     def _values(self, p: Array, derivative: Any) -> Array:
