@@ -1,7 +1,8 @@
 # make study : set up .venv and run the main job     make test : set up .venv and run the default tests
 # make guards : the rules of the house, forged and damaged files, second witnesses, the public surface; part of make test
 # make docs : the site in build/site; its blocks are run, and what they print is compared with the pages
-# make test-all : lint, slow tests, the site, the lowest versions of pyproject.toml, no compiler, no extras, wheel and sdist (.ci/gates)
+# make slow : the tests that make test leaves out, 20 minutes on two cores
+# make test-all : lint, all tests, the site, the lowest versions of pyproject.toml, no compiler, no extras, wheel and sdist (.ci/gates)
 # Python >= 3.11 as python3; PYTHON=... for another one.
 
 PYTHON ?= python3
@@ -30,13 +31,13 @@ test: $(STAMP)
 	$(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadfile
 
 guards: $(STAMP)
-	$(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadfile -m guard
+	$(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadfile -m 'guard and not slow'
 
-test-all: lint slow docs lowest no-compiler no-extras packaging
+test-all: lint test slow docs lowest no-compiler no-extras packaging
 
 slow: $(STAMP)
-	@echo "== slow: all tests, the slow ones too"
-	$(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadfile -m 'slow or not slow'
+	@echo "== slow: the tests that make test leaves out"
+	$(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadfile -m slow
 
 docs: $(STAMP)
 	@echo "== docs: the site, every page run"

@@ -309,7 +309,8 @@ def main() -> None:
         found.append((log, verdict))
     surprising = [log.name for log, v in found if v.identified != log.identified]
     if given.write and not surprising:
-        keep(DOCS / "identify.md", "public logs", table(found), command="python -m evidence.logs")
+        command = "python -m evidence.logs --folder DIR"
+        keep(DOCS / "identify.md", "public logs", table(found), command=command)
     else:
         print(table(found))
     if surprising:

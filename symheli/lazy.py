@@ -6,6 +6,7 @@ import importlib.util
 import sys
 import warnings
 from collections.abc import Callable, Sequence
+from functools import cache
 from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
 from pathlib import Path
@@ -36,7 +37,7 @@ def lazily(
         """A package in which a public name is never hidden by the module of that name."""
 
         def __setattr__(self, name: str, value: Any) -> None:
-            if not (name in home and isinstance(value, ModuleType)):
+            if not (isinstance(value, ModuleType) and (name in home or name in former())):
                 super().__setattr__(name, value)
 
     sys.modules[package].__class__ = Package
@@ -44,11 +45,14 @@ def lazily(
     if Path(file).name == "__init__.py" and table.exists():
         sys.meta_path.append(FormerModules(package, table))
 
+    def former() -> dict[str, str]:
+        return _read(table).get("names", {}) if Path(file).name == "__init__.py" else {}
+
     def find(name: str) -> Any:
         if name in modules:
             return importlib.import_module(f"{package}.{name}")
         if name not in home:
-            return _former_name(package, table, name)
+            return _former_name(package, former(), name)
         value = getattr(importlib.import_module(home[name]), name)
         setattr(sys.modules[package], name, value)
         return value
@@ -59,15 +63,16 @@ def lazily(
     return find, names, sorted(home)
 
 
+@cache
 def _read(table: Path) -> dict[str, dict[str, str]]:
     import tomllib
 
     return tomllib.loads(table.read_text(encoding="utf-8")) if table.exists() else {}
 
 
-def _former_name(package: str, table: Path, name: str) -> Any:
+def _former_name(package: str, former: dict[str, str], name: str) -> Any:
     """Return what a former name stands for; raise `AttributeError` for no such name."""
-    new = None if name.startswith("_") else _read(table).get("names", {}).get(name)
+    new = former.get(name)
     if new is None:
         raise AttributeError(f"module {package!r} has no attribute {name!r}")
     warnings.warn(

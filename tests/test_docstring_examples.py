@@ -10,17 +10,26 @@ import sys
 import warnings
 
 import pytest
+from public_faces import faces, names, root_of
+from public_faces import module as module_of
 from reference import results
 
-PACKAGES = ("symheli", "identification")
-FUNCTIONS_OF = ("symheli.lpv", "symheli.records")
+PACKAGES = faces(("symheli", "identification"))
+SYNTHESIS = faces(("synthesis",))
+FUNCTIONS_OF = (*faces(("symheli.lpv",)), "symheli.records")
 """Rooms whose classes are values of other rooms, or results: here the functions are shown."""
+
+
+def shown(package):
+    """Names that are documented with an example."""
+    return module_of(package).__all__ if package == "symheli.records" else names(package)
+
 
 PUBLIC = tuple(
     {
         thing
-        for package in (*PACKAGES, *FUNCTIONS_OF, "symheli.flight", "synthesis")
-        for name in importlib.import_module(package).__all__
+        for package in (*PACKAGES, *FUNCTIONS_OF, *SYNTHESIS)
+        for name in shown(package)
         if isinstance(thing := getattr(importlib.import_module(package), name), type)
     }
 )
@@ -32,11 +41,14 @@ FLAGS = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
 def exported():
     for package in (*PACKAGES, *FUNCTIONS_OF):
         module = importlib.import_module(package)
-        for name in module.__all__:
+        for name in shown(package):
             thing = getattr(module, name)
             error = isinstance(thing, type) and issubclass(thing, Exception)
-            shown = callable(thing) and not error
-            if shown and (package in PACKAGES or not isinstance(thing, type)):
+            if (
+                callable(thing)
+                and not error
+                and (package in PACKAGES or not isinstance(thing, type))
+            ):
                 yield package, name
 
 
@@ -70,7 +82,8 @@ def start():
     """What the docstring of each package makes."""
     made = {}
 
-    def of(package):
+    def of(face):
+        package = root_of(face)
         if package not in made:
             made[package] = run(importlib.import_module(package).__doc__, package, {})
         return dict(made[package])
@@ -79,53 +92,53 @@ def start():
 
 
 LONG = (
-    "identification-StateSpaceModel",
-    "identification-structure_bias",
+    "identification.model-StateSpaceModel",
+    "identification.judge-structure_bias",
     "synthesis-Certificate",
     "synthesis-Controller",
     "synthesis-Estimator",
     "synthesis-GainCurve",
     "synthesis-StructuredController",
-    "synthesis-Tube",
+    "synthesis.tubes-Tube",
     "synthesis-certify_sampled",
-    "synthesis-coverage",
+    "synthesis.tubes-coverage",
     "synthesis-decay_rate",
     "synthesis-estimator",
     "synthesis-frozen_gain",
-    "synthesis-gain_against_rate",
+    "synthesis.analysis-gain_against_rate",
     "synthesis-l2_gain",
-    "synthesis-lft_feedback",
+    "synthesis.designs-lft_feedback",
     "synthesis-lower_bound",
     "synthesis-output_feedback",
-    "synthesis-proven_around",
+    "synthesis.analysis-proven_around",
     "synthesis-stability",
     "synthesis-state_feedback",
     "synthesis-structured",
-    "synthesis-tube",
-    "synthesis-with_wrong_parameter",
-    "symheli-FlightDataset",
+    "synthesis.tubes-tube",
+    "synthesis.analysis-with_scheduling_error",
+    "symheli.flight-FlightDataset",
     "symheli-LinearFamily",
-    "symheli-simulate_batch",
-    "symheli-sweep_grid",
-    "identification-FilterError",
+    "symheli.integrate-simulate_batch",
+    "symheli.steady-sweep_grid",
+    "identification.methods-FilterError",
     "identification-FitForControl",
-    "identification-KinematicModel",
-    "identification-OutputError",
+    "identification.model-KinematicModel",
+    "identification.methods-OutputError",
     "identification-RigidBodyOnline",
     "identification-calibrate",
     "identification-fit_for_control",
-    "identification-unseen_flight",
+    "identification.judge-validate",
     "symheli.lpv-balanced_truncation",
-    "symheli.lpv-simulate",
-    "synthesis-robust_margin",
-    "synthesis-worst_case_gain",
-    "synthesis-mu_synthesis",
-    "synthesis-loop_shaping",
+    "symheli.lpv.tools-simulate",
+    "synthesis.robust-robust_margin",
+    "synthesis.robust-worst_case_gain",
+    "synthesis.robust-mu_synthesis",
+    "synthesis.designs-loop_shaping",
     "synthesis-DwellTime",
-    "synthesis-SwitchedController",
-    "synthesis-bounded_truncation",
-    "synthesis-dwell_time",
-    "synthesis-generalized_h2",
+    "synthesis.switching-SwitchedController",
+    "synthesis.designs-bounded_truncation",
+    "synthesis.switching-dwell_time",
+    "synthesis.analysis-energy_to_peak",
     "synthesis-h2_gain",
     "synthesis-lqg",
     "symheli.records-check_kinematics",
@@ -145,8 +158,8 @@ def test_the_examples_of_an_exported_name_print_what_they_say(package, name, sta
 RETURNED = sorted(
     {
         (package, home, found.__name__)
-        for package in (*PACKAGES, "synthesis")
-        for name in importlib.import_module(package).__all__
+        for package in (*PACKAGES, *SYNTHESIS)
+        for name in shown(package)
         for home, found in results(getattr(importlib.import_module(package), name))
         if found not in PUBLIC
     }
@@ -162,20 +175,14 @@ def test_what_a_public_function_returns_is_documented(package, home, name, start
         check_short(run(text, f"{home}.{name}", start(package)))
 
 
-WITHOUT = {
-    "synthesis": {
-        *("Margins", "MarginTable", "RobustMargin", "WorstCaseGain", "LoopShaping"),
-        *("MuDesign", "SlopeMargin"),
-        *("Status", "DesignStatus"),
-    }
-}
-"""Names without an example of their own, by package: shown in those of what makes them."""
+WITHOUT = {"LoopShaping", "Status", "DesignStatus", "SCALINGS"}
+"""Names without an example of their own: shown in those of what makes them."""
 
 EXPLAINED = [
     (package, name)
-    for package, without in WITHOUT.items()
-    for name in importlib.import_module(package).__all__
-    if name not in without and callable(getattr(importlib.import_module(package), name))
+    for package in SYNTHESIS
+    for name in names(package)
+    if name not in WITHOUT and callable(getattr(importlib.import_module(package), name))
 ]
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from evidence.jerk.flown import Fastest
 from evidence.jerk.gains import Cell, Loop
-from evidence.tables import four_digits, markdown
+from evidence.tables import markdown
 
 
 def jerk_table(loop: Loop) -> str:
@@ -45,4 +45,5 @@ def _cell(cell: Cell) -> str:
 
 
 def _gain(value: float, infinite: str) -> str:
-    return infinite if math.isinf(value) else four_digits(value)
+    # three digits: the fourth depends on the processor
+    return infinite if math.isinf(value) else f"{value:#.3g}".rstrip(".")

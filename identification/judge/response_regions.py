@@ -83,7 +83,8 @@ class StructureBias:
 
     Examples
     --------
-    >>> off = idn.judge.response_regions.StructureBias(model, {0.0: model.at(0.0)})
+    >>> from identification.judge.response_regions import StructureBias
+    >>> off = StructureBias(model, {0.0: model.at(0.0)})
     >>> bool(np.abs(off.responses([0.1, 1.0], model.outputs, model.inputs)).max() < 1e-12)
     True
     """

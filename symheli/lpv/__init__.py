@@ -3,6 +3,7 @@
 The examples of this package start from a spring that stiffens with p:
 
 >>> import numpy as np
+>>> import symheli
 >>> from symheli import lpv
 >>> spring = symheli.LPVStateSpace.polynomial(
 ...     A=[[[0.0, 1.0], [-2.0, -1.0]], [[0.0, 0.0], [-0.5, 0.0]]],

@@ -17,11 +17,24 @@ def uncertain(
     blocks: Sequence[DynamicBlock],
     source: str = "blocks of bounded gain",
 ) -> UncertainStateSpace:
-    """Return the set of all loops of a model around several blocks of bounded gain.
+    """Build the set of all loops of a model around several blocks of bounded gain.
 
-    Each block is any causal dynamics within its bound (and weight), at rest at the start; beside
-    the block that the model has where it is an uncertain one. Each bound becomes a unit of the
-    outputs of its block, weights become states. `perturbed` has constant matrices for the dynamics.
+    Each block is any causal dynamics within its bound (and weight), at rest at the start. Each
+    bound becomes a unit of the outputs of its block, weights become states.
+
+    Parameters
+    ----------
+    model : LPVStateSpace or UncertainStateSpace
+        The model that the blocks are closed around; an uncertain one keeps its own block.
+    blocks : sequence of DynamicBlock
+        The blocks, each with its channels, its bound and its weight.
+    source : str
+        Where the bounds come from, in words; certificates quote it.
+
+    Returns
+    -------
+    UncertainStateSpace
+        The set, with a bound of 1; `perturbed` has constant matrices for the dynamics.
 
     Raises
     ------

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 
 from symheli import LPVStateSpace
 from symheli.errors import InputError
+from symheli.lpv.lpv_matrices import LPVMatrices
 from symheli.values.arrays import frozen
 from symheli.values.whole_files import write_text
 from synthesis.certify.questions.certificate_file import DAMAGED, content_of, decoded, encoded
@@ -59,10 +61,8 @@ def _read(content: dict[str, Any]) -> ProvenSet:
     from synthesis.sets.invariant_set import InvariantSet
     from synthesis.sets.low_complexity import LowComplexitySet
 
-    model, feedback = decoded(content["model"]), decoded(content["feedback"])
-    _a_model(model)
-    if feedback is not None:
-        _a_model(feedback)
+    model, feedback = _model(content["model"]), content["feedback"]
+    feedback = None if feedback is None else _model(feedback)
     sizes = {name: dict(content[name]) for name in SIZES}
     controls = tuple(map(str, content["controls"]))
     statement = SetStatement(model=model, controls=controls, feedback=feedback, **sizes)
@@ -72,12 +72,13 @@ def _read(content: dict[str, Any]) -> ProvenSet:
         return LowComplexitySet(statement, frozen(decoded(content["V"]), "V", (n, n)), False, why)
     if content["kind"] != "InvariantSet":
         raise InputError(f"unknown kind of set {content['kind']!r:.60}")
-    shape = decoded(content["shape"])
-    _a_model(shape)
+    shape = _model(content["shape"])
     shares = frozen(decoded(content["shares"]), "shares", (None,))
     return InvariantSet(statement, shape, float(content["alpha"]), shares, False, why)
 
 
-def _a_model(value: Any) -> None:
-    if not isinstance(value, LPVStateSpace):
+def _model(content: Any) -> LPVStateSpace:
+    value = decoded(content)
+    if not isinstance(value, LPVMatrices):
         raise InputError(f"expected an LPVStateSpace, got {value!r:.60}")
+    return LPVStateSpace(**{f.name: getattr(value, f.name) for f in fields(value)})

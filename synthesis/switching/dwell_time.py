@@ -80,6 +80,7 @@ class DwellTime:
     --------
     x' = -x, and at every switch x triples: it must fall by as much before.
 
+    >>> import numpy as np
     >>> three = {(0, 1): [[3.0]], (1, 0): [[3.0]]}
     >>> found = synthesis.switching.dwell_time([[[-1.0]], [[-1.0]]], three)
     >>> bool(np.log(3) < found.seconds < 1.005 * np.log(3)), found.verified

@@ -64,8 +64,8 @@ def test_the_table_says_where_nothing_is_proven():
     assert jerk_table(loop).splitlines() == [
         "| acceleration, m/s² | jerk 3 m/s³ | P(V), same knots | P(V), knots chosen |",
         "|---|---|---|---|",
-        "| 1 | 2.500 (2.000) | 2.600 | 2.550 |",
-        "| 4.5 | nothing (grows) | nothing | 104.8 |",
+        "| 1 | 2.50 (2.00) | 2.60 | 2.55 |",
+        "| 4.5 | nothing (grows) | nothing | 105 |",
     ]
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 import synthesis
-from evidence.reach.measured import about, from_hover, largest, on, proven, tables
+from evidence.reach.measured import largest, on, proven, tables
 from studies.loops.lateral import lateral_loop
 from studies.loops.longitudinal import longitudinal_loop
 
@@ -46,18 +46,6 @@ def test_on_the_lateral_loop_each_scaling_proves_more_of_the_range_but_none_all(
         assert proven(on(loop, low, high), test)
         assert not proven(on(loop, low, high), poorer)
     assert not proven(loop, "DG")
-
-
-@pytest.mark.slow
-def test_the_reach_of_each_scaling_on_the_lateral_loop(ideal):
-    loop = lateral_loop(ideal)
-    upper = [from_hover(loop, test).high for test in ("small gain", "D", "DG")]
-    assert 0.4 < upper[0] < upper[1] < upper[2] < 2.0
-    widths = [
-        found.high - found.low
-        for found in (about(loop, 6.5, test) for test in ("small gain", "D", "DG"))
-    ]
-    assert 2.0 < widths[0] < widths[1] < widths[2] < 9.5
 
 
 def test_the_tables_of_the_page_hold_every_range_and_say_what_failed():

@@ -2,11 +2,15 @@
 each is computed again.
 """
 
+import argparse
+import math
 import os
 import re
+import runpy
 import shlex
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,39 +19,24 @@ import pytest
 import synthesis
 from evidence import (
     box_jenkins,
-    gain_table,
     logs,
     r50,
-    responses,
-    sets,
     specs,
     structured,
     tube_gains,
-    tube_loops,
-    tuning,
-    two_bands,
 )
-from evidence.ah1s import compared
-from evidence.bracket.measured import GAINS, bracket
 from evidence.flown import campaign, designs
 from evidence.flown import tuning as sizes
 from evidence.jerk.measured import TransitionPlan, fastest
 from evidence.marks import (
-    calibrated,
     conditions,
-    coverage,
-    fit_for_control,
-    guarantee,
-    measured,
-    spanning,
-    unseen,
 )
 from evidence.planar_vtol import tubes as planar_vtol
 from evidence.public_files import fetched
 from evidence.reach.measured import gains
 from evidence.tables import DOCS
 from evidence.tube_terms import HELD_AGAINST, held_against, remainders
-from evidence.tubes import TRANSITIONS, VEHICLES
+from evidence.tubes import VEHICLES
 from studies.controllers.designs import LQR, design, lqr_schedule
 from studies.controllers.flown import WINDS
 from studies.controllers.plant import baseline, flown_plant
@@ -108,63 +97,6 @@ def worst(cell):
     return found[1], int(found[2])
 
 
-def marks_of_the_worst_seed(section, truth="xcell60", turbulent=False, gentle=False):
-    shown, seed = worst(KEPT["identified.md", section].cells("worst nu-gap, lateral")[2])
-    setting = measured.Setting(truth, measured.PAIRS[truth], turbulent, gentle)
-    assert same(shown, measured.of_seed(setting, seed).gaps["lateral"][0])
-
-
-def ah1s_of_the_worst_seed(structure, ramps, knots):
-    pytest.importorskip("jsbsim", reason="needs jsbsim: pip install 'symheli[jsbsim]'")
-    section = KEPT["identified.md", f"AH-1S {structure} {ramps} {knots} kt"]
-    (shown, seed), *_ = re.findall(r"worst ([\d.]+) \(seed (\d+)\)", section.text)
-    found = compared.of_seed(structure, ramps, knots, "filter error", int(seed))
-    assert same(shown, max(found.gaps))
-
-
-def guarantee_of_the_worst_seed():
-    section = KEPT["identified.md", "guarantee xcell60"]
-    shown, seed = worst(section.cells("worst (seed)")[0])
-    proof = guarantee.exact_gain(Helicopter.load("xcell60", governor="ideal"))
-    exact = proof.gamma, proof.lower
-    found = guarantee.of_seed("xcell60", guarantee.PAIRS["xcell60"], seed, exact)
-    assert same(shown, found.ratio)
-    assert found.verdict == "holds"
-
-
-def unseen_flights_of_the_first_seed():
-    """One heavier vehicle of the table is refused, as the row says of all."""
-    section = KEPT["identified.md", "unseen flights xcell60"]
-    found = unseen.of_seed(0)
-    assert section.cells("deflections")
-    assert found.explained["deflections", True, "20 % heavier"] == [False]
-    assert sum(found.explained["deflections", True, unseen.SAME_VEHICLE]) >= 19
-
-
-def exact_loop_in_the_most_head_wind():
-    shown = KEPT["identified.md", "two masses in wind xcell60"].cells("1.2")
-    found = spanning.exact("xcell60", 1.2, spanning.WINDS[0], prove=False)
-    assert same(shown[1], found.frozen, rel=1e-3)
-
-
-def regions_of_the_first_seed():
-    """A seed lies between the least and the largest that the table prints."""
-    cell = KEPT["identified.md", "regions xcell60"].cells(conditions.CONDITIONS["ideal"].about)[1]
-    least, most = map(float, re.findall(r"[\d.]+", cell)[1:])
-    assert least - 0.06 <= 100 * coverage.of_seed("ideal", 0).covered <= most + 0.06
-
-
-def verdict_of_the_farthest_model_that_is_called_fit():
-    about = fit_for_control.CASES["delay"].about
-    shown, seed = worst(KEPT["identified.md", "verdicts xcell60"].cells(about)[2])
-    assert fit_for_control.farthest(fit_for_control.of_seed("delay", seed)) == f"{shown} ({seed})"
-
-
-def calibrated_vehicle_of_the_worst_seed():
-    shown, seed = worst(KEPT["identified.md", "xcell60 calibrated"].cells("all axes")[2])
-    assert same(shown, calibrated.of_seed(seed).gaps["all axes"], rel=1e-3)
-
-
 def flight_with_servos_of_the_worst_seed():
     name = "servos"
     about = conditions.CONDITIONS[name].about
@@ -173,44 +105,11 @@ def flight_with_servos_of_the_worst_seed():
 
 
 def coefficient_of_the_box_jenkins_system():
-    """The median of the first five seeds is within the scatter of theirs, .02."""
+    """The median of the first three seeds is within the scatter of theirs, .02."""
     name = "Box-Jenkins, noise of order 2"
     shown = float(KEPT["identification.md", "Box-Jenkins system"].cells(name)[0])
-    found = [box_jenkins.of_seed(seed)[name][0] @ [1.0, 0.5, 0.25] for seed in range(5)]
-    assert abs(sorted(found)[2] - shown) < 0.02
-
-
-def bands_of_ten_seeds():
-    """Of the row of 8 m/s: ten of its hundred seeds are within two percent of them all."""
-    shown = KEPT["identified.md", "frequency responses"].cells("8 m/s")[0]
-    found = [responses.of_seed(8.0, seed) for seed in range(10)]
-    held, usable = (
-        sum(getattr(c, kind)["references"].sum() for c in found) for kind in ("inside", "usable")
-    )
-    assert abs(held / usable - float(shown.rstrip("%")) / 100) < 0.02
-
-
-def two_bands_of_the_first_seed():
-    """The bands of one seed hold what those of all do, within a tenth."""
-    found = two_bands.of_seed(0)
-    for name, held in found.held.items():
-        shown = float(KEPT["identified.md", "two bands"].cells(name)[1].rstrip("%")) / 100
-        assert abs(held[found.measured.usable].mean() - shown) < 0.1
-
-
-def margins_of_the_first_flight():
-    assert KEPT["identified.md", "changed gains"].cells("all true margins in their bands")
-    found = tuning.of_seed(0)
-    assert found.inside
-    assert found.called in (found.stable, None)
-
-
-def proven_by_p_alone(section, loop):
-    found = bracket(loop, 1.0, GAINS[1.0], search=synthesis.analysis.LowerBoundSearch(seconds=1.0))
-    shown = KEPT["gains.md", section].cells("1")
-    assert same(shown[1], found.memory)
-    assert same(shown[2], found.plain)
-    assert found.exact
+    found = [box_jenkins.of_seed(seed)[name][0] @ [1.0, 0.5, 0.25] for seed in range(3)]
+    assert abs(sorted(found)[1] - shown) < 0.02
 
 
 def frozen_gain_of_the_exact_servo_loop():
@@ -239,18 +138,6 @@ def gains_on_a_narrow_range():
         assert same(shown, value, rel=2e-4)
 
 
-def governed_flights():
-    # 20 other commands: none leaves with the governor, nearly all without
-    name = "xcell_kahn_hudson"
-    _, governed, without, *_ = KEPT["sets.md", "jumps"].cells(name)
-    heli = Helicopter.load(name, governor="ideal")
-    _, _, *today = sets.row(name, sets.proven_set(heli), 20)
-    assert governed == today[0] == "0, 0"
-    shown, found = ([int(n) for n in each.split(",")] for each in (without, today[1]))
-    assert 18 <= found[0] <= shown[0]
-    assert 18 <= found[1] <= shown[1]
-
-
 def hover_of_the_r50():
     shown = KEPT["vehicles.md", "r50"].text.splitlines()
     assert shown == r50.table().splitlines()
@@ -260,16 +147,6 @@ def tube_in_hover():
     airspeed, gust, _, attitude, *_ = KEPT["tubes.md", "amplitudes"].cells("xcell60")
     found = synthesis.tubes.tube(_xcell(), float(airspeed), gust=float(gust))
     assert found.verified
-    assert attitude == " ".join(f"{w:.2g}" for w in found.half_widths[6:8])
-
-
-def tube_of_a_loop(section, case):
-    cells = KEPT["tubes.md", section].cells(case.vehicle)
-    governor, _, airspeed, gust, states, _, attitude, *_ = cells
-    assert (governor, airspeed, gust) == (case.governor, f"{case.airspeed:g}", f"{case.gust:g}")
-    found = case.found()
-    assert found.verified
-    assert states == str(len(found.deviations.states))
     assert attitude == " ".join(f"{w:.2g}" for w in found.half_widths[6:8])
 
 
@@ -284,19 +161,6 @@ def terms_of_one_interval():
     *_, row = held_against(VEHICLES[0], [(low, gust)]).splitlines()
     shown = KEPT["tubes.md", "terms"].cells(f"{low:g} to {low + 1:g}")
     assert shown == [cell.strip() for cell in row.strip("| ").split("|")][1:]
-
-
-def tube_along_a_transition():
-    name = "xcell_kahn_hudson"
-    case = next(case for case in TRANSITIONS if case[0] == name)
-    _, gust, limits, _, attitude, *_ = KEPT["tubes.md", "transitions"].cells(name)
-    acceleration, jerk, snap = case[4:]
-    assert (gust, limits) == (f"{case[3]:g}", f"{acceleration:g}, {jerk:g}, {snap:g}")
-    heli = Helicopter.load(name, governor="ideal")
-    found = synthesis.tubes.tube(
-        heli, case[1:3], gust=case[3], acceleration=acceleration, jerk=jerk, snap=snap
-    )
-    assert attitude == (" ".join(f"{w:.2g}" for w in found.half_widths[6:8]) * found.verified)
 
 
 def gains_on_one_tube():
@@ -392,16 +256,6 @@ def static_output_feedback_of_one_helicopter():
     assert same(shown[2], float(found[2]), rel=1e-6)  # its infimum is at infinite gains
 
 
-def scheduled_lqr_beside_the_gain_table():
-    heli = Helicopter.load("xcell60", governor="ideal")
-    of = gain_table.plant(heli)
-    name, *found = gain_table.row("scheduled LQR", heli, of, gain_table.lqr_schedule(heli))
-    for new, shown in zip(found, KEPT["structured.md", "gain table"].cells(name), strict=True):
-        (number, *unit), (old, *old_unit) = new.split(), shown.split()
-        assert unit == old_unit
-        assert same(old, float(number), rel=1e-2)  # a proof of another machine ends elsewhere
-
-
 def first_sizes_of_the_lqr():
     """The first evaluation of its search."""
     ideal, heli = _xcell(), Helicopter.load("xcell60", governor="pi")
@@ -411,15 +265,22 @@ def first_sizes_of_the_lqr():
         assert same(cell, ratio)
 
 
-def flown_case(name, controller):
-    """What the trial finds of a controller in light turbulence at the permitted acceleration."""
-    return campaign.trial_of({name: controller}).run(controller=name)
+@cache
+def lqr_flown():
+    """What the trial finds of the LQR in light turbulence at the permitted acceleration."""
+    return campaign.trial_of({LQR: lqr_schedule(_xcell())}).run(controller=LQR)
+
+
+FLOWN = 0.02
+"""Of medians and quantiles of 500 flights: servos move in steps, so that another rounding of the
+processor makes other flights.
+"""
 
 
 def ratio_of_the_lqr_in_light_turbulence():
     light = sizes.SIZES_OF_GUSTS.index(WINDS[0])
     shown = KEPT["flown.md", "energy ratios"].cells(LQR)[light].strip("*")
-    assert same(shown, flown_case(LQR, lqr_schedule(_xcell()))["energy ratio, median"])
+    assert same(shown, lqr_flown()["energy ratio, median"], rel=FLOWN)
 
 
 def frozen_gain_of_the_retuned_lqr():
@@ -431,14 +292,16 @@ def frozen_gain_of_the_retuned_lqr():
 
 
 def entries_of_the_lqr():
-    """Every entry at the permitted acceleration, to the digits shown."""
-    row = flown_case(LQR, lqr_schedule(_xcell()))
+    """Every entry at the permitted acceleration, to the two digits shown."""
+    row = lqr_flown()
     lost, *shown, _, _, every = KEPT["flown.md", "flown entries"].cells(f"{LQR}, 3 m/s^2, 7.7 m/s")
     specs = [s for s in campaign.flown_entries(campaign.of_the_vehicle()) if s.axis == "transition"]
     assert lost == f"{row['lost']:.1%}"
     assert every == f"{row['every entry met']:.1%}"
     for cell, spec in zip(shown, specs, strict=False):
-        assert float(cell) == pytest.approx(row[f"{campaign.entry(spec)}, 95%"], rel=6e-3)
+        found = row[f"{campaign.entry(spec)}, 95%"]
+        digit = 10 ** (math.floor(math.log10(found)) - 1)
+        assert abs(float(cell) - found) <= 0.51 * digit + FLOWN * found
 
 
 def the_lqr_in_still_air():
@@ -449,36 +312,13 @@ def the_lqr_in_still_air():
     assert [float(cell) for cell in shown] == pytest.approx(list(found.values()), rel=6e-3)
 
 
-def frozen_entries_that_static_controllers_come_nearest_to():
-    """Their margins, evaluated again, to a percent."""
-    heli, vehicle = _xcell(), specs.OfVehicle(name="xcell60", points=specs.POINTS)
-    static = {
-        LQR: lqr_schedule(heli),
-        designs.RETUNED: designs.retuned(heli),
-        designs.PD: designs.pd(),
-    }
-    table = vehicle.frozen(static)
-    reached = {n: {r.specification: r for r in table.reached(n)} for n in static}
-    looked_at = 0
-    for line in KEPT["flown.md", "conflicts"].text.splitlines()[2:]:
-        axis, entry, _, nearest, _, shown = (cell.strip() for cell in line.strip("|").split("|"))
-        spec = table.sheet.of(axis, entry)
-        if nearest in static and spec.kind == "frozen":
-            assert abs(float(shown) - reached[nearest][spec].margin) <= 1.0
-            looked_at += 1
-    assert looked_at
-
-
 ROWS = {
     ("flown.md", "tuning"): first_sizes_of_the_lqr,
     ("flown.md", "energy ratios"): ratio_of_the_lqr_in_light_turbulence,
     ("flown.md", "controllers"): frozen_gain_of_the_retuned_lqr,
     ("flown.md", "flown entries"): entries_of_the_lqr,
     ("flown.md", "still air"): the_lqr_in_still_air,
-    ("flown.md", "conflicts"): frozen_entries_that_static_controllers_come_nearest_to,
     ("controllers.md", "specification sheet"): margins_of_the_lqr_schedule,
-    ("gains.md", "interpolated"): lambda: proven_by_p_alone("interpolated", lateral_loop(_xcell())),
-    ("gains.md", "exact"): lambda: proven_by_p_alone("exact", ExactLateral.of(_xcell()).loop()),
     ("gains.md", "identified"): frozen_gain_of_the_exact_servo_loop,
     ("gains.md", "lateral"): lambda: gain_with_any_jerk("lateral", lateral_loop(_xcell())),
     ("gains.md", "longitudinal"): lambda: gain_with_any_jerk(
@@ -487,67 +327,41 @@ ROWS = {
     ("gains.md", "flights"): fastest_of_the_test_flight,
     ("lft.md", "reach"): gains_on_a_narrow_range,
     ("structured.md", "static output feedback"): static_output_feedback_of_one_helicopter,
-    ("structured.md", "gain table"): scheduled_lqr_beside_the_gain_table,
-    ("sets.md", "jumps"): governed_flights,
     ("vehicles.md", "r50"): hover_of_the_r50,
     ("tubes.md", "amplitudes"): tube_in_hover,
-    ("tubes.md", "transitions"): tube_along_a_transition,
     ("tubes.md", "remainders"): remainder_of_one_cell,
     ("tubes.md", "terms"): terms_of_one_interval,
     ("tubes.md", "gains"): gains_on_one_tube,
-    ("tubes.md", "loops"): lambda: tube_of_a_loop("loops", tube_loops.CASES[0]),
-    ("tubes.md", "governed"): lambda: tube_of_a_loop("governed", tube_loops.GOVERNED[0]),
     ("tubes.md", "vtol"): tube_of_the_planar_vtol,
     ("identify.md", "public logs"): one_public_log,
-    ("identified.md", "xcell60"): lambda: marks_of_the_worst_seed("xcell60"),
-    ("identified.md", "xcell_kahn_hudson"): lambda: marks_of_the_worst_seed(
-        "xcell_kahn_hudson", "xcell_kahn_hudson"
-    ),
-    ("identified.md", "xcell60, two flights"): lambda: marks_of_the_worst_seed(
-        "xcell60, two flights", gentle=True
-    ),
-    ("identified.md", "xcell_kahn_hudson, two flights"): lambda: marks_of_the_worst_seed(
-        "xcell_kahn_hudson, two flights", "xcell_kahn_hudson", gentle=True
-    ),
-    ("identified.md", "AH-1S known lags slow 60 kt"): lambda: ah1s_of_the_worst_seed(
-        "known lags", "slow", 60
-    ),
-    ("identified.md", "AH-1S as the X-Cell slow 60 kt"): lambda: ah1s_of_the_worst_seed(
-        "as the X-Cell", "slow", 60
-    ),
-    ("identified.md", "AH-1S known lags fast 60 kt"): lambda: ah1s_of_the_worst_seed(
-        "known lags", "fast", 60
-    ),
-    ("identified.md", "AH-1S known lags slow 100 kt"): lambda: ah1s_of_the_worst_seed(
-        "known lags", "slow", 100
-    ),
-    ("identified.md", "xcell60 in turbulence"): lambda: marks_of_the_worst_seed(
-        "xcell60 in turbulence", turbulent=True
-    ),
-    ("identified.md", "guarantee xcell60"): guarantee_of_the_worst_seed,
-    ("identified.md", "unseen flights xcell60"): unseen_flights_of_the_first_seed,
-    ("identified.md", "two masses in wind xcell60"): exact_loop_in_the_most_head_wind,
-    ("identified.md", "regions xcell60"): regions_of_the_first_seed,
     ("identified.md", "xcell60 under real conditions"): flight_with_servos_of_the_worst_seed,
-    ("identified.md", "verdicts xcell60"): verdict_of_the_farthest_model_that_is_called_fit,
-    ("identified.md", "xcell60 calibrated"): calibrated_vehicle_of_the_worst_seed,
     ("identification.md", "Box-Jenkins system"): coefficient_of_the_box_jenkins_system,
-    ("identified.md", "frequency responses"): bands_of_ten_seeds,
-    ("identified.md", "two bands"): two_bands_of_the_first_seed,
-    ("identified.md", "changed gains"): margins_of_the_first_flight,
-    ("checks.md", "fuzzing symheli"): lambda: faults_of_one_entry("symheli", "symheli.Scheduling"),
     ("checks.md", "fuzzing identification"): lambda: faults_of_one_entry(
         "identification", "identification.judge.theil"
-    ),
-    ("checks.md", "fuzzing synthesis"): lambda: faults_of_one_entry(
-        "synthesis", "synthesis.objectives.PoleRegion"
     ),
     ("checks.md", "fuzzing readers"): outcomes_of_one_reader,
 }
 """How a row of each is computed again."""
 
+DEAR = {
+    ("checks.md", "fuzzing symheli"),
+    ("checks.md", "fuzzing synthesis"),
+    ("flown.md", "conflicts"),
+    ("gains.md", "exact"),
+    ("gains.md", "interpolated"),
+    ("sets.md", "jumps"),
+    ("structured.md", "gain table"),
+    ("tubes.md", "governed"),
+    ("tubes.md", "loops"),
+    ("tubes.md", "transitions"),
+    *(key for key in KEPT if key[0] == "identified.md" and key not in ROWS),
+}
+"""Those of which the cheapest row takes ten seconds or more, or is computed as that of another
+table: their commands alone compute them again. That the commands are still taken is tested.
+"""
+
 TIMED = {key for key in KEPT if key[0] == "benchmarks.md"}
-"""What these hold is of the machine and the day: of them the command must still run."""
+"""What these hold is of the machine and the day."""
 
 
 def test_every_table_that_a_command_wrote_is_checked():
@@ -558,7 +372,8 @@ def test_every_table_that_a_command_wrote_is_checked():
             r"^<!-- (.+): written by its command -->$", page.read_text(encoding="utf-8"), re.M
         )
     }
-    assert marked == KEPT.keys() == ROWS.keys() | TIMED
+    assert marked == KEPT.keys() == ROWS.keys() | TIMED | DEAR
+    assert not DEAR & ROWS.keys()
     for found in KEPT.values():
         what = shlex.split(found.command)[: 2 if found.command.startswith("-m") else 1]
         file = Path(*what[-1].split(".")) if what[0] == "-m" else Path(what[0])
@@ -571,8 +386,31 @@ def test_a_row_is_what_the_command_finds_today(key):
     ROWS[key]()
 
 
+class Taken(Exception):
+    """The program has read its options."""
+
+
+@pytest.mark.parametrize("key", sorted(KEPT), ids=" ".join)
+@pytest.mark.filterwarnings("ignore:.*found in sys.modules:RuntimeWarning")
+def test_the_command_above_a_table_is_one_that_its_program_takes(key, monkeypatch):
+    """Its module is there, and it knows the options; what follows is left out."""
+    what, *options = shlex.split(KEPT[key].command)
+    read = argparse.ArgumentParser.parse_args
+
+    def only_read(self, *arguments):
+        read(self, *arguments)
+        raise Taken
+
+    monkeypatch.setattr(argparse.ArgumentParser, "parse_args", only_read)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    name, options = (options[0], options[1:]) if what == "-m" else (str(ROOT / what), options)
+    monkeypatch.setattr(sys, "argv", [name, *options])
+    run = runpy.run_module if what == "-m" else runpy.run_path
+    with pytest.raises(Taken):
+        run(name, run_name="__main__")
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("key", sorted(TIMED), ids=" ".join)
-def test_the_command_of_a_timed_table_still_runs(key):
-    command = shlex.split(KEPT[key].command)
-    assert _ran(*(part for part in command if part != "--write"), "--quick").strip()
+def test_the_command_of_a_timed_table_still_runs():
+    command = shlex.split(KEPT["benchmarks.md", "gains of loops"].command)
+    assert _ran(*(part for part in command if part not in ("--write", "--quick")), "--quick")

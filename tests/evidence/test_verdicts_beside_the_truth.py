@@ -3,14 +3,11 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from evidence.marks.fit_for_control import (
     CASES,
-    LOOPS,
     Outcome,
     by_correlation,
-    of_seed,
     table,
 )
 
@@ -70,15 +67,3 @@ def test_what_is_not_said_is_not_in_the_log():
     assert np.array_equal(log["d_lat"], record["d_lat_command"])
     assert (log.meta["plan"].servos, log.meta["plan"].delay) == (None, 0.0)
     assert CASES["servos"].log(record) is record
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore::symheli.errors.ConvergenceWarning")  # the user is told, too
-def test_a_delay_that_is_not_said_makes_no_model_fit_that_is_not():
-    """Of 20 ms: by the bound alone the model is fit for all axes, and is not."""
-    found = of_seed("20 ms untold", 2)
-    assert [o.loop for o in found] == list(LOOPS)
-    assert not any(o.said_fit and not o.is_fit for o in found)
-    (whole,) = (o for o in found if o.loop == "all axes")
-    assert whole.said < 1 < whole.true
-    assert whole.rows["residual power"] == "not known"

@@ -7,6 +7,7 @@ import pytest
 from known_vehicles import CONTROLS, STATES, Vehicle
 
 import identification as idn
+from identification.judge.response_regions import StructureBias
 from symheli.errors import InputError
 
 OMEGA = [0.5, 3.0]
@@ -61,9 +62,7 @@ def test_bias_widens_regions_by_its_power_and_moves_no_centre(model):
     points = [2.0, 5.0, 8.0]
     plain = idn.judge.response_regions(model, points, OMEGA, ["p"], ["d_lat"], draws=20)
     there = {p: model.at(p, outputs=["p"], inputs=["d_lat"]) for p in points}
-    off = idn.judge.response_regions.StructureBias(
-        model, {p: replace(one, D=one.D + 0.5) for p, one in there.items()}
-    )
+    off = StructureBias(model, {p: replace(one, D=one.D + 0.5) for p, one in there.items()})
     wide = idn.judge.response_regions(model, points, OMEGA, ["p"], ["d_lat"], bias=off, draws=20)
     assert np.array_equal(wide.centre, plain.centre)
     assert wide.width**2 == pytest.approx(plain.width**2 + 0.25)
@@ -89,11 +88,9 @@ def test_what_is_missing_is_said(vehicle, record, model):
         idn.judge.response_regions(model, [], OMEGA)
     own = model.at(3.0)
     with pytest.raises(InputError, match="bias: expected"):
-        idn.judge.response_regions(
-            model, [5.0], OMEGA, bias=idn.judge.response_regions.StructureBias(model, {3.0: own})
-        )
+        idn.judge.response_regions(model, [5.0], OMEGA, bias=StructureBias(model, {3.0: own}))
     with pytest.raises(InputError, match="sampled every"):
-        idn.judge.response_regions.StructureBias(model, {3.0: replace(own, dt=2 * own.dt)})
+        StructureBias(model, {3.0: replace(own, dt=2 * own.dt)})
     with pytest.raises(InputError, match="source of flights"):
         idn.judge.structure_bias(model, record, record, {3.0: own})
 

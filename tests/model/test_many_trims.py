@@ -54,14 +54,11 @@ ASKED = (
 @pytest.mark.filterwarnings("ignore::symheli.errors.ValidityWarning")
 @pytest.mark.parametrize(
     ("name", "asked"),
-    [  # by default every airframe, and every condition once
-        pytest.param(
-            *(name, asked),
-            id=f"{'-'.join(asked) or 'level'}-{name}",
-            marks=() if j == i % len(ASKED) else pytest.mark.slow,
-        )
+    [  # every airframe, and every condition once
+        pytest.param(*(name, asked), id=f"{'-'.join(asked) or 'level'}-{name}")
         for i, name in enumerate(AIRFRAMES)
         for j, asked in enumerate(ASKED)
+        if j == i % len(ASKED)
     ],
 )
 def test_a_batch_holds_the_trims_found_one_after_another(name, asked):

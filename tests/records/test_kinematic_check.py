@@ -105,7 +105,7 @@ def test_exact_motion_has_no_fault_to_the_error_of_splines():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 2))])
+@pytest.mark.parametrize("seed", [0, 1])
 def test_faults_of_every_kind_come_back_within_their_errors(seed):
     record = analytic(seed)
     record = changed(
@@ -135,11 +135,11 @@ def test_faults_of_every_kind_come_back_within_their_errors(seed):
 
 @pytest.mark.slow
 def test_faults_put_into_flights_come_back_and_errors_tell_the_scatter(ideal):
-    """Three standard errors, as often as a normal number may: of 20 flights x 4 numbers the worst
-    below the limit of one in a thousand, the mean square near one (0.6 to 1.6: 80 numbers).
+    """Three standard errors, as often as a normal number may: of 6 flights x 4 numbers the worst
+    below the limit of one in a thousand, the mean square near one (0.4 to 1.9: 24 numbers).
     """
     z = []
-    for seed in range(20):
+    for seed in range(6):
         record = flown(ideal, seed)
         clean = flown(ideal, seed, noise_db=None)
         found = check_kinematics(
@@ -159,12 +159,12 @@ def test_faults_put_into_flights_come_back_and_errors_tell_the_scatter(ideal):
             z.append((estimate.value - true) / estimate.standard_error)
         assert {row.signal for row in found.inconsistent} == {"p", "q", "phi"}
     assert np.abs(z).max() < found.limit
-    assert 0.6 < np.mean(np.square(z)) < 1.6
+    assert 0.4 < np.mean(np.square(z)) < 1.9
 
 
 @pytest.mark.slow
 def test_sound_flights_are_consistent_with_noise_and_without(ideal):
-    for seed in range(20):
+    for seed in range(4):
         found = flown(ideal, seed, noise_db=30.0 if seed % 4 else None).check_kinematics()
         found.require()
         verdicts = {row.signal: row.verdict for row in found.rows}
@@ -181,23 +181,7 @@ DEG = 180 / np.pi
     ("factors", "said"),
     [
         ({"p": DEG}, {"p": "it is in deg/s"}),
-        pytest.param(
-            {"phi": DEG, "theta": DEG},
-            {"phi": "it is in deg,", "theta": "it is in deg,"},
-            marks=pytest.mark.slow,
-        ),
-        pytest.param(
-            {"p": DEG, "q": DEG, "r": DEG, "phi": DEG, "theta": DEG, "psi": DEG},
-            {n: "it is in deg" for n in ("p", "q", "r", "phi", "theta", "psi")},
-            marks=pytest.mark.slow,
-        ),
         ({"q": -1.0}, {"q": "its sign is turned, or that of theta"}),
-        pytest.param(
-            {"theta": -1.0}, {"theta": "its sign is turned, or that of q"}, marks=pytest.mark.slow
-        ),
-        pytest.param(
-            {"phi": -1.0}, {"phi": "its sign is turned, or that of p"}, marks=pytest.mark.slow
-        ),
         ({"r": -1.0, "psi": -1.0}, {"r": "its sign is turned", "psi": "its sign is turned"}),
         ({"ax": 1 / G}, {"ax": "it is in g"}),
         ({"ay": -1.0}, {"ay": "its sign is turned, or that of v"}),
@@ -271,10 +255,10 @@ def test_a_short_record_and_one_without_rates_say_what_they_lack():
 def test_a_long_record_is_compared_in_pieces_spread_over_it():
     """An hour at 10 Hz: a bias that comes in the last half is seen, and the time is bounded."""
     record = analytic(n=36000, dt=0.1)
-    whole = check_kinematics(record)
-    assert whole.windows <= 120
     late_bias = record["q"] + 0.02 * (record.time > 1800.0)
-    assert "q" in {r.signal for r in check_kinematics(changed(record, q=late_bias)).inconsistent}
+    found = check_kinematics(changed(record, q=late_bias))
+    assert found.windows <= 120
+    assert "q" in {r.signal for r in found.inconsistent}
 
 
 @pytest.mark.slow

@@ -12,6 +12,20 @@ CONTEXT = "a context manager, entered by contextlib and not by the example; its 
 BY_ITS_USERS = "a tuple of what it is given; checked by what it is given to"
 RESULT = "made by the package alone, from what it has checked: see the entry that returns it"
 
+RESULTS = set(
+    """
+    AgainstConstant Air Autopilot Certificate Coefficients
+    Controller Coverage Criterion DwellTime Estimate
+    Estimator Experiment FitForControl FlightDataset FrozenModels
+    GainCurve ReferenceGovernor Helicopter History InvariantSet
+    KinematicModel LPVARXModel LocalGain LoopShaping LowComplexitySet
+    MarginTable Margins MuDesign Online Plan
+    RigidBodyOnline RobustMargin Scores SlopeMargin SpecificationTable
+    StateSpaceModel StructuredController SwitchedController TrimPoint Tube
+    WorstCaseGain
+    """.split()
+)
+
 EXEMPT: dict[str, str] = {
     **{
         name: ERRORS
@@ -36,66 +50,7 @@ EXEMPT: dict[str, str] = {
         ),
         CHOICE,
     ),
-    **{
-        f"symheli.{name}": RESULT
-        for name in (
-            *("Air", "Autopilot", "Helicopter"),
-            *(
-                "TrimPoint",
-                "FlightDataset",
-            ),
-        )
-    },
-    **{
-        f"identification.{name}": RESULT
-        for name in (
-            "StateSpaceModel",
-            *("AgainstConstant", "Coefficients"),
-            *(
-                "Criterion",
-                "Estimate",
-            ),
-            *(
-                "Experiment",
-                "FitForControl",
-                "FrozenModels",
-            ),
-            *("History", "KinematicModel", "LPVARXModel"),
-            *(
-                "Online",
-                "Plan",
-            ),
-            *(
-                "RigidBodyOnline",
-                "Scores",
-            ),
-        )
-    },
-    **{
-        f"synthesis.{name}": RESULT
-        for name in (
-            *("Certificate", "Controller", "DwellTime", "SwitchedController"),
-            *(
-                "Estimator",
-                "GainCurve",
-                "MarginTable",
-                "Margins",
-                "RobustMargin",
-                "WorstCaseGain",
-                "LoopShaping",
-                "MuDesign",
-                "SlopeMargin",
-                "SpecificationTable",
-                "StructuredController",
-                "Tube",
-                "Coverage",
-                "LocalGain",
-                "InvariantSet",
-                "LowComplexitySet",
-                "Governor",
-            ),
-        )
-    },
+    **{name: RESULT for name, _ in exported() if name.rpartition(".")[2] in RESULTS},
     "synthesis.robust.DynamicBlock": BY_ITS_USERS,
     "synthesis.analysis.PolynomialMatrix": ARITHMETIC,
     "symheli.progress.watched": CONTEXT,

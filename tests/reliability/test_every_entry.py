@@ -98,15 +98,3 @@ def test_no_changed_argument_of_quick_entries_fails_silently():
             asked += tally.outcomes.total()
     assert asked > 150
     assert not told, "\n".join(map(str, told))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("package", PACKAGES)
-def test_no_changed_argument_fails_silently(package):
-    told, calls = [], _calls(lambda name: name.startswith(package + "."))
-    names = {entry for entry, _ in exported() if entry.startswith(package + ".")}
-    names -= {*entries.EXEMPT, "identification.forgetting.Forgetting"}
-    assert names <= set(calls)
-    for entry, of in calls.items():
-        told += fuzzed.tally(of, entries.inputs(entry)).faults
-    assert not told, "\n".join(map(str, told))

@@ -17,9 +17,11 @@ from collections.abc import Callable, Iterator
 from types import CodeType, FrameType
 from typing import Any, NamedTuple
 
+from public_faces import faces, names
+
 import symheli.threads
 
-PACKAGES = ("symheli", "identification", "synthesis")
+PACKAGES = faces()
 EXAMPLE = "<doctest"
 INSIDE = {
     *("symheli.LFT", "symheli.LinearFamily", "symheli.FlightRecord"),
@@ -60,7 +62,7 @@ def exported() -> Iterator[tuple[str, Any]]:
     """(package.name, thing) of every public callable of the packages."""
     for package in PACKAGES:
         module = importlib.import_module(package)
-        for name in module.__all__:
+        for name in names(package):
             thing = getattr(module, name)
             if isinstance(thing, type) or callable(thing):
                 yield f"{package}.{name}", thing

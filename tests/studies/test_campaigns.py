@@ -413,20 +413,17 @@ def test_a_case_that_ends_every_worker_is_a_row_with_its_reason(tmp_path, cluste
 
 
 @pytest.mark.slow
-def test_eight_workers_fly_and_identify_the_numbers_of_one_process(tmp_path):
-    pytest.importorskip("distributed", reason="needs dask: pip install 'symheli[campaigns]'")
+def test_workers_fly_and_identify_the_numbers_of_one_process(tmp_path, cluster):
     declared = {
         "trial": "identification",
-        "draws": 4,
-        "paired": ["order"],
         "grid": {"order": [2, 3]},
         "random": {"noise_db": {"low": 20.0, "high": 40.0}},
-        "fixed": {"ramps": 3, "axis": "lateral"},
+        "fixed": {"ramps": 2, "axis": "lateral"},
     }
-    with Here() as here, Cluster.local(8) as eight:
+    with Here() as here:
         one, many = (
             run(campaign_of(declared), tmp_path / f"{kind}.zarr", on).values[:, :-1]
-            for kind, on in (("here", here), ("eight", eight))
+            for kind, on in (("here", here), ("cluster", cluster))
         )
     assert np.isfinite(one).any(axis=1).all()
     np.testing.assert_array_equal(many, one)
@@ -443,7 +440,7 @@ def test_processes_do_the_same_without_a_cluster(tmp_path, importable):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["Here", pytest.param("Cluster.local", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("kind", ["Cluster.local"])
 def test_a_killed_campaign_goes_on_where_it_was(tmp_path, importable, kind):
     if kind != "Here":
         pytest.importorskip("distributed", reason="needs dask: pip install 'symheli[campaigns]'")

@@ -201,12 +201,11 @@ def worked(pid, seconds):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("after", [1.0, 3.0])
-@pytest.mark.parametrize("what", WORK)
-def test_an_interrupt_is_answered_within_two_seconds(what, after):
+@pytest.mark.parametrize("what", list(WORK)[::3])
+def test_an_interrupt_is_answered_within_two_seconds(what):
     child = begun("-c", WORK[what])
     assert child.stdout.readline() == "begins\n"
-    worked(child.pid, after)
+    worked(child.pid, 1.0)
     err, status, seconds = interrupted(child)
     assert err.rstrip().endswith("KeyboardInterrupt")
     assert status == -signal.SIGINT

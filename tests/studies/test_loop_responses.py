@@ -122,32 +122,3 @@ def test_no_proof_where_a_frozen_loop_is_unstable(ideal, loops):
     assert "a model frozen at some p is not stable" in str(found)
     with pytest.raises(InputError, match="a proof between airspeeds needs two of them"):
         stable_between([ideal], loops, 4.0, 4.0, 1.0)
-
-
-@pytest.mark.slow
-def test_stability_between_airspeeds_is_proven_of_the_loops_that_fly(ideal, loops):
-    """Exactly, of a model that at its nodes is plant and loops closed by hand."""
-    found = stable_between([ideal, ideal], loops, 4.0, 6.0, 1.0)
-    assert found.exact
-    assert (found.drawn, found.proven) == (1, 1)
-    assert found.unstable == ()
-    assert str(found).startswith("Proven, in rational arithmetic")
-    model = symheli.linearize(ideal, symheli.trim(ideal, 6.0)).discretize(loops.dt)
-    own = found.closed.at(6.0).poles()
-    hand = closed_loops(model, loops).poles()
-    assert np.sort(np.abs(own)) == pytest.approx(np.sort(np.abs(hand)), abs=1e-6)
-
-
-@pytest.mark.slow
-def test_true_responses_lie_in_their_bands_in_nearly_every_flight():
-    """20 flights, calibrated from their logs, one gain changed at random: the share of the values
-    of each quantity that lie in their bands; three standard deviations of a normal error hold 99.7
-    %, with a covariance estimated from one flight and 12 draws less.
-    """
-    from evidence.tuning import of_seed
-
-    found = [of_seed(seed) for seed in range(20)]
-    for name in QUANTITIES:
-        held = [h for p in found for h in p.held(name)]
-        assert len(held) > 150
-        assert np.mean(held) >= 0.95, name

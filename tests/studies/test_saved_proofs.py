@@ -17,6 +17,8 @@ from synthesis import Certificate
 from synthesis.analysis import LowerBoundSearch
 from synthesis.forms import Spline
 
+pytestmark = pytest.mark.guard
+
 QUICK = LowerBoundSearch(levels=2, dwells=1, starts=1, nodes=8, evaluations=1, samples=100)
 
 
@@ -65,7 +67,6 @@ def test_a_proof_is_written_once_and_again_where_it_is_gone(outcome, tmp_path):
     assert second.is_file()
 
 
-@pytest.mark.slow
 def test_a_proof_about_a_model_that_jumps_travels_too(tmp_path):
     """As that of the exact helicopter, whose models have corners."""
     basis = Patches(1, (0.0, 5.0, 13.0))
@@ -88,7 +89,6 @@ def links(page):
     return [target for target in found if not target.startswith("data:")]
 
 
-@pytest.mark.slow
 def test_the_report_links_every_proof_and_every_link_is_there(outcome, tmp_path):
     page = report.write_report(outcome, tmp_path).read_text(encoding="utf-8")
     targets = links(page)

@@ -15,6 +15,8 @@ from studies.setup.stored_stages import NotUsable, Stored, StoredStages
 from symheli import LinearModel, Scheduling
 from symheli.values import Signal
 
+pytestmark = pytest.mark.guard
+
 
 def again(value):
     return stage_file.read(stage_file.written(value))

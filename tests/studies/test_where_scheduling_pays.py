@@ -15,7 +15,7 @@ from studies.setup.flights import TransitionPlan, autopilot_for
 
 @pytest.mark.slow
 def test_every_output_of_every_axis_is_judged_and_counted():
-    short = {"short": TransitionPlan(ramps=3)}
+    short = {"short": TransitionPlan(ramps=2)}
     with Here() as here:
         lines = list(pays.where_scheduling_pays(0, "xcell60", short, on=here))
     assert [line.output for line in lines] == [

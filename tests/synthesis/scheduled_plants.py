@@ -165,9 +165,8 @@ MISSILE = (["nc", "d", "n1", "n2", "dc"], ["z_error", "z_dc", "error", "q"])
 MISSILE_STATES = tuple(f"x{i}" for i in range(8))
 
 
-def missile(rate, degrees=(6, 4)):
-    """Mach 2 to 4, angle of attack 0 to 20 deg, polynomials of these degrees."""
-    box = [(2.0, 4.0), (0.0, 20.0)]
+def missile(rate, degrees=(6, 4), box=((2.0, 4.0), (0.0, 20.0))):
+    """Over Mach number and angle of attack (deg), polynomials of these degrees."""
     nodes, basis = interpolation_points(degrees, box), polynomials(degrees, box)
     each = (np.stack(M) for M in zip(*(missile_at(*q) for q in nodes), strict=True))
     scheduling = [

@@ -23,6 +23,7 @@ from synthesis.certify.assemble.bounded_real import (
 )
 from synthesis.certify.assemble.lyapunov_blocks import continuous_products, discrete_products
 from synthesis.certify.assemble.memory_blocks import memory_blocks
+from synthesis.certify.assemble.rounded import rounded
 from synthesis.certify.proof.one_parameter import IntervalEvidence
 from synthesis.certify.statement.forms import HigherOrder, LaggedParameter, LyapunovForm, Spline
 from synthesis.certify.statement.lag import LagRegion
@@ -37,7 +38,7 @@ from synthesis.certify.statement.spline import (
 )
 from synthesis.certify.statement.units import Scaling
 from synthesis.numerics.polynomial.cells import Strip, cells, strips
-from synthesis.numerics.polynomial.pieces import ModelPiece, model_pieces, rounded
+from synthesis.numerics.polynomial.pieces import ModelPiece, model_pieces
 from synthesis.numerics.polynomial.symmetric import extended, length, smat, svec
 from synthesis.numerics.polynomial.symmetric_power import (
     generator,

@@ -78,7 +78,7 @@ class LowerBoundSearch:
 
     Examples
     --------
-    >>> Search(starts=1, seconds=2.0).starts
+    >>> LowerBoundSearch(starts=1, seconds=2.0).starts
     1
     """
 

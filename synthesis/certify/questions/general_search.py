@@ -14,6 +14,7 @@ from symheli import LinearModel
 from symheli.lpv.tools import Matrices
 from synthesis.certify.assemble.box import Shape, affine_inequalities, assemble
 from synthesis.certify.assemble.points import at_points, points_of
+from synthesis.certify.assemble.rounded import rounded_pieces
 from synthesis.certify.proof.box import BoxEvidence
 from synthesis.certify.questions.certificate import Proof
 from synthesis.certify.questions.frozen_storage import central_dissipation
@@ -138,7 +139,7 @@ class General(Ladder):
 
     def _in_units(self, units: Scaling) -> float:
         self.evidence = BoxEvidence(self.problem.model, units, self.problem.demand)
-        searched = self.evidence._replace(model=self.problem.model.rounded)
+        searched = self.evidence._replace(model=rounded_pieces(self.problem.model))
         self.scaled, self.scaled_demand = searched.scaled
         return 1.0 / self.evidence.in_units(1.0)
 

@@ -245,7 +245,7 @@ def energy_to_peak(
     >>> from symheli import LPVStateSpace, Scheduling
     >>> p = Scheduling("p", "1", 0.0, 1.0, rate=0.5)
     >>> lag = LPVStateSpace.polynomial([[[-1.0]], [[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], p)
-    >>> cert = generalized_h2(lag, search=None)  # exactly sqrt(1/2)
+    >>> cert = energy_to_peak(lag, search=None)  # exactly sqrt(1/2)
     >>> print(f"{cert.gamma:.3f}")
     0.707
     """

@@ -161,7 +161,7 @@ class LaggedParameter(_InP):
 
     Examples
     --------
-    >>> Memory(0.6, across_segments=3).seconds
+    >>> LaggedParameter(0.6, across_segments=3).seconds
     0.6
     """
 

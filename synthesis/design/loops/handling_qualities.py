@@ -78,7 +78,7 @@ def attitude_bandwidth(
     >>> from symheli import LinearModel
     >>> A, B = [[-4.0, 0.0], [1.0, 0.0]], [[1.0], [0.0]]  # 1/(s (s + 4)): 45 deg left at 4 rad/s
     >>> roll = LinearModel(A, B, [[0.0, 1.0]], [[0.0]], ["p", "phi"], ["d_lat"], ["phi"])
-    >>> print(f"{bandwidth(roll).attitude_response:.2f} rad/s")
+    >>> print(f"{attitude_bandwidth(roll).attitude_response:.2f} rad/s")
     4.00 rad/s
     """
     if len(model.inputs) != 1 or len(model.outputs) != 1:

@@ -69,7 +69,7 @@ def ncfsyn(
 
     >>> from symheli.lpv import series
     >>> integrator = LinearModel([[0.0]], [[1.0]], [[1.0]], [[0.0]], ["x"], ["u"], ["y"])
-    >>> design = ncf(integrator)
+    >>> design = ncfsyn(integrator)
     >>> print(f"{design.optimum:.6f} {design.hinf_norm:.3f} {design.controller.D[0, 0]:.1f}")
     1.414214 1.428 0.0
     """

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import product
-from math import comb
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,11 +18,6 @@ from synthesis.numerics.polynomial.bernstein import restriction
 from synthesis.numerics.polynomial.matrix import PolynomialMatrix
 
 Array = np.ndarray
-
-CONSTANT = 1e-14
-"""In the search for a proof only, coefficients of an entry that differ by less than this fraction
-of its terms count as one constant: the rounding of the basis. The proof does not use it.
-"""
 
 
 class ModelPiece(NamedTuple):
@@ -75,26 +69,6 @@ def model_pieces(lpv: LPVMatrices) -> tuple[ModelPiece, ...]:
         ModelPiece(a, b, *_each(every, k, lpv))
         for k, (a, b, _) in enumerate(function_pieces(lpv.basis, s.low, s.high))
     )
-
-
-def rounded(lpv: LPVMatrices, exactly: Sequence[ModelPiece]) -> tuple[ModelPiece, ...]:
-    """Return the pieces with a constant for every matrix that changes by rounding alone: fewer
-    inequalities for the search.
-    """
-    s = lpv.scheduling
-    out = []
-    for piece, (_, _, functions) in zip(
-        exactly, function_pieces(lpv.basis, s.low, s.high), strict=True
-    ):
-        largest = np.abs(functions).max()
-        own = []
-        for coefficients, M in zip(piece[2:], (lpv.A, lpv.B, lpv.C, lpv.D), strict=True):
-            # entry by entry: states and channels may differ in size by orders of magnitude
-            terms = np.abs(M).sum(axis=0) * largest
-            same = np.all(np.ptp(coefficients, axis=0) <= CONSTANT * terms)
-            own.append(coefficients.mean(axis=0)[None] if same else coefficients)
-        out.append(ModelPiece(piece.low, piece.high, *own))
-    return tuple(out)
 
 
 def function_pieces(basis: FunctionSpace, low: float, high: float) -> tuple[Piece, ...]:
@@ -206,22 +180,6 @@ class Pieces(NamedTuple):
         )
 
     @property
-    def rounded(self) -> Pieces:
-        """The same pieces, each matrix in its least degree up to rounding: fewer
-        inequalities for the search.
-        """
-        models = {}
-        for key, matrices in self.models.items():
-            lower = []
-            for M in matrices:
-                coefficients = M.coefficients
-                for i in range(len(M.box)):
-                    coefficients = _lowered(coefficients, i)
-                lower.append(PolynomialMatrix(M.box, coefficients))
-            models[key] = tuple(lower)
-        return self._replace(models=models)
-
-    @property
     def sizes(self) -> tuple[int, int, int]:
         """Numbers of states, inputs and outputs."""
         A, B, C, _ = next(iter(self.models.values()))
@@ -309,18 +267,3 @@ def _over_box(tensor: Array, functions: Sequence[Array], box: Any) -> Polynomial
     for i, bernstein in enumerate(functions):
         coefficients = np.moveaxis(np.tensordot(bernstein.T, coefficients, axes=(1, i)), 0, i)
     return PolynomialMatrix(box, coefficients)
-
-
-def _lowered(coefficients: Array, axis: int) -> Array:
-    """Return the same polynomial in its least degree along one axis, to rounding."""
-    c = np.moveaxis(coefficients, axis, 0)
-    while (d := len(c) - 1) > 0:
-        binomials = np.array([comb(d, k) for k in range(d + 1)], dtype=float)
-        top = np.tensordot(binomials * (-1.0) ** np.arange(d + 1), c, axes=1)
-        if np.any(np.abs(top) > CONSTANT * np.tensordot(binomials, np.abs(c), axes=1)):
-            break
-        raised = np.zeros((d + 1, d))
-        k = np.arange(d)
-        raised[k, k], raised[k + 1, k] = 1 - k / d, (k + 1) / d
-        c = np.tensordot(np.linalg.pinv(raised), c, axes=1)
-    return np.moveaxis(c, 0, axis)

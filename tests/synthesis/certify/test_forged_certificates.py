@@ -19,6 +19,8 @@ from synthesis.analysis import energy_to_peak, lft_stability
 from synthesis.forms import HigherOrder, LaggedParameter, Spline
 from synthesis.impose import SumOfSquares
 
+pytestmark = pytest.mark.guard
+
 COARSE = Spline(segments=2, degree=2)
 BOX = {"form": Spline(segments=2, degree=1), "impose": SumOfSquares()}
 damped = spring(damping=0.4)
@@ -116,7 +118,6 @@ def refused(forge):
     return not cert.verify() and not cert.verify(rigorous=True)
 
 
-@pytest.mark.slow(only=("sampled", "memory", "uncertain", "uncertain, sampled"))
 @pytest.mark.parametrize("form", FORMS)
 def test_the_certificate_itself_is_accepted(form):
     cert = genuine(form)
@@ -126,7 +127,6 @@ def test_the_certificate_itself_is_accepted(form):
     assert cert.verify(rigorous=True)
 
 
-@pytest.mark.slow(only=("sampled", "memory", "uncertain", "uncertain, sampled"))
 @pytest.mark.parametrize("form", FORMS)
 @settings(max_examples=25, derandomize=True, deadline=None, suppress_health_check=list(HealthCheck))
 @given(data=st.data())
@@ -150,20 +150,8 @@ def test_junk_in_any_field_is_refused(form, data):
     assert refused(lambda: exchanged(cert, path, junk)), f"{path} = {junk!r}"
 
 
-@pytest.mark.slow(
-    only=(
-        "memory",
-        "uncertain, sampled",
-        "box",
-        "box stability",
-        "energy to peak",
-        "decay",
-        "lft, D",
-        "lft, full block",
-    )
-)
 @pytest.mark.parametrize("form", FORMS)
-@settings(max_examples=40, derandomize=True, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=25, derandomize=True, deadline=None, suppress_health_check=list(HealthCheck))
 @given(data=st.data())
 def test_numbers_of_the_proof_that_were_changed_are_refused(form, data):
     cert = genuine(form)
@@ -208,7 +196,6 @@ def test_numbers_of_the_proof_that_were_changed_are_refused(form, data):
     assert refused(lambda: exchanged(cert, path, array)), f"{change} of {path}"
 
 
-@pytest.mark.slow(only=("sampled", "memory", "uncertain", "uncertain, sampled"))
 @pytest.mark.parametrize("form", FORMS)
 def test_a_bound_beyond_the_proof_is_refused(form):
     cert = genuine(form)

@@ -25,14 +25,7 @@ def test_a_lag_has_its_static_gain_at_any_rate(rate):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("seed", "dt"),
-    [
-        pytest.param(k, dt, marks=() if k % 2 == (dt is None) else pytest.mark.slow)
-        for k in range(4)
-        for dt in (None, 0.1)
-    ],
-)
+@pytest.mark.parametrize(("seed", "dt"), [(1, None), (2, 0.1)])
 def test_a_constant_model_has_its_h_infinity_norm(seed, dt):
     m = random_stable(seed, states=4, degree=0, dt=dt).at(0.5)
     expected = control.system_norm(control.ss(m.A, m.B, m.C, m.D, dt or 0), p="inf", tol=1e-8)
@@ -102,7 +95,7 @@ def test_the_gain_does_not_depend_on_the_unit_of_time():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("rate", [0.0, 0.1, 2.0])
+@pytest.mark.parametrize("rate", [0.1])
 def test_a_fast_sampled_model_has_the_gain_of_the_continuous_one(rate):
     lpv = random_stable(6, degree=1)
     continuous = l2_gain(lpv, rate, form=COARSE, search=None)

@@ -188,12 +188,10 @@ def test_the_energy_to_peak_gain_of_an_oscillator():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("solver", installed_solvers())
-@pytest.mark.parametrize("scale", [1e-4, 1.0, 1e4])
-@pytest.mark.parametrize("excess", [1e-1, 1e-8])
-def test_no_scaling_makes_an_unstable_plant_proven(solver, scale, excess):
-    """By no relaxation, solver or scaling."""
-    never_proven(solver, scale, excess)
+@pytest.mark.parametrize("scale", [1e-4, 1e4])
+def test_no_scaling_makes_an_unstable_plant_proven(scale):
+    """By no relaxation."""
+    never_proven("CLARABEL", scale, 1e-8)
 
 
 @pytest.mark.slow(but="CLARABEL")

@@ -11,8 +11,6 @@ sys.path.append(str(Path(__file__).resolve().parents[3]))  # benchmarks/ is not 
 
 from benchmarks.reliability import ROUTES, count
 
-CHUNK = 500
-
 
 @pytest.mark.slow
 def test_no_proof_of_the_first_plants_is_false():
@@ -20,9 +18,3 @@ def test_no_proof_of_the_first_plants_is_false():
     assert not wrong
     # plants on the stable side are there, and some of them are proven by every route
     assert set(asked) == set(ROUTES) == {route for route in ROUTES if proven[route]}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("chunk", range(20))
-def test_no_proof_near_the_limit_is_false(chunk):
-    assert count(CHUNK * chunk, CHUNK)[2] == []

@@ -24,8 +24,10 @@ from synthesis.certify.statement.trajectory import SchedulingTrajectory
 from synthesis.forms import Spline
 from synthesis.impose import Grid
 
+pytestmark = pytest.mark.guard
+
 QUICK = settings(
-    max_examples=30, derandomize=True, deadline=None, suppress_health_check=list(HealthCheck)
+    max_examples=20, derandomize=True, deadline=None, suppress_health_check=list(HealthCheck)
 )
 
 
@@ -108,7 +110,6 @@ def changed(content, path, value):
 JUNK = (None, "P", -1, 1e300, 10**400, [], {}, True, {"float": "nan"}, {"type": "Certificate"})
 
 
-@pytest.mark.slow(only=("sampled", "memory", "uncertain, sampled"))
 @pytest.mark.parametrize("form", FORMS)
 @QUICK
 @given(data=st.data())

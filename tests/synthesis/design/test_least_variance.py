@@ -13,6 +13,7 @@ from symheli import LPVStateSpace, Scheduling
 from symheli.errors import InputError
 from synthesis import Plant, h2, h2_gain, multiobjective
 from synthesis.design.lti.h2 import h2_norm
+from synthesis.impose import SumOfSquares
 from synthesis.objectives import H2
 
 
@@ -121,6 +122,7 @@ def test_the_disks_whose_speeds_jump():
     loop = made.closed()
     points = [(a, b) for a in (0.0, 4.5, 9.0) for b in (0.0, 12.5, 25.0)]
     assert max(h2_norm(loop.at(*p)) for p in points) == pytest.approx(1.5506, rel=1e-3)
-    proven = h2_gain(loop, search=None)
+    # 14 states: by Bernstein coefficients the solver runs out of digits
+    proven = h2_gain(loop, impose=SumOfSquares(), search=None)
     assert proven.verified
     assert made.optimum < proven.gamma < 1.8

@@ -8,8 +8,7 @@ import pytest
 from published_plants import DEGREE, grid_to_lft, lft_tutorial, spinning_disks, wu_1996
 from scheduled_plants import frozen
 
-from synthesis import hinf, l2_gain, output_feedback
-from synthesis.certify.questions.adjoint import ADJOINT
+from synthesis import hinf, output_feedback
 
 
 def test_the_worst_frozen_optimum_of_the_disks_is_what_was_found_by_other_means():
@@ -31,19 +30,13 @@ def test_polynomials_stand_for_sine_and_cosine(half):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("rate", "printed"), [(1.0, 0.8315), (math.inf, 1.1299)])
-def test_the_loop_of_the_disks_is_proven_near_what_its_design_promised(rate, printed):
-    made = output_feedback(spinning_disks(rate))
+def test_the_loop_of_the_disks_is_proven_near_what_its_design_promised():
+    made = output_feedback(spinning_disks(math.inf))
     # the printed optimum has five digits, a design is within a thousandth of it or below
-    assert made.optimum <= printed * 1.001
+    assert made.optimum <= 1.1299 * 1.001
     certificate = made.certify(search=None)
     assert certificate.frozen <= certificate.gamma <= 1.05 * made.promised
     assert certificate.verify()
-    if math.isfinite(rate):
-        # without being told by which of the two, `l2_gain` proves the same of the loop itself
-        of_loop = l2_gain(made.closed(), rate, search=None)
-        assert ADJOINT in of_loop.hypotheses
-        assert of_loop.gamma == pytest.approx(certificate.gamma, rel=1e-3)
 
 
 @pytest.mark.slow
@@ -60,15 +53,5 @@ def test_the_loop_of_two_parameters_that_jump_is_proven_near_what_its_design_pro
     made = output_feedback(grid_to_lft(math.inf))
     assert made.optimum <= 1.996
     certificate = made.certify(search=None)
-    assert certificate.frozen <= certificate.gamma <= 1.05 * made.promised
-    assert certificate.verify()
-
-
-@pytest.mark.slow
-def test_the_loop_of_the_turned_actuators_at_rest_is_proven_near_what_its_design_promised():
-    """16 states, of which every storage function turns with the angle."""
-    made = output_feedback(wu_1996(0.0))
-    assert made.promised <= 1.05 * made.optimum
-    certificate = made.certify(0.0, search=None)
     assert certificate.frozen <= certificate.gamma <= 1.05 * made.promised
     assert certificate.verify()

@@ -41,9 +41,7 @@ def test_what_no_spline_serves_comes_to_an_end():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (7, 29))]
-)
+@pytest.mark.parametrize("seed", [1])
 def test_a_narrow_peak_of_the_frozen_optimum_is_found(seed):
     """The plants were drawn with more values of p, and one where B2 or C2 passes zero."""
     drawn = random_plant(seed)
@@ -53,7 +51,7 @@ def test_a_narrow_peak_of_the_frozen_optimum_is_found(seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [2, 3])
+@pytest.mark.parametrize("seed", [2])
 def test_central_controllers_keep_their_level_between_the_points(seed):
     """Frozen gain recomputed where nothing was fitted or judged."""
     plant = random_plant(seed).plant.with_rate(0.0)
@@ -74,7 +72,7 @@ def test_central_controllers_keep_their_level_between_the_points(seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 7, 9, 13, 22, 29, 45])
+@pytest.mark.parametrize("seed", [1])
 def test_plants_whose_gains_turn_sharply_are_settled_near_their_optimum(seed):
     drawn = random_plant(seed)
     made = output_feedback(drawn.plant, 0.0)

@@ -83,8 +83,8 @@ def test_the_norm_of_lightly_damped_models_is_that_of_a_dense_grid():
 
 
 @pytest.mark.slow
-def test_the_norms_of_a_thousand_lightly_damped_models_are_those_of_dense_grids():
-    agree(range(60, 1060))
+def test_the_norms_of_more_lightly_damped_models_are_those_of_dense_grids():
+    agree(range(60, 160))
 
 
 def exact_gain(model, omega):

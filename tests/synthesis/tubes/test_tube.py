@@ -27,21 +27,10 @@ from synthesis.tubes.inequality import elementwise, rank_one
 from synthesis.tubes.reference import TUBE_SIZES, moving
 from synthesis.tubes.tube import _covers
 
-CASES = [
-    ("xcell60", 0.0, {"gust": 0.5}),
-    pytest.param(("xcell_kahn_hudson", 8.0, {"gust": 0.25}), marks=pytest.mark.slow),
-    pytest.param(("yamaha_r50", 8.0, {"gust": 0.25}), marks=pytest.mark.slow),
-    pytest.param(
-        ("xcell60", (4.0, 4.5), {"gust": 0.2, "acceleration": 0.5, "jerk": 0.5, "snap": 1.0}),
-        marks=pytest.mark.slow,
-    ),
-]
 
-
-@pytest.fixture(scope="module", params=CASES)
-def proven(request):
-    name, airspeed, limits = request.param
-    found = tube(Helicopter.load(name, governor="ideal"), airspeed, **limits)
+@pytest.fixture(scope="module")
+def proven():
+    found = tube(Helicopter.load("xcell60", governor="ideal"), 0.0, gust=0.5)
     assert found.verified, found.why
     return found
 
@@ -49,7 +38,7 @@ def proven(request):
 @pytest.mark.slow
 def test_no_nonlinear_flight_leaves_the_tube(proven):
     # from its border, in gusts of full size that change at random, slowly and fast
-    assert from_its_border(proven, 100, 2.0) < 1 + 1e-6  # that of the integration
+    assert from_its_border(proven, 40, 1.0) < 1 + 1e-6  # that of the integration
 
 
 @pytest.mark.slow
@@ -68,35 +57,22 @@ def test_a_saved_tube_is_proven_again_from_its_file(proven, tmp_path, capsys):
     assert "invariant tube of the nonlinear equations" in capsys.readouterr().out
 
 
-def _without_a_part(content):
-    for name in ("cells", "factors", "multipliers"):
-        content[name].pop()
-
-
-FORGED = {
-    "larger gusts": lambda c: c.update(gust=2.0 * c["gust"]),
-    "a smaller tube": lambda c: c.update(P=(4 * np.array(c["P"])).tolist()),
-    "a larger tube than enclosed": lambda c: c.update(P=(0.5 * np.array(c["P"])).tolist()),
-    "no feedback": lambda c: c.update(gain=(0 * np.array(c["gain"])).tolist()),
-    "the feedback's sign": lambda c: c.update(gain=(-np.array(c["gain"])).tolist()),
+FORGED_FLIGHT = {
     "another flight": lambda c: c["steady"][0][0][0].__setitem__(0, c["steady"][0][0][0][0] + 1.0),
-    "negative multiplier": lambda c: c["multipliers"][0].update(wind=[[-1.0]]),
-    "no multiplier": lambda c: c["multipliers"][-1].update(tube=np.zeros((10, 10)).tolist()),
-    "a part of the commands left out": _without_a_part,
-    "the proof of a part left out": lambda c: c["multipliers"].pop(),
     "larger accelerations": lambda c: c["limits"].__setitem__(0, 2 * c["limits"][0] + 0.1),
     "a heavier helicopter": lambda c: c.update(
         vehicle=c["vehicle"].replace("mass = { value = ", "mass = { value = 1")
     ),
 }
+"""Of what a file of a helicopter holds; the inequalities are those of any model, `FORGED`."""
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("forgery", FORGED)
-def test_a_forged_tube_is_not_proven(proven, tmp_path, forgery):
+@pytest.mark.parametrize("forgery", FORGED_FLIGHT)
+def test_a_forged_tube_of_a_helicopter_is_not_proven(proven, tmp_path, forgery):
     path = proven.save(tmp_path / "tube.json")
     content = json.loads(path.read_text())
-    FORGED[forgery](content)
+    FORGED_FLIGHT[forgery](content)
     path.write_text(json.dumps(content))
     assert not Tube.load(path).verified
     assert main(["verify", str(path)]) == 1
@@ -106,18 +82,11 @@ def test_a_forged_tube_is_not_proven(proven, tmp_path, forgery):
 @pytest.mark.parametrize(
     "damage",
     [
-        lambda c: c.pop("gain"),
-        lambda c: c.update(P=[[1.0]]),
-        lambda c: c.update(gust=float("nan")),
-        lambda c: c.update(version=1),
-        lambda c: c["cells"].append([0]),
         lambda c: c["limits"].pop(),
         lambda c: c["airspeeds"].append(0.0),
-        lambda c: c.update(schema="another"),
-        lambda c: c["multipliers"][0].update(terms="text"),
     ],
 )
-def test_a_damaged_file_is_refused(proven, tmp_path, damage):
+def test_a_damaged_file_of_a_helicopter_is_refused(proven, tmp_path, damage):
     path = proven.save(tmp_path / "tube.json")
     content = json.loads(path.read_text())
     damage(content)
@@ -126,16 +95,16 @@ def test_a_damaged_file_is_refused(proven, tmp_path, damage):
         Tube.load(path)
 
 
-@pytest.mark.slow
+@pytest.mark.guard
 def test_where_there_is_no_tube_it_says_why(tmp_path):
-    heli = Helicopter.load("xcell60", governor="ideal")
-    large = tube(heli, 8.0, gust=3.0)
+    model, about = _pendulum()
+    large = tube(model, about, gust=5.0, sizes=(0.2, 0.3))
     assert not large.verified
     assert "no tube" in str(large)
     with pytest.raises(InputError, match="only a proven tube"):
         large.save(tmp_path / "none.json")
-    loose = tube(heli, 0.0, gust=0.1, gain=np.zeros((4, 10)))
-    assert not loose.verified
+    falls = tube(*_pendulum(gain=(0.0, 0.0)), gust=0.1, sizes=(0.2, 0.3))
+    assert not falls.verified
 
 
 def test_wrong_arguments_are_refused():
@@ -312,16 +281,6 @@ def test_rows_that_are_not_run_stay_as_the_page_has_them():
         chosen(["other"], names)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("airspeeds", [(9.0, 10.0), (12.0, 13.0)])
-def test_a_tube_crosses_the_edges_where_the_tail_stalls_and_the_wake_covers_it(airspeeds):
-    heli = Helicopter.load("xcell60", governor="ideal")
-    found = tube(heli, airspeeds, gust=0.25, acceleration=1.0, jerk=1.0, snap=1.0)
-    assert found.verified, found.why
-    assert from_its_border(found, 1000, 0.25) < 1
-    assert max(worst(found, p) for p in airspeeds) < 1
-
-
 def test_along_a_range_the_feedback_spares_the_pitching_moment_of_the_tail():
     heli, p = Helicopter.load("xcell60", governor="ideal"), np.array([12.5, 12.5])
     level = trim(heli, airspeed=p[0])
@@ -339,7 +298,7 @@ def test_along_a_range_the_feedback_spares_the_pitching_moment_of_the_tail():
 
 @pytest.mark.slow
 def test_the_set_of_a_cell_with_two_kinks_holds_the_jacobians_in_it():
-    heli, n, count = Helicopter.load("xcell60", governor="ideal"), 10, 4000
+    heli, n, count = Helicopter.load("xcell60", governor="ideal"), 10, 800
     loop = Deviations(heli, moving(heli, np.array([9.0, 10.0]), (1.0, 1.0, 1.0)), 0.15)
     cell, factor = CommandCell(0, (0.0, 1.0), (0.0, 0.5)), np.diag(0.2 * np.array(TUBE_SIZES[:n]))
     drifts = np.zeros((1, 4, n))
@@ -398,6 +357,90 @@ def upright():
     return found.with_gain(["x0"]).with_gain(["x0"], energy=False)
 
 
+@pytest.fixture(scope="module")
+def swinging():
+    """About angles from 0 to a quarter, commanded with their rate and acceleration."""
+    c = casadi.SX.sym("c", 3)
+    swing = [casadi.vertcat(c[0], c[1]), c[2] - casadi.sin(c[0])]
+    model, about = _pendulum(
+        casadi.Function("swing", [c], swing),
+        schedule=[0.0, 0.25],
+        rate=(-0.2, 0.2),
+        others=[[-0.2, 0.2]],
+        pieces=(2, 1),
+    )
+    found = tube(model, about, gust=0.2, sizes=(0.2, 0.3))
+    assert found.verified, found.why
+    return found
+
+
+@pytest.mark.guard
+def test_a_saved_tube_about_moving_references_is_proven_again(swinging, tmp_path, capsys):
+    path = swinging.save(tmp_path / "tube.json")
+    again = Tube.load(path)
+    assert again.verified
+    np.testing.assert_array_equal(again.P, swinging.P)
+    assert main(["verify", str(path)]) == 0
+    assert "invariant tube of the nonlinear equations" in capsys.readouterr().out
+
+
+def _without_a_part(content):
+    for name in ("cells", "factors", "multipliers"):
+        content[name].pop()
+
+
+FORGED = {
+    "larger gusts": lambda c: c.update(gust=2.0 * c["gust"]),
+    "a smaller tube": lambda c: c.update(P=(4 * np.array(c["P"])).tolist()),
+    "a larger tube than enclosed": lambda c: c.update(P=(0.5 * np.array(c["P"])).tolist()),
+    "no feedback": lambda c: c.update(gain=(0 * np.array(c["gain"])).tolist()),
+    "the feedback's sign": lambda c: c.update(gain=(-np.array(c["gain"])).tolist()),
+    "negative multiplier": lambda c: c["multipliers"][0].update(wind=[[-1.0]]),
+    "no multiplier": lambda c: c["multipliers"][-1].update(tube=np.zeros((2, 2)).tolist()),
+    "a part of the commands left out": _without_a_part,
+    "the proof of a part left out": lambda c: c["multipliers"].pop(),
+    "a faster command": lambda c: c.update(rate=[2 * r for r in c["rate"]]),
+    "a wider command": lambda c: c["others"].__setitem__(0, [-0.6, 0.6]),
+    "a longer schedule": lambda c: c["schedule"].__setitem__(-1, 0.9),
+    "other equations": lambda c: c["model"]["operations"].__setitem__(2, ["cos", 1]),
+}
+
+
+@pytest.mark.guard
+@pytest.mark.parametrize("forgery", FORGED)
+def test_a_forged_tube_is_not_proven(swinging, tmp_path, forgery):
+    path = swinging.save(tmp_path / "tube.json")
+    content = json.loads(path.read_text())
+    FORGED[forgery](content)
+    path.write_text(json.dumps(content))
+    assert not Tube.load(path).verified
+    assert main(["verify", str(path)]) == 1
+
+
+@pytest.mark.guard
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda c: c.pop("gain"),
+        lambda c: c.update(P=[[1.0]]),
+        lambda c: c.update(gust=float("nan")),
+        lambda c: c.update(version=1),
+        lambda c: c["cells"].append([0]),
+        lambda c: c["others"].append([0.0]),
+        lambda c: c.update(schema="another"),
+        lambda c: c["multipliers"][0].update(terms="text"),
+    ],
+)
+def test_a_damaged_file_is_refused(swinging, tmp_path, damage):
+    path = swinging.save(tmp_path / "tube.json")
+    content = json.loads(path.read_text())
+    damage(content)
+    path.write_text(json.dumps(content))
+    with pytest.raises(InputError):
+        Tube.load(path)
+
+
+@pytest.mark.guard
 def test_a_tube_of_any_model_and_its_gains_are_proven_again_from_the_file(upright, tmp_path):
     again = Tube.load(upright.save(tmp_path / "tube.json"))
     assert again.verified
@@ -405,6 +448,7 @@ def test_a_tube_of_any_model_and_its_gains_are_proven_again_from_the_file(uprigh
     assert again.hypotheses == upright.hypotheses
 
 
+@pytest.mark.guard
 @pytest.mark.parametrize(
     "forgery",
     [
