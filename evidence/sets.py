@@ -144,7 +144,7 @@ def table(vehicles: Sequence[str], flights: int) -> str:
     rows = []
     for name in vehicles:
         found = proven_set(Helicopter.load(name, governor="ideal"))
-        rows.append(row(name, found, flights) if found.proven else [name, found.why, *[""] * 5])
+        rows.append(row(name, found, flights) if found.verified else [name, found.why, *[""] * 5])
         print(*rows[-1], flush=True)
     both = "left the set, a limit"
     head = ["helicopter", "flights", f"governed: {both}", f"without: {both}"]

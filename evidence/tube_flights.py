@@ -106,7 +106,7 @@ def cells_of(found: Tube, count: int, seconds: float) -> list[str]:
     from any airspeed of its nodes, and the furthest of `count` flights from its border; or why
     there is none.
     """
-    if not found.proven:
+    if not found.verified:
         return [f"none: {found.why}", "", "", ""]
     sampled = found.deviations.reference.jump is not None
     share = max(worst(found, p) for p in ([None] if sampled else found.nodes))

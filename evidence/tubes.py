@@ -40,7 +40,7 @@ def largest(heli: Helicopter, airspeed: float) -> tuple[float, Tube | None]:
     while high - low > 1:
         middle = (low + high) // 2
         trial = tube(heli, airspeed, gust=GUSTS[middle])
-        low, high, found = (middle, high, trial) if trial.proven else (low, middle, found)
+        low, high, found = (middle, high, trial) if trial.verified else (low, middle, found)
     return (GUSTS[low] if found else 0.0), found
 
 

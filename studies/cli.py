@@ -12,7 +12,7 @@ import warnings
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
-from studies.commands.arguments import add
+from studies.commands.arguments import add, renamed
 from studies.output import Output, as_json
 from studies.progress import displayed
 from studies.threads import one_thread
@@ -35,12 +35,15 @@ VERBS = (
     "verify",
     "export",
     "campaign",
-    "pays",
-    "design",
+    "compare",
+    "experiment",
     "doctor",
     "completion",
 )
 """Each is the module of that name in `studies.commands`."""
+
+FORMER = {"design": "experiment", "pays": "compare"}
+"""Verbs of the last release, and what they are now."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -91,7 +94,10 @@ def parsed(words: Sequence[str]) -> argparse.Namespace:
     Without a verb the verbs are shown.
     """
     whole = parser()
-    verb = next((word for word in words if not word.startswith("-")), None)
+    words, verb = list(words), None
+    place = next((k for k, word in enumerate(words) if not word.startswith("-")), None)
+    if place is not None:
+        verb = words[place] = renamed(FORMER, "symheli")(words[place])
     if verb is None and not {"-h", "--help", "--version"} & set(words):
         whole.print_help(sys.stderr)
         raise UsageError("give a command; `symheli COMMAND --help` lists its options")

@@ -42,8 +42,8 @@ def require(heli: object, call: str) -> None:
 
 @dataclass(frozen=True)
 class Helicopter:
-    """An airframe with a governor in air of constant density, as CasADi functions with named
-    signals.
+    """A helicopter is an airframe with a governor in air of constant density: its equations of
+    motion as CasADi functions with named signals.
 
     `states` (Euler form: u v w p q r phi theta, component states a1 b1, and Om om_i where
     `governor` is "pi"), `inputs` (d_lon d_lat d_col d_ped) and `wind` (u_w v_w w_w, body axes) are
@@ -66,6 +66,12 @@ class Helicopter:
     ------
     InputError
         An unknown governor, a density that is not positive, a vehicle that lacks a number.
+
+    See Also
+    --------
+    symheli.vehicles : airframes that come along
+    symheli.trim : one steady flight
+    symheli.fly : one closed-loop flight
 
     References
     ----------

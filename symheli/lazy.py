@@ -84,6 +84,17 @@ def _former_name(package: str, former: dict[str, str], name: str) -> Any:
     return getattr(importlib.import_module(module), own)
 
 
+def former_attribute(old: str, new: str) -> property:
+    """Return a property for the former name of an attribute: it warns, and gives the new one."""
+
+    def found(self: Any) -> Any:
+        now = f"{type(self).__name__}.{old} is .{new} now; the old name goes with the next release"
+        warnings.warn(now, FutureWarning, stacklevel=2)
+        return getattr(self, new)
+
+    return property(found, doc=f"Former name of `{new}`, for this release.")
+
+
 class FormerModules(MetaPathFinder, Loader):
     """Finder of modules that have moved: the module of a former path has the names of the new one.
 

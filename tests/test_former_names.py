@@ -62,3 +62,29 @@ def test_a_module_that_moved_is_found_at_its_former_path(old, new, name, monkeyp
 def test_a_module_that_never_was_is_not_there():
     with pytest.raises(ModuleNotFoundError), warnings.catch_warnings(action="ignore"):
         importlib.import_module("synthesis.polynomial.no_such_module")
+
+
+@pytest.mark.parametrize(
+    ("module", "kind", "new"),
+    [
+        ("synthesis", "Certificate", "bound"),
+        ("synthesis.certify.questions.gain_curve", "GainCurve", "bounds"),
+        ("synthesis.design.loops.frozen_reading", "Largest", "bound"),
+        ("synthesis.sets", "InvariantSet", "verified"),
+        ("synthesis.sets", "LowComplexitySet", "verified"),
+        ("synthesis.tubes", "Tube", "verified"),
+    ],
+)
+def test_what_is_proven_is_a_bound_or_a_truth_and_the_old_name_warns(module, kind, new):
+    class Found(getattr(importlib.import_module(module), kind)):
+        """A result with one number."""
+
+        def __new__(cls):
+            return object.__new__(cls) if not issubclass(cls, tuple) else tuple.__new__(cls, (0,))
+
+        def __init__(self):
+            pass
+
+    setattr(Found, new, 0.5)
+    with pytest.warns(FutureWarning, match=rf"Found\.proven is \.{new} now"):
+        assert Found().proven == 0.5

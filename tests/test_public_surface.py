@@ -201,3 +201,35 @@ def test_no_path_of_somebodys_computer(room):
 def test_examples_run():
     for path in sorted((ROOT / "examples").glob("*.py")):
         subprocess.run([sys.executable, str(path)], check=True, capture_output=True, timeout=60)
+
+
+LEANING = ("Of", "That", "Those", "As", "What", "Where")
+"""First words that need the line above them."""
+
+
+def found_at(path):
+    """What a dotted path names: a module, a public name of one, an attribute of that."""
+    parts = path.split(".")
+    thing = importlib.import_module(parts[0])
+    for part in parts[1:]:
+        thing = getattr(thing, part)
+    return thing
+
+
+@pytest.mark.parametrize("package", ["symheli", "symheli.lpv", "identification", "synthesis"])
+def test_every_docstring_of_the_face_stands_alone_and_points_to_others(package):
+    """Its first sentence leans on nothing, and See Also names others that are there."""
+    face = importlib.import_module(package)
+    for name in face.__all__:
+        text = inspect.getdoc(getattr(face, name))
+        assert text.split()[0] not in LEANING, f"{package}.{name}"
+        section = re.search(r"^See Also\n-{8}\n((?:\S.*\n?)+)", text, flags=re.MULTILINE)
+        assert section, f"{package}.{name} points to nothing"
+        others = [
+            each.strip()
+            for line in section[1].splitlines()
+            for each in line.partition(" : ")[0].split(",")
+        ]
+        assert 1 <= len(others) <= 3, f"{package}.{name}"
+        for other in others:
+            assert inspect.getdoc(found_at(other)), f"{package}.{name}: {other}"

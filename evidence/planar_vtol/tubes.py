@@ -125,7 +125,7 @@ def table() -> str:
         if case.bank:
             limits = f"phi within {case.bank:g} deg, phi' within {case.turn:g} deg/s, {limits}"
         row = [f"{case.motions}, regulator", f"{limits} (reference)", f"{case.gust:g}"]
-        if made.proven:
+        if made.verified:
             position, control = sizes(made)
             far, border = "", ""
             if not case.bank:

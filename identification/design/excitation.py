@@ -157,6 +157,11 @@ def excitation_report(
     InputError
         The scheduling parameter leaves the range of the basis.
 
+    See Also
+    --------
+    identification.choose_experiments : the most informative flights
+    identification.uncertainty : covariance that coloured residuals allow
+
     Examples
     --------
     Two values of p do not determine a cubic:

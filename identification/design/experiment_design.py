@@ -181,6 +181,11 @@ def choose_experiments(experiments: tuple[Experiment, ...], count: int) -> Plan:
     ExcitationError
         None is allowed.
 
+    See Also
+    --------
+    identification.design.compare_experiments : all experiments, ranked
+    symheli.Excitation : test signals on the inputs
+
     References
     ----------
     Fedorov (1972), Theory of Optimal Experiments; for flight tests Morelli (2012).

@@ -25,7 +25,7 @@ PAST_SAMPLES = 2
 """Number of samples of p and the outputs that are known before the sample k."""
 
 NOTHING_NEW = 1e-6
-"""Of the spread of p from sample to sample; news below this is rounding."""
+"""Share of the spread of p from sample to sample; news below this is rounding."""
 
 
 def share_from_outputs(arx: LPVARX, records: FlightRecord | Iterable[FlightRecord]) -> Array:

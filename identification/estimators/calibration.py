@@ -307,6 +307,11 @@ def calibrate(
     DataWarning
         The residuals are no white noise: the equations leave something out.
 
+    See Also
+    --------
+    identification.fit : coefficients from records
+    symheli.Helicopter : the equations with numbers
+
     References
     ----------
     Jategaonkar (2015), Flight Vehicle System Identification, ch. 4; multiple shooting: Bock (1983).

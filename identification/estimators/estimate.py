@@ -127,6 +127,12 @@ def fit(
         The scheduling signal contains the outputs that the model is to predict, samples are means
         and the delay is not 0, or instruments are weak.
 
+    See Also
+    --------
+    identification.LPVARX : a difference equation over parameters
+    identification.scores : one step ahead to free run
+    identification.excitation_report : whether data determine the coefficients
+
     References
     ----------
     Bamieh and Giarre (2002), Identification of linear parameter varying models, Int. J. Robust and

@@ -403,7 +403,7 @@ class Signals(NamedTuple):
 
     @classmethod
     def of(cls, arx: Aerodynamics, record: FlightRecord, part: slice) -> Signals:
-        """Of the samples of `part` of a record."""
+        """Signals of the samples of `part` of a record."""
         late = arx.sensors
         ahead = np.array([late.delay if late and name in late.signals else 0.0 for name in STATES])
         s, first = Samples.of(arx, record), len(VELOCITIES)

@@ -17,7 +17,7 @@ from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 
 TOLERANCE = {"double": 1e-9, "single": 1e-3}
-"""What another compiler or processor may differ by, relative to max(1, size): it may contract
+"""Largest difference of another compiler or processor, relative to max(1, size): it may contract
 products and sums.
 """
 

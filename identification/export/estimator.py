@@ -159,7 +159,7 @@ def _header(rls: RecursiveLeastSquares, units: Mapping[str, str], up: str) -> di
 
 
 def _configuration(rls: RecursiveLeastSquares, up: str) -> str:
-    """What `rls_config` points to, as constants."""
+    """Arrays that `rls_config` points to, as constants."""
     c = rls.configuration
     entries = [
         f"{{RLS_{KINDS[k].upper()}, {channel}, {lag}, {p_lag}}}"

@@ -1,4 +1,4 @@
-"""What a model is worth: comparisons, uncertainty, stability, dependence."""
+"""The worth of a model: comparisons, uncertainty, stability, dependence."""
 
 from symheli.lazy import lazily
 

@@ -31,7 +31,7 @@ HORIZONS = horizons()
 """One step, 1 s and free run; the verdict rests on the last two."""
 
 Verdict = Literal["pays", "pays for prediction only", "does NOT pay"]
-"""What scheduling is worth for an output: better in free run, which simulation and feedback rest
+"""The worth of scheduling for an output: better in free run, which simulation and feedback rest
 on, and no worse 1 s ahead; better 1 s ahead alone; or neither.
 """
 
@@ -118,7 +118,7 @@ class AgainstConstant:
         return self.hold_p and self.leak > MADE_OF_OUTPUTS
 
     def verdict(self) -> list[str]:
-        """Where scheduling pays and where it does not, in sentences."""
+        """The outputs for which scheduling pays and does not, in sentences."""
         if len(self.judged) < 2:
             return []
         if self.test is None:
@@ -140,7 +140,7 @@ class AgainstConstant:
         return sentences
 
     def verdict_on(self, output: str) -> Verdict:
-        """What scheduling is worth for this output on held-out data; see `Verdict` and `PAYS`.
+        """The worth of scheduling for this output on held-out data; see `Verdict` and `PAYS`.
 
         Raises `UnknownNameError` for an output the models do not have, `InputError` where nothing
         was held out, or the structure is itself a constant one.

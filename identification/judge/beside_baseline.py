@@ -191,8 +191,8 @@ def _scheduled(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Prediction:
-    """What one model achieved on the unseen flight: its scores, and its prediction `Scores.horizon`
-    seconds ahead (n, ny) for a figure, NaN where its past is incomplete.
+    """The achievement of one model on the unseen flight: its scores, and its prediction
+    `Scores.horizon` seconds ahead (n, ny) for a figure, NaN where its past is incomplete.
     """
 
     name: str

@@ -24,7 +24,7 @@ from symheli.values.arrays import Array
 from symheli.values.numbers import whole
 
 TAKEN = 0.8
-"""Of the residuals' power, what the fit is taken to have removed at most."""
+"""Share of the residuals' power that the fit is taken to have removed at most."""
 
 LEAST_FREEDOM = 2.0
 
@@ -32,8 +32,8 @@ LEAST_FREEDOM = 2.0
 def covariances(
     arx: LPVARX, phi: Array, error: Array, runs: Sequence[slice], lags: int
 ) -> tuple[Array, Array, Array]:
-    """Of all coefficients together (ny, n, ny, n), the same as if residuals were white, and freedom
-    (ny,).
+    """Covariances of all coefficients together (ny, n, ny, n), the same as if residuals were white,
+    and freedom (ny,).
 
     From regressors phi (m, n) and residuals (m, ny) in unbroken `runs`. With D_i = (Phi_i'
     Phi_i)^-1 of equation i and R_ij the correlation of residuals i and j over `lags` samples,

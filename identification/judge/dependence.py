@@ -19,10 +19,10 @@ SIGNIFICANT = 1e-3
 """A probability below this is not chance."""
 
 WORTH = 0.01
-"""Of the residual; less than this is not worth another structure, however significant."""
+"""Share of the residual; less than this is not worth another structure, however significant."""
 
 MOST = 0.95
-"""Of the residual; what explains less may not be the whole story."""
+"""Share of the residual; what explains less may not be the whole story."""
 
 ROUNDING = 1e-9
 """A residual below this fraction of the output is rounding: there is nothing left to explain."""

@@ -14,15 +14,15 @@ from identification.structure.kinematic_arx import MOVING
 from symheli.values.arrays import Array
 
 LEFT = 1e-3
-"""Of a derivative that is left out: without any damping a plant may integrate, and a pole on the
-unit circle has no nu-gap.
+"""Share of a derivative that is left out: without any damping a plant may integrate, and a pole on
+the unit circle has no nu-gap.
 """
 
 
 @dataclass(frozen=True, eq=False)
 class Derivatives:
-    """What a steady change of a signal adds to the rate of an output, at one value of the
-    scheduling: per second, the coefficients of all lags of the signal together,
+    """The amount that a steady change of a signal adds to the rate of an output, at one value of
+    the scheduling: per second, the coefficients of all lags of the signal together,
 
         D(p) = sum_i f(p)' theta_i / dt        (lagged outputs of an ARX: -(1 + sum_i a_i(p)) / dt).
 
@@ -48,7 +48,7 @@ class Derivatives:
 
     @classmethod
     def of(cls, plant: FrozenPlant, theta: Array, p: object) -> Derivatives:
-        """Those among the signals of the plant."""
+        """The derivatives among the signals of the plant."""
         arx, model = plant.regression, plant.model
         f, dt = np.asarray(arx.basis(p), float).reshape(-1), model.dt
         kinematic = isinstance(model, KinematicModel)

@@ -243,6 +243,12 @@ def fit_for_control(
     UnknownNameError
         A signal of the loop that is not in the plant.
 
+    See Also
+    --------
+    identification.judge.validate : the verdict on flights not identified
+    identification.uncertainty : covariance that coloured residuals allow
+    identification.compare_frozen : poles and nu-gaps beside exact models
+
     References
     ----------
     Tischler and Remple (2012), Aircraft and Rotorcraft System Identification, ch. 11 to 14;

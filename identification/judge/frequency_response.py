@@ -194,6 +194,11 @@ def frequency_response(
     ExcitationError
         The inputs or references move together, or too few windows remain.
 
+    See Also
+    --------
+    identification.judge.response_regions : regions of frequency responses
+    identification.fit : coefficients from records
+
     References
     ----------
     Bendat and Piersol (2010), Random Data, ch. 7 and 9; Tischler and Remple (2012), Aircraft and

@@ -223,6 +223,11 @@ def compare_frozen(
         Without a point or a sampled model, where `models`, `mode` or `responses_at` have other
         points, and as `symheli.lpv.nu_gap`.
 
+    See Also
+    --------
+    symheli.lpv.nu_gap : distance of two models in feedback
+    identification.judge.frozen_stability : whether frozen models are stable
+
     References
     ----------
     Vinnicombe (2001), Uncertainty and Feedback, ch. 3.

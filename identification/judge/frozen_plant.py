@@ -81,7 +81,7 @@ class AtPoint:
 
     @cached_property
     def sizes(self) -> dict[str, Any]:
-        """As `nu_gap` takes them."""
+        """Sizes as `nu_gap` takes them."""
         return {
             "input_scale": np.array([self.scales[u] for u in self.plant.inputs]),
             "output_scale": np.array([self.scales[y] for y in self.plant.outputs]),
@@ -98,7 +98,7 @@ class AtPoint:
 
     @cached_property
     def drawn(self) -> LinearModels | None:
-        """Those of the draws; None without a covariance."""
+        """The plants of the draws; None without a covariance."""
         return None if self.thetas is None else self.plant.of_each(self.thetas, *self._values)
 
     @cached_property

@@ -60,7 +60,7 @@ class FrozenStability:
 
     @property
     def calls(self) -> tuple[Call, ...]:
-        """What is known at each point: "not known" where the band crosses the imaginary axis."""
+        """The verdict at each point: "not known" where the band crosses the imaginary axis."""
         return tuple(
             "stable" if high < 0 else "unstable" if low > 0 else "not known"
             for low, high in zip(self.low, self.high, strict=True)

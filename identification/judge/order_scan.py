@@ -167,6 +167,12 @@ def order_scan(
     InputError
         The basis is no polynomial of one parameter.
 
+    See Also
+    --------
+    identification.fit : coefficients from records
+    identification.scores : one step ahead to free run
+    identification.residual_analysis : whiteness and correlations
+
     References
     ----------
     Schwarz (1978), Estimating the dimension of a model, Annals of Statistics 6 (the criterion).

@@ -1,4 +1,4 @@
-"""What a model leaves unexplained: are the residuals white, do inputs still show in them, where
+"""The unexplained part of a model: are the residuals white, do inputs still show in them, where
 does the error come from.
 """
 
@@ -142,6 +142,11 @@ def residual_analysis(model: LPVARXModel, record: FlightRecord, lags: int = 25) 
     ------
     InputError
         Fewer than 10 `lags` residuals remain.
+
+    See Also
+    --------
+    identification.scores : one step ahead to free run
+    identification.uncertainty : covariance that coloured residuals allow
 
     References
     ----------

@@ -62,7 +62,7 @@ class Scores:
         free_run: Array,
         horizon: float = HORIZON,
     ) -> Scores:
-        """Of predictions (n, ny) beside what was `measured`, a column an output.
+        """Scores of predictions (n, ny) beside what was `measured`, a column an output.
 
         NaN for an output of which no row has both a measurement and a prediction. Raises
         `InputError` unless every output has one column, for a horizon that is not greater than 0
@@ -121,6 +121,11 @@ def scores(
     -----
     DataWarning
         The scheduling is a function of the outputs or their past.
+
+    See Also
+    --------
+    identification.judge.validate : the verdict on flights not identified
+    identification.judge.compare_constant : against a model without scheduling
 
     Examples
     --------

@@ -23,7 +23,7 @@ SLOW = 0.1
 """A mode turns or decays by less than this (rad, or natural logarithm) from sample to sample."""
 
 LOST = 0.25
-"""Of the rate of decay or growth, |Re s|: an error beyond leaves a mode unknown."""
+"""Share of the rate of decay or growth, |Re s|: an error beyond leaves a mode unknown."""
 
 SHARES = (0.5, 0.8, 0.9)
 """Parts of the noise that are taken off the information to see whether a pole stays. All of it
@@ -102,7 +102,7 @@ class SlowModes:
 
     @property
     def lost(self) -> tuple[SlowMode, ...]:
-        """Those that noise leaves unknown."""
+        """Modes that noise leaves unknown."""
         return tuple(mode for mode in self.modes if mode.lost)
 
     def __str__(self) -> str:
@@ -225,7 +225,7 @@ def _compensated(model: LPVARXModel, data: Regression) -> list[Array]:
 
 
 def _poles(model: LPVARXModel, p: Array) -> Array:
-    """Of the model with the scheduling held at p, complex, those at zero left out."""
+    """Poles of the model with the scheduling held at p, complex, those at zero left out."""
     A = model.coefficients.at(held_value(p, model.structure.basis)).A
     na, ny = A.shape[0], A.shape[1]
     companion = np.eye(na * ny, k=-ny)
@@ -235,8 +235,8 @@ def _poles(model: LPVARXModel, p: Array) -> Array:
 
 
 def _standard_error(model: LPVARXModel, joint: Array, p: Array, z: complex) -> float:
-    """Of log z / dt. With M(z) = I + sum A_i z^-i, l' M = 0 and M r = 0: dz = -(l' sum dA_i z^-i
-    r)/(l' M'(z) r).
+    """Standard error of log z / dt. With M(z) = I + sum A_i z^-i, l' M = 0 and M r = 0: dz = -(l'
+    sum dA_i z^-i r)/(l' M'(z) r).
     """
     arx, A, f = (
         model.structure,

@@ -223,7 +223,8 @@ class Uncertainty:
 def uncertainty(
     model: LPVARXModel, records: FlightRecord | Iterable[FlightRecord], *, lags: int | None = None
 ) -> Uncertainty:
-    """Covariance of the least-squares coefficients of a model over the records it was fitted to.
+    """Compute the covariance of the least-squares coefficients of a model over the records it was
+    fitted to.
 
     With D = (Phi' Phi)^-1 and R(l) the correlation of the residuals, D [sum_k sum_l phi(k) R(k - l)
     phi(l)'] D instead of sigma^2 D: modelling errors colour residuals, and the white formula is
@@ -251,6 +252,11 @@ def uncertainty(
         measure.
     ExcitationError
         Records that do not determine the coefficients.
+
+    See Also
+    --------
+    identification.fit : coefficients from records
+    identification.residual_analysis : whiteness and correlations
 
     References
     ----------

@@ -166,7 +166,7 @@ class Coefficients:
 
 
 def _position(arx: LPVARX, term: Term) -> int:
-    """Where the coefficients of a term stand along the first axis of A or B."""
+    """Position of the coefficients of a term along the first axis of A or B."""
     match term.kind:
         case "output":
             return term.lag - 1

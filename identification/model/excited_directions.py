@@ -1,4 +1,4 @@
-"""Where a loop excites the errors of a set of models: what a set is to be tight for."""
+"""Directions in which a loop excites the errors of a set of models: it is to be tight there."""
 
 from __future__ import annotations
 

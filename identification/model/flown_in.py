@@ -1,4 +1,4 @@
-"""What the flights of an identified model were flown in: wind, mass, governor, servos."""
+"""Conditions in which an identified model was flown: wind, mass, governor, servos."""
 
 from __future__ import annotations
 

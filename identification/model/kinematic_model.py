@@ -245,7 +245,7 @@ class KinematicModel:
         return Realization.of(kin, theta, self.trim, self.inputs, self.dt, rotor)
 
     def _actuators(self, inputs: Sequence[str] | None) -> dict[str, LinearModel]:
-        """What stands before each of the inputs that stay."""
+        """Actuators before each of the inputs that stay."""
         if self.structure.actuators is None:
             return {}
         kept = [u for u in self.inputs if inputs is None or u in inputs]

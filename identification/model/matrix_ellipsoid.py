@@ -30,7 +30,7 @@ EVENNESS = 0.1
 Chosen on seed 0 of the lateral loop in wind: .03 to .3 differ by 10 % of its gain.
 """
 CHANCE = 1e-6
-"""That a radius of draws is too small."""
+"""Chance that a radius of draws is too small."""
 LOOSEST = 1e3
 """A cover that is verified only this many times larger than computed is none."""
 

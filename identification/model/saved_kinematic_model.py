@@ -68,7 +68,7 @@ def _actuators(**given: Any) -> Actuators:
 
 
 MADE = {"actuators": _actuators, "wind": SteadyWind, "sensors": LateSensors}
-"""What makes each part of a structure from its plain values."""
+"""Makers of each part of a structure from its plain values."""
 
 
 def load(path: str | os.PathLike[str], basis: FunctionSpace | None = None) -> KinematicModel:

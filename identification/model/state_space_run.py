@@ -23,7 +23,7 @@ class StateSpaceRun:
 
     @cached_property
     def shapes(self) -> tuple[tuple[int, ...], ...]:
-        """Of A, B, C and D."""
+        """Shapes of A, B, C and D."""
         n, nx = self.structure.basis.size, self.structure.order
         ny, nu = len(self.structure.outputs), len(self.structure.inputs)
         through = nu if self.structure.feedthrough else 0

@@ -93,7 +93,7 @@ class History:
 
     @property
     def regressor_names(self) -> tuple[str, ...]:
-        """Those of the rows of the coefficients, such as "q(k-1) f0(airspeed(k-1))"."""
+        """Names of the rows of the coefficients, such as "q(k-1) f0(airspeed(k-1))"."""
         return self.state.configuration.structure.regressor_names
 
     def plot(

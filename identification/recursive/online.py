@@ -155,7 +155,7 @@ class Online:
 
     @property
     def state(self) -> RLSState:
-        """What is known now, as a value."""
+        """The state now, as a value."""
         memory, knew = self._state.copy(), self._start.memory
         learnt = memory[at.COUNT] != knew[at.COUNT] or memory[at.MILLIONS] != knew[at.MILLIONS]
         return RLSState(self._configuration, memory) if learnt else self._start.after_idling(memory)

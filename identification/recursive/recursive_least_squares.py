@@ -34,8 +34,10 @@ AT_ONCE = 10_000
 
 @dataclass(frozen=True)
 class RecursiveLeastSquares:
-    """Recursive least squares with forgetting: `init`, `update`, or `run` over a record; `online`
-    for real time.
+    """Recursive least squares updates the coefficients of a structure with every sample and may
+    forget old ones.
+
+    `init`, `update`, or `run` over a record; `online` for real time.
 
     Each sample rotates the row [phi', y'] into [sqrt(l) R, sqrt(l) Z] by square-root-free Givens
     rotations; the covariance is never formed, so nothing can lose its definiteness. Outputs share
@@ -69,6 +71,12 @@ class RecursiveLeastSquares:
     ------
     InputError
         An option out of range, or a floor beside a way of forgetting.
+
+    See Also
+    --------
+    identification.fit : coefficients from records
+    identification.forgetting.Directional : forgetting where data come in
+    identification.export.write_estimator : recursive least squares in C
 
     References
     ----------

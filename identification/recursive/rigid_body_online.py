@@ -22,11 +22,16 @@ WIDE, FAST = len(STATES), len(MOVING)
 
 
 class RigidBodyOnline(Online):
-    """An `Online` whose samples are u v w p q r phi theta, the controls and p: it passes on the
-    increments of the velocities beyond the kinematics.
+    """A rigid body online is an `Online` whose samples are u v w p q r phi theta, the controls and
+    p: it passes on the increments of the velocities beyond the kinematics.
 
     Made by `RecursiveLeastSquares.online` of a `KinematicARX`. After a missing sample or a gap the
     next sample is a start: nothing is learnt until the lags are full again.
+
+    See Also
+    --------
+    identification.RecursiveLeastSquares : least squares sample by sample
+    identification.KinematicARX : a structure with known kinematics
 
     Examples
     --------

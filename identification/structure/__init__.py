@@ -1,4 +1,6 @@
-"""What is sought: outputs, inputs, lags, basis; sensors, actuators and wind around the vehicle."""
+"""Structures that are sought: outputs, inputs, lags, basis; sensors, actuators and wind around the
+vehicle.
+"""
 
 from symheli.lazy import lazily
 

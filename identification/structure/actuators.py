@@ -26,7 +26,7 @@ SETTLING = 0.5
 
 @dataclass(frozen=True)
 class Actuators:
-    """What stands between command and deflection: a delay, then a servo for each control.
+    """Actuators stand between command and deflection: a delay (s), then a servo for each control.
 
     Parameters
     ----------
@@ -47,6 +47,11 @@ class Actuators:
     ------
     InputError
         A number out of range.
+
+    See Also
+    --------
+    identification.KinematicARX : a structure with known kinematics
+    symheli.Servo : lag, travel and rate of an actuator
 
     Examples
     --------
@@ -77,7 +82,7 @@ class Actuators:
 
     @property
     def unknown(self) -> tuple[str, ...]:
-        """What is estimated: "bandwidth", a factor of it, and "delay" (s)."""
+        """Unknowns that are estimated: "bandwidth", a factor of it, and "delay" (s)."""
         given = {"bandwidth": self.bandwidth_deviation, "delay": self.delay_deviation}
         return tuple(name for name, deviation in given.items() if deviation)
 

@@ -94,7 +94,7 @@ class Aerodynamics(LPVARX):
 
     @property
     def parts(self) -> dict[str, Part]:
-        """What stands between the record and the regression, by name of its field."""
+        """Parts between the record and the regression, by name of its field."""
         every = {"actuators": self.actuators, "wind": self.wind, "sensors": self.sensors}
         return {name: part for name, part in every.items() if part is not None}
 
@@ -206,8 +206,9 @@ def _change(speed: str) -> str:
 
 @dataclass(frozen=True)
 class KinematicARX:
-    """A rigid vehicle whose inertial, gravity and Euler terms are known and whose aerodynamics are
-    functions of scheduling parameters p; any vehicle, any inputs.
+    """A kinematic ARX structure describes a rigid vehicle whose inertial, gravity and Euler terms
+    are known and whose aerodynamics are functions of scheduling parameters p; any vehicle, any
+    inputs.
 
     With y = (u v w p q r phi theta), kinematics k(y) and z = (u v w p q r),
 
@@ -255,6 +256,12 @@ class KinematicARX:
     ------
     InputError
         As `LPVARX`, an input that is a state, or one without servo.
+
+    See Also
+    --------
+    identification.LPVARX : a difference equation over parameters
+    identification.fit : coefficients from records
+    identification.structure.LateSensors : sensors that lag
 
     References
     ----------

@@ -56,7 +56,7 @@ class LateSensors:
 
     @property
     def unknown(self) -> tuple[str, ...]:
-        """What is estimated: "delay" (s)."""
+        """Unknowns that are estimated: "delay" (s)."""
         return ("delay",) if self.deviation else ()
 
     def moved(self, z: Sequence[float]) -> LateSensors:

@@ -95,8 +95,8 @@ CONSTANT = Polynomial(0, 0.0, 1.0)
 
 @dataclass(frozen=True)
 class LPVARX:
-    """Linear difference equation whose coefficients are functions of scheduling parameters p, any
-    number of inputs and outputs.
+    """An LPV-ARX structure is a linear difference equation whose coefficients are functions of
+    scheduling parameters p, with any number of inputs and outputs.
 
         y(k) = -sum_{i=1..na} A_i(p) y(k-i) + sum_{j=0..nb-1} B_j(p) u(k-delay-j)
                + c(p) + d(p) (p(k) - p(k-1))
@@ -139,6 +139,12 @@ class LPVARX:
     InputError
         Repeated or missing names, negative orders, a basis of another number of parameters, an
         unknown `scheduling_at`, or an output that would predict itself.
+
+    See Also
+    --------
+    identification.fit : coefficients from records
+    identification.KinematicARX : a structure with known kinematics
+    identification.StateSpace : a structure with states
 
     References
     ----------

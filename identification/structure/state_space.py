@@ -13,7 +13,8 @@ from symheli.values.numbers import whole
 
 @dataclass(frozen=True)
 class StateSpace:
-    """Linear states whose matrices are functions of scheduling parameters p,
+    """An LPV state-space structure has linear states whose matrices are functions of scheduling
+    parameters p,
 
         x(k+1) = A(p(k)) x(k) + B(p(k)) u(k),   y(k) = C x(k) + D u(k),
 
@@ -39,6 +40,11 @@ class StateSpace:
     ------
     InputError
         As `LPVARX`, an order below 1, or a schedule of its own that is no single output.
+
+    See Also
+    --------
+    identification.LPVARX : a difference equation over parameters
+    identification.fit : coefficients from records
 
     References
     ----------

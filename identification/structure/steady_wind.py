@@ -63,7 +63,7 @@ class SteadyWind:
 
     @property
     def unknown(self) -> tuple[str, ...]:
-        """What is estimated: "north" and "east" (m/s)."""
+        """Unknowns that are estimated: "north" and "east" (m/s)."""
         return ("north", "east") if self.deviation else ()
 
     def moved(self, z: Sequence[float]) -> SteadyWind:

@@ -1,4 +1,4 @@
-"""What a pilot feels of closed loops: response to commands, rejection of disturbances, step."""
+"""Closed loops as a pilot feels them: response to commands, rejection of disturbances, step."""
 
 from __future__ import annotations
 

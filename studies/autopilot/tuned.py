@@ -51,7 +51,7 @@ QUANTITIES = {
     "rise": QuantityBand("s", 0.02),
     "settling": QuantityBand("s", 0.02),
 }
-"""What has a band: two margins, then `Responses`."""
+"""Quantities with a band: two margins, then `Responses`."""
 
 RESPOND = {
     control: (attitude or rate, command, f"{attitude or rate}_disturbance")

@@ -128,7 +128,7 @@ class CampaignDataset:
         return {row: reason for row, reason in enumerate(found) if reason}
 
     def rows_of(self, cases: Sequence[Case]) -> list[int]:
-        """Where these cases stand."""
+        """Rows of these cases."""
         at = {case.key: row for row, case in enumerate(self.cases)}
         return [at[case.key] for case in cases]
 

@@ -53,7 +53,7 @@ class Candidate:
         return AirspeedSchedule.transition(0.0, TOP, self.acceleration, hold=2.0)
 
     def excitation(self, axis: Axis, seed: int = 0) -> Excitation:
-        """Of the axis's inputs alone."""
+        """Excitation of the axis's inputs alone."""
         amplitude = {name: self.amplitude * AMPLITUDE[name] for name in axis.inputs}
         return Excitation(amplitude, self.kind, self.band, seed)
 

@@ -103,7 +103,7 @@ class Sweeps:
 
     @property
     def excitation(self) -> Excitation:
-        """What is added to the inputs."""
+        """Signals that are added to the inputs."""
         sizes = {name: self.amplitude * AMPLITUDE[name] for name in self.axis.inputs}
         return Excitation(sizes, "sweep", SWEPT, period=SWEEP)
 
@@ -320,7 +320,7 @@ def flown(plan: Path, records: Sequence[FlightRecord], *, sweeps: bool = False) 
         )
     except (ValueError, KeyError, TypeError, StopIteration) as error:
         raise InputError(
-            f"{plan}: expected the plan.json that symheli design --write wrote ({error!r})"
+            f"{plan}: expected the plan.json that symheli experiment --write wrote ({error!r})"
         ) from error
     structure = axis.structure()
     if any(len(f.factor) != len(structure.regressor_names) for f in flights):

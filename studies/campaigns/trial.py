@@ -22,7 +22,7 @@ LONGEST_REASON = 240
 """Characters that are kept of why a case failed."""
 
 Value = bool | int | float | str
-"""Of a parameter."""
+"""Value of a parameter."""
 
 
 @dataclass(frozen=True, eq=False)

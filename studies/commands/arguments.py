@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from argparse import ArgumentParser
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -58,6 +59,22 @@ def flag(name: str, help: str) -> Argument:
 def positional(name: str, help: str, **settings: Any) -> Argument:
     """An argument known by its place."""
     return Argument(name, {"help": help, **settings})
+
+
+def renamed(former: Mapping[str, str], command: str) -> Callable[[str], str]:
+    """Return what replaces a word of the last release by the new one, with a note on stderr."""
+
+    def now(word: str) -> str:
+        if word not in former:
+            return word
+        print(
+            f"symheli: note: {command} {word} is {command} {former[word]} now; the old word goes"
+            " with the next release",
+            file=sys.stderr,
+        )
+        return former[word]
+
+    return now
 
 
 def one_of(*arguments: Argument) -> ArgumentGroup:

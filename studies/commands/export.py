@@ -7,31 +7,32 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from studies.commands import estimator, given_model, options
-from studies.commands.arguments import group, option, positional, several
+from studies.commands import given_model, identifier, options
+from studies.commands.arguments import group, option, positional, renamed, several
 from studies.output import Output
 from symheli.errors import InputError
 
 HELP = (
-    "C code of the equations of motion, of the recursive estimator, of an identified model or of a"
-    " controller, a MATLAB file, or equations in print"
+    "C code of the equations of motion, of a recursive identification, of an identified model or of"
+    " a controller, a MATLAB file, or equations in print"
 )
 
 ARGUMENTS = (
     positional(
         "format",
-        "c: equations of motion and header; estimator: recursive identification as C for an"
+        "c: equations of motion and header; identifier: recursive identification as C for an"
         " autopilot; model: an identified model (--model) as C; controller: one in a table over"
         " airspeed (--model) as C; mat: linear models along airspeed, or what --model holds; latex,"
         " markdown: every component's equations to read",
-        choices=("c", "estimator", "model", "controller", "mat", "latex", "markdown"),
+        type=renamed({"estimator": "identifier"}, "symheli export"),
+        choices=("c", "identifier", "model", "controller", "mat", "latex", "markdown"),
     ),
     *options.HELICOPTER,
     option(
         "--out",
         "PATH",
         "file (default: NAME_rhs.c, NAME_family.mat, NAME_equations.tex or .md) or folder"
-        " (estimator, model, controller)",
+        " (identifier, model, controller)",
         Path,
     ),
     several(
@@ -42,7 +43,7 @@ ARGUMENTS = (
         default=(0.0, 13.0),
     ),
     option("--points", "N", "airspeeds of the family", options.at_least_one, 14),
-    *estimator.ARGUMENTS,
+    *identifier.ARGUMENTS,
     group(
         "model, controller, mat",
         "C code that predicts and simulates what symheli identify --save kept (--single applies),"
@@ -77,8 +78,8 @@ def run(arguments: argparse.Namespace) -> Output:
         from symheli.export import write_c
 
         written = write_c(heli, arguments.out or Path(f"{name}_rhs.c"))
-    elif arguments.format == "estimator":
-        written = estimator.write(arguments, heli)
+    elif arguments.format == "identifier":
+        written = identifier.write(arguments, heli)
     elif arguments.format == "mat":
         from symheli.export import write_mat
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from symheli.steady.equilibrium import TrimPoint
 
 STANDARD_OUTPUT = "-"
-"""Where choices are written to without a file."""
+"""Place that choices are written to without a file."""
 
 PICTURES = (".png", ".svg", ".pdf")
 
@@ -208,7 +208,7 @@ ON_A_RUNNER = (
         Path,
     ),
 )
-"""Where a campaign runs, and where its cases are kept."""
+"""The place where a campaign runs, and the one where its cases are kept."""
 
 
 def write_config(what: str) -> Argument:

@@ -138,7 +138,7 @@ def run(arguments: argparse.Namespace) -> Output:
 
 
 def kept(arguments: argparse.Namespace) -> str:
-    """What is left of an interrupted run."""
+    """Files that are left of an interrupted run."""
     if arguments.out:
         return f"what was finished is in {arguments.out}: the same command goes on from there"
     return "nothing was kept; with --out DIR what is finished is"
@@ -202,7 +202,7 @@ def _cell(reached: Any) -> str:
 
 
 def _about(rate: float) -> str:
-    """What the proofs are about."""
+    """The statement of the proofs."""
     moving = f"changing at most at {rate:g} m/s^2" if rate else "held"
     return (
         f"Proven for every airspeed between the ends, {moving}, of the cubic interpolation of the"

@@ -93,7 +93,9 @@ def _tube(file: str) -> tuple[None, str, dict[str, Any]]:
 
     progress(f"enclosing the equations of {file} and verifying in rational arithmetic")
     found = Tube.load(file)
-    verdict = f"proven in exact arithmetic: {found}" if found.proven else f"not proven: {found.why}"
+    verdict = (
+        f"proven in exact arithmetic: {found}" if found.verified else f"not proven: {found.why}"
+    )
     return (
         None,
         verdict,
@@ -103,7 +105,7 @@ def _tube(file: str) -> tuple[None, str, dict[str, Any]]:
             "airspeeds": found.nodes.tolist(),
             "gust": found.deviations.gust,
             "half_widths": found.half_widths.tolist(),
-            "exact": found.proven,
+            "exact": found.verified,
             "hypotheses": found.hypotheses,
         },
     )
@@ -115,7 +117,9 @@ def _set(file: str) -> tuple[None, str, dict[str, Any]]:
 
     progress(f"verifying {file} in rational arithmetic")
     found = read(file)
-    verdict = f"proven in exact arithmetic: {found}" if found.proven else f"not proven: {found.why}"
+    verdict = (
+        f"proven in exact arithmetic: {found}" if found.verified else f"not proven: {found.why}"
+    )
     own = found.statement
     return (
         None,
@@ -126,7 +130,7 @@ def _set(file: str) -> tuple[None, str, dict[str, Any]]:
             "disturbance": own.disturbance,
             "state_bounds": own.state_bounds,
             "input_bounds": own.input_bounds,
-            "exact": found.proven,
+            "exact": found.verified,
             "hypotheses": own.hypotheses,
         },
     )

@@ -20,7 +20,7 @@ def proven(files: Iterable[str]) -> list[Tube]:
 
     found = [(name, Tube.load(name)) for name in files]
     for name, tube in found:
-        if not tube.proven:
+        if not tube.verified:
             raise InputError(f"{name}: not proven: {tube.why}")
     return [tube for _, tube in found]
 

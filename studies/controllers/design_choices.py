@@ -73,7 +73,7 @@ SERVO_RATE = 3.0
 """Rate limit of every servo, rad/s of blade pitch; assumed, the source of the servos gives none."""
 
 NOISE_SHARE = 1 / 3
-"""Of the noise that counts as 1, the standard deviation that is flown."""
+"""Share of the noise that counts as 1: the standard deviation that is flown."""
 
 
 def _numbers(servo: Servo) -> tuple[float, ...]:

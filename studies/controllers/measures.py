@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from synthesis.tubes import Tube
 
 AT_THE_STOP = 0.999
-"""Of the travel."""
+"""Share of the travel."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

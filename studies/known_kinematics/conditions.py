@@ -146,7 +146,7 @@ class RealCondition:
         }
 
     def logged(self, record: FlightRecord) -> FlightRecord:
-        """What of a flight is in the log."""
+        """The part of a flight that is in the log."""
         return record.rows(slice(None, None, self.decimated))
 
     def structure(self, record: FlightRecord) -> KinematicARX:
@@ -208,7 +208,7 @@ def into_the_wind(seed: int) -> float:
 
 
 def wind_of(seed: int) -> Array:
-    """Where the wind of a seed blows to: north and east, m/s."""
+    """Direction and speed of the wind of a seed: north and east, m/s."""
     towards = np.radians(into_the_wind(seed) + 180.0)
     return WIND * np.array([np.cos(towards), np.sin(towards)])
 

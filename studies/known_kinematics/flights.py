@@ -27,11 +27,11 @@ LONGEST = 150.0
 """Length of the aggressive flight, s."""
 
 LINES = (0.02, 4.0)
-"""Of the multisines, Hz."""
+"""Lines of the multisines, Hz."""
 
 AMPLITUDE = {"d_lon": 0.018, "d_lat": 0.010, "d_col": 0.015, "d_ped": 0.016}
-"""Of the multisines, rad: louder where the slow longitudinal modes are, and low enough sideways
-that the flapping stays linear.
+"""Amplitudes of the multisines, rad: louder where the slow longitudinal modes are, and low enough
+sideways that the flapping stays linear.
 """
 
 GENTLE_TARGETS = (0.0, 2.0, 0.0, 4.0, 0.0, 13.0, 0.0, 1.0, 0.0, 7.0, 0.0, 3.0, 0.0)
@@ -44,7 +44,7 @@ hover.
 
 TEST_LINES = (0.1, 5.0)
 TEST_AMPLITUDE = STUDY_AMPLITUDE
-"""Of the flight that judges: those of the study."""
+"""Amplitudes of the flight that judges: those of the study."""
 
 DELAY = 0.02
 """From command to servo, s, where servos fly."""

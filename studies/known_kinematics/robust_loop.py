@@ -17,14 +17,14 @@ OUTPUTS, INPUTS = ("v", "p", "r", "phi"), ("d_lat", "d_ped")
 
 PROBABILITY = 0.95
 DRAWS = 20_000
-"""Of the radius of the ellipsoid: see `identification.model.matrix_ellipsoid`."""
+"""Draws of the radius of the ellipsoid: see `identification.model.matrix_ellipsoid`."""
 
 DEGREE = 4
-"""Of the loop in airspeed: what it leaves of any entry is below 1e-4 of the largest."""
+"""Degree of the loop in airspeed: what it leaves of any entry is below 1e-4 of the largest."""
 
 FORM = Spline(degree=1, segments=4)
-"""Of the certificates of sets: quadratics on 6 segments prove gains 0.05 % smaller in three times
-the time.
+"""Form of the certificates of sets: quadratics on 6 segments prove gains 0.05 % smaller in three
+times the time.
 """
 
 Verdict = Literal["holds", "fails", "undecided", "no certificate"]

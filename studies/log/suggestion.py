@@ -18,7 +18,7 @@ AXES = (
     ("ped", ("r",)),
     ("col", ("w",)),
 )
-"""What drives what, the best first."""
+"""Inputs and what they drive, the best first."""
 
 SLOW = 0.03
 """s: samples closer than this, or than those of the input, are averaged to about this; three lags

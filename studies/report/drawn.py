@@ -26,7 +26,7 @@ LARGEST = 110_000
 """Bytes of an SVG that still stands in the page."""
 
 COLOURS = 64
-"""Of a PNG in the page."""
+"""Colours of a PNG in the page."""
 
 APART = 3.0
 """Of a curve in a PNG the highest and the lowest point of every so many points of the width."""

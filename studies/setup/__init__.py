@@ -1,1 +1,1 @@
-"""What the studies share: flights, axes, sizes of signals, bounds and stored stages."""
+"""Choices that the studies share: flights, axes, sizes of signals, bounds and stored stages."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 Question = Callable[[], list[Any]]
-"""What a process can answer: a `functools.partial`; of a proof the answers are bounds."""
+"""A question that a process can answer: a `functools.partial`; a proof's answers are bounds."""
 
 
 @dataclass(frozen=True)

@@ -55,7 +55,7 @@ class StoredStages:
     keys: Mapping[str, str]
 
     def path(self, name: str, part: int | None = None) -> Path:
-        """Where the stage, or an answer to one of its questions, is stored."""
+        """File where the stage, or an answer to one of its questions, is stored."""
         return self.folder / (f"{name}.stage" if part is None else f"{name}-{part}.stage")
 
     def _key(self, name: str, part: int | None) -> str:

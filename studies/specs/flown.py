@@ -30,10 +30,10 @@ from synthesis.sheet.measures import rate_over_change
 from synthesis.sheet.sheet import ControlAxis, Sheet
 
 ACCELERATIONS = (1.0, 3.0)
-"""Of the transitions, gentle and aggressive, m/s^2."""
+"""Accelerations of the transitions, gentle and aggressive, m/s^2."""
 
 SHARE = 0.95
-"""Of the flights that meet a value: the value shown is the one they do not exceed."""
+"""Share of the flights that meet a value: the value shown is the one they do not exceed."""
 
 STEP_AT, STEP_FOR = 1.0, 4.0
 """When an attitude is commanded, and how long the flight goes on, s."""
@@ -48,10 +48,10 @@ SWITCH_AT, SWITCH_FOR = 1.5, 2.0
 
 OF_A_FLIGHT = ("speed", "track", "altitude", "heading", "attitude", "rotor_speed")
 OF_A_CONTROL = ("effort", "stops")
-"""What is measured of a transition."""
+"""Measures of a transition."""
 
 OF_A_SWITCH = ("switch_attitude", "switch_acceleration")
-"""What is measured where a controller takes over in flight."""
+"""Measures where a controller takes over in flight."""
 
 HELD_AT = (0.0, 6.5, 13.0)
 """Airspeeds of the steps, m/s."""

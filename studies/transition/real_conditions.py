@@ -19,7 +19,7 @@ CONDITION = "servos"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RealConditions:
-    """What was found of one flight.
+    """Findings of one flight.
 
     `about`: the condition; `delay`: from command to servo, s, and `found` with its standard
     deviation; `gap`: nu-gap of all axes to the exact model at `SPEEDS`, from the commands; `reason`

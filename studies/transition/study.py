@@ -31,7 +31,7 @@ from symheli.errors import InputError
 from symheli.progress import Task, task, tracked
 
 REPORT = 10.0
-"""Of figures and report, which keep one core busy, s."""
+"""Time of figures and report, which keep one core busy, s."""
 
 
 class Study(Outcome):

@@ -158,6 +158,11 @@ def vehicles() -> list[str]:
     list of str
         What `Helicopter.load` takes, beside a path.
 
+    See Also
+    --------
+    symheli.Helicopter : the equations with numbers
+    symheli.airframe.identified_models : published identified models
+
     Examples
     --------
     >>> symheli.vehicles()

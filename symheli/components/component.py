@@ -50,7 +50,7 @@ class Flow:
 
 @dataclass
 class Effect:
-    """What a part does, in body axes: force X Y Z (N) and moment L M N (N m) about its reference
+    """Effect of a part, in body axes: force X Y Z (N) and moment L M N (N m) about its reference
     point (the c.g. unless the vehicle places it elsewhere), the derivatives of its own states, the
     torque it takes from the main shaft (N m, referred to the main rotor), the flow it makes, and
     switching functions whose sign changes mark a corner of the model (a jump where the name begins

@@ -37,7 +37,7 @@ def profile_torque_coefficient(mu2: Any, profile_drag: Any, solidity: Any) -> An
 
 
 class Load(NamedTuple):
-    """What a rotor does along and about its shaft: inflow ratio lam0 and C_T (dimensionless),
+    """Load of a rotor along and about its shaft: inflow ratio lam0 and C_T (dimensionless),
     thrust (N), torque (N m), and the switching functions of blade stall (thrust limit) and vortex
     ring.
     """

@@ -17,7 +17,7 @@ from symheli.values.numbers import whole
 
 @dataclass(frozen=True)
 class Wind:
-    """Steady wind plus gusts plus turbulence.
+    """Wind is the sum of a steady wind, gusts and turbulence, in m/s.
 
     Turbulence is laid along north, the heading flights keep: its first component is along the path.
 
@@ -36,6 +36,12 @@ class Wind:
     ------
     InputError
         Numbers that are not finite.
+
+    See Also
+    --------
+    symheli.fly : one closed-loop flight
+    symheli.environment.Gust : one gust
+    symheli.environment.Dryden : turbulence
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""What the equations in print and in SymPy need to know of a helicopter."""
+"""Facts of a helicopter that the equations in print and in SymPy need."""
 
 from __future__ import annotations
 

@@ -36,7 +36,8 @@ TOLERANCE = 1e-5
 32-bit numbers.
 """
 SIZES = (0.01, 0.1, 10.0)
-"""Of what is measured, in turn: far within the limits of a command, about them, beyond them."""
+"""Sizes of what is measured, in turn: far within the limits of a command, about them, beyond them.
+"""
 
 RESET, ENTER = 1, 2
 """Events of the flight, as controller_check.c knows them."""
@@ -137,7 +138,7 @@ def _header(controller: TableController, up: str) -> dict[str, object]:
 
 
 def _read(controller: TableController, name: str) -> str:
-    """What is given where a controller reads a command of its own."""
+    """Value that is given where a controller reads a command of its own."""
     own = name in controller.own_commands
     return "in force, its trim before one is; reference: the trim" if own else ""
 

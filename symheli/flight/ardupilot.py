@@ -25,10 +25,10 @@ AXES = {"RLL": ("p", "phi", "d_lat"), "PIT": ("q", "theta", "d_lon"), "YAW": ("r
 """Rate, attitude and control of each axis; in yaw the rate is commanded."""
 
 MEASURED = ("p", "q", "r", "phi", "theta")
-"""What the loops feed back: rates (rad/s) and attitudes (rad)."""
+"""Signals that the loops feed back: rates (rad/s) and attitudes (rad)."""
 
 COMMANDS = {"phi_command": "rad", "theta_command": "rad", "r_command": "rad/s"}
-"""What the pilot commands, with units, in the order of `AXES`."""
+"""Commands of the pilot, with units, in the order of `AXES`."""
 
 LEAK = 0.02
 """Part of the integrator beyond its lower limit that leaks away at every step."""

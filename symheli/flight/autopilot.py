@@ -45,7 +45,8 @@ SIZES = {**SCALE, **dict.fromkeys(INPUTS, INPUT_SCALE)}
 
 @dataclass(frozen=True, eq=False)
 class Autopilot:
-    """u = u0 - K(V)(x - x0) on the measured states, K straight between the airspeeds of a table.
+    """An autopilot feeds back the measured states, u = u0 - K(V)(x - x0), with K straight between
+    the airspeeds V of a table.
 
     Parameters
     ----------
@@ -65,6 +66,12 @@ class Autopilot:
     ------
     InputError
         Shapes that do not fit, airspeeds that do not increase, states that no sensor measures.
+
+    See Also
+    --------
+    symheli.fly : one closed-loop flight
+    symheli.TableController : a controller to fly and to write in C
+    synthesis.lqr : state feedback by Riccati equations
 
     Examples
     --------

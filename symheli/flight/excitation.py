@@ -21,7 +21,7 @@ FADE_IN, FADE_OUT = 0.1, 0.04
 
 @dataclass(frozen=True)
 class Excitation:
-    """A signal added to each of the named inputs.
+    """An excitation adds a test signal to each of the named inputs.
 
     Parameters
     ----------
@@ -45,6 +45,11 @@ class Excitation:
     ------
     InputError
         Another kind, an empty band, an amplitude that is not positive.
+
+    See Also
+    --------
+    symheli.fly : one closed-loop flight
+    identification.choose_experiments : the most informative flights
 
     References
     ----------

@@ -1,4 +1,4 @@
-"""What a simulated flight was flown with, in words that a record keeps."""
+"""Conditions of a simulated flight, in words that a record keeps."""
 
 from __future__ import annotations
 

@@ -60,6 +60,12 @@ def fly(
     ValidityWarning
         It is flown faster than the equations are known to hold for, gusts included.
 
+    See Also
+    --------
+    symheli.flight.fly_batch : many flights at once
+    symheli.simulate : the equations with given inputs
+    symheli.FlightPlan : all settings of a flight
+
     Examples
     --------
     >>> transition = symheli.AirspeedSchedule.transition(4.0, 6.0, acceleration=2.0, hold=1.0)

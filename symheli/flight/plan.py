@@ -50,8 +50,8 @@ class Options(TypedDict, total=False):
 
 @dataclass(frozen=True)
 class FlightPlan:
-    """All settings of a flight; `record.meta["plan"]` of every flight holds them, so that it can be
-    repeated.
+    """A flight plan holds all settings of a flight, so that it can be repeated;
+    `record.meta["plan"]` of every flight is one.
 
     Parameters
     ----------
@@ -89,6 +89,11 @@ class FlightPlan:
     ------
     InputError
         Something that does not fit.
+
+    See Also
+    --------
+    symheli.fly : one closed-loop flight
+    symheli.flight.fly_batch : many flights at once
 
     Examples
     --------

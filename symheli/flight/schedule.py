@@ -14,7 +14,7 @@ from symheli.values.numbers import whole
 
 @dataclass(frozen=True)
 class AirspeedSchedule:
-    """Airspeed commands joined by half-cosine ramps.
+    """An airspeed schedule joins commands (m/s) over time (s) by half-cosine ramps.
 
     Parameters
     ----------
@@ -33,6 +33,11 @@ class AirspeedSchedule:
     ------
     InputError
         Lists of different lengths, an acceleration that is not positive, a negative speed or time.
+
+    See Also
+    --------
+    symheli.fly : one closed-loop flight
+    symheli.FlightPlan : all settings of a flight
 
     Examples
     --------

@@ -10,7 +10,8 @@ from symheli.errors import InputError
 
 @dataclass(frozen=True)
 class Sensor:
-    """Measured = true value some time ago, sampled and held, plus bias plus white noise, rounded.
+    """A sensor reads the true value some time ago, sampled and held, plus bias plus white noise,
+    rounded.
 
     Delay and period act in whole control samples, rounded up. Before the first sample the value at
     the start is read.
@@ -32,6 +33,11 @@ class Sensor:
     ------
     InputError
         A negative or infinite number.
+
+    See Also
+    --------
+    symheli.fly : one closed-loop flight
+    symheli.Servo : lag, travel and rate of an actuator
 
     Examples
     --------

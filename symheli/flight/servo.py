@@ -17,8 +17,9 @@ from symheli.values.signal import Signal
 
 @dataclass(frozen=True, kw_only=True)
 class Servo:
-    """H(s) = (s/zero + 1)/(s/pole + 1) wn^2/(s^2 + 2 z wn s + wn^2) behind a limited, quantised
-    command; output within the travel.
+    """A servo moves a control behind a limited, quantised command, its output within the travel.
+
+    H(s) = (s/zero + 1)/(s/pole + 1) wn^2/(s^2 + 2 z wn s + wn^2).
 
     Parameters
     ----------
@@ -37,6 +38,11 @@ class Servo:
     ------
     InputError
         A number that is not positive, or a zero without a pole.
+
+    See Also
+    --------
+    symheli.fly : one closed-loop flight
+    symheli.Sensor : delay, sampling, bias and noise
 
     References
     ----------
@@ -178,8 +184,8 @@ class ServoBank:
         return moved, self.deflection(moved)
 
     def follow(self, commands: np.ndarray) -> np.ndarray:
-        """What the linear parts follow (k, n), rad, of commands (k, n): limited, quantised, and no
-        faster than the servos.
+        """Commands that the linear parts follow (k, n), rad, of commands (k, n): limited,
+        quantised, and no faster than the servos.
         """
         out = np.empty_like(commands)
         last = commands[0]

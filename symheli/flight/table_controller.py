@@ -53,8 +53,11 @@ from symheli.values.units import per_second, ratio
 
 @dataclass(frozen=True, eq=False)
 class TableController:
-    """x(k+1) = A(p) x + B(p) e + L(p) (u - w), w = u0 + C(p) x + D(p) e, u = w within its limits,
-    e = measured - reference, all in 32-bit arithmetic.
+    """A table controller computes commands from measurements in 32-bit arithmetic, with matrices
+    from a table over one parameter p.
+
+    x(k+1) = A(p) x + B(p) e + L(p) (u - w), w = u0 + C(p) x + D(p) e, u = w within its limits, e =
+    measured - reference.
 
     A .. L stand in a table over one parameter p, straight between its knots. `model` holds the same
     numbers: what an analysis certifies is what `fly` flies and what `write_controller` writes in C,
@@ -100,6 +103,12 @@ class TableController:
     InputError
         Shapes that do not fit, knots that do not increase, names of no such signal, numbers that
         are not finite in 32 bits.
+
+    See Also
+    --------
+    symheli.fly : one closed-loop flight
+    symheli.flight.ParameterMonitor : the parameter in use
+    symheli.export.write_controller : the controller in C
 
     Examples
     --------

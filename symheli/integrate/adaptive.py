@@ -198,7 +198,7 @@ def _head(pair: EmbeddedTableau, switches: int) -> str:
 
 
 def _first_switch(before: Array, after: Array) -> float:
-    """As `first_switch` in adaptive.c."""
+    """The twin of `first_switch` in adaptive.c."""
     with np.errstate(all="ignore"):
         share = before / (before - after)
         share = share[

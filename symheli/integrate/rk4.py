@@ -174,7 +174,7 @@ def runge_kutta_step(rates: Callable[[Array], Array], x: Array, h: float) -> Arr
 
 
 def _fed_back(feedback: Feedback, k: int, x: Array, u: Array) -> Array:
-    """As `feed_back` in rk4.c."""
+    """The twin of `feed_back` in rk4.c."""
     q0, q1, q2, q3 = x[6:10]
     sine, over, under = (
         2 * (q0 * q2 - q3 * q1),

@@ -78,6 +78,11 @@ def simulate(
     ValidityWarning
         The flight leaves what the equations are known to hold for.
 
+    See Also
+    --------
+    symheli.fly : one closed-loop flight
+    symheli.integrate.simulate_batch : many simulations at once
+
     References
     ----------
     Hairer, Norsett and Wanner (1993), Solving Ordinary Differential Equations I, II.4; Hairer and

@@ -35,7 +35,7 @@ of the file.
 
 
 def _inflated(content: memoryview) -> bytes:
-    """What was compressed, at most `MAX_INFLATED` bytes: a small file may claim any amount."""
+    """Bytes that were compressed, at most `MAX_INFLATED`: a small file may claim any amount."""
     stream = zlib.decompressobj()
     out = stream.decompress(content, MAX_INFLATED)
     if stream.unconsumed_tail:

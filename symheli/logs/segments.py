@@ -123,8 +123,8 @@ def segments(columns: Mapping[str, Column], guesses: Mapping[str, Guess]) -> tup
 
 
 def serving(found: Sequence[Segment]) -> tuple[Segment, ...]:
-    """Those to identify from: flight, and no shorter than `MIN_DURATION` with the flight that they
-    adjoin.
+    """Segments to identify from: flight, and no shorter than `MIN_DURATION` with the flight that
+    they adjoin.
     """
     out: list[Segment] = []
     for flight in flights(found):

@@ -103,6 +103,11 @@ def balanced_truncation(
         An order that is not below the number of states that matter, or a frozen model that is not
         stabilisable and detectable, for the response not stable.
 
+    See Also
+    --------
+    symheli.lpv.minimal_realization : fewer states, the same response
+    synthesis.designs.bounded_truncation : with an error bound while p moves
+
     References
     ----------
     Jonckheere and Silverman (1983), IEEE Trans. Automatic Control 28; Meyer (1990), 35; the bounds

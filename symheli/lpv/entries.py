@@ -102,7 +102,7 @@ def entry_called(models: Any, name: str) -> Array:
 
 
 def chosen(every: Sequence[MatrixEntry], wanted: Sequence[str]) -> list[MatrixEntry]:
-    """Those of these names; raises `UnknownNameError`."""
+    """Entries of these names; raises `UnknownNameError`."""
     by_name = {str(e.name): e for e in every}
     for name in wanted:
         if name not in by_name:

@@ -123,6 +123,12 @@ def bode(
     InputError, UnknownNameError
         Another type of model, a channel it does not have.
 
+    See Also
+    --------
+    symheli.lpv.sigma : singular values
+    symheli.lpv.step : step responses
+    symheli.lpv.tools.nyquist : the loop in the complex plane
+
     Examples
     --------
     >>> upper, lower = lpv.bode(spring, "u1", "y1", [0.0, 0.5, 1.0])
@@ -169,6 +175,11 @@ def sigma(model: Model, p: object = None, *, omega: object = None, ax: Axes | No
     ------
     InputError
         Another type of model.
+
+    See Also
+    --------
+    symheli.lpv.bode : magnitude and phase
+    synthesis.frozen_gain : the worst frozen model
 
     Examples
     --------
@@ -400,6 +411,11 @@ def step(
     ------
     InputError, UnknownNameError
         Another type of model, a channel it does not have, a duration that is not positive.
+
+    See Also
+    --------
+    symheli.lpv.bode : magnitude and phase
+    symheli.lpv.tools.pole_map : poles over the parameter
 
     Examples
     --------

@@ -55,6 +55,12 @@ def append(*systems: System) -> Any:
     InputError
         Sample periods that differ; ranges, units or rates of a shared parameter that do not agree.
 
+    See Also
+    --------
+    symheli.lpv.connect : several systems, by names
+    symheli.lpv.series : one system after the other
+    symheli.lpv.parallel : sum of two systems
+
     Examples
     --------
     >>> two = lpv.append(spring, spring)
@@ -84,6 +90,11 @@ def series(first: System, second: System) -> Any:
     ------
     InputError
         Numbers of signals or sample periods that differ.
+
+    See Also
+    --------
+    symheli.lpv.parallel : sum of two systems
+    symheli.lpv.feedback : a loop of two systems
 
     Examples
     --------
@@ -123,6 +134,11 @@ def parallel(first: System, second: System) -> Any:
     ------
     InputError
         Numbers of signals or sample periods that differ.
+
+    See Also
+    --------
+    symheli.lpv.series : one system after the other
+    symheli.lpv.append : systems side by side
 
     Examples
     --------
@@ -169,12 +185,6 @@ def feedback(plant: System, controller: System, sign: int | None = None) -> Any:
         `LPVStateSpace` through feedthrough that depends on the parameters: `.to_lft()` of one of
         the two closes that exactly.
 
-    See Also
-    --------
-    LPVStateSpace.feedback : constant gains by name, a positive loop
-    lower_feedback : by names; may keep other inputs and outputs
-    connect : several systems by names
-
     Examples
     --------
     A gain of 2 in a negative loop stiffens the spring:
@@ -182,6 +192,12 @@ def feedback(plant: System, controller: System, sign: int | None = None) -> Any:
     >>> lpv.feedback(spring, 2.0, sign=-1).at(0.0).A.round(6) + 0.0
     array([[ 0.,  1.],
            [-4., -1.]])
+
+    See Also
+    --------
+    symheli.LPVStateSpace.feedback : constant gains by name
+    symheli.lpv.tools.lower_feedback : loops by names, other channels kept
+    symheli.lpv.connect : several systems, by names
     """
     if sign not in (1, -1):
         raise InputError(
@@ -237,6 +253,12 @@ def connect(
         An input is left open, an output name is used twice, sums that need each other, or a
         singular loop.
 
+    See Also
+    --------
+    symheli.lpv.feedback : a loop of two systems
+    symheli.lpv.series : one system after the other
+    symheli.lpv.append : systems side by side
+
     Examples
     --------
     >>> loop = lpv.connect(
@@ -278,7 +300,7 @@ def connect(
             raise InputError(f"sums: {name!r} is the name of an output or an external input")
 
     def row(name: str, above: tuple[str, ...] = ()) -> Array:
-        """What a signal is of the outputs and the external inputs."""
+        """Row of a signal in terms of the outputs and the external inputs."""
         if name in single:
             return single[name]
         if name in above:
@@ -292,7 +314,7 @@ def connect(
         return np.sum([np.zeros(len(known)), *terms], axis=0)
 
     def source(u: Signal) -> Array:
-        """What feeds an input of a system."""
+        """Source of an input of a system."""
         if str(u) in sums:
             return total(str(u), (str(u),) if u not in known else ())
         if u in given and u in external:

@@ -33,7 +33,8 @@ AIRSPEED = Signal("airspeed", "m/s")
 
 @dataclass(frozen=True, eq=False)
 class LinearFamily:
-    """Linear models at every combination of the `values` (n1, n2, ...) of one or more `axes`.
+    """A linear family holds linear models at every combination of the `values` (n1, n2, ...) of one
+    or more `axes`.
 
     family[k] is a model of a family over one axis and family[i, j] one over two, by position;
     family.at(5.0) is the model at a value of the parameter; family["A[q, u]"] is one entry of all
@@ -57,6 +58,11 @@ class LinearFamily:
     ------
     InputError
         Wrong numbers of values or models, values that do not increase, models that differ in names.
+
+    See Also
+    --------
+    symheli.sweep : trims and linear models over airspeed
+    symheli.LPVStateSpace : matrices as functions of parameters
 
     Examples
     --------

@@ -28,7 +28,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class LinearModel(Operators):
-    """dx/dt = A x + B u, y = C x + D u, or x(k+1) = A x(k) + B u(k), in deviations from `point`.
+    """A linear model describes small deviations from an operating `point` in state space, with
+    named signals that carry their units.
+
+    dx/dt = A x + B u, y = C x + D u, or x(k+1) = A x(k) + B u(k).
 
     Parameters
     ----------
@@ -45,6 +48,11 @@ class LinearModel(Operators):
     ------
     InputError
         Shapes that do not fit the names, or a period that is not positive.
+
+    See Also
+    --------
+    symheli.linearize : the exact linear model about a trim
+    symheli.LPVStateSpace : matrices as functions of parameters
 
     Examples
     --------

@@ -72,7 +72,10 @@ class FitResiduals(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LPVStateSpace(Operators, LPVMatrices):
-    """dx/dt = A(p) x + B(p) u, y = C(p) x + D(p) u, or sampled x(k+1) = A(p(k)) x(k) + ...
+    """A linear parameter-varying (LPV) model has matrices that are functions of scheduling
+    parameters p.
+
+    dx/dt = A(p) x + B(p) u, y = C(p) x + D(p) u, or sampled x(k+1) = A(p(k)) x(k) + ...
 
     A(p) = sum_j f_j(p) A_j with the n functions f_j of `basis`, of one scheduling parameter p or of
     several. With one, p may have any shape; with d, the last axis of p holds them.
@@ -99,6 +102,12 @@ class LPVStateSpace(Operators, LPVMatrices):
     ------
     InputError
         Shapes that do not fit, numbers that are not finite, ranges beyond the basis.
+
+    See Also
+    --------
+    symheli.LFT : rational dependence on the parameters
+    symheli.LinearFamily : linear models over parameters
+    synthesis.l2_gain : worst-case gain while p moves
 
     Examples
     --------

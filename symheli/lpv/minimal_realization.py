@@ -15,8 +15,8 @@ TOLERANCE = 1e-9
 
 
 def minimal_realization(model: Model, *, tolerance: float = TOLERANCE) -> Model:
-    """Leave out the states that no input reaches, and those that no output shows, whatever p does;
-    the response is the same.
+    """Remove the states that no input reaches and those that no output shows, whatever p does; the
+    response stays the same.
 
     The reachable states are the smallest space that holds the columns of every coefficient of B(p)
     and that no coefficient of A(p) leaves; the observable ones by duality. One orthogonal
@@ -38,6 +38,10 @@ def minimal_realization(model: Model, *, tolerance: float = TOLERANCE) -> Model:
     ------
     InputError
         Another type of model, a tolerance that is not from 0 to 1.
+
+    See Also
+    --------
+    symheli.lpv.balanced_truncation : fewer states, at a small error
 
     References
     ----------

@@ -71,6 +71,11 @@ def nu_gap(
         Models with poles on the stability boundary, as far as rounding can tell, or with other
         signals or sample periods; scales that are not positive.
 
+    See Also
+    --------
+    symheli.lpv.stability_margin : distance to the nearest plant that is lost
+    symheli.lpv.tools.nu_gaps : nu-gaps of many pairs of models
+
     References
     ----------
     Vinnicombe (2001), Uncertainty and Feedback, ch. 3.

@@ -29,7 +29,8 @@ Rates = Limit | Sequence[Limit] | Mapping[str, Limit]
 
 @dataclass(frozen=True)
 class Scheduling:
-    """A scheduling parameter p in [low, high] with |dp/dt| <= rate, or dp/dt another parameter.
+    """A scheduling parameter p stays within [low, high] with |dp/dt| <= rate, or dp/dt is another
+    parameter.
 
     Parameters
     ----------
@@ -46,6 +47,10 @@ class Scheduling:
     ------
     InputError
         A range that is empty or not finite, a rate that is not >= 0.
+
+    See Also
+    --------
+    symheli.LPVStateSpace, symheli.lpv.Polynomial
 
     Examples
     --------

@@ -60,6 +60,11 @@ def stability_margin(
     UnknownNameError
         A signal that the plant does not have.
 
+    See Also
+    --------
+    symheli.lpv.nu_gap : distance of two models in feedback
+    synthesis.disk_margin : margin of all channels at once
+
     References
     ----------
     Vinnicombe (2001), Uncertainty and Feedback, ch. 3.

@@ -39,8 +39,10 @@ class DeltaPart(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class UncertainStateSpace(Operators):
-    """Every LPV model dx/dt = A x + B u + E d, y = C x + D u + F d, d = Delta v, v = G x + H u + J
-    d, |Delta|_2 <= bound; or sampled.
+    """An uncertain LPV model is the set of the models with any block Delta, |Delta|_2 <= bound,
+    between two of its signals.
+
+    dx/dt = A x + B u + E d, y = C x + D u + F d, d = Delta v, v = G x + H u + J d; or sampled.
 
     All matrices are functions of the scheduling parameters, E, F, G, H and J known: `model` has the
     inputs (u, d) and the outputs (y, v). What is derived of the set (a loop closed around it, fewer
@@ -67,6 +69,11 @@ class UncertainStateSpace(Operators):
     InputError
         Names that the model does not have, a block without channels, a bound that is negative or
         not finite, a probability outside (0, 1], no source, parts that are not those of Delta.
+
+    See Also
+    --------
+    synthesis.robust.robust_margin : how much more uncertainty a loop bears
+    synthesis.l2_gain : worst-case gain while p moves
 
     Examples
     --------

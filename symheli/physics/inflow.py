@@ -13,7 +13,7 @@ HALLEY_STEPS = 3
 tests).
 """
 RELAXATION, RELAXED_STEPS = 0.6, 40
-"""Of the printed iteration; 0.4^40 is below rounding."""
+"""Relaxation of the printed iteration; 0.4^40 is below rounding."""
 
 STEP_TOLERANCE = 1e-7
 """Step of the inflow iteration at which it ends: the error is of the order of its cube."""

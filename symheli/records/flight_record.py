@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from symheli.records.kinematic_check import KinematicCheck
 
 CONDITIONS = ("wind", "mass", "governor", "servos")
-"""What `meta["flown"]` of a record may say."""
+"""Conditions that `meta["flown"]` of a record may state."""
 
 GAP = 1.5
 """Two samples further apart than this many median steps have a gap between them."""
@@ -47,7 +47,7 @@ MAX_UPSAMPLING = 1e4
 
 @dataclass(frozen=True, eq=False)
 class FlightRecord:
-    """Samples of signals over time, in SI units and radians.
+    """A flight record holds samples of signals over time, in SI units and radians.
 
     NaN marks a missing sample. A time step longer than 1.5 median steps is a gap: `segments()`
     splits there, and no regressor reaches across.
@@ -73,6 +73,11 @@ class FlightRecord:
     ------
     InputError
         Fewer than two samples, time that does not increase, an infinite value.
+
+    See Also
+    --------
+    symheli.fly : one closed-loop flight
+    identification.fit : coefficients from records
 
     Examples
     --------

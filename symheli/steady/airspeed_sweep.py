@@ -71,6 +71,12 @@ def sweep(
     ValidityWarning
         The equations are not known to hold at all of them, once for all.
 
+    See Also
+    --------
+    symheli.linearize : the exact linear model about a trim
+    symheli.steady.sweep_grid : linear models over several parameters
+    symheli.derivatives : stability and control derivatives
+
     Examples
     --------
     >>> family = symheli.sweep(heli, [2.0, 5.0, 8.0])

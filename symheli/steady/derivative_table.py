@@ -39,7 +39,7 @@ A[u, q] = X_q - w0.
 """
 
 SHOWN = ("X_u", "Z_w", "M_u", "M_w", "Y_v", "L_v", "N_v", "N_r")
-"""Those that shape the transition."""
+"""Derivatives that shape the transition."""
 
 if TYPE_CHECKING:
     import pandas
@@ -168,6 +168,11 @@ def derivatives(family: LinearFamily) -> DerivativeTable:
     ------
     InputError
         A discrete family, or trims that turn.
+
+    See Also
+    --------
+    symheli.sweep : trims and linear models over airspeed
+    symheli.linearize : the exact linear model about a trim
 
     Examples
     --------

@@ -112,7 +112,7 @@ def trim(
     throw: bool = True,
     continuation: bool = True,
 ) -> TrimPoint:
-    """Find the steady flight at an airspeed.
+    """Find the controls and attitude of the steady flight at an airspeed.
 
     Newton's method with the exact Jacobian (MINPACK's hybrid method where that stalls); where that
     fails, by continuation from hover and from other guesses. Success is judged on the recomputed
@@ -149,6 +149,12 @@ def trim(
     -----
     ValidityWarning
         The equations are not known to hold there; see `symheli.steady.validity`.
+
+    See Also
+    --------
+    symheli.trim_map : trims over airspeed and climb rate
+    symheli.linearize : the exact linear model about a trim
+    symheli.steady.trim_batch : many trims at once
 
     Examples
     --------

@@ -16,7 +16,7 @@ from symheli.steady.trim_batch import TrimBatch, unknowns
 from symheli.values.arrays import Array
 
 ACCURACY = 1e-6
-"""Of an airspeed at which there is a corner, m/s."""
+"""Accuracy of an airspeed at which there is a corner, m/s."""
 _MEANINGLESS = 1e-7  # a switching function that stays below this is zero, not switching
 _QUARTERS = np.array([0.25, 0.5, 0.75])
 CUTS = len(_QUARTERS) + 3

@@ -26,8 +26,10 @@ def linearize(
     inputs: Sequence[str] | None = None,
     allow_accelerating: bool = False,
 ) -> LinearModel:
-    """Return A, B of the Euler form about a trim by algorithmic differentiation through the
-    implicit inflow; C = I, D = 0.
+    """Return the linear model of a helicopter about a trim, exact by algorithmic differentiation
+    through the implicit inflow.
+
+    A, B are of the Euler form; C = I, D = 0.
 
     The air is that of the point.
 
@@ -59,6 +61,11 @@ def linearize(
     -----
     ValidityWarning
         As in `trim`.
+
+    See Also
+    --------
+    symheli.trim : one steady flight
+    symheli.sweep : trims and linear models over airspeed
 
     Examples
     --------

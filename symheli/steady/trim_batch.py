@@ -263,7 +263,7 @@ def hover(flights: SteadyFlights) -> Array:
 
 
 def unknowns(heli: Helicopter, start: TrimPoint | TrimBatch) -> Array:
-    """Those of a point of this helicopter (nz,), or of many (N, nz)."""
+    """Unknowns of a point of this helicopter (nz,), or of many (N, nz)."""
     many = isinstance(start, TrimBatch)
     given = start.states if many else start.x.signals
     if given != heli.states:

@@ -215,6 +215,11 @@ def trim_map(
         The equations are not known to hold at all of them, once for all; the vortex ring is a flag
         of the result.
 
+    See Also
+    --------
+    symheli.trim : one steady flight
+    symheli.sweep : trims and linear models over airspeed
+
     Examples
     --------
     >>> found = symheli.trim_map(heli, [4.0, 8.0], [-2.0, 0.0])

@@ -37,7 +37,7 @@ DENSITIES = (0.3, 1.6)
 -50 degC at sea level.
 """
 VISCOSITY, SOUND = 1.79e-5, 340.3
-"""Of air at 15 degC: Pa s, m/s."""
+"""Viscosity and sound of air at 15 degC: Pa s, m/s."""
 
 HEAD = "beyond what the equations of the helicopter are known to hold for:"
 RING = (

@@ -35,7 +35,7 @@ class ZarrArray:
 
     @classmethod
     def whole(cls, dimension: str, values: Array) -> ZarrArray:
-        """Of one chunk that holds all values."""
+        """Description of one chunk that holds all values."""
         shape = values.shape
         return cls(dimensions=(dimension,), shape=shape, chunks=shape, dtype=values.dtype.str)
 

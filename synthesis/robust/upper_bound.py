@@ -42,7 +42,7 @@ MAX_FREQUENCIES = 400
 NARROW = 1e-9
 """Relative width of an interval of frequencies below which its level is raised."""
 BISECTIONS = 14
-"""Of the level at one frequency."""
+"""Bisections of the level at one frequency."""
 GROWTH = 1.001
 """Factor by which a level is raised above the least at the frequency that decides."""
 MAX_LEVEL = 1e4

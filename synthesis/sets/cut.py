@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from synthesis.sets.invariant_set import InvariantSet
 
 POINTS = 361
-"""Of the border."""
+"""Points of the border."""
 CLOSE = 0.99
 """Part of the largest share of a limit from which on a limit counts as binding too."""
 ROOM = 1.3
@@ -28,7 +28,7 @@ def plot_cut(
     found: InvariantSet, first: str, second: str, p: Sequence[float], ax: Axes | None
 ) -> Axes:
     """See `InvariantSet.cut`."""
-    if not found.proven:
+    if not found.verified:
         raise InputError(f"there is no set to draw: {found.why}")
     i, j = indices([first, second], found.shape.states, "state")
     if i == j:

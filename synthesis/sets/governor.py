@@ -17,7 +17,7 @@ from symheli.values.summary import summarized
 from synthesis.sets.invariant_set import InvariantSet
 
 HALVINGS = 40
-"""Of the share of the way to the wanted reference."""
+"""Halvings of the share of the way to the wanted reference."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,8 +139,8 @@ def reference_governor(
     >>> print(synthesis.sets.reference_governor(found, [1.0]).next([0.5], 9.0, 0.0).round(4))
     2.5
     """
-    if not isinstance(found, InvariantSet) or not found.proven:
-        raise InputError("found: expected an InvariantSet with a proof (found.proven)")
+    if not isinstance(found, InvariantSet) or not found.verified:
+        raise InputError("found: expected an InvariantSet with a proof (found.verified)")
     n, m = len(found.shape.states), len(found.shape.parameters)
     moved: Callable[[Array], Array]
     trim = found.statement.model.trim

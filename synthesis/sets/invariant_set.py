@@ -64,7 +64,7 @@ class InvariantSet(ProvenSet):
         V lost in a sample); 0 without disturbances.
     shares : array (nw,)
         Multipliers of the disturbances, which add up to alpha at most.
-    proven : bool
+    verified : bool
         The inequalities hold in exact arithmetic for every p.
     why : str
         Why there is no proof; empty where there is one.
@@ -79,7 +79,7 @@ class InvariantSet(ProvenSet):
     >>> from symheli import LinearModel
     >>> plant = LinearModel([[1.0]], [[2.0]], [[1.0]], [[0.0]], ["x"], ["u"], ["x_m"])
     >>> found = synthesis.sets.invariant_set(plant, input_bounds={"u": 1.0})
-    >>> found.proven, bool(1.999 < found.half_widths()[0] < 2)  # b / a
+    >>> found.verified, bool(1.999 < found.half_widths()[0] < 2)  # b / a
     (True, True)
     """
 
@@ -87,7 +87,7 @@ class InvariantSet(ProvenSet):
     shape: LPVStateSpace
     alpha: float
     shares: Array
-    proven: bool
+    verified: bool
     why: str = ""
     form: ClassVar[str] = "invariant ellipsoid"
 
@@ -95,7 +95,7 @@ class InvariantSet(ProvenSet):
 
     @property
     def stored(self) -> Mapping[str, Any]:
-        """What a file holds of the set beside its statement."""
+        """Values that a file holds of the set beside its statement."""
         return {"shape": self.shape, "alpha": self.alpha, "shares": self.shares}
 
     def gramian(self, *p: float) -> Array:
@@ -213,7 +213,7 @@ def invariant_set(
     Returns
     -------
     InvariantSet
-        `proven` says whether there is one, `why` why not; a larger set may exist.
+        `verified` says whether there is one, `why` why not; a larger set may exist.
 
     Raises
     ------
@@ -230,7 +230,7 @@ def invariant_set(
     >>> held = synthesis.sets.invariant_set(
     ...     lag.select(inputs=["w", "u"]), state_bounds={"x": 2.0}, input_bounds={"u": 3.0},
     ...     disturbance={"w": 0.5})
-    >>> held.proven, held.contains([1.9], 0.3), max(held.used(0.5), key=held.used(0.5).get)
+    >>> held.verified, held.contains([1.9], 0.3), max(held.used(0.5), key=held.used(0.5).get)
     (True, True, 'x')
     """
     solver = general_solver(solver)
@@ -279,7 +279,7 @@ class _Climb:
             if found is None:
                 return self._none(self.why)
             made = self._made(found, alpha).established()
-            if made.proven:
+            if made.verified:
                 return made
             spare *= MORE_SPARE
         return self._none("no candidate passes the exact check")

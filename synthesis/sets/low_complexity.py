@@ -53,7 +53,7 @@ class LowComplexitySet(ProvenSet):
         Model, feedback, disturbances and limits.
     V : array (n, n)
         Its columns are the directions to the faces; W = V^-1.
-    proven : bool
+    verified : bool
         The sums hold in exact arithmetic for every p.
     why : str
         Why there is no proof; empty where there is one.
@@ -71,13 +71,13 @@ class LowComplexitySet(ProvenSet):
     ...     [[0.5, 0.2], [0.0, 0.7]], np.zeros((2, 0)), np.eye(2), np.zeros((2, 0)), ["x", "y"], [],
     ...     ["x_m", "y_m"], dt=0.1)
     >>> found = synthesis.sets.low_complexity_set(model, state_bounds={"x": 1.0, "y": 2.0})
-    >>> found.proven, found.half_widths.round(3).tolist(), found.contains([0.9, 1.9])
+    >>> found.verified, found.half_widths.round(3).tolist(), found.contains([0.9, 1.9])
     (True, [1.0, 2.0], True)
     """
 
     statement: SetStatement
     V: Array
-    proven: bool
+    verified: bool
     why: str = ""
     form: ClassVar[str] = "invariant parallelepiped"
 
@@ -85,7 +85,7 @@ class LowComplexitySet(ProvenSet):
 
     @property
     def stored(self) -> Mapping[str, Any]:
-        """What a file holds of the set beside its statement."""
+        """Values that a file holds of the set beside its statement."""
         return {"V": self.V}
 
     @cached_property
@@ -179,7 +179,7 @@ def low_complexity_set(
     Returns
     -------
     LowComplexitySet
-        `proven` says whether there is one, `why` why not: the search is local, by linear programs
+        `verified` says whether there is one, `why` why not: the search is local, by linear programs
         about the set before, and poles with |Re| + |Im| > 1 have none.
 
     Raises
@@ -198,7 +198,7 @@ def low_complexity_set(
     ...     [[1.2]], [[1.0, 0.1]], [[1.0]], [[0.0, 0.0]], ["x"], ["u", "w"], ["x_m"], dt=0.1)
     >>> found = synthesis.sets.low_complexity_set(
     ...     sampled, controller=[[-0.7]], input_bounds={"u": 0.7}, disturbance={"w": 1.0})
-    >>> found.proven, round(found.half_widths.item(), 6)
+    >>> found.verified, round(found.half_widths.item(), 6)
     (True, 1.0)
     """
     statement = stated(model, controller, state_bounds, input_bounds, disturbance)

@@ -1,4 +1,4 @@
-"""What sets of states with a proof have in common: membership, their files and their words."""
+"""Sets of states with a proof: membership, files and words that they have in common."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from symheli.lazy import former_attribute
 from symheli.values.arrays import Array
 from synthesis.sets.statement import SetStatement
 
@@ -18,19 +19,21 @@ from synthesis.sets.statement import SetStatement
 class ProvenSet(ABC):
     """The states at which `level` is at most 1, with the `statement` that no motion leaves them.
 
-    `proven` is false, and `why` says why, where the exact check has not passed.
+    `verified` is false, and `why` says why, where the exact check has not passed.
     """
 
     statement: SetStatement
-    proven: bool
+    verified: bool
     why: str
     form: ClassVar[str]
     """The set in words."""
 
+    proven = former_attribute("proven", "verified")
+
     @property
     @abstractmethod
     def stored(self) -> Mapping[str, Any]:
-        """What a file holds of the set beside its statement."""
+        """Values that a file holds of the set beside its statement."""
 
     @abstractmethod
     def level(self, x: Any, *p: float) -> Array:
@@ -45,8 +48,8 @@ class ProvenSet(ABC):
         return bool(np.all(self.level(x, *p) <= 1))
 
     def established(self) -> Self:
-        """The same set, `proven` where the exact check passes."""
-        return replace(self, proven=True, why="") if self.verify() else self  # type: ignore[type-var]
+        """The same set, `verified` where the exact check passes."""
+        return replace(self, verified=True, why="") if self.verify() else self  # type: ignore[type-var]
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the set as JSON, sufficient to prove it again: `symheli verify FILE`."""
@@ -56,12 +59,12 @@ class ProvenSet(ABC):
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
-        """Read a set and prove it again; `proven` says whether that succeeded."""
+        """Read a set and prove it again; `verified` says whether that succeeded."""
         from synthesis.sets.set_file import read
 
         return read(path, cls)
 
     def __str__(self) -> str:
-        if not self.proven:
+        if not self.verified:
             return f"no invariant set: {self.why}"
         return self.statement.summary(self.form)

@@ -26,7 +26,7 @@ SIZES = ("disturbance", "state_bounds", "input_bounds")
 
 def written(found: ProvenSet, path: str | os.PathLike[str]) -> Path:
     """Write the set; see `InvariantSet.save`."""
-    if not found.proven:
+    if not found.verified:
         raise InputError(f"only a proven set is saved; here {found.why}")
     own = found.statement
     content = {

@@ -105,7 +105,7 @@ class SetStatement:
 
     @cached_property
     def amplitudes(self) -> Array:
-        """Of the disturbances, (nw,)."""
+        """Amplitudes of the disturbances, (nw,)."""
         return np.array(list(self.disturbance.values()), dtype=float)
 
     @cached_property
@@ -122,14 +122,14 @@ class SetStatement:
         return tuple(out)
 
     def summary(self, what: str) -> str:
-        """What is proven, with the limits and hypotheses, in lines."""
+        """The statement, with the limits and hypotheses, in lines."""
         limited = ", ".join(f"|{limit.signal}| <= {limit.bound:g}" for limit in self.limits)
         lines = (f"- {line}" for line in self.hypotheses)
         return "\n".join([f"{what}, proven for every p", f"within {limited}", *lines])
 
     @property
     def hypotheses(self) -> tuple[str, ...]:
-        """What the statement rests on, in sentences."""
+        """Hypotheses of the statement, in sentences."""
         law = "u = K(p) x with all states known" if self.controls else "the loop as it is given"
         time = "continuous" if self.model.dt is None else "discrete"
         each = [f"|{w}| <= {a:g}" for w, a in self.disturbance.items()]

@@ -52,8 +52,8 @@ class SwitchInside:
 
     def __post_init__(self) -> None:
         own = tuple(self.sets)
-        if not own or not all(isinstance(one, InvariantSet) and one.proven for one in own):
-            raise InputError("sets: expected InvariantSets with a proof (set.proven)")
+        if not own or not all(isinstance(one, InvariantSet) and one.verified for one in own):
+            raise InputError("sets: expected InvariantSets with a proof (set.verified)")
         first = own[0].shape
         for one in own:
             if (one.shape.states, one.shape.box) != (first.states, first.box):

@@ -1,4 +1,4 @@
-"""What controllers reach of a specification sheet over a scheduling parameter."""
+"""Controllers held against a specification sheet over a scheduling parameter."""
 
 from __future__ import annotations
 
@@ -323,6 +323,11 @@ def specifications(
         fit, an axis without definition, a controller with none of the axes.
     UnknownNameError
         A signal or a measure that is not there.
+
+    See Also
+    --------
+    synthesis.sheet.Sheet : the requirements
+    synthesis.margin_table : margins over the parameters
 
     Examples
     --------

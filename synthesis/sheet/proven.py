@@ -53,7 +53,7 @@ class Proven:
 
     @property
     def frozen(self) -> float:
-        """That of the worst frozen model of the same fit; NaN where one is unstable."""
+        """Value of the worst frozen model of the same fit; NaN where one is unstable."""
         frozen = self.certificate.frozen
         return in_unit(self.specification.measure, frozen) if math.isfinite(frozen) else math.nan
 

@@ -21,12 +21,14 @@ SMALL_HELICOPTER = Path(__file__).parent / "small_helicopter.toml"
 NOT_CONFIRMED = "not confirmed"
 
 EXPONENTS = {"none": 0.0, "time": -0.5, "frequency": 0.5, "speed": -0.5, "length": -1.0}
-"""Of N = length of the sheet's vehicle / length of the vehicle at hand, by which a value scales."""
+"""Exponents of N = length of the sheet's vehicle / length of the vehicle at hand, by which a value
+scales.
+"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ControlAxis:
-    """What an axis is: its loop is broken at `control`, `response` follows its command.
+    """An axis of control: its loop is broken at `control`, `response` follows its command.
 
     type "attitude": the response is the attitude; "rate": its integral is. `coupled`: the signal
     that should stay at rest; "": none. `step`: size of a command, in the unit of the response.

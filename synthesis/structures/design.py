@@ -211,6 +211,11 @@ def structured(
         No start leads to loops that are stable at all conditions; `reasons` say whether any
         controller does.
 
+    See Also
+    --------
+    synthesis.structures.TunableController : a structure with free gains
+    synthesis.hinf : least worst-case gain of one model
+
     References
     ----------
     Burke, Henrion, Lewis and Overton, IFAC Proceedings 39 (2006), for the problem; Lewis and

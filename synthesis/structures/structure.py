@@ -234,12 +234,12 @@ class TunableController:
 
     @property
     def measurements(self) -> tuple[Signal, ...]:
-        """What the controller reads."""
+        """Signals that the controller reads."""
         return tuple(s for s in self.frame.inputs if s not in self._names)
 
     @property
     def controls(self) -> tuple[Signal, ...]:
-        """What the controller commands."""
+        """Signals that the controller commands."""
         return tuple(s for s in self.frame.outputs if s not in self._names)
 
     @property

@@ -26,7 +26,7 @@ from synthesis.numerics.polynomial.matrix import PolynomialMatrix
 from synthesis.numerics.polynomial.regions import convert
 
 DEGREE = 3
-"""Of P between two knots of continuous time."""
+"""Degree of P between two knots of continuous time."""
 
 
 class Modes(NamedTuple):

@@ -46,7 +46,7 @@ FLAP_ERROR = 1.0
 
 @dataclass(frozen=True)
 class Choice:
-    """What a loop's controller is made of.
+    """Parts that a loop's controller is made of.
 
     gain: array (4, n) or (nodes, 4, n), a `LinearModel` or LPV controller from deviations to
     commands by name, or None, a regulator of the states `known` (None: the ten of the ideal

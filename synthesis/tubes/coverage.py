@@ -98,7 +98,7 @@ def coverage(tube: Tube, flight: FlightRecord) -> Coverage:
     """
     loop, plan = tube.deviations, flight.meta.get("plan")
     reference, heli = loop.reference, loop.model
-    if not (tube.proven and isinstance(reference, Reference) and isinstance(heli, Helicopter)):
+    if not (tube.verified and isinstance(reference, Reference) and isinstance(heli, Helicopter)):
         raise InputError("coverage needs a proven tube of a helicopter")
     if plan is None:
         raise InputError("the record has no plan: it must be that of a simulated flight")

@@ -45,7 +45,7 @@ class CommandCell:
 
     @property
     def ranges(self) -> tuple[tuple[float, float], ...]:
-        """Of s, a and the others."""
+        """Ranges of s, a and the others."""
         return (self.s, self.a, *self.others)
 
     @property
@@ -73,7 +73,7 @@ class Deviations:
 
     @property
     def name(self) -> str:
-        """Of the vehicle, or of the model's function."""
+        """Name of the vehicle, or of the model's function."""
         own = self.model
         if not isinstance(own, Helicopter):
             return own.name()
@@ -86,7 +86,7 @@ class Deviations:
 
     @property
     def hypotheses(self) -> tuple[str, ...]:
-        """What is modelled and assumed, in sentences."""
+        """Hypotheses of model and gusts, in sentences."""
         return self.reference.hypotheses(self.name, self.gust, self.states)
 
     @property

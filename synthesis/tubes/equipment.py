@@ -114,7 +114,7 @@ class LoopEquipment:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of all further states: of the controller, held commands, servos."""
+        """Names of all further states: of the controller, held commands, servos."""
         return (*self.states, *self.held, *(self.bank.names if self.bank else ()))
 
     @property

@@ -130,7 +130,7 @@ class Motions:
 
     @property
     def nodes(self) -> Array:
-        """Of the scheduling command; one, 0, where there is none."""
+        """Nodes of the scheduling command; one, 0, where there is none."""
         return np.zeros(1) if self.schedule is None else self.schedule
 
     @property
@@ -140,7 +140,7 @@ class Motions:
 
     @property
     def ranges(self) -> tuple[tuple[float, float], ...]:
-        """Of dp/dt and of the other commands."""
+        """Ranges of dp/dt and of the other commands."""
         return (self.rate, *((float(low), float(high)) for low, high in self.others))
 
     @property
@@ -154,7 +154,7 @@ class Motions:
         return (16,) + (4,) * len(self.ranges)
 
     def hypotheses(self, name: str, gust: float, states: tuple[str, ...] = ()) -> tuple[str, ...]:
-        """What a tube about them rests on, in sentences."""
+        """Hypotheses of a tube about them, in sentences."""
         limits = [f"[{low:g}, {high:g}]" for low, high in self.ranges]
         command = []
         if self.schedule is not None:
@@ -178,7 +178,7 @@ class Motions:
 
     @cached_property
     def data(self) -> Array:
-        """What `between` takes of each interval, (intervals, .)."""
+        """Data that `between` takes of each interval, (intervals, .)."""
         i = np.arange(self.intervals)
         ends = [i, i + (len(self.nodes) > 1)]
         p = np.stack([self.nodes[k] for k in ends], axis=1)

@@ -87,13 +87,15 @@ class Reference:
 
     @cached_property
     def nodes(self) -> Array:
-        """Of the scheduling command: the airspeeds, or the time since the last sample."""
+        """Nodes of the scheduling command: the airspeeds, or the time since the last sample."""
         own = self.equipment
         return np.linspace(0.0, own.period, own.parts + 1) if self.sampled else self.airspeeds
 
     @property
     def ranges(self) -> tuple[tuple[float, float], ...]:
-        """Of the commands that cells split besides the airspeed: the acceleration; 1 of a clock."""
+        """Ranges of the commands that cells split besides the airspeed: the acceleration; 1 of a
+        clock.
+        """
         return ((1.0, 1.0),) if self.sampled else ((-self.limits[0], self.limits[0]),)
 
     @cached_property
@@ -119,7 +121,7 @@ class Reference:
         return bool(held or (np.isinf(self.limits[2]) and with_jerk))
 
     def hypotheses(self, name: str, gust: float, states: tuple[str, ...] = ()) -> tuple[str, ...]:
-        """What a tube about it rests on, in sentences."""
+        """Hypotheses of a tube about it, in sentences."""
         p, (a, j, b) = self.airspeeds, self.limits
         command = f"the commanded airspeed is {p[0]:g} m/s"
         if len(p) > 1:
@@ -144,7 +146,7 @@ class Reference:
 
     @cached_property
     def data(self) -> Array:
-        """What `between` takes of each interval, (intervals, .)."""
+        """Data that `between` takes of each interval, (intervals, .)."""
         i = np.arange(self.intervals)
         ends = [0 * i, 0 * i] if self.sampled else [i, i + (len(self.airspeeds) > 1)]
         p = np.stack([self.airspeeds[i] for i in ends], axis=1)

@@ -19,6 +19,7 @@ from scipy.linalg import eigh, expm
 from symheli import Helicopter
 from symheli.errors import InputError
 from symheli.flight import Servo
+from symheli.lazy import former_attribute
 from symheli.progress import Task, task, tracked
 from symheli.values.summary import summarized
 from symheli.values.whole_files import write_text
@@ -75,7 +76,7 @@ INSIDE = 1 - 1e-6
 """Share of the enclosed deviations that the tube may fill, for rounding of the search."""
 UNDEFINED = "the reference is not defined for all commands, as the root of a negative number"
 TOLERANCE = 1e-6
-"""Of the semidefinite programs: the exact check decides."""
+"""Tolerance of the semidefinite programs: the exact check decides."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +98,7 @@ class Tube:
         The deviations e = factor z, |z| <= 1, over which the equations are enclosed.
     multipliers : tuple of Multipliers
         Of the matrix inequality of each cell; none where nothing was found.
-    proven : bool
+    verified : bool
         The inequality holds in exact arithmetic for every enclosed matrix.
     why : str
         Why there is no proof; empty where there is one.
@@ -114,7 +115,7 @@ class Tube:
     --------
     >>> import symheli
     >>> found = tube(symheli.Helicopter.load("xcell60", governor="ideal"), 3.0, gust=0.1)
-    >>> found.save("tube.json").name, Tube.load("tube.json").proven
+    >>> found.save("tube.json").name, Tube.load("tube.json").verified
     ('tube.json', True)
     """
 
@@ -123,15 +124,17 @@ class Tube:
     cells: tuple[CommandCell, ...]
     factors: Array
     multipliers: tuple[Multipliers, ...]
-    proven: bool
+    verified: bool
     why: str
     gains: tuple[LocalGain, ...] = ()
+
+    proven = former_attribute("proven", "verified")
 
     __repr__ = summarized
 
     @property
     def nodes(self) -> Array:
-        """Of the commanded airspeed, m/s, or of another scheduling command; one where it is
+        """Nodes of the commanded airspeed, m/s, or of another scheduling command; one where it is
         held.
         """
         return self.deviations.reference.nodes
@@ -160,7 +163,7 @@ class Tube:
 
     @property
     def hypotheses(self) -> tuple[str, ...]:
-        """What the statement rests on, in sentences."""
+        """Hypotheses of the statement, in sentences."""
         d = self.deviations
         travel = (
             "shown, not assumed: commands and blade pitch stay within their travel, servos below"
@@ -176,7 +179,7 @@ class Tube:
         sizes = ", ".join(f"{name} {width:.3g}" for name, width in named)
         inputs = zip(self.deviations.inputs, self.control_half_widths, strict=True)
         controls = ", ".join(f"{name} {width:.3g}" for name, width in inputs)
-        if not self.proven:
+        if not self.verified:
             return f"no tube: {self.why}"
         return "\n".join(
             [
@@ -224,7 +227,7 @@ class Tube:
         >>> print(f"{found.with_gain(['theta']).gains[0].gamma:.4f} rad/(m/s)")
         0.0043 rad/(m/s)
         """
-        if not self.proven:
+        if not self.verified:
             raise InputError(f"only a proven tube has gains; here {self.why}")
         if not self.deviations.gust > 0:
             raise InputError("a gain from gusts needs a tube in gusts: make it with gust > 0")
@@ -293,7 +296,7 @@ class Tube:
         """Write the tube as JSON: equations (the vehicle file, or the operations of the model),
         feedback and proof.
         """
-        if not self.proven:
+        if not self.verified:
             raise InputError(f"only a proven tube is saved; here {self.why}")
         content = {
             "schema": SCHEMA,
@@ -309,7 +312,7 @@ class Tube:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Tube:
-        """Read a tube and prove it again; `proven` says whether that succeeded."""
+        """Read a tube and prove it again; `verified` says whether that succeeded."""
         content = content_of(path, SCHEMA, VERSION, "a tube", "Tube.save")
         try:
             found = _read(content)
@@ -318,7 +321,7 @@ class Tube:
             raise InputError(f"{path}: {error}") from None
         except DAMAGED as error:
             raise InputError(f"{path}: damaged, a value is invalid or missing ({error})") from None
-        return replace(found, proven=not why, why=why)
+        return replace(found, verified=not why, why=why)
 
 
 def _read(content: dict[str, Any]) -> Tube:
@@ -412,7 +415,7 @@ def tube(
     Returns
     -------
     Tube
-        `proven` says whether there is one, `why` why not; a larger tube than that found may exist.
+        `verified` says whether there is one, `why` why not; a larger tube may exist.
 
     Raises
     ------
@@ -433,7 +436,7 @@ def tube(
     >>> import symheli
     >>> heli = symheli.Helicopter.load("xcell60", governor="ideal")
     >>> found = tube(heli, 3.0, gust=0.1)
-    >>> found.proven, bool(found.half_widths[0] < 0.02)
+    >>> found.verified, bool(found.half_widths[0] < 0.02)
     (True, True)
     """
     if not (np.isfinite(gust) and gust >= 0):
@@ -598,7 +601,7 @@ def _found(loop: Deviations, cells: tuple[CommandCell, ...], sizes: Array, solve
         return Tube(loop, P, cells, factors, (), False, why)
     made = Tube(loop, P, cells, factors, tuple(found.multipliers), True, "")
     why = made._refused(over)
-    return replace(made, proven=not why, why=why)
+    return replace(made, verified=not why, why=why)
 
 
 def _grown(

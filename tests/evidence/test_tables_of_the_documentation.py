@@ -146,7 +146,7 @@ def hover_of_the_r50():
 def tube_in_hover():
     airspeed, gust, _, attitude, *_ = KEPT["tubes.md", "amplitudes"].cells("xcell60")
     found = synthesis.tubes.tube(_xcell(), float(airspeed), gust=float(gust))
-    assert found.proven
+    assert found.verified
     assert attitude == " ".join(f"{w:.2g}" for w in found.half_widths[6:8])
 
 

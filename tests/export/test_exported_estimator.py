@@ -184,7 +184,7 @@ def test_the_command_writes_it(tmp_path, capsys):
         main(
             [
                 "export",
-                "estimator",
+                "identifier",
                 "--outputs",
                 "q,theta",
                 "--inputs",
@@ -200,5 +200,5 @@ def test_the_command_writes_it(tmp_path, capsys):
     assert (
         "#define ESTIMATOR_Y_q 0 /* rad/s */" in (tmp_path / "on board" / "estimator.h").read_text()
     )
-    assert main(["export", "estimator", "--outputs", "thta", "--out", str(tmp_path)]) == 1
+    assert main(["export", "identifier", "--outputs", "thta", "--out", str(tmp_path)]) == 1
     assert "did you mean 'theta'" in capsys.readouterr().err

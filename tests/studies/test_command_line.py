@@ -520,6 +520,28 @@ def test_a_misspelt_verb_or_option_gets_the_nearest_name(run, arguments, sentenc
     assert sentence in err
 
 
+@pytest.mark.parametrize(("old", "new"), cli.FORMER.items())
+def test_a_verb_of_the_last_release_still_works_and_names_the_new_one(run, old, new):
+    now, told = run(new, "--help"), f"symheli: note: symheli {old} is symheli {new} now"
+    status, out, err = run(old, "--help")
+    assert (status, out) == now[:2]
+    assert err.count("\n") == 1
+    assert err.startswith(told)
+    assert run(old, "--seedz", 1)[0] == run(new, "--seedz", 1)[0] == 2
+
+
+def test_export_estimator_is_export_identifier(run, tmp_path):
+    words = ("--outputs", "q", "--inputs", "d_lon", "--out")
+    assert run("export", "identifier", *words, tmp_path / "new")[2] == ""
+    status, out, err = run("export", *words, tmp_path / "old", "estimator")
+    assert status == 0
+    assert "estimator_check.c" in out
+    assert err.count("\n") == 1
+    assert "symheli export estimator is symheli export identifier now" in err
+    files = [sorted(p.name for p in (tmp_path / name).iterdir()) for name in ("new", "old")]
+    assert files[0] == files[1]
+
+
 def test_without_a_verb_the_verbs_are_shown(run):
     status, out, err = run()
     assert (status, out) == (2, "")

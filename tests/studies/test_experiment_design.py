@@ -105,7 +105,7 @@ def test_the_table_of_a_flight_is_what_was_flown(field):
 def test_the_flight_as_planned_is_enough_and_a_part_of_it_is_not(field, tmp_path, capsys):
     folder, record = field
     whole, plan = record.save(tmp_path / "whole.npz"), folder / "plan.json"
-    assert cli.main(["design", "--plan", str(plan), "--flown", str(whole)]) == 0
+    assert cli.main(["experiment", "--plan", str(plan), "--flown", str(whole)]) == 0
     told = capsys.readouterr().out
     assert told.startswith("this is enough\nstandard errors 1.00 times those planned")
     found = flyable.flown(plan, [record.split(0.4)[0]])
@@ -134,7 +134,7 @@ def test_records_and_plans_that_do_not_fit_are_refused_in_words(field, tmp_path)
         flyable.flown(plan, [record.decimate(2)])
     for content in ("{}", "no json", plan.read_text().replace('"version": 1', '"version": 9')):
         (tmp_path / "bad.json").write_text(content)
-        with pytest.raises(InputError, match=r"expected the plan\.json that symheli design"):
+        with pytest.raises(InputError, match=r"expected the plan\.json that symheli experiment"):
             flyable.flown(tmp_path / "bad.json", [record])
 
 

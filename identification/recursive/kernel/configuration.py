@@ -60,14 +60,14 @@ class Triangle:
 
     @cached_property
     def blocks(self) -> tuple[slice, ...]:
-        """Where each block of LANES rows lies, row after row."""
+        """Start of each block of LANES rows lies, row after row."""
         ends = np.cumsum(
             [LANES * (self.wide - start) for start in range(0, self.wide, LANES)]
         ).tolist()
         return tuple(slice(a, b) for a, b in zip([0, *ends[:-1]], ends, strict=True))
 
     def full(self, packed: Array) -> Array:
-        """As a square matrix (n + m, n + m)."""
+        """The whole as a square matrix (n + m, n + m)."""
         out = np.zeros((self.wide, self.wide), packed.dtype)
         for start, block in zip(range(0, self.wide, LANES), self.blocks, strict=True):
             out[start : start + LANES, start:] = packed[block].reshape(LANES, -1)
@@ -76,7 +76,7 @@ class Triangle:
 
 @dataclass(frozen=True)
 class GroupLayout:
-    """Where the parts of a group of n regressors and m outputs lie, `state` and `work` numbers
+    """Places of the parts of a group of n regressors and m outputs lie, `state` and `work` numbers
     after the start of the whole.
     """
 
@@ -88,7 +88,7 @@ class GroupLayout:
 
     @cached_property
     def triangle(self) -> Triangle:
-        """Of the regressors and the outputs."""
+        """Triangle of the regressors and the outputs."""
         return Triangle(self.n, self.m)
 
     @cached_property
@@ -224,7 +224,7 @@ class KernelConfiguration:
 
     @property
     def past(self) -> slice:
-        """Where the past lies in the state, newest sample first."""
+        """Place of the past in the state, newest sample first."""
         return slice(HEADER, HEADER + (self.structure.memory + 1) * self.width)
 
     @cached_property

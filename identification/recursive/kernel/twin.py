@@ -479,7 +479,7 @@ def evaluate(factor: Factor, p: Any) -> Array:
 
 
 def running_sums(v: Array) -> Array:
-    """Of LANES numbers, summed as in rls.c: neighbours first, then pairs, then fours."""
+    """Sums of LANES numbers, summed as in rls.c: neighbours first, then pairs, then fours."""
     for step in (1, 2, 4):
         v = v + np.append(np.zeros_like(v[:step]), v[:-step])
     return v

@@ -15,7 +15,8 @@ from symheli.values.arrays import frozen
 
 @dataclass(frozen=True)
 class BSpline(PiecewisePolynomial):
-    """B-splines between breakpoints, degree - 1 times continuously differentiable; their sum is 1.
+    """B-splines are piecewise polynomials between breakpoints, degree - 1 times continuously
+    differentiable; their sum is 1.
 
     Each differs from zero over at most degree + 1 intervals: what the data say of one speed stays
     there. Degree 1 is `PiecewiseLinear`; the end knots are repeated, so that the first and last
@@ -32,6 +33,10 @@ class BSpline(PiecewisePolynomial):
     ------
     InputError
         Another degree, or breakpoints that do not increase.
+
+    See Also
+    --------
+    symheli.lpv.CubicSpline, symheli.lpv.Polynomial
 
     References
     ----------

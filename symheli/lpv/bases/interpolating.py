@@ -49,13 +49,13 @@ class Cardinal(PiecewisePolynomial):
 
     @property
     def distinct_values(self) -> int:
-        """As many as there are nodes."""
+        """The number of nodes."""
         return self.size
 
 
 @dataclass(frozen=True)
 class PiecewiseLinear(Cardinal):
-    """Hat functions: straight lines between the nodes.
+    """Hat functions interpolate through the nodes by straight lines.
 
     Parameters
     ----------
@@ -66,6 +66,10 @@ class PiecewiseLinear(Cardinal):
     ------
     InputError
         Fewer nodes, or nodes that do not increase.
+
+    See Also
+    --------
+    symheli.lpv.CubicSpline, symheli.lpv.BSpline
 
     Examples
     --------
@@ -83,7 +87,8 @@ class PiecewiseLinear(Cardinal):
 
 @dataclass(frozen=True)
 class CubicSpline(Cardinal):
-    """Cubic splines through the nodes with not-a-knot ends (twice continuously differentiable).
+    """Cubic splines interpolate through the nodes, twice continuously differentiable, with
+    not-a-knot ends.
 
     Parameters
     ----------
@@ -94,6 +99,10 @@ class CubicSpline(Cardinal):
     ------
     InputError
         Fewer nodes, or nodes that do not increase.
+
+    See Also
+    --------
+    symheli.lpv.BSpline, symheli.lpv.PiecewiseLinear
 
     References
     ----------

@@ -24,7 +24,8 @@ MAX_LOST_DIGITS = 8.0
 
 @dataclass(frozen=True)
 class Polynomial(Basis):
-    """Polynomials of degree 0 .. `degree` in p, as Legendre polynomials orthonormal over a range.
+    """Legendre polynomials, orthonormal over a range, span the polynomials in p of degree 0 ..
+    `degree`.
 
     f_j(p) = sqrt(2 j + 1) P_j(x), x = (2 p - low - high)/(high - low): condition number of the
     Gramian over the range is 1, where raw monomials p^j on 0-13 m/s have 1e6 at degree 5.
@@ -40,6 +41,10 @@ class Polynomial(Basis):
     ------
     InputError
         A negative degree, or an empty range.
+
+    See Also
+    --------
+    symheli.lpv.BSpline, symheli.lpv.Product, symheli.lpv.UserFunctions
 
     Examples
     --------

@@ -19,8 +19,8 @@ from symheli.values.arrays import Array
 
 @dataclass(frozen=True)
 class Product(FunctionSpace):
-    """f_j(p) = f_{j1}(p_1) f_{j2}(p_2) ...: every product of functions of the factors, the last
-    factor running fastest.
+    """A product basis holds every product of functions of its factors, f_j(p) = f_{j1}(p_1)
+    f_{j2}(p_2) ..., the last factor running fastest.
 
     Products of bases orthonormal over their ranges are orthonormal over the box.
 
@@ -35,6 +35,10 @@ class Product(FunctionSpace):
     ------
     InputError
         Fewer than two factors, or a total degree that does not suit them.
+
+    See Also
+    --------
+    symheli.lpv.Polynomial, symheli.Scheduling
 
     Examples
     --------
@@ -86,7 +90,7 @@ class Product(FunctionSpace):
 
     @property
     def distinct_values(self) -> int:
-        """As many points as functions (in general position)."""
+        """The number of functions (in general position)."""
         return self.size
 
     @property

@@ -33,16 +33,16 @@ class Restricted(Basis):
 
     @property
     def size(self) -> int:
-        """That of the basis."""
+        """Size of the basis."""
         return self.basis.size
 
     @property
     def distinct_values(self) -> int:
-        """As many as there are functions."""
+        """The number of functions."""
         return self.size
 
     def constant(self) -> Array:
-        """That of the basis, which is 1 on every line."""
+        """Coefficients of the basis, which is 1 on every line."""
         return self.basis.constant()
 
     def points(self, s: Array) -> Array:

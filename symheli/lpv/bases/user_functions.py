@@ -27,8 +27,8 @@ rounding of what is fitted in that basis.
 
 @dataclass(frozen=True)
 class UserFunctions(Basis):
-    """f_j(p) = functions[j](p): any callables that take an array of p and return one of the same
-    shape.
+    """A basis of one's own is any list of callables, f_j(p) = functions[j](p), that take an array
+    of p and return one of the same shape.
 
     Columns are scaled where they are fitted, so the size of the functions does not matter; their
     independence does.
@@ -49,6 +49,11 @@ class UserFunctions(Basis):
     ------
     InputError
         A function does not return finite numbers over the range.
+
+    See Also
+    --------
+    symheli.lpv.Polynomial : orthonormal polynomials
+    symheli.lpv.BSpline : piecewise polynomials of any degree
 
     Examples
     --------
@@ -140,7 +145,7 @@ class UserFunctions(Basis):
 
     @property
     def distinct_values(self) -> int:
-        """As many as there are functions."""
+        """The number of functions."""
         return self.size
 
     def _values(self, p: Array, derivative: Any) -> Array:

@@ -28,9 +28,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class LFT(Operators, LFTMatrices):
-    """M(delta) = M22 + M21 Delta (I - M11 Delta)^-1 M12 = [A B; C D], Delta = diag(delta_i I_ni),
-    |delta_i| <= 1: the upper loop of a constant matrix with normalised scheduling parameters.
+    """A linear fractional transformation closes normalised scheduling parameters, |delta_i| <= 1,
+    around a constant matrix.
 
+    M(delta) = M22 + M21 Delta (I - M11 Delta)^-1 M12 = [A B; C D], Delta = diag(delta_i I_ni), and
     dx/dt = A x + B u, y = C x + D u, or x(k+1) = A x(k) + B u(k).
 
     Parameters
@@ -48,6 +49,11 @@ class LFT(Operators, LFTMatrices):
     ------
     InputError
         Shapes that do not fit, a parameter in two blocks, a period that is not positive.
+
+    See Also
+    --------
+    symheli.LPVStateSpace : matrices as functions of parameters
+    synthesis.lft_gain : gains for parameters that may jump
 
     References
     ----------

@@ -16,7 +16,7 @@ from symheli.values.arrays import Array
 SAMPLES = 12
 """Number of points of the box at which the parameter-dependent part is evaluated."""
 TOLERANCES = (1e-12, 1e-14)
-"""Of the reductions that are tried where nothing may be lost."""
+"""Tolerances of the reductions that are tried where nothing may be lost."""
 ROUNDING = 4 * np.finfo(float).eps
 """Relative change of an entry below which it is the same number."""
 LOSS = 64 * np.finfo(float).eps

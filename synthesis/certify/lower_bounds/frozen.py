@@ -55,6 +55,11 @@ def frozen_gain(
         `gain` (inf where a frozen model is unstable), `p` and `omega` (rad/s; then NaN) where it
         occurs.
 
+    See Also
+    --------
+    synthesis.lower_bound : the worst trajectory of p found
+    synthesis.l2_gain : worst-case gain while p moves
+
     References
     ----------
     Boyd and Balakrishnan, Systems and Control Letters 15 (1990); Bruinsma and Steinbuch, Systems

@@ -163,6 +163,11 @@ def lower_bound(
     InputError
         For a rate that is not >= 0.
 
+    See Also
+    --------
+    synthesis.l2_gain : worst-case gain while p moves
+    synthesis.frozen_gain : the worst frozen model
+
     References
     ----------
     Margaliot, "Stability analysis of switched systems using variational principles: an

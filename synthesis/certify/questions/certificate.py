@@ -13,6 +13,7 @@ import numpy as np
 
 from symheli import Scheduling
 from symheli.errors import CertificateError, InputError
+from symheli.lazy import former_attribute
 from symheli.values.summary import as_table, summarized
 from synthesis.certify.statement.kind import Kind
 from synthesis.certify.statement.outcome import Attempt, Seconds, Status
@@ -78,8 +79,8 @@ class Proof(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Certificate:
-    """A bound that holds for every p(t) within its range and rates, with its proof and its
-    hypotheses.
+    """A certificate is a bound that holds for every p(t) within its range and rates, with its proof
+    and its hypotheses.
 
     Made by `l2_gain`, `stability`, `decay_rate`, `energy_to_peak`, `h2_gain`, `lft_gain` and
     `lft_stability`.
@@ -134,6 +135,10 @@ class Certificate:
     CertificateError
         If two of its numbers contradict each other, or a verified certificate has no proof.
 
+    See Also
+    --------
+    synthesis.l2_gain, synthesis.stability, synthesis.decay_rate
+
     Examples
     --------
     >>> from symheli import LPVStateSpace, Scheduling
@@ -178,12 +183,12 @@ class Certificate:
         sign, moving = (-1.0, "upper bound") if self.kind == "decay rate" else (1.0, "lower bound")
         what = self.kind.split()[-1] if self.kind.endswith("gain") else self.kind
         # frozen and limit are computed to 1e-8, what is proven is loosened by 5e-7 at least
-        slack = 1e-6 * abs(self.proven) if math.isfinite(self.proven) else 0.0
+        slack = 1e-6 * abs(self.bound) if math.isfinite(self.bound) else 0.0
         for name, bound in ((f"frozen {what}", self.frozen), (moving, self.limit)):
-            if self.verified and sign * (bound - self.proven) > slack:
+            if self.verified and sign * (bound - self.bound) > slack:
                 raise CertificateError(
                     f"the {name} {bound:.9g} contradicts the certified {self.kind}"
-                    f" {self.proven:.9g}; one of the two is wrong"
+                    f" {self.bound:.9g}; one of the two is wrong"
                 )
         if sign * (self.frozen - self.limit) > 1e-9 * abs(self.frozen):
             raise CertificateError(
@@ -220,9 +225,11 @@ class Certificate:
         return None if self.proof is None else self.proof.lyapunov
 
     @property
-    def proven(self) -> float:
+    def bound(self) -> float:
         """`gamma` of a gain, `alpha` of a decay rate, NaN for stability."""
         return self.alpha if self.kind == "decay rate" else self.gamma
+
+    proven = former_attribute("proven", "bound")
 
     @property
     def limit(self) -> float:
@@ -260,7 +267,7 @@ class Certificate:
             return False
         try:
             with np.errstate(all="ignore"):
-                return (self.proof.exact if rigorous else self.proof.floating)(self.proven)
+                return (self.proof.exact if rigorous else self.proof.floating)(self.bound)
         except (np.linalg.LinAlgError, OverflowError, ValueError, ZeroDivisionError):
             # numbers too large or of no use to compute with show nothing
             return False
@@ -311,8 +318,8 @@ class Certificate:
             return f"a proof of the {self.kind} has no decay rate"
         if not self.kind.endswith("gain") and not math.isnan(self.gamma):
             return f"a proof of the {self.kind} has no gain"
-        if self.kind != "stability" and not 0 <= self.proven < math.inf:
-            return f"the bound of a {self.kind} must be a finite number >= 0, got {self.proven}"
+        if self.kind != "stability" and not 0 <= self.bound < math.inf:
+            return f"the bound of a {self.kind} must be a finite number >= 0, got {self.bound}"
         try:
             return self.proof.fault(self.kind, self.rates)
         except (TypeError, ValueError, AttributeError, LookupError, OverflowError) as error:

@@ -130,7 +130,7 @@ DAMAGED = (
     *(TypeError, ValueError, AttributeError, LookupError),
     *(ArithmeticError, RecursionError, np.linalg.LinAlgError),
 )
-"""What values of a damaged file raise."""
+"""Errors that values of a damaged file raise."""
 
 
 def content_of(

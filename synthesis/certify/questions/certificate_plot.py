@@ -22,7 +22,7 @@ def plot_certificate(certificate: Certificate, ax: Axes | None) -> Axes:
     bounds = {
         "frozen": (certificate.frozen, GREY),
         "attained": (certificate.limit, ORANGE),
-        "proven": (certificate.proven, BLUE),
+        "proven": (certificate.bound, BLUE),
     }
     for place, (name, (bound, colour)) in enumerate(bounds.items()):
         if math.isfinite(bound):
@@ -32,9 +32,9 @@ def plot_certificate(certificate: Certificate, ax: Axes | None) -> Axes:
             words = {"proven": "nothing proven"}.get(name, "none" if math.isnan(bound) else "grows")
             at = ax.get_xaxis_transform()
             ax.text(place, 0.5, words, transform=at, ha="center", color=colour)
-    if math.isfinite(certificate.limit) and math.isfinite(certificate.proven):
+    if math.isfinite(certificate.limit) and math.isfinite(certificate.bound):
         ax.axhspan(
-            *sorted((certificate.limit, certificate.proven)), color=ORANGE, alpha=0.15, linewidth=0
+            *sorted((certificate.limit, certificate.bound)), color=ORANGE, alpha=0.15, linewidth=0
         )
     rates = ", ".join(f"{rate:g}" for rate in certificate.rates)
     ax.set_xticks(range(len(bounds)), list(bounds))

@@ -13,7 +13,7 @@ from synthesis.numerics.program.lyapunov_program import MAX_STATES_GENERAL
 ABOVE_FROZEN = 1.05
 """Ratio of a proven gain to the worst frozen one beyond which P of a higher degree is tried."""
 DEGREE = 4
-"""Of that P in each parameter."""
+"""Degree of that P in each parameter."""
 MAX_ROWS = 6
 """Number of states and inputs up to which sums of squares in two parameters take seconds."""
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from symheli.lazy import former_attribute
 from symheli.values.labelled import frame
 from symheli.values.signal import Signal
 from symheli.values.summary import as_table, summarized
@@ -37,7 +38,7 @@ class GainCurve:
     lower : mapping
         {rate: gain along a computed trajectory}, which no bound can undercut; inf: the state grows
         there.
-    proven : mapping
+    bounds : mapping
         {form of the proof: {rate: gain}}, the least conservative form first; inf: nothing proven.
     jumping : mapping
         {test: gain} of the proofs that let the parameter jump; inf: nothing proven.
@@ -60,11 +61,13 @@ class GainCurve:
     unit: str
     frozen: float
     lower: Mapping[float, float]
-    proven: Mapping[str, Mapping[float, float]]
+    bounds: Mapping[str, Mapping[float, float]]
     jumping: Mapping[str, float]
     parameter: str = "airspeed"
     rate_unit: str = "m/s^2"
     certificates: Mapping[tuple[str, float], Certificate] = field(default_factory=dict)
+
+    proven = former_attribute("proven", "bounds")
 
     __repr__ = summarized
     _repr_html_ = as_table
@@ -114,7 +117,7 @@ class GainCurve:
         """Least gain proven at each rate, {rate: gain}: a proof for a larger rate holds for a
         smaller one.
         """
-        every = [(rate, gain) for gains in self.proven.values() for rate, gain in gains.items()]
+        every = [(rate, gain) for gains in self.bounds.values() for rate, gain in gains.items()]
         least = {
             rate: min(gain for r, gain in every if r >= rate)
             for rate in sorted({rate for rate, _ in every})
@@ -185,7 +188,7 @@ class GainCurve:
         column a form; units in attrs["units"], the frozen gain in attrs["frozen"]. Raises
         `InputError` without pandas.
         """
-        forms = {**self.proven, **{test: {math.inf: g} for test, g in self.jumping.items()}}
+        forms = {**self.bounds, **{test: {math.inf: g} for test, g in self.jumping.items()}}
         rates = sorted({r for gains in (self.lower, *forms.values()) for r in gains})
         columns = {"lower": self.lower, "proven": self.best, **forms}
         made = frame(

@@ -27,13 +27,13 @@ def plot_gain_curve(
     """See `GainCurve.plot`."""
     ax = axes_of(ax)
     rates = sorted(
-        {r for gains in (curve.lower, *curve.proven.values()) for r in gains if 0 < r < math.inf}
+        {r for gains in (curve.lower, *curve.bounds.values()) for r in gains if 0 < r < math.inf}
     )
     slow, fast = 0.4 * min([0.1, *rates]), 2.0 * max([6.0, *rates])
     place = {0.0: slow, math.inf: fast, **{r: r for r in rates}}
     shown = [
         g
-        for g in (curve.frozen, *_finite(curve.jumping, *curve.proven.values(), curve.lower))
+        for g in (curve.frozen, *_finite(curve.jumping, *curve.bounds.values(), curve.lower))
         if 0 < g < math.inf
     ]
     low, high = 0.6 * min(shown, default=1.0), 2.5 * max(shown, default=1.0)
@@ -56,7 +56,7 @@ def plot_gain_curve(
     if both:
         x, low_side, high_side = zip(*both, strict=True)
         ax.fill_between(x, low_side, high_side, color=ORANGE, alpha=0.15, linewidth=0)
-    for form, gains in curve.proven.items():
+    for form, gains in curve.bounds.items():
         points = sorted((place[r], g) for r, g in gains.items() if math.isfinite(g))
         if points:
             ax.plot(

@@ -86,6 +86,12 @@ def lft_gain(
     SolverError
         For a solver that is not installed.
 
+    See Also
+    --------
+    synthesis.l2_gain : worst-case gain while p moves
+    synthesis.analysis.lft_stability : stability of an LFT
+    synthesis.designs.lft_feedback : controllers for parameters that may jump
+
     References
     ----------
     Fan, Tits and Doyle, IEEE Trans. Automatic Control 36 (1991), D and G scalings; Scherer, "LPV

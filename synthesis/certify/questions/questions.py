@@ -67,6 +67,12 @@ def l2_gain(
     SolverError
         For a solver that is not installed.
 
+    See Also
+    --------
+    synthesis.lower_bound : the worst trajectory of p found
+    synthesis.analysis.gain_against_rate : the gain over permitted rates
+    synthesis.lft_gain : gains for parameters that may jump
+
     References
     ----------
     Wu, Yang, Packard and Becker, "Induced L2-norm control for LPV systems with bounded parameter
@@ -119,6 +125,11 @@ def stability(
     InputError, SolverError
         As of `l2_gain`.
 
+    See Also
+    --------
+    synthesis.decay_rate : how fast the free state decays
+    synthesis.analysis.lft_stability : stability of an LFT
+
     References
     ----------
     Boyd, El Ghaoui, Feron and Balakrishnan, "Linear Matrix Inequalities in System and Control
@@ -169,6 +180,11 @@ def decay_rate(
     ------
     InputError, SolverError
         As of `l2_gain`.
+
+    See Also
+    --------
+    synthesis.stability : whether the free state decays
+    synthesis.l2_gain : worst-case gain while p moves
 
     References
     ----------
@@ -271,6 +287,11 @@ def h2_gain(
     ------
     InputError, SolverError
         As of `l2_gain`.
+
+    See Also
+    --------
+    synthesis.l2_gain : worst-case gain while p moves
+    synthesis.analysis.energy_to_peak : peaks by the energy of the input
 
     References
     ----------

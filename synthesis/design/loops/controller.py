@@ -56,7 +56,8 @@ margin leave such a P enough digits for its verification.
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Controller:
-    """x' = A(p) x + B(p) y, u = C(p) x + D(p) y from the measurements of a plant to its controls.
+    """A controller computes the controls of a plant from its measurements: x' = A(p) x + B(p) y, u
+    = C(p) x + D(p) y.
 
     Attributes
     ----------
@@ -79,6 +80,12 @@ class Controller:
         Whether `certify` uses the adjoint of the loop.
     notes : tuple of str
         Reasons why the synthesis reached no lower gamma, or the controller no requested limit.
+
+    See Also
+    --------
+    synthesis.output_feedback : a controller of the order of the plant
+    synthesis.certify_sampled : the sampled loop as implemented
+    symheli.TableController : a controller to fly and to write in C
 
     Examples
     --------

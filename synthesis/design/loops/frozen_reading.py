@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 from symheli import LPVStateSpace
 from symheli.errors import InputError
+from symheli.lazy import former_attribute
 from symheli.lpv.linear_model import LinearModel
 from symheli.threads import with_one_thread
 from synthesis.certify.questions.questions import stability
@@ -24,12 +25,14 @@ accurate.
 
 
 class Largest(NamedTuple):
-    """Result of a bisection: `proven`, the largest value with a proof, 0 where even the least tried
+    """Result of a bisection: `bound`, the largest value with a proof, 0 where even the least tried
     had none; `failed`, the least without one, inf where all had one.
     """
 
-    proven: float
+    bound: float
     failed: float
+
+    proven = former_attribute("proven", "bound")
 
 
 def largest(
@@ -64,7 +67,7 @@ def largest(
     Examples
     --------
     >>> print(largest(lambda b: b < 0.3, 1.0, 0.1))
-    Largest(proven=0.25, failed=0.3125)
+    Largest(bound=0.25, failed=0.3125)
     """
     if not (most > 0 and tolerance > 0):
         raise InputError(f"expected most > 0 and tolerance > 0, got {most!r} and {tolerance!r}")
@@ -144,9 +147,9 @@ def proven_around(
         return stability(narrow.close(_within(frozen, narrow)), **options).verified
 
     down, up = at - s.low, s.high - at
-    below = largest(lambda d: proven(at - d, at), down, tolerance).proven if down > 0 else 0.0
+    below = largest(lambda d: proven(at - d, at), down, tolerance).bound if down > 0 else 0.0
     low = s.low if below == down else at - below
-    above = largest(lambda d: proven(low, at + d), up, tolerance).proven if up > 0 else 0.0
+    above = largest(lambda d: proven(low, at + d), up, tolerance).bound if up > 0 else 0.0
     return low, s.high if above == up else at + above
 
 

@@ -93,6 +93,11 @@ def margin_table(
     InputError, UnknownNameError
         As `loop`; another type of model.
 
+    See Also
+    --------
+    synthesis.margins : margins of a scalar loop
+    synthesis.specifications : a whole sheet of requirements
+
     Examples
     --------
     >>> from symheli import LPVStateSpace, Scheduling

@@ -172,6 +172,12 @@ def margins(loop: LinearModel) -> Margins:
     InputError
         For a loop of several channels.
 
+    See Also
+    --------
+    synthesis.disk_margin : margin of all channels at once
+    synthesis.margin_table : margins over the parameters
+    synthesis.analysis.open_loop : L opened at an input
+
     References
     ----------
     Seiler, Packard and Gahinet, "An introduction to disk margins", IEEE Control Systems Magazine 40
@@ -256,6 +262,11 @@ def disk_margin(loop: LinearModel) -> float:
     ------
     InputError
         For a loop that is not square.
+
+    See Also
+    --------
+    synthesis.margins : margins of a scalar loop
+    symheli.lpv.stability_margin : distance to the nearest plant that is lost
 
     References
     ----------

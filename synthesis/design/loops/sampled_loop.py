@@ -131,6 +131,11 @@ def certify_sampled(
     InputError
         A plant or a controller in continuous time, a fit whose performance is missed too.
 
+    See Also
+    --------
+    synthesis.l2_gain : worst-case gain while p moves
+    synthesis.Controller : what a design returns
+
     Examples
     --------
     >>> import synthesis

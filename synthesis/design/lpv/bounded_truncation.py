@@ -159,7 +159,7 @@ class _FullModel:
 
     @property
     def dual(self) -> _FullModel:
-        """Of the transposed model."""
+        """The transposed model."""
 
         def turned(p: Array) -> Sequence[Array]:
             A, B, C, D = (np.swapaxes(M, 1, 2) for M in self.matrices(p))

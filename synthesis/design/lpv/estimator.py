@@ -115,6 +115,11 @@ def estimator(
     InputError, SynthesisError
         As `output_feedback`.
 
+    See Also
+    --------
+    synthesis.output_feedback : a controller of the order of the plant
+    synthesis.lqg : the regulator on a Kalman filter
+
     References
     ----------
     The dual of Wu, Yang, Packard and Becker (1996), theorem 4.1.

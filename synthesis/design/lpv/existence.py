@@ -78,7 +78,9 @@ ROUNDING = 1e-8
 
 
 def imposed_at(divisions: int, impose: Grid | None) -> Divisions:
-    """Where the inequalities of a design are imposed; raises `InputError` for what is no `Grid`."""
+    """Points at which the inequalities of a design are imposed; raises `InputError` for what is no
+    `Grid`.
+    """
     if impose is not None and not isinstance(impose, Grid):
         raise InputError(
             f"impose: expected a Grid, or None for points where they are needed, got {impose!r:.60}"

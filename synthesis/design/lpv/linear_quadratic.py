@@ -40,7 +40,8 @@ def lqr(
     R: Weight | None = None,
     N: ArrayLike | None = None,
 ) -> Controller:
-    """Design u = F(p) x, F at every p from the Riccati equation of the frozen plant.
+    """Design a state feedback u = F(p) x, F at every p from the Riccati equation of the frozen
+    plant.
 
     States that are not measured, those of delays and servos among them, are computed in the
     controller by their own equations from the measured states and the commands; what disturbs them
@@ -72,6 +73,11 @@ def lqr(
     SynthesisError
         No stabilising solution at some p, states that cannot be computed by their own equations,
         or a frozen loop that is not stable; with reasons.
+
+    See Also
+    --------
+    synthesis.lqg : the regulator on a Kalman filter
+    synthesis.state_feedback : u = F(p) x by linear matrix inequalities
 
     References
     ----------
@@ -145,6 +151,12 @@ def lqg(
         without noise.
     SynthesisError
         No stabilising solution at some p, or a frozen loop that is not stable; with reasons.
+
+    See Also
+    --------
+    synthesis.lqr : state feedback by Riccati equations
+    synthesis.h2 : least variance of one model
+    synthesis.estimator : an observer with a bound of its error
 
     References
     ----------

@@ -113,6 +113,12 @@ def multiobjective(
     InputError, SynthesisError
         As `output_feedback`; also where the bounds contradict each other.
 
+    See Also
+    --------
+    synthesis.objectives.L2 : a gain as an objective
+    synthesis.objectives.H2 : a variance as an objective
+    synthesis.output_feedback : a controller of the order of the plant
+
     References
     ----------
     Scherer, Gahinet and Chilali, IEEE Trans. Automatic Control 42 (1997); with X(p) or Y(p):
@@ -210,7 +216,7 @@ class _Problem:
         # energies and variances are per unit of time
         self.pace = [1.0 if isinstance(o, L2) else math.sqrt(time) for o in objectives]
         self.sizes = [o.bound or 1.0 for o in objectives]
-        """Of the gains in the scaled loop: outputs are measured in them."""
+        """Sizes of the gains in the scaled loop: outputs are measured in them."""
         m, breaks = len(plant.parameters), self.scaled.breaks
         own = degrees_of(lambda p: list(self.scaled.at(p)), breaks)
         most = np.maximum(*(np.array(b.degrees or (4,) * m) for b in (X, Y)))

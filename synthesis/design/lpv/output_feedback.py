@@ -124,6 +124,12 @@ def output_feedback(
         There is no such controller, or none was found; `reasons` say which mode, direction or
         weight decides.
 
+    See Also
+    --------
+    synthesis.Plant : what a design takes
+    synthesis.certify_sampled : the sampled loop as implemented
+    synthesis.multiobjective : several objectives at once
+
     References
     ----------
     Wu, Yang, Packard and Becker, Int. J. Robust and Nonlinear Control 6 (1996); Apkarian and Adams,

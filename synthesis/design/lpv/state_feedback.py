@@ -70,6 +70,11 @@ def state_feedback(
     SynthesisError
         There is no such controller, or none was found; with reasons.
 
+    See Also
+    --------
+    synthesis.lqr : state feedback by Riccati equations
+    synthesis.output_feedback : a controller of the order of the plant
+
     References
     ----------
     Wu, Yang, Packard and Becker, Int. J. Robust and Nonlinear Control 6 (1996), theorem 4.1.

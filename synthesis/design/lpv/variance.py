@@ -183,7 +183,7 @@ class _Search:
 
     @property
     def unit(self) -> float:
-        """Of an H2 norm of the scaled plant: energies are per unit of time."""
+        """Unit of an H2 norm of the scaled plant: energies are per unit of time."""
         return self.scaled.channel / math.sqrt(self.scaled.time)
 
     def controllers(

@@ -83,6 +83,12 @@ def h2(
     UnknownNameError
         A signal that the model does not have.
 
+    See Also
+    --------
+    synthesis.lqg : the regulator on a Kalman filter
+    synthesis.hinf : least worst-case gain of one model
+    synthesis.h2_gain : variance in white noise
+
     References
     ----------
     Zhou, Doyle, Glover (1996), section 14.5; Chen and Francis (1995), Optimal Sampled-Data Control

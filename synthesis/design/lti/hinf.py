@@ -107,6 +107,12 @@ def hinf(
     UnknownNameError
         A signal that the model does not have.
 
+    See Also
+    --------
+    synthesis.h2 : least variance of one model
+    synthesis.output_feedback : a controller of the order of the plant
+    synthesis.designs.mixed_sensitivity : weights on S, KS and T
+
     References
     ----------
     Doyle, Glover, Khargonekar, Francis, IEEE Trans. Automatic Control 34 (1989); Zhou, Doyle,

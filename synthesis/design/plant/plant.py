@@ -41,7 +41,10 @@ measurement, and with a weight.
 
 @dataclass(frozen=True, eq=False)
 class Plant:
-    """dx/dt = A x + B1 w + B2 u, z = C1 x + D11 w + D12 u, y = C2 x + D21 w + D22 u; or sampled.
+    """A plant is the model that a controller is designed for, with disturbances, controls,
+    performance and measurements.
+
+    dx/dt = A x + B1 w + B2 u, z = C1 x + D11 w + D12 u, y = C2 x + D21 w + D22 u; or sampled.
 
     w are the disturbances, u the controls, z the performance and y the measurements; all matrices
     are functions of the scheduling parameters. Each method gives a new plant; in the order of the
@@ -68,6 +71,12 @@ class Plant:
         A model of another kind, an input that is disturbance and control, a name that repeats.
     UnknownNameError
         A signal that the model does not have.
+
+    See Also
+    --------
+    synthesis.output_feedback : a controller of the order of the plant
+    synthesis.Controller : what a design returns
+    symheli.LPVStateSpace : matrices as functions of parameters
 
     Examples
     --------

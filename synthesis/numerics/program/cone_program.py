@@ -39,7 +39,7 @@ LYAPUNOV = "LYAPUNOV"
 
 @dataclass(frozen=True)
 class Solver:
-    """Name of the solver, and its stopping criteria.
+    """A solver of semidefinite programs is a name with stopping criteria.
 
     Parameters
     ----------
@@ -60,6 +60,11 @@ class Solver:
         For a setting out of range, or one that the solver has no option for.
     SolverError
         For a solver that is not installed.
+
+    See Also
+    --------
+    synthesis.analysis.installed_solvers : solvers that can be named
+    synthesis.l2_gain : worst-case gain while p moves
 
     Examples
     --------

@@ -100,7 +100,7 @@ class Interval:
         return Interval(least, self.magnitude)
 
     def intersect(self, other: Interval) -> Interval:
-        """What lies in both, which must not be empty."""
+        """The part that lies in both, which must not be empty."""
         return Interval(np.maximum(self.lower, other.lower), np.minimum(self.upper, other.upper))
 
     def hull(self, other: Interval) -> Interval:

@@ -71,9 +71,9 @@ def test_a_stiff_model_has_the_same_bound_in_any_units(route, speeds, coupling, 
     assert bounds[1].verify(rigorous=True)
     # 3e-3: the decay rate is bisected to 2e-3 of its limit; a gain to the solver's gap, 1e-4 on the
     # stiffest
-    assert bounds[1].proven == pytest.approx(bounds[0].proven, rel=3e-3)
+    assert bounds[1].bound == pytest.approx(bounds[0].bound, rel=3e-3)
     if route in ("splines", "box", "lft"):
-        assert bounds[0].proven == pytest.approx(bounds[0].frozen, rel=1e-3)
+        assert bounds[0].bound == pytest.approx(bounds[0].frozen, rel=1e-3)
 
 
 @pytest.mark.slow(but="energy to peak-1")
@@ -104,7 +104,7 @@ def test_no_limit_on_the_rate_is_worse_than_none(route, lpv):
     slack = 5e-3 if route == "decay" else 2e-3
     sign = -1 if route == "decay" else 1
     assert all(
-        sign * (fast.proven - slow.proven) >= -slack * slow.proven for slow, fast in pairwise(certs)
+        sign * (fast.bound - slow.bound) >= -slack * slow.bound for slow, fast in pairwise(certs)
     )
 
 
@@ -168,7 +168,7 @@ def test_looking_harder_from_below_changes_nothing_above(route, lpv):
     harder = replace(QUICK, levels=6, dwells=7, nodes=40, evaluations=10, steps=80)
     certs = [ROUTES[route](lpv, 0.5, search) for search in (None, QUICK, harder)]
     assert certs[0].verified
-    assert [cert.proven for cert in certs] == [certs[0].proven] * 3
+    assert [cert.bound for cert in certs] == [certs[0].bound] * 3
 
 
 def test_growth_is_reported_whatever_was_proven_before():

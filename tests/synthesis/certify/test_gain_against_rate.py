@@ -41,7 +41,7 @@ def test_the_curve_is_that_of_the_single_gains(loop, curve):
     assert sorted(curve.lower) == [0.0, 0.2, 1.0, math.inf]
     for rate in (0.0, 0.2, 1.0):
         alone = synthesis.l2_gain(loop, rate, form=FORM, search=QUICK)
-        assert curve.proven["P(p)"][rate] == alone.gamma
+        assert curve.bounds["P(p)"][rate] == alone.gamma
         assert curve.lower[rate] == alone.lower
         assert curve.certificates["P(p)", rate].verified == alone.verified
     # p frozen at 0: 1/(s^2 + 0.4 s + 1) peaks at 1/(0.4 sqrt(1 - 0.04)); stiffer is lower
@@ -58,7 +58,7 @@ def test_bounds_are_in_order_and_grow_with_the_rate(curve):
 
 def test_a_rate_at_which_the_state_grows_has_no_proof(curve):
     assert curve.growing == 1.0
-    assert math.isinf(curve.proven["P(p)"][1.0])
+    assert math.isinf(curve.bounds["P(p)"][1.0])
     assert curve.fastest[0] == 0.2
     assert "at 1 1/s a computed history of stiffness makes the state grow" in curve.verdict()
 
@@ -69,7 +69,7 @@ def test_the_frame_holds_every_form(curve, pd):
     assert frame.index.name == "rate"
     assert frame.attrs["units"]["rate"] == "1/s"
     assert frame.attrs["frozen"] == curve.frozen
-    assert frame.loc[0.2, "P(p)"] == curve.proven["P(p)"][0.2]
+    assert frame.loc[0.2, "P(p)"] == curve.bounds["P(p)"][0.2]
     assert math.isnan(frame.loc[0.2, "LFT DG"])
 
 
@@ -83,7 +83,7 @@ def test_proofs_of_a_curve_travel(curve, tmp_path):
     cert = curve.certificates["P(p)", 0.2]
     back = synthesis.Certificate.load(cert.save(tmp_path / "proof.json"))
     assert back.verify(rigorous=True)
-    assert back.gamma == curve.proven["P(p)"][0.2]
+    assert back.gamma == curve.bounds["P(p)"][0.2]
 
 
 @pytest.mark.parametrize("rates", [[], [-1.0], [0.5, 0.5], [math.nan]])
@@ -112,7 +112,7 @@ def test_the_curve_is_drawn_on_the_axes_given(curve, ax):
     assert curve.plot(ax) is ax
     lines = {line.get_label(): np.asarray(line.get_ydata()) for line in ax.lines}
     np.testing.assert_array_equal(
-        lines["proven, P(p)"], [curve.proven["P(p)"][r] for r in (0.0, 0.2)]
+        lines["proven, P(p)"], [curve.bounds["P(p)"][r] for r in (0.0, 0.2)]
     )
     assert "worst trajectory of the linear model" in lines  # no flight
     assert "stiffness" in ax.get_xlabel()

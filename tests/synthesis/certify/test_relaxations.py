@@ -73,7 +73,7 @@ def test_a_scalar_system_of_two_parameters_has_its_closed_forms(kind, dt):
         assert cert.verified
         assert cert.verify(rigorous=True)
         # 5e-7 and more of loosening, the solver's gap, and the margin of the state block
-        assert cert.proven == pytest.approx(value, rel=2e-5)
+        assert cert.bound == pytest.approx(value, rel=2e-5)
         assert cert.frozen == pytest.approx(value, rel=1e-7)
     assert stability(model, **options).verify(rigorous=True)
 
@@ -237,7 +237,7 @@ def test_a_grid_is_never_a_proof(analysis):
     assert not cert.verify()
     assert not cert.verify(rigorous=True)
     if analysis is not stability:
-        assert math.isinf(cert.proven)
+        assert math.isinf(cert.bound)
         assert cert.indicative == pytest.approx(
             {l2_gain: 1, energy_to_peak: math.sqrt(0.5), decay_rate: 1}[analysis], rel=1e-3
         )
@@ -254,7 +254,7 @@ def test_exact_arithmetic_rejects_a_tampered_certificate(dt):
         assert cert.verify()
         assert cert.verify(rigorous=True)
         P = cert.lyapunov
-        better = cert.proven * (1.02 if analysis is decay_rate else 0.98)
+        better = cert.bound * (1.02 if analysis is decay_rate else 0.98)
         # neither the bound nor P can be moved: negative P, or a bound better than P admits
         for bad in (
             replace(

@@ -133,7 +133,7 @@ def test_junk_anywhere_is_an_error_or_a_failed_proof(form, data, tmp_path_factor
     assert cert.rates == own.rates
     ranges = [[(s.low, s.high) for s in c.proof.evidence.parameters] for c in (cert, own)]
     assert ranges[0] == ranges[1]
-    assert cert.proven >= own.proven * (1 - 1e-2) or own.kind in ("stability", "decay rate")
+    assert cert.bound >= own.bound * (1 - 1e-2) or own.kind in ("stability", "decay rate")
 
 
 @pytest.mark.parametrize("form", ["spline", "box", "decay", "energy to peak", "lft, DG"])

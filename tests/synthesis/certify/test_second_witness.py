@@ -187,7 +187,7 @@ def test_the_witness_of_the_decay_and_of_higher_degrees_looks_too(monkeypatch):
     for cert in (decay, quartic, memory):
         assert cert.verify(rigorous=True)
         judge, P = cert.proof
-        assert judge.checked_independently(P, cert.proven, verify.rational())
+        assert judge.checked_independently(P, cert.bound, verify.rational())
         # the same P against a model that grows: without proof and pieces the witness must see it
         lpv = judge.model.source if cert is decay else judge.lpv
         grows = replace(
@@ -200,4 +200,4 @@ def test_the_witness_of_the_decay_and_of_higher_degrees_looks_too(monkeypatch):
                 if cert is decay
                 else judge._replace(lpv=grows)
             )
-            assert not other.checked_independently(P, cert.proven, verify.rational())
+            assert not other.checked_independently(P, cert.bound, verify.rational())

@@ -41,10 +41,10 @@ def test_every_certificate_answers_the_same_questions(analysis):
         cert.kind
     )
     if exact is None:
-        assert all(map(math.isnan, (cert.proven, cert.limit, cert.frozen, cert.gap)))
+        assert all(map(math.isnan, (cert.bound, cert.limit, cert.frozen, cert.gap)))
     else:
         # 3e-3: the decay rate is found by bisection to 2e-3, gains are loosened by 1e-6 or so
-        assert (cert.proven, cert.limit, cert.frozen) == pytest.approx([exact] * 3, rel=3e-3)
+        assert (cert.bound, cert.limit, cert.frozen) == pytest.approx([exact] * 3, rel=3e-3)
         assert 1.0 <= cert.gap < 1.003
     faster = math.inf if "lft" in analysis else 1.0
     assert cert.rates == (faster,)
@@ -78,9 +78,9 @@ def test_no_certificate_can_be_made_out_of_order(analysis):
     # beyond what a frozen model or a trajectory shows, and a trajectory better than the frozen
     # model it began with
     for change, said in (
-        ({"frozen": worse * cert.proven}, "the frozen"),
-        ({limit: worse * cert.proven}, "bound"),
-        ({proven: cert.proven / worse}, "contradicts the certified"),
+        ({"frozen": worse * cert.bound}, "the frozen"),
+        ({limit: worse * cert.bound}, "bound"),
+        ({proven: cert.bound / worse}, "contradicts the certified"),
         ({limit: cert.limit / worse}, "is inconsistent with the frozen"),
     ):
         with pytest.raises(CertificateError, match=said):

@@ -345,9 +345,9 @@ def test_bisection_ends_on_both_sides_of_the_truth(truth):
         return value <= truth
 
     found = largest(proves, 3.0, 0.01)
-    assert found.proven <= truth < found.failed
-    assert found.failed - found.proven <= 0.03
-    assert found.proven in asked
+    assert found.bound <= truth < found.failed
+    assert found.failed - found.bound <= 0.03
+    assert found.bound in asked
 
 
 def test_bisection_refuses_what_is_not_positive():

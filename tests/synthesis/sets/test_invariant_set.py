@@ -34,7 +34,7 @@ CART = linear([[0, 1], [0, 0]], [0, 1], ["x", "v"], ["u"])
 @pytest.mark.parametrize(("a", "b"), [(1.0, 2.0), (3.0, 0.5), (0.01, 1.0)])
 def test_of_an_unstable_lag_with_a_saturated_input_it_is_the_whole_controllable_set(a, b):
     found = invariant_set(linear([[a]], [b], ["x"], ["u"]), input_bounds={"u": 1.0})
-    assert found.proven
+    assert found.verified
     # |x| < b/a; the solver's tolerance and the spare of the inequalities are 1e-7
     assert b / a * (1 - 1e-5) < found.half_widths()[0] < b / a
     assert found.used()["u"] == pytest.approx(1, rel=1e-5)
@@ -46,7 +46,7 @@ def test_of_a_sampled_lag_with_a_disturbance_it_is_the_closed_form():
         model, state_bounds={"x": 3.0}, input_bounds={"u": 0.2}, disturbance={"w": 1.0}
     )
     # 1.2 X - .4 + .1 = X; alpha is on a grid of sqrt(2), which takes .1 %
-    assert found.proven
+    assert found.verified
     assert 1.5 * (1 - 2e-3) < found.half_widths()[0] < 1.5
 
 
@@ -59,7 +59,7 @@ def test_a_double_integrator_has_the_set_of_an_independent_program(u_max):
     bound = cvxpy.bmat([[Q, Y.T], [Y, np.array([[u_max**2]])]])
     limits = [motion + motion.T << 0, bound >> 0, Q[0, 0] <= 4, Q[1, 1] <= 1]
     cvxpy.Problem(cvxpy.Maximize(cvxpy.log_det(Q)), limits).solve(solver="CLARABEL")
-    assert found.proven
+    assert found.verified
     # areas: the log det of cvxpy is exact to its tolerance of 1e-8
     assert found.volume() == pytest.approx(math.pi * np.sqrt(np.linalg.det(Q.value)), rel=1e-5)
 
@@ -137,7 +137,7 @@ def furthest(found, count, steps, dt, seed=0):
 @pytest.fixture(scope="module")
 def random_set():
     found = invariant_set(random_plant(0), **LIMITS, alpha=1.0)
-    assert found.proven, found.why
+    assert found.verified, found.why
     return found
 
 
@@ -162,7 +162,7 @@ def test_a_larger_disturbance_drives_it_out(random_set):
 @pytest.mark.parametrize("seed", [1])
 def test_no_motion_of_other_random_plants_leaves_their_sets(seed, dt):
     found = invariant_set(random_plant(seed, dt), **LIMITS)
-    assert found.proven, found.why
+    assert found.verified, found.why
     most, used = furthest(found, 200, 300, 1e-3)
     assert most < 1 + 1e-5
     assert used < 1 + 1e-5
@@ -177,7 +177,7 @@ def test_of_a_given_law_the_set_is_that_of_an_independent_program():
     A = CART.A + CART.B @ K
     limits = [A @ Q + Q @ A.T << 0, Q[0, 0] <= 4, Q[1, 1] <= 1, K @ Q @ K.T <= 1]
     cvxpy.Problem(cvxpy.Maximize(cvxpy.log_det(Q)), limits).solve(solver="CLARABEL")
-    assert found.proven
+    assert found.verified
     assert found.volume() == pytest.approx(math.pi * np.sqrt(np.linalg.det(Q.value)), rel=1e-5)
     np.testing.assert_array_equal(found.gain(), K)
 
@@ -189,11 +189,11 @@ def test_what_holds_at_the_ends_of_the_range_only_is_not_proven():
         scheduling=Scheduling("p", "1", 0.0, 1.0, rate=0.0), states=["x"], inputs=[], outputs=["y"],
     )  # fmt: skip
     found = invariant_set(model, state_bounds={"x": 1.0})
-    assert not found.proven
+    assert not found.verified
     assert "no set" in found.why
     narrow = model.with_scheduling(Scheduling("p", "1", 0.0, 0.1, rate=0.0))
     stable = invariant_set(narrow, state_bounds={"x": 1.0})
-    assert stable.proven
+    assert stable.verified
     assert not replace(stable, statement=replace(stable.statement, model=model)).verify()
 
 
@@ -210,7 +210,7 @@ def test_a_law_in_pieces_over_p_is_proven_piece_by_piece():
         np.zeros((3, 1, 0)), gains, (p,), (), ("x",), ("u",),
     )  # fmt: skip
     found = invariant_set(model, controller=law, input_bounds={"u": 1.0})
-    assert found.proven
+    assert found.verified
     assert found.half_widths(0.5)[0] == pytest.approx(1 / 2.5, rel=1e-5)  # |K x| <= 1 at p = 1
 
 
@@ -236,14 +236,14 @@ def test_a_forged_set_is_not_proven(random_set, tmp_path, forgery):
     content = json.loads(path.read_text())
     FORGED[forgery](content)
     path.write_text(json.dumps(content))
-    assert not InvariantSet.load(path).proven
+    assert not InvariantSet.load(path).verified
 
 
 @pytest.mark.guard
 def test_a_saved_set_is_proven_again_from_its_file(random_set, tmp_path, capsys):
     path = random_set.save(tmp_path / "set.json")
     again = InvariantSet.load(path)
-    assert again.proven
+    assert again.verified
     np.testing.assert_array_equal(again.shape.A, random_set.shape.A)
     assert main(["verify", str(path)]) == 0
     assert "invariant ellipsoid, proven for every p" in capsys.readouterr().out
@@ -359,7 +359,7 @@ def test_wrong_arguments_are_refused(options, told):
 
 def test_a_set_without_a_bound_says_so():
     found = invariant_set(CART, input_bounds={"u": 1.0})
-    assert not found.proven
+    assert not found.verified
     assert "limit more states" in found.why
     with pytest.raises(InputError, match="limit more states"):
         found.save("never.json")

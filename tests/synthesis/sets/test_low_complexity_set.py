@@ -28,7 +28,7 @@ BOX = {"x0": 1.0, "x1": 1.0}
 
 def test_where_the_limits_themselves_are_invariant_they_are_found():
     found = low_complexity_set(autonomous([[0.5, 0.4], [-0.3, 0.6]]), state_bounds=BOX)
-    assert found.proven
+    assert found.verified
     # the search leaves 1e-9 of every sum, and ends where steps of 1e-4 no longer help
     assert found.volume == pytest.approx(4.0, rel=1e-3)
 
@@ -39,7 +39,7 @@ def test_a_spiral_has_one_where_the_sum_of_its_parts_is_below_one(angle, there):
     r = 0.78
     turn = r * np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     assert (r * (np.cos(angle) + np.sin(angle)) < 1) == there
-    assert low_complexity_set(autonomous(turn), state_bounds=BOX).proven == there
+    assert low_complexity_set(autonomous(turn), state_bounds=BOX).verified == there
 
 
 def test_of_a_lag_with_a_disturbance_it_is_the_closed_form():
@@ -49,8 +49,8 @@ def test_of_a_lag_with_a_disturbance_it_is_the_closed_form():
     assert low_complexity_set(lag, state_bounds={"x": 1.0}, **loud).half_widths[0] == pytest.approx(
         1.0, rel=1e-6
     )
-    assert low_complexity_set(lag, state_bounds={"x": 0.21}, **loud).proven
-    assert not low_complexity_set(lag, state_bounds={"x": 0.19}, **loud).proven
+    assert low_complexity_set(lag, state_bounds={"x": 0.21}, **loud).verified
+    assert not low_complexity_set(lag, state_bounds={"x": 0.19}, **loud).verified
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +71,7 @@ def scheduled():
         input_bounds={"u": 0.5},
         disturbance={"w": 0.5},
     )
-    assert found.proven, found.why
+    assert found.verified, found.why
     return found
 
 
@@ -97,7 +97,7 @@ def test_no_motion_leaves_it_and_a_larger_one_is_not_proven(scheduled):
 
 def test_a_saved_set_is_proven_again_from_its_file(scheduled, tmp_path, capsys):
     path = scheduled.save(tmp_path / "set.json")
-    assert LowComplexitySet.load(path).proven
+    assert LowComplexitySet.load(path).verified
     assert main(["verify", str(path)]) == 0
     assert "invariant parallelepiped, proven for every p" in capsys.readouterr().out
     with pytest.raises(InputError, match="expected InvariantSet"):
@@ -105,7 +105,7 @@ def test_a_saved_set_is_proven_again_from_its_file(scheduled, tmp_path, capsys):
     content = json.loads(path.read_text())
     content["disturbance"] = [["w", 5.0]]
     path.write_text(json.dumps(content))
-    assert not LowComplexitySet.load(path).proven
+    assert not LowComplexitySet.load(path).verified
     assert main(["verify", str(path)]) == 1
 
 
@@ -129,7 +129,7 @@ def test_limits_that_see_no_state_say_so():
         controller=[[0.0]],
         input_bounds={"u": 1.0},
     )
-    assert not found.proven
+    assert not found.verified
     assert "limit a state" in found.why
 
 

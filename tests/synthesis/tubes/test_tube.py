@@ -31,7 +31,7 @@ from synthesis.tubes.tube import _covers
 @pytest.fixture(scope="module")
 def proven():
     found = tube(Helicopter.load("xcell60", governor="ideal"), 0.0, gust=0.5)
-    assert found.proven, found.why
+    assert found.verified, found.why
     return found
 
 
@@ -51,7 +51,7 @@ def test_the_worst_gust_found_fills_a_good_part_of_the_tube(proven):
 def test_a_saved_tube_is_proven_again_from_its_file(proven, tmp_path, capsys):
     path = proven.save(tmp_path / "tube.json")
     again = Tube.load(path)
-    assert again.proven
+    assert again.verified
     np.testing.assert_array_equal(again.P, proven.P)
     assert main(["verify", str(path)]) == 0
     assert "invariant tube of the nonlinear equations" in capsys.readouterr().out
@@ -74,7 +74,7 @@ def test_a_forged_tube_of_a_helicopter_is_not_proven(proven, tmp_path, forgery):
     content = json.loads(path.read_text())
     FORGED_FLIGHT[forgery](content)
     path.write_text(json.dumps(content))
-    assert not Tube.load(path).proven
+    assert not Tube.load(path).verified
     assert main(["verify", str(path)]) == 1
 
 
@@ -99,12 +99,12 @@ def test_a_damaged_file_of_a_helicopter_is_refused(proven, tmp_path, damage):
 def test_where_there_is_no_tube_it_says_why(tmp_path):
     model, about = _pendulum()
     large = tube(model, about, gust=5.0, sizes=(0.2, 0.3))
-    assert not large.proven
+    assert not large.verified
     assert "no tube" in str(large)
     with pytest.raises(InputError, match="only a proven tube"):
         large.save(tmp_path / "none.json")
     falls = tube(*_pendulum(gain=(0.0, 0.0)), gust=0.1, sizes=(0.2, 0.3))
-    assert not falls.proven
+    assert not falls.verified
 
 
 def test_wrong_arguments_are_refused():
@@ -353,7 +353,7 @@ def _pendulum(reference=None, gain=(-3.0, -2.0), **about):
 def upright():
     model, about = _pendulum()
     found = tube(model, about, gust=0.2, sizes=(0.2, 0.3))
-    assert found.proven, found.why
+    assert found.verified, found.why
     return found.with_gain(["x0"]).with_gain(["x0"], energy=False)
 
 
@@ -370,7 +370,7 @@ def swinging():
         pieces=(2, 1),
     )
     found = tube(model, about, gust=0.2, sizes=(0.2, 0.3))
-    assert found.proven, found.why
+    assert found.verified, found.why
     return found
 
 
@@ -378,7 +378,7 @@ def swinging():
 def test_a_saved_tube_about_moving_references_is_proven_again(swinging, tmp_path, capsys):
     path = swinging.save(tmp_path / "tube.json")
     again = Tube.load(path)
-    assert again.proven
+    assert again.verified
     np.testing.assert_array_equal(again.P, swinging.P)
     assert main(["verify", str(path)]) == 0
     assert "invariant tube of the nonlinear equations" in capsys.readouterr().out
@@ -413,7 +413,7 @@ def test_a_forged_tube_is_not_proven(swinging, tmp_path, forgery):
     content = json.loads(path.read_text())
     FORGED[forgery](content)
     path.write_text(json.dumps(content))
-    assert not Tube.load(path).proven
+    assert not Tube.load(path).verified
     assert main(["verify", str(path)]) == 1
 
 
@@ -443,7 +443,7 @@ def test_a_damaged_file_is_refused(swinging, tmp_path, damage):
 @pytest.mark.guard
 def test_a_tube_of_any_model_and_its_gains_are_proven_again_from_the_file(upright, tmp_path):
     again = Tube.load(upright.save(tmp_path / "tube.json"))
-    assert again.proven
+    assert again.verified
     assert [gain.gamma for gain in again.gains] == [gain.gamma for gain in upright.gains]
     assert again.hypotheses == upright.hypotheses
 
@@ -470,7 +470,7 @@ def test_a_forged_gain_is_not_proven(upright, tmp_path, forgery):
     content = json.loads(path.read_text())
     forgery(content)
     path.write_text(json.dumps(content))
-    assert not Tube.load(path).proven
+    assert not Tube.load(path).verified
 
 
 @pytest.mark.guard
@@ -518,8 +518,8 @@ def test_a_reference_that_does_not_exist_for_all_commands_has_no_tube(moving):
         low: tube(line, Motions(root, [[-3, -2]], others=[[low, 0.5]]), gust=0.1, sizes=[0.2, 0.3])
         for low in (-0.5, 0.1)
     }
-    assert found[0.1].proven
-    assert not found[-0.5].proven
+    assert found[0.1].verified
+    assert not found[-0.5].verified
     assert "reference is not defined" in found[-0.5].why
 
 
@@ -600,7 +600,7 @@ def test_a_reference_that_misses_the_equations_moves_the_tube():
     model, about = _pendulum(drifting)
     found = tube(model, about, gust=0.2, sizes=(0.2, 0.3))
     _, exact = _pendulum()
-    assert found.proven
+    assert found.verified
     # .02 of an acceleration are a tenth of the gust
     assert (
         found.half_widths[0] > 1.05 * tube(model, exact, gust=0.2, sizes=(0.2, 0.3)).half_widths[0]
@@ -611,7 +611,7 @@ def test_a_reference_that_misses_the_equations_moves_the_tube():
 @pytest.mark.parametrize("case", [c for c in VTOL if not c.bank], ids=lambda c: c.motions)
 def test_the_planar_vtol_stays_within_less_than_the_published_tube(case):
     found = vtol_tube(case)
-    assert found.proven, found.why
+    assert found.verified, found.why
     position, control = sizes(found)
     assert position < 0.5713518919661784  # compute_tubes.m, lambda 1.2
     assert control < 0.5687971228165479

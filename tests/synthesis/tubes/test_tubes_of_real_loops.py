@@ -248,7 +248,7 @@ def test_the_first_hypothesis_that_a_flight_breaks_is_named(at_3):
         flight = symheli.fly(heli, schedule, **{"controller": law, "dt": PERIOD, **options})
         assert coverage(given, flight).fails == words
     with pytest.raises(InputError, match="proven"):
-        coverage(replace(given, proven=False), flight)
+        coverage(replace(given, verified=False), flight)
 
 
 # --- whole tubes --------------------------------------------------------------------------------
@@ -257,15 +257,15 @@ def test_the_first_hypothesis_that_a_flight_breaks_is_named(at_3):
 @pytest.fixture(scope="module")
 def sampled(at_3):
     found = tube(at_3[0], 3.0, gust=0.2, period=PERIOD)
-    assert found.proven, found.why
+    assert found.verified, found.why
     return found
 
 
 @pytest.mark.slow
 def test_a_governed_helicopter_with_an_observer_stays_in_its_tube(tmp_path):
     found = tube(Helicopter.load("xcell60"), 3.0, gust=0.2, known=EIGHT)
-    assert found.proven, found.why
-    assert Tube.load(found.save(tmp_path / "tube.json")).proven
+    assert found.verified, found.why
+    assert Tube.load(found.save(tmp_path / "tube.json")).verified
     assert "the governor and engine" in str(found)
     assert "2 states of its own" in str(found)
     assert from_its_border(found, 100, 1.0) < 1 + 1e-6  # that of the integration
@@ -282,7 +282,7 @@ def test_no_flight_of_the_sampled_loop_leaves_its_tube(sampled):
 def test_a_sampled_tube_is_proven_again_and_its_forgeries_are_not(sampled, tmp_path):
     path = sampled.save(tmp_path / "tube.json")
     again = Tube.load(path)
-    assert again.proven
+    assert again.verified
     assert again.hypotheses == sampled.hypotheses
     whole = path.read_text()
     for forge in (
@@ -295,7 +295,7 @@ def test_a_sampled_tube_is_proven_again_and_its_forgeries_are_not(sampled, tmp_p
         content = json.loads(whole)
         forge(content)
         path.write_text(json.dumps(content))
-        assert not Tube.load(path).proven
+        assert not Tube.load(path).verified
     with pytest.raises(InputError, match="sampled"):
         sampled.with_gain(["theta"])
 
@@ -304,7 +304,7 @@ def test_a_sampled_tube_is_proven_again_and_its_forgeries_are_not(sampled, tmp_p
 def test_flights_of_the_package_are_covered_and_stay_inside(at_3):
     heli, x, u, *_ = at_3
     sampled = tube(heli, 3.0, gust=0.05, gain=flown_law(heli, x, u), period=PERIOD)
-    assert sampled.proven, sampled.why
+    assert sampled.verified, sampled.why
     calm = symheli.AirspeedSchedule((3.0,), (1.0,), (3.0,), lead=0.1, start=3.0)
     schedule = {"dt": PERIOD, "controller": flown_law(heli, x, u)}
     flight = symheli.fly(heli, calm, **schedule)

@@ -1,4 +1,4 @@
-"""Options of `symheli export estimator`: which model an autopilot shall identify in flight."""
+"""Options of `symheli export identifier`: which model an autopilot shall identify in flight."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 ARGUMENTS = (
     group(
-        "estimator",
+        "identifier",
         "C code that identifies the coefficients over airspeed in flight",
         option(
             "--outputs",

@@ -1,4 +1,4 @@
-"""symheli pays: where a scheduled model beats a constant one, on flights in wind and noise."""
+"""symheli compare: scheduled models beside constant ones, on flights in wind and noise."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from studies.commands.options import ON_A_RUNNER, VEHICLE, count, kept_on_a_runn
 from studies.output import Output
 
 HELP = (
-    "where scheduling pays: LPV beside LTI on transitions in wind and noise, two inputs and all"
-    " inputs"
+    "compare scheduled with constant models (LPV beside LTI) on transitions in wind and noise, two"
+    " inputs and all inputs: where scheduling pays"
 )
 
 ARGUMENTS = (

@@ -1,4 +1,4 @@
-"""Command symheli design: the most informative excitation and transition, within limits."""
+"""symheli experiment: the most informative excitation and transition, within limits."""
 
 from __future__ import annotations
 
