@@ -41,7 +41,7 @@ def l2_gain(
     rate : float, sequence or mapping, optional
         Largest |dp/dt| in units of p per second: one for all parameters, one each, or by name; by
         default the model's own. math.inf: p may jump, and P is constant; 0: every frozen model.
-    form : Spline, Memory, HigherOrder or FunctionSpace, optional
+    form : Spline, LaggedParameter, HigherOrder or FunctionSpace, optional
         The form of the Lyapunov function. Functions of one's own, a `FunctionSpace`, are for
         `impose=Grid(n)` in continuous time, where nothing is proven.
     impose : Bernstein, SumOfSquares, Vertices or Grid, optional
