@@ -90,13 +90,13 @@ def pose(
     usual = form is None and impose is None and solver is None
     form, impose = form or Spline(), impose or Bernstein()
     if not isinstance(form, Spline | LaggedParameter | HigherOrder):
-        raise InputError(f"form must be a Spline, Memory or HigherOrder, got {form!r:.60}")
+        raise InputError(f"form must be a Spline, LaggedParameter or HigherOrder, got {form!r:.60}")
     if not isinstance(impose, Bernstein | SumOfSquares | Vertices | Grid):
         raise InputError(
             f"impose must be Bernstein, SumOfSquares, Vertices or Grid, got {impose!r:.60}"
         )
     if search is not None and not isinstance(search, LowerBoundSearch):
-        raise InputError(f"search must be a Search, or None for none, got {search!r:.60}")
+        raise InputError(f"search must be a LowerBoundSearch or None, got {search!r:.60}")
     uncertain = model if isinstance(model, UncertainStateSpace) else None
     model = _accepted(model)
     moving = limits(model.parameters, rate)
@@ -203,7 +203,7 @@ def _check_options(problem: BoundProblem) -> None:
         if problem.gains and isinstance(form, HigherOrder):
             raise InputError(
                 "HigherOrder proves stability only: a V of that degree does not balance energies;"
-                " for a gain use Memory"
+                " for a gain use LaggedParameter"
             )
     if kind == "stability" and form.accept is not None:
         raise InputError("accept compares bounds, and stability has none: leave it out")

@@ -41,7 +41,7 @@ def l2_gain(
     rate : float, sequence or mapping, optional
         Largest |dp/dt| in units of p per second: one for all parameters, one each, or by name; by
         default the model's own. math.inf: p may jump, and P is constant; 0: every frozen model.
-    form : Spline, Memory, HigherOrder or FunctionSpace, optional
+    form : Spline, LaggedParameter, HigherOrder or FunctionSpace, optional
         The form of the Lyapunov function. Functions of one's own, a `FunctionSpace`, are for
         `impose=Grid(n)` in continuous time, where nothing is proven.
     impose : Bernstein, SumOfSquares, Vertices or Grid, optional
@@ -49,7 +49,7 @@ def l2_gain(
     solver : Solver or str, optional
         Which solver, and when it stops; by default Clarabel, for a `Spline` in one parameter and
         more than 9 states this package's own, "LYAPUNOV".
-    search : Search or None
+    search : LowerBoundSearch or None
         How hard to look for bad trajectories; with None the
         worst frozen gain is the lower bound.
 
