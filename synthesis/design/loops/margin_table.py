@@ -77,7 +77,8 @@ def margin_table(
     model : LPVStateSpace, LFT, LinearFamily or LinearModel
         The plant.
     feedback : mapping, LinearModel or LPVStateSpace
-        As of `open_loop`; of an LPVStateSpace over the parameters of the plant the frozen controller.
+        As of `open_loop`; of an LPVStateSpace over the parameters of the plant the frozen
+        controller.
     at : str
         The input at which the loop is broken.
     p : array_like, optional
