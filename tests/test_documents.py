@@ -11,9 +11,11 @@ import sys
 import executed
 import notebook
 import numpy as np
+import public_faces
 import pytest
 import reference
 from executed import DOCS, PageError, check, difference, write
+from public_faces import TOP
 
 from studies import cli
 
@@ -342,3 +344,14 @@ def test_the_page_of_names_lists_every_public_name_once(package):
     section = page.split(f"\n## {package}\n")[1].split("\n## ")[0]
     named = re.findall(r"`(\w+)`", section)
     assert sorted(named) == sorted(importlib.import_module(package).__all__)
+
+
+def test_the_page_of_names_lists_every_name_one_level_lower():
+    page = (DOCS / "names.md").read_text(encoding="utf-8")
+    section = page.split("\n## One level lower\n")[1].split("\n## ")[0]
+    rows = re.findall(r"^\| `([\w.]+)` \| (.*) \|$", section, flags=re.MULTILINE)
+    listed = {face: set(re.findall(r"`(\w+)`", names)) for face, names in rows}
+    lower = set(public_faces.faces((*TOP, "symheli.lpv")))
+    assert listed.keys() == lower - {*TOP, "symheli.lpv"}
+    for face, names in listed.items():
+        assert names == set(public_faces.names(face)), face

@@ -25,7 +25,7 @@ class Recursion(Method):
     ----------
     forgetting : float or Forgetting
         A factor in (0, 1] (the weight of a sample is the factor to the power of its age), or one of
-        `Constant`, `Variable`, `Directional`.
+        `Constant`, `Variable`, `Directional` of `identification.forgetting`.
 
     Raises
     ------

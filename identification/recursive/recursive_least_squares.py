@@ -61,7 +61,7 @@ class RecursiveLeastSquares:
         increments of u v w p q r have beyond the kinematics.
     forgetting : float or Forgetting
         A factor l in (0, 1] (a sample k steps old has the weight l^k), or one of `Constant`,
-        `Variable`, `Directional`.
+        `Variable`, `Directional` of `identification.forgetting`.
     floor : float, optional
         That of `Constant`, for a factor.
     precision : {"double", "single"}

@@ -10,14 +10,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-INK, BLUE, ORANGE, GREEN, RED, GREY = (
-    "#1b1f24",
-    "#0b61a4",
-    "#d9730d",
-    "#2e7d32",
-    "#b3261e",
-    "#8a949e",
-)
+INK, BLUE, ORANGE = "#1b1f24", "#0b61a4", "#d9730d"
+GREEN, RED, GREY = "#2e7d32", "#b3261e", "#8a949e"
 LINE, SHADE, GRID = BLUE, "#eceff1", "#e6e9ec"
 
 

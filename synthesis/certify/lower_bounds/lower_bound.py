@@ -150,7 +150,7 @@ def lower_bound(
         Largest |dp/dt|, units of p per second; by default the model's own, math.inf: p may jump.
     frozen : FrozenGain, optional
         Where it is known already.
-    search : Search or None
+    search : LowerBoundSearch or None
         How hard to look; with None, or rate 0, the frozen gain is the bound.
 
     Returns

@@ -303,10 +303,7 @@ def _remembering(
             drift = PolynomialMatrix.constant(np.array([[nu]]), here.box) - lead - steeper * nu
             corner = _scaled(drift, here.derivative(1))
             side = model[1] * 0
-            yield (
-                _scaled(height, F) + block([[corner, side], [side.T, side.T @ side]]),
-                height,
-            )
+            yield (_scaled(height, F) + block([[corner, side], [side.T, side.T @ side]]), height)
 
 
 def _scaled(f: PolynomialMatrix, F: PolynomialMatrix) -> PolynomialMatrix:

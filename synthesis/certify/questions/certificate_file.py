@@ -20,14 +20,7 @@ from typing import Any
 import numpy as np
 
 from symheli.errors import CertificateError, InputError
-from symheli.lpv.bases import (
-    BSpline,
-    CubicSpline,
-    Patches,
-    PiecewiseLinear,
-    Polynomial,
-    Product,
-)
+from symheli.lpv.bases import BSpline, CubicSpline, Patches, PiecewiseLinear, Polynomial, Product
 from symheli.lpv.lft_matrices import Block, LFTMatrices
 from symheli.lpv.lpv_matrices import LPVMatrices
 from symheli.lpv.scheduling import Scheduling

@@ -68,7 +68,7 @@ def lft_gain(
         "small gain", "D", "DG" or "full block", from the most conservative to the least.
     solver : Solver or str
         Which solver, and when it stops.
-    search : Search or None
+    search : LowerBoundSearch or None
         How hard to look for bad trajectories; None: not at all.
 
     Returns
@@ -127,7 +127,7 @@ def lft_stability(
         "small gain", "D", "DG" or "full block", from the most conservative to the least.
     solver : Solver or str
         Which solver, and when it stops.
-    search : Search or None
+    search : LowerBoundSearch or None
         How hard to look for bad trajectories; None: not at all.
 
     Returns

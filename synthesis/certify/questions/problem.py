@@ -96,7 +96,7 @@ def pose(
             f"impose must be Bernstein, SumOfSquares, Vertices or Grid, got {impose!r:.60}"
         )
     if search is not None and not isinstance(search, LowerBoundSearch):
-        raise InputError(f"search must be a LowerBoundSearch, or None for none, got {search!r:.60}")
+        raise InputError(f"search must be a LowerBoundSearch or None, got {search!r:.60}")
     uncertain = model if isinstance(model, UncertainStateSpace) else None
     model = _accepted(model)
     moving = limits(model.parameters, rate)

@@ -49,7 +49,7 @@ def l2_gain(
     solver : Solver or str, optional
         Which solver, and when it stops; by default Clarabel, for a `Spline` in one parameter and
         more than 9 states this package's own, "LYAPUNOV".
-    search : Search or None
+    search : LowerBoundSearch or None
         How hard to look for bad trajectories; with None the
         worst frozen gain is the lower bound.
 

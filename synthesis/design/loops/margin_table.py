@@ -77,7 +77,8 @@ def margin_table(
     model : LPVStateSpace, LFT, LinearFamily or LinearModel
         The plant.
     feedback : mapping, LinearModel or LPVStateSpace
-        As of `loop`; of an LPVStateSpace over the parameters of the plant the frozen controller.
+        As of `open_loop`; of an LPVStateSpace over the parameters of the plant the frozen
+        controller.
     at : str
         The input at which the loop is broken.
     p : array_like, optional
@@ -91,7 +92,7 @@ def margin_table(
     Raises
     ------
     InputError, UnknownNameError
-        As `loop`; another type of model.
+        As `open_loop`; another type of model.
 
     See Also
     --------

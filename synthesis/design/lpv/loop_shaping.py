@@ -47,14 +47,14 @@ def loop_shaping(
     impose: Grid | None = None,
 ) -> LoopShaping:
     """Design the scheduled controller of the least gain [K; I] (I - W2 G W1 K)^-1 [I, W2 G W1] of a
-    plant shaped by weights: `output_feedback` of the problem that `ncf` solves at one p.
+    plant shaped by weights: `output_feedback` of the problem that `ncfsyn` solves at one p.
 
     Parameters
     ----------
     G : LPVStateSpace
         The plant, continuous or sampled.
     W1, W2 : weight or LPVStateSpace
-        Before and behind it, as for `ncf`; also over the same parameters.
+        Before and behind it, as for `ncfsyn`; also over the same parameters.
     rate, X, Y, back_off, impose
         As for `output_feedback`.
 
@@ -66,7 +66,7 @@ def loop_shaping(
     Raises
     ------
     InputError
-        Another kind of model; weights as for `ncf`; otherwise as `output_feedback`.
+        Another kind of model; weights as for `ncfsyn`; otherwise as `output_feedback`.
     SynthesisError
         As `output_feedback`.
 
@@ -120,7 +120,7 @@ def _weight(
 
 
 def _four_block(G: LPVStateSpace) -> Plant:
-    """Return the plant of `ncf` over p: from noise on y and a disturbance of u to u and y."""
+    """Return the plant of `ncfsyn` over p: from noise on y and a disturbance of u to u and y."""
     noise = {Signal(f"{y}_noise", y.unit): y for y in G.outputs}
     disturbance = {Signal(f"{u}_disturbance", u.unit): u for u in G.inputs}
     inputs = {

@@ -114,7 +114,7 @@ def output_feedback(
     Returns
     -------
     Controller
-        Its `gamma` is what the inequalities promise; `certify` proves what the controller does.
+        `promised` is the gain of its inequalities; `certify` proves what the controller does.
 
     Raises
     ------
