@@ -23,7 +23,6 @@ from evidence import (
     r50,
     specs,
     structured,
-    tube_gains,
 )
 from evidence.flown import campaign, designs
 from evidence.flown import tuning as sizes
@@ -35,8 +34,6 @@ from evidence.planar_vtol import tubes as planar_vtol
 from evidence.public_files import fetched
 from evidence.reach.measured import gains
 from evidence.tables import DOCS
-from evidence.tube_terms import HELD_AGAINST, held_against, remainders
-from evidence.tubes import VEHICLES
 from studies.controllers.designs import LQR, design, lqr_schedule
 from studies.controllers.flown import WINDS
 from studies.controllers.plant import baseline, flown_plant
@@ -148,27 +145,6 @@ def tube_in_hover():
     found = synthesis.tubes.tube(_xcell(), float(airspeed), gust=float(gust))
     assert found.verified
     assert attitude == " ".join(f"{w:.2g}" for w in found.half_widths[6:8])
-
-
-def remainder_of_one_cell():
-    *_, row = remainders(VEHICLES[0], [3.0]).splitlines()
-    shown = KEPT["tubes.md", "remainders"].cells("3 to 4")
-    assert shown == [cell.strip() for cell in row.strip("| ").split("|")][1:]
-
-
-def terms_of_one_interval():
-    low, gust = HELD_AGAINST[0]
-    *_, row = held_against(VEHICLES[0], [(low, gust)]).splitlines()
-    shown = KEPT["tubes.md", "terms"].cells(f"{low:g} to {low + 1:g}")
-    assert shown == [cell.strip() for cell in row.strip("| ").split("|")][1:]
-
-
-def gains_on_one_tube():
-    airspeed, output, _, _, proven, flown = KEPT["tubes.md", "gains"].cells("xcell60")
-    found = synthesis.tubes.tube(_xcell(), float(airspeed), gust=tube_gains.GUST)
-    gain = found.with_gain([output.split(",")[0]]).gains[0]
-    assert same(proven, gain.gamma, rel=1e-3)  # the solver stops at 1e-6 of a cost
-    assert float(flown) < gain.gamma
 
 
 def tube_of_the_planar_vtol():
@@ -329,9 +305,6 @@ ROWS = {
     ("structured.md", "static output feedback"): static_output_feedback_of_one_helicopter,
     ("vehicles.md", "r50"): hover_of_the_r50,
     ("tubes.md", "amplitudes"): tube_in_hover,
-    ("tubes.md", "remainders"): remainder_of_one_cell,
-    ("tubes.md", "terms"): terms_of_one_interval,
-    ("tubes.md", "gains"): gains_on_one_tube,
     ("tubes.md", "vtol"): tube_of_the_planar_vtol,
     ("identify.md", "public logs"): one_public_log,
     ("identified.md", "xcell60 under real conditions"): flight_with_servos_of_the_worst_seed,
@@ -351,6 +324,9 @@ DEAR = {
     ("gains.md", "interpolated"),
     ("sets.md", "jumps"),
     ("structured.md", "gain table"),
+    ("tubes.md", "remainders"),
+    ("tubes.md", "terms"),
+    ("tubes.md", "gains"),
     ("tubes.md", "governed"),
     ("tubes.md", "loops"),
     ("tubes.md", "transitions"),
