@@ -220,7 +220,7 @@ MUTANTS = (
         "symheli/records/shifted.py",
         "extrapolate=False)(time + by)",
         "extrapolate=False)(time - by)",
-        "tests/identification/test_between_record_and_rotor.py",
+        "tests/records/test_flight_record.py",
     ),
     Mutant(
         "a moving trim drives the model the wrong way",

@@ -2,15 +2,22 @@
 `l2_gain`.
 
     python -m evidence.size
+    python -m evidence.size --walk     the way of a model through static calls, today and before
 """
 
 from __future__ import annotations
 
+import argparse
 import ast
 import importlib
+import subprocess
 import sys
+import tempfile
 from collections import Counter
 from pathlib import Path
+
+from evidence.house import House
+from evidence.walk import Walk
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("symheli", "identification", "synthesis", "studies")
@@ -41,7 +48,7 @@ def repeated() -> list[str]:
     return sorted(name for name, times in found.items() if times > 1)
 
 
-def entered() -> list[str]:
+def entered_at_run_time() -> list[str]:
     """Modules in which `l2_gain` of a model with one parameter hands the model itself to a
     function.
     """
@@ -69,8 +76,41 @@ def entered() -> list[str]:
     return sorted(seen)
 
 
+QUESTIONS = ("synthesis/certify/questions/questions.py", "synthesis/analysis/questions.py")
+"""Where `l2_gain` stands, and where it stood."""
+BEFORE = "3fea9f6d"
+"""The last commit before the rooms of synthesis had floors."""
+
+
+def walked(root: Path) -> dict[str, list[str]]:
+    """Return the modules that `model` of `l2_gain` enters by static calls, in a tree of sources."""
+    path = next(path for path in QUESTIONS if (root / path).exists())
+    start = path.removesuffix(".py").replace("/", "."), "l2_gain"
+    return Walk(House(root)).follow(start, "model")
+
+
+def walk() -> None:
+    """Print the way of a model through static calls, today and at `BEFORE`."""
+    with tempfile.TemporaryDirectory() as folder:
+        archive = subprocess.run(
+            ["git", "archive", BEFORE, *PACKAGES], cwd=ROOT, capture_output=True, check=True
+        ).stdout
+        subprocess.run(["tar", "-x", "-C", folder], input=archive, check=True)
+        before = walked(Path(folder))
+    for when, entered in ((BEFORE, before), ("today", walked(ROOT))):
+        print(f"{when}: a model enters {len(entered)} modules in l2_gain by static calls")
+        for module, functions in sorted(entered.items()):
+            print(f"  {module}: {', '.join(functions)}")
+    print(f"at run time, of one parameter, today: {len(entered_at_run_time())} modules")
+
+
 def main() -> None:
     """Print the counts."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--walk", action="store_true", help="the way of a model through l2_gain")
+    if parser.parse_args().walk:
+        walk()
+        return
     print(f"{'':16}{'files':>8}{'lines':>8}{'classes':>9}")
     for group in (PACKAGES, BESIDE):
         rows = [counted(folder) for folder in group]
@@ -83,7 +123,7 @@ def main() -> None:
     print(", ".join(f"{package} {len(public)}" for package, public in names.items()), end=": ")
     print(len(set().union(*names.values())), "different public names")
     print("class names in two files or more:", ", ".join(repeated()))
-    modules = entered()
+    modules = entered_at_run_time()
     print(f"a model passes through {len(modules)} modules in l2_gain: {', '.join(modules)}")
 
 

@@ -36,8 +36,8 @@ class Operators:
     __slots__ = ()
 
     if TYPE_CHECKING:
-        inputs: Any
-        outputs: Any
+        inputs: tuple[Signal, ...]
+        outputs: tuple[Signal, ...]
         parameters: Any
         select: Any
 

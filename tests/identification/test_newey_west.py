@@ -20,7 +20,7 @@ def test_it_is_the_sum_of_tapered_products_however_the_rows_come(cuts):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("flights", [8, pytest.param(40, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("flights", [8])
 def test_instruments_know_the_scatter_of_their_coefficients(flights):
     """Flights with noisy sensors: the errors, in standard errors, have the size of one."""
     vehicle, sensors = Vehicle(na=1, nb=1), np.array([0.02] * 3 + [0.005] * 3 + [0.002] * 2)

@@ -174,21 +174,21 @@ def test_directional_forgetting_is_its_information_in_fifty_digits(experiment, w
 
 
 @pytest.mark.slow
-@settings(max_examples=2000, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(experiments(), st.sampled_from(["all", "constant", "no floor", "variable"]))
 def test_the_same_on_records_nobody_chose(experiment, way):
     compare(*experiment, WAYS[way], checks=8)
 
 
 @pytest.mark.slow
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(experiments(small=True), st.sampled_from(["directional", "directional, loud or not"]))
 def test_directional_forgetting_on_records_nobody_chose(experiment, way):
     compare(*experiment, WAYS[way], checks=4)
 
 
 @pytest.mark.slow
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=40, deadline=None, derandomize=True)
 @given(experiments())
 def test_batch_and_recursion_call_the_same_records_determined(experiment):
     """From both sides of the limit: steps of p of 1e-12 to 1 of its range."""

@@ -10,6 +10,7 @@ import pytest
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.records import FlightRecord, decimate, low_pass, split
+from symheli.records.shifted import shifted
 
 
 def record(time=None, **columns):
@@ -276,3 +277,12 @@ def test_irregular_samples_are_brought_to_one_step_with_an_error_of_second_order
     error = np.abs(regular["q"] - np.sin(3 * regular.time)).max()
     bound = 9 * (1.4 * step) ** 2 / 8
     assert 0.3 * bound < error <= bound  # it is that large: the longest steps meet the crests
+
+
+def test_a_late_signal_is_put_where_it_belongs():
+    t = 0.02 * np.arange(200)
+    late = FlightRecord.from_arrays(t, {"q": "rad/s"}, q=np.sin(t - 0.07))
+    mended = shifted(late, {"q": 0.07})["q"]
+    # what comes after the record is not known; a cubic spline of steps of .02 s: 1e-9
+    assert np.isnan(mended[-4:]).any()
+    np.testing.assert_allclose(mended[:-4], np.sin(t)[:-4], atol=1e-6)

@@ -143,10 +143,10 @@ class Pieces(NamedTuple):
     """A model of one or several parameters, polynomial between the `breaks` of each (most have none
     inside their range).
 
-    `source` is the model as it was given.
+    `source` is the model as it was given: an `LPVStateSpace`, of a file its `LPVMatrices`.
     """
 
-    source: LPVMatrices
+    source: Any
     parameters: tuple[Scheduling, ...]
     breaks: tuple[tuple[float, ...], ...]
     models: dict[tuple[int, ...], tuple[PolynomialMatrix, ...]]

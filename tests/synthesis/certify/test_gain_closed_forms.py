@@ -162,10 +162,8 @@ def test_stability_needs_no_channels():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("sampled", [False, True])
-def test_the_lateral_loop_is_proven_with_the_default_options_and_bracketed(sampled):
-    lpv = lateral().discretize(0.02) if sampled else lateral()
-    cert = l2_gain(lpv, 1.0)
+def test_the_lateral_loop_is_proven_with_the_default_options_and_bracketed():
+    cert = l2_gain(lateral(), 1.0)
     assert cert.verified
     assert cert.frozen < cert.lower < cert.gamma < 3.0
     assert cert.verify(rigorous=True)

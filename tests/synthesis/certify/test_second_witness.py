@@ -22,6 +22,8 @@ from synthesis.forms import HigherOrder, LaggedParameter, Spline
 from synthesis.impose import SumOfSquares
 from synthesis.numerics.polynomial import pieces, regions
 
+pytestmark = pytest.mark.guard
+
 COARSE = Spline(segments=4, degree=2, grading=1.0)
 BOX = {"form": Spline(segments=4, degree=2, grading=1.0), "impose": SumOfSquares()}
 
@@ -131,17 +133,16 @@ def no_feedthrough(lpv):
     return replace(lpv, D=0 * lpv.D)
 
 
-LONG = (("perturb a weight", "box"), ("drop strips", "box"))
-"""Two analyses of one solver, of which "energy to peak" is the richer."""
+REPEATED = {
+    *(("perturb a weight", "box"), ("drop strips", "box")),
+    *(("perturb a weight", "variance"), ("drop strips", "variance")),
+}
+"""Analyses of one solver, of which "energy to peak" is the richer."""
 
 
-@pytest.mark.slow(but="drop cells-energy to peak")
 @pytest.mark.parametrize(
     ("case", "analysis"),
-    [
-        pytest.param(*pair, marks=pytest.mark.slow if pair in LONG else ())
-        for pair in product(CASES, ANALYSES)
-    ],
+    [pair for pair in product(CASES, ANALYSES) if pair not in REPEATED],
 )
 def test_an_error_shared_by_assembly_and_proof_is_found(case, analysis, monkeypatch):
     mutate, model = CASES[case]
@@ -174,7 +175,6 @@ def test_an_error_shared_by_assembly_and_proof_is_found(case, analysis, monkeypa
     assert not cert.verify(rigorous=True)
 
 
-@pytest.mark.slow
 def test_the_witness_of_the_decay_and_of_higher_degrees_looks_too(monkeypatch):
     decay = decay_rate(spring(damping=0.4), 0.2, **BOX, search=None)
     quartic = stability(spring(damping=0.4), 0.2, form=HigherOrder(2, segments=2), search=None)

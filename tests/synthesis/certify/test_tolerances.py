@@ -67,13 +67,11 @@ def listed():
     return out
 
 
-@pytest.mark.slow
 def test_every_tolerance_is_on_the_page():
     missing = {at: line for at, line in found().items() if at not in listed()}
     assert not missing, f"argue these in {PAGE.name}: {missing}"
 
 
-@pytest.mark.slow
 def test_the_page_lists_nothing_that_is_gone():
     rows = listed()
     assert len(set(rows)) == len(rows)

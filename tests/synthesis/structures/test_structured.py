@@ -7,7 +7,6 @@ import signal
 
 import numpy as np
 import pytest
-from published_plants import wu_1996
 from scheduled_plants import spring
 
 from symheli import LinearModel, Scheduling
@@ -203,19 +202,6 @@ def test_specifications_are_ratios_to_their_bounds_and_each_has_its_controller()
         proof = own.certify(search=None)
         assert proof.gamma == pytest.approx(own.promised, rel=1e-3)
     assert "largest gains of the specifications" in str(made)
-
-
-@pytest.mark.slow
-def test_a_published_scheduled_plant_is_stabilised_over_its_whole_range():
-    """Wu, Yang, Packard and Becker (1996): two unstable states turned by an angle against their
-    actuators; static gains in a basis of five functions, frozen and at a slow rate.
-    """
-    plant = wu_1996(0.1, half=1.0)
-    basis = Polynomial(4, -1.0, 1.0)
-    made = structured(plant, TunableController.pid(plant, basis=basis), starts=4, decay=0.05)
-    assert made.structure.numbers == 20
-    assert made.optimum <= made.promised * 1.001
-    assert made.certify(0.1, search=None).verified
 
 
 # --- the structure -------------------------------------------------------------------------------

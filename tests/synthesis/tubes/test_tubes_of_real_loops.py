@@ -262,17 +262,6 @@ def sampled(at_3):
 
 
 @pytest.mark.slow
-def test_a_governed_helicopter_with_an_observer_stays_in_its_tube(tmp_path):
-    found = tube(Helicopter.load("xcell60"), 3.0, gust=0.2, known=EIGHT)
-    assert found.verified, found.why
-    assert Tube.load(found.save(tmp_path / "tube.json")).verified
-    assert "the governor and engine" in str(found)
-    assert "2 states of its own" in str(found)
-    assert from_its_border(found, 100, 1.0) < 1 + 1e-6  # that of the integration
-    assert 0.4 < worst(found) < 1
-
-
-@pytest.mark.slow
 def test_no_flight_of_the_sampled_loop_leaves_its_tube(sampled):
     assert from_its_border(sampled, 100, 1.0) < 1 + 1e-6  # that of the integration
     assert 0.4 < worst(sampled) < 1
