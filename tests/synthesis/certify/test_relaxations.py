@@ -12,24 +12,12 @@ from test_never_call_unstable_stable import unstable
 
 from symheli import LFT, LPVStateSpace, Scheduling
 from symheli.errors import CertificateError, InputError, UnknownNameError
-from symheli.lpv import LFT, LPVStateSpace, Scheduling
-from synthesis import (
-    Bernstein,
-    Grid,
-    Memory,
-    Solver,
-    Spline,
-    Status,
-    SumOfSquares,
-    Vertices,
-    decay_rate,
-    generalized_h2,
-    installed_solvers,
-    l2_gain,
-    stability,
-)
-from synthesis.polynomial.pieces import pieces
-from synthesis.proof.inequalities import Demand
+from synthesis import Solver, decay_rate, l2_gain, stability
+from synthesis.analysis import Status, energy_to_peak, installed_solvers
+from synthesis.certify.statement.demand import Demand
+from synthesis.forms import LaggedParameter, Spline
+from synthesis.impose import Bernstein, Grid, SumOfSquares, Vertices
+from synthesis.numerics.polynomial.pieces import pieces
 
 PROOFS = {"bernstein": Bernstein(), "sos": SumOfSquares(), "vertices": Vertices()}
 QUICK = Spline(degree=1)
