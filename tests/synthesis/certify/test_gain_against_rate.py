@@ -31,7 +31,7 @@ def loop():
 
 @pytest.fixture(scope="module")
 def curve(loop):
-    return synthesis.certify.questions.gain_against_rate(
+    return synthesis.analysis.gain_against_rate(
         loop, [1.0, 0.0, math.inf, 0.2], lft=["DG"], form=FORM, search=QUICK, title="a spring"
     )
 
@@ -89,13 +89,13 @@ def test_proofs_of_a_curve_travel(curve, tmp_path):
 @pytest.mark.parametrize("rates", [[], [-1.0], [0.5, 0.5], [math.nan]])
 def test_rates_that_are_none_are_refused(loop, rates):
     with pytest.raises(InputError, match="rates: expected different numbers >= 0"):
-        synthesis.certify.questions.gain_against_rate(loop, rates)
+        synthesis.analysis.gain_against_rate(loop, rates)
 
 
 def test_several_parameters_are_refused(loop):
     two = loop.with_parameter(Scheduling("other", "1", 0.0, 1.0))
     with pytest.raises(InputError, match="a model of one parameter"):
-        synthesis.certify.questions.gain_against_rate(two, [0.0])
+        synthesis.analysis.gain_against_rate(two, [0.0])
 
 
 # --- pictures -------------------------------------------------------------------------------------

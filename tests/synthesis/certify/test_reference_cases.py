@@ -15,20 +15,11 @@ from models import constant
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
-from symheli.lpv import LFT, LPVStateSpace, Scheduling
-from synthesis import (
-    HigherOrder,
-    Search,
-    Solver,
-    Spline,
-    Status,
-    SumOfSquares,
-    frozen_gain,
-    l2_gain,
-    lft_gain,
-    lft_stability,
-    stability,
-)
+from symheli import LFT, LPVStateSpace, Scheduling
+from synthesis import Solver, frozen_gain, l2_gain, lft_gain, stability
+from synthesis.analysis import LowerBoundSearch, Status, lft_stability
+from synthesis.forms import HigherOrder, Spline
+from synthesis.impose import SumOfSquares
 
 COARSE = Spline(segments=4)
 GOLDEN = (1 + math.sqrt(5)) / 2
@@ -347,7 +338,7 @@ def test_the_lower_bound_of_a_first_order_gain_comes_close_to_its_exact_value(ra
     reached, rounded down, however busy the processor is.
     """
     exact = 2.5 if math.isinf(rate) else scalar_gain(rate)
-    cert = l2_gain(scalar(rate), form=COARSE, search=Search(seconds=math.inf))
+    cert = l2_gain(scalar(rate), form=COARSE, search=LowerBoundSearch(seconds=math.inf))
     assert share < cert.lower / exact <= 1.0
 
 
