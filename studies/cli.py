@@ -141,7 +141,7 @@ def parser() -> Parser:
         module = importlib.import_module(f"studies.commands.{verb}")
         sub = verbs.add_parser(verb, help=module.HELP, description=module.HELP)
         kept = getattr(module, "kept", _nothing_written)
-        sub.set_defaults(run=module.run, usage=sub.format_usage, kept=kept, whole=whole)
+        sub.set_defaults(run=module.run, usage=sub.format_usage, kept=kept, every_verb=whole)
         add(sub, module.ARGUMENTS)
         sub.add_argument("--json", action="store_true", help="print what a program would read")
     return whole

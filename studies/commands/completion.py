@@ -20,5 +20,5 @@ def run(arguments: argparse.Namespace) -> Output:
     with extra("shell", "completion of the command line"):
         import shtab
 
-    script = shtab.complete(arguments.whole, shell=arguments.shell)
+    script = shtab.complete(arguments.every_verb, shell=arguments.shell)
     return Output(script, {"shell": arguments.shell, "script": script})

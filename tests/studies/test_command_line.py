@@ -573,6 +573,15 @@ def test_a_suggested_unit_can_be_typed_into_a_shell(run, tmp_path):
     assert "--units 'GyroY dps=UNIT'" in err
 
 
+def test_no_option_of_a_verb_takes_what_the_command_line_keeps_for_itself():
+    """`specs` was always whole: argparse gives an option the default that is set by its name."""
+    given = {"run", "usage", "kept", "every_verb", "verb", "json"}
+    (verbs,) = (a for a in cli.parser()._actions if isinstance(a.choices, dict))
+    for name, verb in verbs.choices.items():
+        own = [a.dest for a in verb._actions if a.option_strings != ["--json"]]
+        assert not given & set(own), name
+
+
 def test_help_and_version_succeed(run):
     assert run("--version")[1].strip() == f"symheli {symheli.__version__}"
     for verb in cli.VERBS:
