@@ -44,6 +44,14 @@ class Mutant(NamedTuple):
 
 
 SERVOS = "tests/flight/test_servos_sensors_and_gusts.py"
+COVERS = (
+    "tests/synthesis/certify/test_cover.py"
+    " tests/synthesis/robust/test_delays_and_servos_as_blocks.py"
+)
+POLYNOMIALS = (
+    "tests/synthesis/numerics/test_bernstein_and_cells.py"
+    " tests/synthesis/numerics/test_polynomial_matrices.py"
+)
 
 MUTANTS = (
     Mutant(
@@ -285,14 +293,14 @@ MUTANTS = (
         "synthesis/numerics/polynomial/bernstein.py",
         "blossom([a] * (degree - k) + [b] * k)",
         "blossom([b] * (degree - k) + [a] * k)",
-        "tests/synthesis/numerics/test_bernstein_and_cells.py tests/synthesis/numerics/test_polynomial_matrices.py",
+        POLYNOMIALS,
     ),
     Mutant(
         "products of Bernstein polynomials have the weights of another place",
         "synthesis/numerics/polynomial/bernstein.py",
         "/ comb(a + b, i + k)",
         "/ comb(a + b, i)",
-        "tests/synthesis/numerics/test_bernstein_and_cells.py tests/synthesis/numerics/test_polynomial_matrices.py",
+        POLYNOMIALS,
     ),
     Mutant(
         "what is added to a form at will is not nothing",
@@ -439,14 +447,14 @@ MUTANTS = (
         "synthesis/robust/covers.py",
         "np.polymul([0.5, 1.0]",
         "np.polymul([0.7, 1.0]",
-        "tests/synthesis/certify/test_cover.py tests/synthesis/robust/test_delays_and_servos_as_blocks.py",
+        COVERS,
     ),
     Mutant(
         "the weight of a lag covers the nearer end of the bandwidths",
         "synthesis/robust/covers.py",
         "h, k = sizes.max(), (sizes / ends).max()",
         "h, k = sizes.min(), (sizes / ends).min()",
-        "tests/synthesis/certify/test_cover.py tests/synthesis/robust/test_delays_and_servos_as_blocks.py",
+        COVERS,
     ),
     # --- studies -----------------------------------------------------------------------------
     Mutant(
