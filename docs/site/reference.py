@@ -14,17 +14,22 @@ from pathlib import Path
 PACKAGES = (
     "symheli",
     "symheli.lpv",
-    "symheli.environment",
-    "symheli.flight",
-    "symheli.records",
-    "symheli.integrate",
-    "symheli.equations",
-    "symheli.export",
+    *("symheli.lpv.tools", "symheli.lpv.bases", "symheli.steady", "symheli.airframe"),
+    *("symheli.environment", "symheli.flight", "symheli.records", "symheli.integrate"),
+    *("symheli.equations", "symheli.export", "symheli.embedding", "symheli.progress"),
+    *("symheli.values", "symheli.errors"),
     "identification",
-    "identification.export",
+    *("identification.methods", "identification.forgetting", "identification.judge"),
+    *("identification.model", "identification.structure", "identification.design"),
+    *("identification.recursive", "identification.export"),
     "synthesis",
+    *("synthesis.analysis", "synthesis.designs", "synthesis.objectives", "synthesis.forms"),
+    *("synthesis.impose", "synthesis.robust", "synthesis.sets", "synthesis.tubes"),
+    *("synthesis.switching", "synthesis.structures", "synthesis.sheet"),
 )
-"""What has an `__all__` for users, the names that count most first."""
+"""Modules with names for users, the names that count most first."""
+OWN = {"symheli.embedding": ("embed",), "symheli.progress": ("watched",)}
+"""Names for users of modules without an `__all__`; of errors all classes."""
 FIRST_PAGES = ("symheli", "identification", "synthesis")
 
 
@@ -35,12 +40,18 @@ def public():
     seen = set()
     for package in PACKAGES:
         module = importlib.import_module(package)
-        for name in module.__all__:
+        for name in names(module):
             thing = getattr(module, name)
             for at, one in [(package, thing), *results(thing)]:
                 if callable(one) and id(one) not in seen:
                     seen.add(id(one))
                     yield at, name if one is thing else one.__name__, _room(package, one)
+
+
+def names(module):
+    """Names of a module for users."""
+    own = [n for n, thing in vars(module).items() if isinstance(thing, type) and n[0].isupper()]
+    return getattr(module, "__all__", OWN.get(module.__name__, own))
 
 
 def results(thing):

@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
+from synthesis.certify.lft.classes import Class
 from synthesis.certify.lft.coordinates import Loop
-from synthesis.certify.lft.multipliers import Class
 from synthesis.numerics.polynomial.symmetric import basis, extended, smat, svec
 from synthesis.numerics.program.cone_program import ConeProgram
 

@@ -10,8 +10,9 @@ import numpy as np
 
 from symheli import LFT, Scheduling
 from symheli.errors import InputError
+from synthesis.certify.lft.classes import check_scaling, multiplier_class
 from synthesis.certify.lft.coordinates import coordinates, scaled
-from synthesis.certify.lft.multipliers import Multiplier, check_scaling, multiplier_class
+from synthesis.certify.lft.multipliers import Multiplier
 from synthesis.certify.lft.program import (
     gain_program,
     inequality,
