@@ -17,6 +17,7 @@ from identification.judge.criteria import together
 from identification.judge.derivatives import Certainty, Derivatives
 from identification.judge.fit_for_control import added
 from identification.judge.frozen_plant import FrozenPlant
+from identification.judge.response_regions import StructureBias
 from symheli import FlightRecord, LinearModel
 from symheli.errors import InputError, UnknownNameError
 
@@ -263,9 +264,7 @@ def test_the_bias_of_the_structure_is_added_and_the_whole_margin_counts(noisy):
     """Gains a and b are |a - b| / sqrt((1 + a^2)(1 + b^2)) apart, behind a delay too."""
     model, joint = fitted(noisy)
     there = LinearModel([[0.0]], [[1.0]], [[2.0]], [[0.0]], ["x"], ["u"], ["y"], dt=DT)
-    bias = idn.judge.response_regions.StructureBias(
-        with_gain(model, 2.5 / float(model.theta[0, 0])), {0.0: there}
-    )
+    bias = StructureBias(with_gain(model, 2.5 / float(model.theta[0, 0])), {0.0: there})
     options = {"scales": SCALES, "covariance": joint, **SHORT}
     alone = idn.fit_for_control(model, noisy, LOOP, **options)
     found = idn.fit_for_control(model, noisy, LOOP, bias=bias, **options)
@@ -275,9 +274,7 @@ def test_the_bias_of_the_structure_is_added_and_the_whole_margin_counts(noisy):
     row = found["nu-gap over margin"]
     assert (row.value, row.threshold) == (pytest.approx(found.bound[0] / found.margin[0]), 1.0)
     assert [r.name for r in found.criteria] == ["unstable loops", row.name, "J", "TIC"]
-    far = idn.judge.response_regions.StructureBias(
-        with_gain(model, -0.3 / float(model.theta[0, 0])), {0.0: there}
-    )
+    far = StructureBias(with_gain(model, -0.3 / float(model.theta[0, 0])), {0.0: there})
     assert idn.fit_for_control(model, noisy, LOOP, bias=far, **options).verdict == "not known"
     with pytest.raises(InputError, match="bias: expected a model at every point"):
         idn.fit_for_control(model, noisy, LOOP, bias=bias, **{**options, "points": [0.5]})

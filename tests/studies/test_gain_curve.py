@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from studies.setup.bounds import LFT_TESTS
 from studies.transition import gain_tables, guarantees
 from symheli import LPVStateSpace, Scheduling
 from synthesis.analysis import LowerBoundSearch
@@ -59,7 +60,7 @@ def test_the_table_shows_every_form_and_what_a_jumping_airspeed_costs():
     asked = guarantees.bounds("baseline", "gust", lpv, (0.0, 1.0, math.inf), form, quick)
     found = guarantees.answered([*asked, *guarantees.lft_bounds("baseline", "gust", lpv)])
     table = gain_tables.guarantee(found, "gust")
-    assert table.columns[5:] == ["P(p)", "constant P", *guarantees.LFT_TESTS]
+    assert table.columns[5:] == ["P(p)", "constant P", *LFT_TESTS]
     # a first-order lag with pole -1 at the worst: gain 1 whatever p does, and every test finds it
     # or more
     assert [row[5:7] for row in table.rows] == [["1", "1"], ["1", "1"], ["", "1"]]

@@ -13,8 +13,8 @@ import synthesis
 from studies.known_kinematics.truth import AXES, Truth, frozen_axes
 from studies.loops.lateral import ATTITUDE_HOLD
 from studies.loops.robust_lateral import margin
-from studies.setup.bounds import PLAIN, Bound
-from studies.transition import conclusions, guarantees, tables
+from studies.setup.bounds import PLAIN, Bound, rate_text
+from studies.transition import conclusions, tables
 from studies.transition.baseline import build_baseline
 from studies.transition.guarantees import ALLOWED, ESTIMATE
 from studies.transition.known_kinematics import (
@@ -143,4 +143,4 @@ def test_a_certificate_is_said_to_hold_where_the_exact_loop_is_below_it(
     (sentence,) = conclusions.certificates(study)
     assert f"the certificate from the flights {of_the_set}" in sentence
     assert f"that of the estimate alone {of_the_estimate}" in sentence
-    assert guarantees.rate_text(0.0) in sentence
+    assert rate_text(0.0) in sentence

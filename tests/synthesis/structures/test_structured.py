@@ -320,7 +320,7 @@ def test_without_a_stabilising_start_the_reason_is_said():
 
 
 @pytest.mark.slow
-def test_an_interrupted_search_returns_the_best_so_far_and_says_so():
+def test_an_interrupted_search_returns_the_best_so_far_and_says_so(interruptible):
     plant = random_plant(3)
 
     def interrupt(progress):
