@@ -31,7 +31,7 @@ test: $(STAMP)
 	$(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadfile
 
 guards: $(STAMP)
-	$(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadfile -m 'guard and not slow'
+	$(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadfile -m 'guard and not slow' $$(grep -rl --include='*.py' 'mark\.guard' tests)
 
 test-all: lint test slow docs lowest no-compiler no-extras packaging
 

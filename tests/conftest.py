@@ -27,6 +27,9 @@ TOGETHER = {
 """Files that need the same long computation: one process does it once."""
 
 LONGEST = (
+    "tests/house/test_rooms.py",
+    "tests/synthesis/certify/test_saved_certificates.py",
+    "tests/synthesis/certify/test_second_witness.py",
     "the report",
     "tests/synthesis/certify/test_about_the_model_given.py",
     "tests/synthesis/certify/test_uncertain_models.py",

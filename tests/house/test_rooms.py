@@ -96,9 +96,9 @@ def test_the_page_of_the_rooms_is_written_from_the_table_that_the_tests_read():
     assert page == plan.with_tables(page), "python -m evidence.house --write"
 
 
-def test_no_number_rises_without_a_reason():
+def test_no_number_rises_without_a_reason(house):
     """Old, new and reason are printed for what rose; a limit far above its number is no limit."""
-    found, limits = ratchets.measured(), ratchets.limits()
+    found, limits = ratchets.measured(house), ratchets.limits()
     assert found.keys() <= limits.keys()
     for name, limit in limits.items():
         old, new = limit.get("was", limit["limit"]), limit["limit"]
@@ -112,6 +112,6 @@ def test_no_number_rises_without_a_reason():
                 f"{name}: {found[name]}, at most {new}; make it smaller, or raise the limit in"
                 f" {ratchets.FILE.name} with was = {new} and a reason"
             )
-            assert found[name] >= 0.97 * new, (
+            assert found[name] >= 0.97 * new - 2, (
                 f"{name} has fallen to {found[name]}: python -m evidence.ratchets --lower"
             )
