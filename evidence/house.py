@@ -143,7 +143,7 @@ def _imports(house: House, module: str) -> tuple[Import, ...]:
             visit(child, inner)
 
     visit(tree, "load")
-    for node in ast.walk(tree):
+    for node in ast.walk(tree) if bound else ():
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
             package = bound.get(node.value.id)
             if package is not None:
