@@ -141,7 +141,7 @@ def _needed(
         some = [cell._replace(over=kind(cell.over)) for cell in over]
         own = smallest(some, roots, SIZES, decay, SPARE, solver)
         needed = None if own is None else inside(own.P, cells, factors) ** -0.5
-        out.append("no ellipsoid" if needed is None else f"{needed:.2f}")
+        out.append("no ellipsoid" if needed is None else f"{needed:.1f}")
     return out
 
 
