@@ -96,18 +96,19 @@ def _matrices(model: LPVStateSpace | LFT, p: Array) -> Matrices:
 
 @dataclass(frozen=True)
 class _Orthonormal(FunctionSpace):
-    """Combinations of functions that are orthonormal on the points of the grid.
+    """Combinations of functions that are orthonormal on samples of the whole range.
+
+    Not on the grid: of few points, combinations that vanish there still have slopes.
 
     The inequalities do not depend on the choice, but their numbers do: P in 1, p, p^2, 1/p and
     sqrt(p) loses a thousandth of the gain to rounding.
     """
 
     basis: FunctionSpace
-    points: Array
 
     @cached_property
     def _mixing(self) -> Array:
-        values = self.basis(self.points[:, 0] if self.dimension == 1 else self.points)
+        values = self.basis(self.basis.samples())
         _, sizes, right = np.linalg.svd(values / math.sqrt(len(values)), full_matrices=False)
         kept = sizes > 1e-12 * sizes[0]
         return right[kept].T / sizes[kept]
@@ -145,7 +146,7 @@ def _least(
     """
     program = AffineProgram()
     n, inputs = model.B.shape[1:]
-    P = program.symmetric(n, _Orthonormal(basis, points))
+    P = program.symmetric(n, _Orthonormal(basis))
     constant = polynomials([0] * len(moving), [(s.low, s.high) for s in moving])
     g = program.variable(np.ones((1, 1, 1)), constant)
     p, level = program.value(P), program.value(g) * np.eye(inputs)

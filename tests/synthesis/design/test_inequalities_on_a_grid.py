@@ -168,3 +168,20 @@ def test_a_model_of_sines_is_fitted_for_its_certificate():
 def test_what_has_no_meaning_on_a_grid_is_refused(later, message):
     with pytest.raises(InputError, match=message):
         later()
+
+
+def test_functions_that_vanish_on_the_grid_still_have_slopes_there():
+    """With as many functions as points, or more, none is lost: the least gain does not grow."""
+    p = Scheduling("p", "1", low=0.0, high=1.0, rate=0.5)
+    lag = LPVStateSpace.polynomial(
+        [[[0, 1], [-1, -0.4]], [[0, 0], [-2, 0]]], [[[0], [1]]], [[[1, 0]]], [[[0]]], p
+    )
+    gains = [
+        l2_gain(
+            lag,
+            form=UserFunctions.from_expressions([p.symbol**k for k in range(count)], p),
+            impose=Grid(2),
+        ).indicative
+        for count in (2, 4)
+    ]
+    assert gains[1] < 0.999 * gains[0]
