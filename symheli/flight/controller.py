@@ -54,11 +54,7 @@ def deviations(given: object) -> LPVStateSpace:
         )
     return turned(
         model,
-        {
-            y: y.removesuffix(ERROR)
-            for y in model.inputs
-            if y.removesuffix(ERROR) in CONTROLLER_INPUTS
-        },
+        {y: y.removesuffix(ERROR) for y in model.inputs if y.endswith(ERROR)},
     )
 
 

@@ -77,14 +77,15 @@ class TableController:
         [A B L; C D 0] at the knots; rounded to 32 bits. Rows of a command that integrates are what
         it changes by in a sample.
     states, inputs, outputs : sequence of str
-        n names; of nu measured states; of ny inputs of the helicopter. An input may also be the
-        command in force of an output that integrates, <name>_command, with the trim as reference.
+        n names; of nu measured signals; of ny controls; any names. What `fly` flies measures states
+        of the helicopter and commands its inputs. An input may also be the command in force of an
+        output that integrates, <name>_command, with the trim as reference.
     dt : float
         Sample period, s.
     integrates : sequence of str
         The outputs that integrate.
     limits : mapping of str to (float, float)
-        Ends of the commands, rad; none where nothing is given.
+        Ends of the commands, in their units; none where nothing is given.
     rate : float
         Certified rate of the parameter, in its unit per second.
     fade : float
@@ -101,8 +102,8 @@ class TableController:
     Raises
     ------
     InputError
-        Shapes that do not fit, knots that do not increase, names of no such signal, numbers that
-        are not finite in 32 bits.
+        Shapes that do not fit, knots that do not increase, names given twice, numbers that are not
+        finite in 32 bits.
 
     See Also
     --------
@@ -144,12 +145,10 @@ class TableController:
             object.__setattr__(self, group, signals(getattr(self, group)))
         if not self.inputs or not self.outputs:
             raise InputError("a controller needs at least one input and one output")
-        require_names("helicopter input", self.outputs, INPUTS)
-        indices(self.integrates, self.outputs, "output that integrates")
+        held = indices(self.integrates, self.outputs, "output that integrates")
         object.__setattr__(self, "integrates", tuple(map(str, self.integrates)))
-        own = tuple(f"{y}{COMMAND}" for y in self.integrates)
-        require_names("measured signal", self.inputs, (*CONTROLLER_INPUTS, *own))
-        read = tuple(Signal(s, "rad") if s in own else s for s in self.inputs)
+        own = {f"{self.outputs[i]}{COMMAND}": self.outputs[i].unit for i in held}
+        read = tuple(Signal(s, own.get(s)) for s in self.inputs)
         object.__setattr__(self, "inputs", read)
         object.__setattr__(self, "parameter", Signal(self.parameter))
         object.__setattr__(self, "knots", increasing(self.knots, "knots"))
@@ -183,6 +182,7 @@ class TableController:
         fade: float = 1.0,
         monitor: ParameterMonitor | None = None,
         follow: Follow = "command",
+        integrates: Collection[str] | None = None,
     ) -> TableController:
         """The table of a sampled model over one parameter, of any name and unit.
 
@@ -192,9 +192,10 @@ class TableController:
         Parameters
         ----------
         model : LPVStateSpace or synthesis.Controller
-            As a `ScheduledController` takes it: `<name>_error` is reference minus measured; an
-            output may also be the rate of a command, as d_lon_rate (rad/s), which then integrates,
-            and d_lon_command an input, as in a design on `plant.velocity_form(measured=True)`.
+            Sampled, over one parameter, with inputs measured minus reference. An input
+            `<name>_error` is reference minus measured, and becomes `<name>`. An output may be the
+            rate of a command, as d_lon_rate (rad/s), and d_lon_command an input, as in a design on
+            `plant.velocity_form(measured=True)`.
         knots : int or sequence of float
             So many at equal distances over the range of the model, or the values, in its unit.
         correction : array_like, optional
@@ -203,6 +204,9 @@ class TableController:
             integrate (see `symheli.flight.anti_windup`).
         limits, fade, monitor, follow
             See above.
+        integrates : collection of str, optional
+            The commands, d_lon of d_lon_rate, that integrate. Default: each whose output is called
+            <name>_rate; () takes every output as the command itself.
 
         Raises
         ------
@@ -210,7 +214,7 @@ class TableController:
             A continuous model or one over several parameters, knots beyond its range, numbers
             beyond those of 32 bits.
         """
-        source = Tabulated(model)
+        source = Tabulated(model, integrates)
         at = source.knots(knots)
         table = cls(
             at,
@@ -298,7 +302,7 @@ class TableController:
             np.concatenate([M[:, n:, :n], keep], axis=2),
             M[:, n:, seen],
             (Scheduling(str(self.parameter), self.parameter.unit, *self._ends, self._rate),),
-            (*self.states, *(Signal(f"{self.outputs[i]}_held", "rad") for i in held)),
+            (*self.states, *(Signal(f"{y}_held", y.unit) for y in (self.outputs[i] for i in held))),
             tuple(s for s in self.inputs if s not in read),
             self.outputs,
             self.dt,
@@ -344,7 +348,7 @@ class TableController:
         """Return states, filters and integrators on the ground; the parameter in use starts at the
         next valid reading.
 
-        With `command` (ny,), rad, the one in force now: the first step answers just that, whatever
+        With `command` (ny,), in the units of the outputs, the one in force now: the first step answers just that, whatever
         is measured then, and what it differs by from the controller's own fades away (or stays,
         where a command integrates). `axes` are the outputs that are flown, default all; see
         `fly_axes`.
@@ -372,8 +376,8 @@ class TableController:
         valid: bool = True,
         others: ArrayLike | None = None,
     ) -> tuple[Array, TableState]:
-        """Return the commands (ny,), float32, in rad, at one sample, and the next state, whose
-        `status` lists the events of the step.
+        """Return the commands (ny,), float32, in the units of the outputs, at one sample, and the
+        next state, whose `status` lists the events of the step.
 
         Parameters
         ----------
@@ -381,13 +385,13 @@ class TableController:
             Of the inputs, in their units; of an input <name>_command the command in force, which is
             the trim on the ground, and its trim.
         trim : (ny,)
-            Of the outputs, rad.
+            Of the outputs, in their units.
         parameter : float
             As it is read, or commanded, in its unit; anything where it is bad.
         valid : bool
             Whether who read it trusts it.
         others : (ny,), optional
-            Commands applied on the axes that are not flown, rad; default the trim.
+            Commands applied on the axes that are not flown, in their units; default the trim.
         """
         n, s, nu, ny = self.numbers, self._own(state), len(self.inputs), len(self.outputs)
         with np.errstate(all="ignore"):  # NaN and infinity are handled below
@@ -407,7 +411,8 @@ class TableController:
         """Commands (4,), rad, and the state of the next sample; see `PureController`. Inputs it
         does not name stay at their trim.
 
-        Raises `InputError` where a flight does not provide the parameter of the table.
+        Raises `InputError` where a flight of the helicopter does not provide the parameter or the
+        inputs of the table, or has no such control.
         """
         parameter = self._provided(measured if self.follow == "reading" else p)
         u = np.array([reference[s] for s in INPUTS])
@@ -443,6 +448,16 @@ class TableController:
 
     @cached_property
     def _rows(self) -> list[int]:
+        """Position of each output among the helicopter inputs, where `fly` can fly it."""
+        require_names("measured signal", self.inputs, (*CONTROLLER_INPUTS, *self.own_commands))
+        require_names("helicopter input", self.outputs, INPUTS)
+        for s in (*self.inputs, *self.outputs):
+            own = Signal(self.own_commands.get(s, str(s))).unit
+            if s.unit != own:
+                raise InputError(
+                    f"the table has {s} in {s.unit}, and a flight has it in {own}: design with the"
+                    " units of the helicopter model"
+                )
         return indices(self.outputs, INPUTS, "helicopter input")
 
     @cached_property
@@ -498,17 +513,19 @@ class TableController:
         return int(max(min(math.floor(min(seconds / self.dt, MAX_COUNT) + 1e-9), MAX_COUNT), least))
 
 
-def _limits(given: object, outputs: Sequence[str]) -> Mapping[str, tuple[float, float]]:
+def _limits(given: object, outputs: Sequence[Signal]) -> Mapping[str, tuple[float, float]]:
     if not isinstance(given, Mapping):
-        raise InputError(f"limits: expected {{output: (low, high)}} in rad, got {given!r:.80}")
+        raise InputError(f"limits: expected {{output: (low, high)}} in its unit, got {given!r:.80}")
     out = {}
     for name, ends in given.items():
-        indices([name], outputs, "output with a limit")
+        (i,) = indices([name], outputs, "output with a limit")
         try:
             low, high = map(float, ends)
         except (TypeError, ValueError):
             low = high = math.nan
         if not low < high:
-            raise InputError(f"limits[{name!r}]: expected (low, high) in rad, got {ends!r:.80}")
+            raise InputError(
+                f"limits[{name!r}]: expected (low, high) in {outputs[i].unit}, got {ends!r:.80}"
+            )
         out[str(name)] = (low, high)
     return out

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +15,8 @@ from symheli.lpv.bases.interpolating import PiecewiseLinear
 from symheli.lpv.lpv_matrices import Matrices
 from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.values.arrays import Array
-from symheli.values.signal import Signal
+from symheli.values.signal import Signal, indices
+from symheli.values.units import integral
 
 CHECKS_PER_INTERVAL = 4
 """Number of points between two knots at which a table is compared with its original."""
@@ -28,6 +29,7 @@ class Tabulated:
     """
 
     model: LPVStateSpace
+    integrates: Collection[str] | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "model", deviations(self.model))
@@ -38,6 +40,11 @@ class Tabulated:
                 "a table is over one scheduling parameter, this model over"
                 f" {', '.join(s.name for s in self.model.parameters)}: design the controller over"
                 " one of them"
+            )
+        if self.integrates is not None:
+            rates = [str(y).removesuffix(RATE) for y in self.model.outputs if y.endswith(RATE)]
+            indices(
+                self.integrates, rates, "command that integrates, <name> of an output <name>_rate"
             )
 
     @property
@@ -54,12 +61,22 @@ class Tabulated:
     @property
     def outputs(self) -> tuple[Signal, ...]:
         """The commands, or those whose rates are given."""
-        return tuple(Signal(str(y).removesuffix(RATE), "rad") for y in self.model.outputs)
+        return tuple(
+            _integrated(y) if rate else y
+            for y, rate in zip(self.model.outputs, self.rates, strict=True)
+        )
 
     @property
     def rates(self) -> Array:
         """(ny,) of bool: which outputs are rates of commands."""
-        return np.array([str(y).endswith(RATE) for y in self.model.outputs], bool)
+        chosen = self.integrates
+        return np.array(
+            [
+                y.endswith(RATE) and (chosen is None or y.removesuffix(RATE) in chosen)
+                for y in self.model.outputs
+            ],
+            bool,
+        )
 
     def knots(self, given: int | Sequence[float]) -> Array:
         """Return this number of equidistant knots, or the given ones, in the range of the model;
@@ -121,3 +138,9 @@ class Tabulated:
                 f"correction: expected (states, outputs) {shape[1:]}, one at each knot {shape}, or"
                 f" 0, got {given!r:.80}"
             ) from error
+
+
+def _integrated(rate: Signal) -> Signal:
+    """The command whose rate this is; where the rate has no unit, in the unit of its name."""
+    unit = None if rate.unit == "1" else integral(rate.unit)
+    return Signal(rate.removesuffix(RATE), unit)
