@@ -348,9 +348,9 @@ class TableController:
         """Return states, filters and integrators on the ground; the parameter in use starts at the
         next valid reading.
 
-        With `command` (ny,), in the units of the outputs, the one in force now: the first step answers just that, whatever
-        is measured then, and what it differs by from the controller's own fades away (or stays,
-        where a command integrates). `axes` are the outputs that are flown, default all; see
+        With `command` (ny,), in the units of the outputs, the one in force now: the first step
+        answers just that, whatever is measured then, and what it differs by from the controller's
+        own fades away (or stays, where a command integrates). `axes` are the outputs that are flown, default all; see
         `fly_axes`.
         """
         every = np.ones(len(self.outputs), bool)

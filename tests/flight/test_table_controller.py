@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from flight.flown import SHORT, STORM, InPython, differences, dynamic
-from flight.tables import DT, INPUTS, MACH, OUTPUTS, InFlight, over, sampled, static, table
+from flight.tables import DT, MACH, OUTPUTS, InFlight, over, sampled, static, table
 
 import symheli
 import synthesis
@@ -564,7 +564,7 @@ def test_a_controller_that_reads_its_command_flies_on_and_off_the_ground(ideal):
         fly(ideal, hover, controller=other)
     held = TableController.of(design, 2, integrates=()).outputs
     assert [(str(y), y.unit) for y in held] == [("d_lat_rate", "1")]
-    with pytest.raises(InputError, match="unknown command that integrates.*'d_ped'"):
+    with pytest.raises(InputError, match="unknown command that integrates 'd_ped'"):
         TableController.of(design, 2, integrates=["d_ped"])
 
 
