@@ -350,8 +350,8 @@ class TableController:
 
         With `command` (ny,), in the units of the outputs, the one in force now: the first step
         answers just that, whatever is measured then, and what it differs by from the controller's
-        own fades away (or stays, where a command integrates). `axes` are the outputs that are flown, default all; see
-        `fly_axes`.
+        own fades away (or stays, where a command integrates). `axes` are the outputs that are
+        flown, default all; see `fly_axes`.
         """
         every = np.ones(len(self.outputs), bool)
         state = TableState.ground(self.numbers, every if axes is None else self._flown(axes))

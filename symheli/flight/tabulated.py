@@ -43,9 +43,7 @@ class Tabulated:
             )
         if self.integrates is not None:
             rates = [str(y).removesuffix(RATE) for y in self.model.outputs if y.endswith(RATE)]
-            indices(
-                self.integrates, rates, "command that integrates, <name> of an output <name>_rate"
-            )
+            indices(self.integrates, rates, "command that integrates")
 
     @property
     def dt(self) -> float:
