@@ -187,12 +187,16 @@ def _in_a_folder():
 
 
 def check(path):
-    """Runs a page; `PageError` where a block fails or prints something else."""
+    """Runs a page; `PageError` where a block fails, or with every block that prints another text."""
     page, name = Path(path).read_text(encoding="utf-8"), Path(path).name
     with _in_a_folder():
-        for block, found, after in printed(page, name):
-            if after is not None and (wrong := difference(found, after.code)):
-                raise PageError(f"{name}, line {block.line}: the block differs in {wrong}")
+        wrong = [
+            f"{name}, line {block.line}: the block differs in {other}"
+            for block, found, after in printed(page, name)
+            if after is not None and (other := difference(found, after.code))
+        ]
+    if wrong:
+        raise PageError("\n".join(wrong))
 
 
 def write(path):
@@ -258,8 +262,11 @@ if __name__ == "__main__":
     sys.path.insert(0, str(DOCS.parent))
     _start()
     act, given = (write, sys.argv[2:]) if "--write" in sys.argv[1:2] else (check, sys.argv[1:])
+    failed = []
     for page in given or pages():
         try:
             act(page)
         except PageError as error:
-            sys.exit(str(error))
+            failed.append(str(error))
+            print(error, file=sys.stderr, flush=True)
+    sys.exit(bool(failed))
