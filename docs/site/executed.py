@@ -187,7 +187,7 @@ def _in_a_folder():
 
 
 def check(path):
-    """Runs a page; `PageError` where a block fails, or with every block that prints another text."""
+    """Runs a page; `PageError` where a block fails, or with every block that differs."""
     page, name = Path(path).read_text(encoding="utf-8"), Path(path).name
     with _in_a_folder():
         wrong = [
