@@ -5,6 +5,7 @@ units of the states.
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import replace
 from typing import Any
 
@@ -259,11 +260,16 @@ def _stabilised(A: Array, poles: Any, continuous: bool) -> Array:
 
 
 def _gramian(A: Array, B: Array, continuous: bool, least: float = 1e-12) -> Array:
-    """Return the Gramian with no eigenvalue below the fraction `least` of the largest."""
-    X = (
-        linalg.solve_continuous_lyapunov(A, -B @ B.T)
-        if continuous
-        else linalg.solve_discrete_lyapunov(A, B @ B.T)
-    )
+    """Return the Gramian with no eigenvalue below the fraction `least` of the largest.
+
+    Near chains of integrators its digits are few; units and coordinates need no more.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", linalg.LinAlgWarning)
+        X = (
+            linalg.solve_continuous_lyapunov(A, -B @ B.T)
+            if continuous
+            else linalg.solve_discrete_lyapunov(A, B @ B.T)
+        )
     values, vectors = linalg.eigh(symmetrized(X))
     return (vectors * np.maximum(values, least * abs(values[-1]))) @ vectors.T

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from symheli import LinearModel, LPVStateSpace
+from symheli import LPVStateSpace
 from symheli.lpv.frozen_plots import Model, frozen_at, parameters_of
 from symheli.values.drawing import label
 from symheli.values.labelled import frame
 from symheli.values.signal import Signal
 from synthesis.design.loops.margins import Margins, margins, open_loop
+from synthesis.design.plant.as_controller import as_controller
+from synthesis.design.plant.plant import Plant
 
 if TYPE_CHECKING:
     import pandas
@@ -64,8 +65,8 @@ class MarginTable:
 
 
 def margin_table(
-    model: Model,
-    feedback: Mapping[tuple[str, str], float] | LinearModel | LPVStateSpace,
+    model: Model | Plant,
+    feedback: Any,
     at: str,
     p: object = None,
 ) -> MarginTable:
@@ -74,11 +75,11 @@ def margin_table(
 
     Parameters
     ----------
-    model : LPVStateSpace, LFT, LinearFamily or LinearModel
-        The plant.
-    feedback : mapping, LinearModel or LPVStateSpace
-        As of `open_loop`; of an LPVStateSpace over the parameters of the plant the frozen
-        controller.
+    model : LPVStateSpace, LFT, LinearFamily, LinearModel or Plant
+        What is controlled; of a `Plant` from its controls to its measurements.
+    feedback : mapping, LinearModel, LPVStateSpace, Controller or TableController
+        As of `open_loop`; a controller over the parameters of the plant is frozen where it is. Of a
+        `Plant` what its `close` takes.
     at : str
         The input at which the loop is broken.
     p : array_like, optional
@@ -108,6 +109,10 @@ def margin_table(
     >>> [round(float(m.crossover[0]), 6) for _, m in found.rows]
     [2.0, 4.0]
     """
+    if isinstance(model, Plant):
+        feedback = as_controller(feedback, model.controls, model.measurements)
+        model = model.nominal.select(inputs=model.controls, outputs=model.measurements)
+    feedback = getattr(feedback, "model", feedback)
     rows = []
     for one in frozen_at(model, p):
         there: Any = feedback.at(*one.p) if isinstance(feedback, LPVStateSpace) else feedback

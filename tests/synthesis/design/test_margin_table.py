@@ -1,13 +1,14 @@
 """Margins over the parameter are those of the frozen loops."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from symheli import LPVStateSpace, Scheduling
+from symheli import LinearModel, LPVStateSpace, Scheduling, TableController
 from symheli.errors import UnknownNameError
-from synthesis import margin_table, margins
+from synthesis import Plant, margin_table, margins
 from synthesis.analysis import open_loop
 
 P = Scheduling("p", "1", low=0.0, high=2.0)
@@ -44,3 +45,19 @@ def test_a_scheduled_controller_is_frozen_with_its_plant():
     np.testing.assert_allclose(gains[0], gains[1], rtol=1e-9)  # the gain is scheduled away
     with pytest.raises(UnknownNameError):
         margin_table(PLANT, GAIN, "u2")
+
+
+def test_a_plant_with_references_and_its_table_have_the_margins_of_the_loop():
+    """What the table reads with the other sign, as reference minus measured, is turned."""
+    speed = LPVStateSpace.constant(PLANT.at(0.5), Scheduling("speed", "km/h", 0.0, 50.0, 1.0))
+    made = Plant(speed, [], ["y1"], ["u1"], ["y1"]).with_input_disturbance().with_reference(["y1"])
+    plant = made.weighted({"y1_error": 2.0}).sampled(0.01)
+    gain = LinearModel.gain([[1.0]], ["y1_error"], ["u1"])
+    design = LPVStateSpace.constant(replace(gain, dt=0.01), speed.parameters)
+    table = TableController.of(design, 2)
+    own = PLANT.at(0.5).discretize(0.01)
+    direct = margins(open_loop(own, GAIN, "u1"))
+    for given in (table, design):
+        ((_, found),) = margin_table(plant, given, "u1", [10.0]).rows
+        np.testing.assert_allclose(found.gain, direct.gain, rtol=1e-6)
+        assert found.phase == pytest.approx(direct.phase, rel=1e-6)
