@@ -30,6 +30,7 @@ TOP = {
     ),
     *("pyproject.toml", "setup.py", "constraints.txt", "Makefile", ".gitignore"),
     *("README.md", "LICENSE", "CITATION.cff", "CHANGELOG.md"),
+    *("CONTRIBUTING.md", "CODE_OF_CONDUCT.md", "SECURITY.md"),
 }
 
 
