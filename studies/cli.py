@@ -9,14 +9,14 @@ import os
 import re
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NoReturn
 
 from studies.commands.arguments import add, renamed
 from studies.output import Output, as_json
 from studies.progress import displayed
 from studies.threads import one_thread
-from symheli.errors import SymheliError, TrimError, UnknownNameError
+from symheli.errors import InputError, SymheliError, TrimError, UnknownNameError
 
 VERBS = (
     "study",
@@ -72,7 +72,7 @@ def _run(arguments: argparse.Namespace) -> int:
     with warnings.catch_warnings():
         warnings.showwarning = _PrintedOnce()
         try:
-            with displayed():
+            with displayed(), _allowed(arguments):
                 output: Output = arguments.run(arguments)
             print(as_json(output.data) if arguments.json else output.text, flush=True)
             return output.status
@@ -86,6 +86,33 @@ def _run(arguments: argparse.Namespace) -> int:
         except OSError as error:
             sentence = f"{error.filename or 'a file'}: {error.strerror or error}"
             return _fail(error, arguments.json, sentence)
+
+
+@contextlib.contextmanager
+def _allowed(arguments: argparse.Namespace) -> Iterator[None]:
+    """Let this command and the processes that it starts run Python files, where --allow-code is
+    given. Raises `InputError` where nothing that is read could name one.
+    """
+    if not getattr(arguments, "allow_code", False):
+        yield
+        return
+    files = [*map(str, getattr(arguments, "logs", ())), str(getattr(arguments, "file", ""))]
+    if not any(name.endswith(".toml") for name in (str(arguments.vehicle), *files)):
+        raise InputError(
+            "--allow-code runs the Python files that a vehicle file or a campaign names, and no"
+            " such file is given: leave it out"
+        )
+    from symheli.components import ALLOW_CODE
+
+    before = os.environ.get(ALLOW_CODE)
+    os.environ[ALLOW_CODE] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[ALLOW_CODE]
+        else:
+            os.environ[ALLOW_CODE] = before
 
 
 def parsed(words: Sequence[str]) -> argparse.Namespace:

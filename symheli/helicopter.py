@@ -123,13 +123,14 @@ class Helicopter:
         density: float = 1.225,
         printed: Sequence[str] = (),
         smoothing: float = 0.0,
+        *,
+        allow_code: bool = False,
     ) -> Helicopter:
         """Load a packaged airframe by name (`symheli.airframe.vehicle.vehicles()`) or a vehicle
-        TOML file by path.
+        TOML file by path. With `allow_code` the Python files that it names as parts are run.
         """
-        return cls(
-            load_vehicle(vehicle), governor, float(density), frozenset(printed), float(smoothing)
-        )
+        loaded = load_vehicle(vehicle, allow_code=allow_code)
+        return cls(loaded, governor, float(density), frozenset(printed), float(smoothing))
 
     def __getstate__(self) -> dict[str, Any]:
         """The airframe and its options, without what was built from them: CasADi's functions cross

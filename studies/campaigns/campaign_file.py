@@ -30,20 +30,22 @@ TABLES = ("grid", "random", "fixed")
 KINDS = {frozenset({"low", "high"}): Uniform, frozenset({"mean", "deviation"}): Normal}
 
 
-def read_campaign(path: Path) -> Campaign:
-    """The campaign a file declares; see `Campaign` for what its entries mean.
+def read_campaign(path: Path, *, allow_code: bool = False) -> Campaign:
+    """The campaign a file declares; see `Campaign` for what its entries mean. A trial
+    "module:NAME" is imported only with `allow_code`.
 
     Raises `InputError`, which names the file, where it cannot be read or does not fit.
     """
     try:
-        return campaign_of(tomllib.loads(path.read_text(encoding="utf-8")))
+        entries = tomllib.loads(path.read_text(encoding="utf-8"))
+        return campaign_of(entries, allow_code=allow_code)
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise InputError(f"{path} cannot be read as TOML: {error}") from error
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
 
 
-def campaign_of(entries: Mapping[str, Any]) -> Campaign:
+def campaign_of(entries: Mapping[str, Any], *, allow_code: bool = False) -> Campaign:
     """The campaign that the entries of a file declare.
 
     Examples
@@ -66,7 +68,7 @@ def campaign_of(entries: Mapping[str, Any]) -> Campaign:
             raise InputError(f"the axis {name} of the grid is a list of values, got {values!r}")
     random = {name: _drawn(name, what) for name, what in given.get("random", {}).items()}
     given["random"] = random
-    return Campaign(trial(entries["trial"]), **given)
+    return Campaign(trial(entries["trial"], allow_code=allow_code), **given)
 
 
 def _drawn(name: str, what: Any) -> Normal | Uniform:

@@ -22,14 +22,15 @@ OUTPUTS = ("u", "v", "w", "p", "q", "r", "phi", "theta", "Om")
 INPUTS = ("d_lon", "d_lat", "d_col", "d_ped")
 
 ARGUMENTS = (
-    positional("vehicle", "packaged vehicle, or a vehicle file", metavar="VEHICLE"),
+    *options.vehicle(None, "packaged vehicle, or a vehicle file", in_place=False),
     positional(
         "logs",
-        "flight logs with d_lon, d_lat, d_col, d_ped (deflections) and any of"
+        "the vehicle, where --vehicle does not name it, and flight logs with d_lon, d_lat, d_col,"
+        " d_ped (deflections) and any of"
         f" {', '.join(OUTPUTS)}",
         type=Path,
         nargs="+",
-        metavar="LOG",
+        metavar="VEHICLE LOG",
     ),
     option(
         "--map",
@@ -77,6 +78,13 @@ def run(arguments: argparse.Namespace) -> Output:
 
     if arguments.write is not None and arguments.write.suffix != ".toml":
         raise InputError(f"--write: expected a file that ends in .toml, got {arguments.write}")
+    if arguments.vehicle is None:
+        arguments.vehicle = str(arguments.logs.pop(0))
+    if not arguments.logs:
+        raise InputError(
+            f"{arguments.vehicle} is taken as the vehicle, and there is no log: symheli calibrate"
+            " VEHICLE LOG..."
+        )
     heli = symheli.Helicopter.load(arguments.vehicle, governor=arguments.governor)
     heli = heli.at_altitude(arguments.altitude) if arguments.altitude else heli
     records = [record_of(arguments, log) for log in arguments.logs]

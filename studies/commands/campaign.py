@@ -6,7 +6,13 @@ import argparse
 from pathlib import Path
 
 from studies.commands.arguments import flag, option, positional
-from studies.commands.options import ON_A_RUNNER, at_least_one, kept_on_a_runner
+from studies.commands.options import (
+    ON_A_RUNNER,
+    at_least_one,
+    file_or_vehicle,
+    kept_on_a_runner,
+    vehicle,
+)
 from studies.output import Output
 from symheli.errors import InputError
 
@@ -20,7 +26,9 @@ ARGUMENTS = (
         type=Path,
         metavar="FILE",
     ),
-    option("--vehicle", "NAME", "(without FILE) packaged airframe or TOML file (default: xcell60)"),
+    *vehicle(
+        None, "(without FILE) packaged airframe or TOML file (default: xcell60)", in_place=False
+    ),
     option("--seeds", "N", "(without FILE) number of seeds (default: 20)", at_least_one),
     option(
         "--show",
@@ -38,6 +46,7 @@ def run(arguments: argparse.Namespace) -> Output:
     """Run the campaign; it shows its own progress."""
     from studies.campaigns.runners import runner
 
+    file_or_vehicle(arguments)
     if arguments.file is not None:
         return _declared(arguments)
     if arguments.show or arguments.again:

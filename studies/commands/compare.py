@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from studies.commands.arguments import option
-from studies.commands.options import ON_A_RUNNER, VEHICLE, count, kept_on_a_runner
+from studies.commands.options import ON_A_RUNNER, count, kept_on_a_runner, vehicle
 from studies.output import Output
 
 HELP = (
@@ -14,7 +14,7 @@ HELP = (
 )
 
 ARGUMENTS = (
-    VEHICLE,
+    *vehicle(),
     option("--seeds", "N", "seeds beside the default one", count, 20),
     *ON_A_RUNNER,
 )

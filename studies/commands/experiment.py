@@ -16,7 +16,7 @@ HELP = (
 )
 
 ARGUMENTS = (
-    options.VEHICLE,
+    *options.vehicle(),
     option(
         "--axis",
         ("longitudinal", "lateral", "all"),

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import argparse
 import math
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from studies.commands.arguments import Argument, option, several
+from studies.commands.arguments import Argument, flag, option, positional, several
 from studies.output import Output
 from symheli.airframe.printed_forms import PRINTED
 from symheli.errors import InputError
@@ -152,10 +153,43 @@ class _Span(argparse.Action):
         setattr(namespace, self.dest, (low, high, int(points)))
 
 
-VEHICLE = option("--vehicle", "NAME", "packaged airframe or TOML file", default="xcell60")
+ALLOW_CODE = flag(
+    "--allow-code", "run the Python files that the file names (parts of a vehicle, a trial)"
+)
+
+
+class _OneVehicle(argparse.Action):
+    """Takes the vehicle from its place or from --vehicle, and refuses two different ones."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: Any,
+        option_string: str | None = None,
+    ) -> None:
+        if values is None:  # its place is empty
+            return
+        before = getattr(namespace, "named_vehicle", None)
+        if before not in (None, values):
+            parser.error(f"two vehicles are given, {before} and {values}: give one")
+        namespace.named_vehicle = namespace.vehicle = values
+
+
+def vehicle(default: str | None = "xcell60", help: str = "", in_place: bool = True) -> tuple:
+    """The vehicle of a verb, as argument (where its place is free) or as --vehicle, and
+    --allow-code.
+    """
+    help = help or "packaged airframe or TOML file"
+    named = option("--vehicle", "NAME", help, default=default, action=_OneVehicle)
+    place = positional(
+        "vehicle", "the same as --vehicle", nargs="?", metavar="VEHICLE", action=_OneVehicle
+    )
+    return (named, *([place] if in_place else []), ALLOW_CODE)
+
 
 HELICOPTER = (
-    VEHICLE,
+    *vehicle(),
     option(
         "--governor",
         ("ideal", "pi"),
@@ -245,6 +279,31 @@ def choices_written(text: Callable[[Path], str], target: str) -> Output:
         raise InputError(f"{path} already exists; give another name, or remove it")
     write_text(path, text(path.parent))
     return Output(f"wrote {path}", {"written": path})
+
+
+def file_or_vehicle(arguments: argparse.Namespace) -> None:
+    """Take what stands in the place of the file of choices as the vehicle, where it is one.
+
+    Raises `InputError` where --vehicle names another.
+    """
+    from symheli.airframe.vehicle import vehicles
+
+    given = arguments.file
+    if given is None or not (str(given) in vehicles() or _is_a_vehicle(given)):
+        return
+    if arguments.vehicle not in (None, str(given)):
+        raise InputError(
+            f"two vehicles are given, {given} and {arguments.vehicle}: give one, or a file of"
+            " choices"
+        )
+    arguments.vehicle, arguments.file = str(given), None
+
+
+def _is_a_vehicle(path: Path) -> bool:
+    try:
+        return "body" in tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
+        return False  # whoever reads it says what is wrong
 
 
 def helicopter(arguments: argparse.Namespace) -> Helicopter:

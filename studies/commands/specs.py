@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from studies.commands import options
-from studies.commands.arguments import flag, option, positional, several
+from studies.commands.arguments import flag, option, several
 from studies.output import Output, columns, progress
 from symheli.errors import InputError, UnknownNameError
 
@@ -32,10 +32,8 @@ worst: over all airspeeds; of an entry without boundaries, the range; flown: wha
   flights keep to"""
 
 ARGUMENTS = (
-    positional(
-        "vehicle",
-        "packaged airframe or TOML file (default: xcell60, or that of the study)",
-        nargs="?",
+    *options.vehicle(
+        None, "packaged airframe or TOML file (default: xcell60, or that of the study)"
     ),
     option(
         "--controller",

@@ -26,7 +26,7 @@ ARGUMENTS = (
         type=Path,
         metavar="FILE",
     ),
-    option("--vehicle", "NAME", "packaged airframe or TOML file (default: xcell60)"),
+    *options.vehicle(None, "packaged airframe or TOML file (default: xcell60)", in_place=False),
     option("--out", "DIR", "folder of report and numbers (default: study)", Path),
     Argument(
         "--quick",
@@ -48,6 +48,7 @@ ARGUMENTS = (
 
 def run(arguments: argparse.Namespace) -> Output:
     """Run the study; it shows its own progress and writes into the folder."""
+    options.file_or_vehicle(arguments)
     configuration = _configuration(arguments)
     if arguments.write_config is not None:
         return options.choices_written(configuration.text, arguments.write_config)

@@ -29,7 +29,7 @@ ARGUMENTS = (
         type=Path,
         metavar="FILE",
     ),
-    option("--vehicle", "NAME", "packaged airframe or TOML file (default: xcell60)"),
+    *options.vehicle(None, "packaged airframe or TOML file (default: xcell60)", in_place=False),
     option(
         "--model",
         "FILE",

@@ -46,8 +46,8 @@ DECIMALS = {"dB": 1, "%": 0}
 """Shown, by unit; else two."""
 
 ARGUMENTS = (
+    *options.vehicle(None, "vehicle file that is calibrated from the log"),
     positional("log", "flight log of deflections and motion", type=Path, metavar="LOG"),
-    option("--vehicle", "FILE", "vehicle file that is calibrated from the log", required=True),
     option(
         "--parameters",
         "FILE",
@@ -125,6 +125,10 @@ def run(arguments: argparse.Namespace) -> Output:
     change = dict(arguments.set)
     before = HelicopterLoops.from_parameters(parameters, throw=dict(arguments.throw))
     after = before.with_parameters(change)
+    if arguments.vehicle is None:
+        raise InputError(
+            f"name the vehicle that flew {arguments.log}: symheli tune VEHICLE LOG, or --vehicle"
+        )
     heli = symheli.Helicopter.load(arguments.vehicle, governor=arguments.governor)
     drawn = [heli]
     calibration = None

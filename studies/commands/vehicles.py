@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from studies.commands.arguments import flag, one_of, positional
+from studies.commands import options
+from studies.commands.arguments import flag, one_of
 from studies.output import Output
 
 HELP = (
@@ -13,7 +14,7 @@ HELP = (
 )
 
 ARGUMENTS = (
-    positional("vehicle", "packaged airframe or vehicle file to check and summarise", nargs="?"),
+    *options.vehicle(None, "packaged airframe or vehicle file to check and summarise"),
     one_of(
         flag("--toml", "print a whole vehicle file to start from (default: that of xcell60)"),
         flag(

@@ -176,9 +176,11 @@ def vehicles() -> list[str]:
     )
 
 
-def load_vehicle(name_or_path: str | os.PathLike[str]) -> Vehicle:
-    """Read a packaged airframe by name, or any TOML file by path. Raises `InputError` with every
-    wrong or missing entry of the file: its line, what was expected and what came.
+def load_vehicle(name_or_path: str | os.PathLike[str], *, allow_code: bool = False) -> Vehicle:
+    """Read a packaged airframe by name, or any TOML file by path.
+
+    A Python file that it names as a part is run only with `allow_code`. Raises `InputError` with
+    every wrong or missing entry of the file: its line, what was expected and what came.
     """
     given = os.fspath(name_or_path)
     if given.endswith(".toml"):
@@ -187,7 +189,8 @@ def load_vehicle(name_or_path: str | os.PathLike[str]) -> Vehicle:
             raise InputError(
                 f"no vehicle file at {given}; packaged airframes: {', '.join(vehicles())}"
             )
-        file, name = VehicleFile(given, text_of(path), path.parent), path.stem
+        file = VehicleFile(given, text_of(path), path.parent, allow_code=allow_code)
+        name = path.stem
     else:
         if given not in vehicles():
             raise UnknownNameError("vehicle", given, vehicles())

@@ -35,8 +35,11 @@ LINEAR = ".linear.toml"
 class VehicleFile:
     """Text of a vehicle file, its tables, the line of each entry, and all errors found."""
 
-    def __init__(self, path: str, text: str, folder: Path | None = None):
+    def __init__(
+        self, path: str, text: str, folder: Path | None = None, *, allow_code: bool = False
+    ):
         self.path, self.lines, self.folder = path, text.splitlines(), folder
+        self.allow_code = allow_code
         self.tables, unread = readable(text)
         self._written: dict[str, str] = {}
         """{section: name it has in the text}, where that is misspelt."""
@@ -254,7 +257,7 @@ class VehicleFile:
 
     def _component(self, section: str, kind: str) -> Component:
         try:
-            return find(kind, self.folder)
+            return find(kind, self.folder, allow_code=self.allow_code)
         except UnknownNameError as error:
             raise InputError(f"{error}; or name a file: component = './{section}.py'") from error
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import os
 import pkgutil
 from pathlib import Path
 
@@ -18,17 +19,29 @@ from symheli.components.component import AirMotion, Component, Effect, Flow
 from symheli.components.entry import Entry
 from symheli.errors import InputError, UnknownNameError
 
+ALLOW_CODE = "SYMHELI_ALLOW_CODE"
+"""Environment variable: 1 lets vehicle files run the Python files that they name as parts."""
+
 __all__ = ["AirMotion", "Component", "Effect", "Entry", "Flow", "find", "packaged", "unnamed"]
 
 
-def find(name: str, folder: Path | None = None) -> Component:
-    """The component of the packaged file `name`, or of a user's "./name.py" relative to `folder`
-    (the file is run).
+def find(name: str, folder: Path | None = None, *, allow_code: bool = False) -> Component:
+    """The component of the packaged file `name`, or of a user's "./name.py" relative to `folder`.
 
+    That file is run, where `allow_code` or the environment variable SYMHELI_ALLOW_CODE=1 says so.
     Raises `UnknownNameError`, `InputError`.
     """
     if name.endswith(".py"):
-        return _from_file((folder or Path()) / name)
+        path = (folder or Path()) / name
+        if not path.is_file():
+            raise InputError(f"no component file at {path}")
+        if not (allow_code or os.environ.get(ALLOW_CODE) == "1"):
+            raise InputError(
+                f"loading this vehicle would run the Python file {path}. Read it; to run it, add"
+                " --allow-code on the command line, allow_code=True to Helicopter.load, or set"
+                f" {ALLOW_CODE}=1"
+            )
+        return _from_file(path)
     if name not in packaged():
         raise UnknownNameError("component", name, packaged())
     return importlib.import_module(f"{__name__}.{name}").COMPONENT
@@ -41,8 +54,6 @@ def packaged() -> list[str]:
 
 
 def _from_file(path: Path) -> Component:
-    if not path.is_file():
-        raise InputError(f"no component file at {path}")
     spec = importlib.util.spec_from_file_location(path.stem, path)
     assert spec is not None and spec.loader is not None  # noqa: S101, PT018  a .py file has both
     module = importlib.util.module_from_spec(spec)

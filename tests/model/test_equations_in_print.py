@@ -129,7 +129,7 @@ def test_latex_is_written_by_the_command(tmp_path):
 
 def test_a_second_rotor_and_a_part_of_ones_own_are_printed_under_their_names(tmp_path):
     (tmp_path / "wing.py").write_text(WING_COMPONENT)
-    heli = symheli.Helicopter.load(write(tmp_path, WING, AFT_ROTOR))
+    heli = symheli.Helicopter.load(write(tmp_path, WING, AFT_ROTOR), allow_code=True)
     sections = {section.title: section for section in listing(heli)}
     assert (
         r"Z_{\mathrm{wing}} = - \frac{\mathrm{area} \mathrm{lift\_slope} \rho u_{a} w_{a}}{2}"

@@ -5,6 +5,7 @@ gravity.
 from __future__ import annotations
 
 import math
+import os
 import re
 
 import numpy as np
@@ -12,6 +13,9 @@ import pytest
 from airframes import AFT_ROTOR, DOCS, FORWARD, WING, WING_COMPONENT, write
 
 import symheli
+from studies import cli
+from symheli.airframe.vehicle import load_vehicle
+from symheli.errors import InputError
 
 
 @pytest.fixture(autouse=True)
@@ -29,7 +33,7 @@ def ideal():
 
 
 def load(path, governor="ideal"):
-    return symheli.Helicopter.load(path, governor=governor)
+    return symheli.Helicopter.load(path, governor=governor, allow_code=True)
 
 
 def test_a_wing_of_ones_own_changes_z_w_as_its_closed_form_says(tmp_path, ideal):
@@ -214,3 +218,38 @@ def test_other_numbers_share_the_compiled_equations(ideal):
         ideal.with_parameters({"body.mass": -1.0})
     with pytest.raises(symheli.errors.InputError, match="finite"):
         ideal.with_parameters({"body.mass": math.nan})
+
+
+def test_a_part_in_python_is_run_only_where_that_is_asked_for(tmp_path, monkeypatch, capsys):
+    """What loads a vehicle unasked runs nothing: the file would leave a trace."""
+    trace = tmp_path / "trace"
+    (tmp_path / "wing.py").write_text(f"open({str(trace)!r}, 'w').close()\n{WING_COMPONENT}")
+    path = write(tmp_path, WING)
+    with pytest.raises(InputError, match=r"run the Python file .*wing\.py.*allow_code=True"):
+        symheli.Helicopter.load(path)
+    for words in (["vehicles", str(path)], ["trim", str(path)], ["trim", "--vehicle", str(path)]):
+        assert cli.main(words) == 1
+        assert "--allow-code" in capsys.readouterr().err
+    assert not trace.exists()
+    assert cli.main(["trim", str(path), "--airspeed", "5", "--allow-code"]) == 0
+    assert trace.exists()
+    assert "SYMHELI_ALLOW_CODE" not in os.environ  # asked for once, not from then on
+    trace.unlink()
+    monkeypatch.setenv("SYMHELI_ALLOW_CODE", "1")
+    assert "wing" in load_vehicle(path).sections
+    assert trace.exists()
+    assert cli.main(["trim", "xcell60", "--allow-code"]) == 1
+    assert "no such file is given" in capsys.readouterr().err
+
+
+def test_a_campaign_file_imports_no_module_unasked(tmp_path, monkeypatch, capsys):
+    trace = tmp_path / "trace"
+    (tmp_path / "own_trial.py").write_text(f"open({str(trace)!r}, 'w').close()\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    file = tmp_path / "campaign.toml"
+    file.write_text('trial = "own_trial:TRIAL"\ndraws = 2\n')
+    assert cli.main(["campaign", str(file)]) == 1
+    assert "--allow-code" in capsys.readouterr().err
+    assert not trace.exists()
+    assert cli.main(["campaign", str(file), "--allow-code"]) == 1  # it has no TRIAL
+    assert trace.exists()

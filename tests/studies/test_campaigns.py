@@ -145,7 +145,7 @@ def test_a_file_declares_the_same_campaign(tmp_path):
         """)
     )
     said = asked(grid={"kind": ["rod", "bob"]}, random={"length": Uniform(1, 2)}, paired=["kind"])
-    assert read_campaign(file).cases == said.cases
+    assert read_campaign(file, allow_code=True).cases == said.cases
     for wrong, message in {
         "trial = 'pendulums'": "unknown trial 'pendulums'",
         "trial = 'campaign_trials:NONE'": "cannot be imported",
@@ -158,7 +158,7 @@ def test_a_file_declares_the_same_campaign(tmp_path):
     }.items():
         file.write_text(wrong)
         with pytest.raises(InputError, match=message) as error:
-            read_campaign(file)
+            read_campaign(file, allow_code=True)
         assert str(file) in str(error.value)
 
 
@@ -322,7 +322,7 @@ def declared(tmp_path, monkeypatch):
     (tmp_path / "pendulums.toml").write_text(
         'trial = "campaign_trials:PENDULUM"\n[grid]\nlength = [1.0, -1.0]\nkind = ["rod", "bob"]\n'
     )
-    return ["campaign", "pendulums.toml", "--workers", "1"]
+    return ["campaign", "pendulums.toml", "--allow-code", "--workers", "1"]
 
 
 def test_the_command_runs_a_file_and_shows_medians_and_failures(declared, capsys):

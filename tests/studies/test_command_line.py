@@ -511,7 +511,7 @@ def test_wrong_usage_is_status_2(run, arguments):
         (["tirm"], "unknown verb 'tirm'; did you mean 'trim'"),
         (["trim", "--airspeeed", "5"], "unknown option '--airspeeed'; did you mean '--airspeed'"),
         (["study", "--quik"], "unknown option '--quik'; did you mean '--quick'"),
-        (["trim", "5"], "symheli trim does not take '5'"),
+        (["trim", "xcell60", "5"], "symheli trim does not take '5'"),
     ],
 )
 def test_a_misspelt_verb_or_option_gets_the_nearest_name(run, arguments, sentence):
