@@ -62,7 +62,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _fail(error, asks_json, status=2)
     except SystemExit as stop:  # --help, --version
         return int(stop.code or 0)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, SystemError) as error:
+        if isinstance(error, SystemError) and not isinstance(error.__cause__, KeyboardInterrupt):
+            raise
         kept = arguments.kept(arguments) if arguments else "nothing was begun"
         print(f"\nsymheli: interrupted; {kept}", file=sys.stderr)
         return 130

@@ -103,6 +103,11 @@ class Helicopter:
         return f"Helicopter({self.vehicle.name!r}{options}): {self.vehicle.title}"
 
     def __post_init__(self) -> None:
+        if not isinstance(self.vehicle, Vehicle):
+            raise InputError(
+                f"vehicle: expected a Vehicle, got {self.vehicle!r:.60}; a packaged airframe or a"
+                f" file is loaded by Helicopter.load({self.vehicle!r:.60})"
+            )
         if self.governor not in ("pi", "ideal"):
             raise UnknownNameError("governor", self.governor, ("pi", "ideal"))
         if not (np.isfinite(self.density) and self.density > 0):
@@ -147,13 +152,24 @@ class Helicopter:
         """
         return NamedVector(self.dynamics.parameters, np.array(self._values))
 
-    def with_parameters(self, changes: Mapping[str, float]) -> Helicopter:
+    def with_parameters(
+        self, changes: Mapping[str, float] | None = None, **entries: float
+    ) -> Helicopter:
         """Return the same helicopter with other numbers, {"body.mass": 9.0, "density": 1.1} in SI;
         names as in `parameters`.
 
         Nothing is built or compiled anew: the compiled functions take the parameters as an
-        argument.
+        argument. Raises `InputError` for names and values that cannot be.
         """
+        if entries or not isinstance(changes, Mapping):
+            given = next(iter(entries), "mass")
+            ending = f".{given}"
+            known = [n for n in map(str, self.parameters.signals) if n.endswith(ending)]
+            raise InputError(
+                "with_parameters: give one mapping from the names of .parameters to numbers in SI,"
+                f" such as with_parameters({{{(known or ['body.mass'])[0]!r}:"
+                f" {entries.get(given, 9.0):g}}})"
+            )
         density = changes.get(DENSITY, self.density)
         vehicle = self.vehicle.with_values(
             {name: value for name, value in changes.items() if name != DENSITY}

@@ -179,7 +179,7 @@ class LPVARX:
     _: KW_ONLY
     na: Orders
     nb: Orders
-    delay: Orders
+    delay: Orders = 1
     basis: FunctionSpace = CONSTANT
     scheduling_at: Literal["lag", "now"] = "lag"
     offset: bool = False

@@ -6,6 +6,7 @@ import argparse
 import os
 import platform
 import tempfile
+import warnings
 from importlib.metadata import PackageNotFoundError, version
 
 from studies.output import Output, columns
@@ -60,18 +61,18 @@ def run(arguments: argparse.Namespace) -> Output:
         *([n, v or "MISSING", "required"] for n, v in required.items()),
     ]
     rows += [[n, v or "not installed", OPTIONAL[n]] for n, v in optional.items()]
-    if cc:
+    slower = (
+        "models run in the CasADi virtual machine, several times slower, same numbers to rounding"
+    )
+    works = bool(cc) and _compiles()
+    if works:
         compiling = f"C compiler: {cc}; models run as machine code"
+    elif cc:
+        compiling = f"C compiler: {cc} does NOT compile; {slower} (set CC to another)"
     elif os.environ.get("SYMHELI_COMPILE") == "0":
-        compiling = (
-            "C compiler: switched off by SYMHELI_COMPILE=0; models run in the CasADi virtual"
-            " machine, several times slower, same numbers to rounding"
-        )
+        compiling = f"C compiler: switched off by SYMHELI_COMPILE=0; {slower}"
     else:
-        compiling = (
-            "C compiler: none found; models run in the CasADi virtual machine, several times"
-            " slower, same numbers to rounding (install gcc or set CC)"
-        )
+        compiling = f"C compiler: none found; {slower} (install gcc or set CC)"
     level = next(iter(compiled_kernels("double"))) if compiled_kernel("double") else None
     lines = (
         f"machine code, level {level}"
@@ -95,7 +96,7 @@ def run(arguments: argparse.Namespace) -> Output:
         "python": platform.python_version(),
         "required": required,
         "optional": optional,
-        "compiler": cc,
+        "compiler": cc if works else None,
         "compiled_estimator": level is not None,
         "estimator_level": level,
         "solvers": solvers,
@@ -104,6 +105,15 @@ def run(arguments: argparse.Namespace) -> Output:
         "missing": missing,
     }
     return Output(text, data, status=1 if missing or not solvers else 0)
+
+
+def _compiles() -> bool:
+    """Whether the compiler makes a library of one function."""
+    from symheli.codegen.compile import library
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return library("int symheli_doctor(void) { return 0; }\n", "doctor") is not None
 
 
 def _version(package: str) -> str | None:

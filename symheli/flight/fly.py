@@ -8,13 +8,14 @@ from symheli.codegen import Layout
 from symheli.errors import FlightLostError
 from symheli.flight.flight_data import ADVICE
 from symheli.flight.flights import Flights
-from symheli.flight.plan import FlightPlan, Options, plan_of
+from symheli.flight.plan import FlightPlan, Options, plan_of, shows_options
 from symheli.flight.schedule import AirspeedSchedule
 from symheli.flight.validity import warn_of_flown
 from symheli.helicopter import Helicopter, require
 from symheli.records.flight_record import FlightRecord
 
 
+@shows_options
 def fly(
     heli: Helicopter, schedule: AirspeedSchedule | FlightPlan, **options: Unpack[Options]
 ) -> FlightRecord:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import inspect
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field, fields, replace
-from typing import Any, Literal, TypedDict, get_args
+from typing import Any, Literal, ParamSpec, TypedDict, TypeVar, get_args
 
 import numpy as np
 
@@ -18,6 +19,8 @@ from symheli.flight.schedule import AirspeedSchedule
 from symheli.flight.sensor import Sensor
 from symheli.flight.servo import Servo, one_each
 from symheli.values.numbers import whole
+
+P, R = ParamSpec("P"), TypeVar("R")
 
 MIN_SAMPLE_PERIOD = 1e-6
 """Least sample period, s."""
@@ -179,6 +182,18 @@ def plan_of(given: AirspeedSchedule | FlightPlan, options: Options) -> FlightPla
         if name not in known:
             raise UnknownNameError("option of a flight", name, known)
     return FlightPlan(given, **options)  # type: ignore[arg-type]
+
+
+def shows_options(function: Callable[P, R]) -> Callable[P, R]:
+    """The function, whose signature shows the options of a flight by name in `help` and completion,
+    with the values that a `FlightPlan` has for them.
+    """
+    shown = inspect.signature(function)
+    plan = inspect.signature(FlightPlan).parameters
+    own = [p for p in shown.parameters.values() if p.kind is not inspect.Parameter.VAR_KEYWORD]
+    named = [plan[name] for name in Options.__annotations__]
+    function.__signature__ = shown.replace(parameters=[*own, *named])  # type: ignore[attr-defined]
+    return function
 
 
 def _expect(name: str, value: object, kind: type) -> None:

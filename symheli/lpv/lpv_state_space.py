@@ -156,6 +156,15 @@ class LPVStateSpace(Operators, LPVMatrices):
         scaled = recentred(whole, [centre(*bounds) for bounds in ranges])
         scaled.setdefault((0,) * len(given), np.zeros_like(next(iter(whole.values()))))
         basis, M = coefficients_of(scaled, ranges)
+        for kind, group, count in (
+            ("states", states, nx),
+            ("inputs", inputs, M.shape[2] - nx),
+            ("outputs", outputs, M.shape[1] - nx),
+        ):
+            if group and len(group) != count:
+                raise InputError(
+                    f"{kind}: {len(group)} names, {', '.join(group)}, for {count} in the matrices"
+                )
         return cls(
             basis,
             M[:, :nx, :nx],
@@ -666,6 +675,16 @@ def _by_exponents(
         raise InputError(
             f"{name}: expected {{exponents: matrix}}, such as {{{(0,) * count}: {name}0}}, with"
             f" {count} parameters"
+        )
+    if isinstance(matrices, str) or not hasattr(matrices, "__len__"):
+        raise InputError(
+            f"{name}: expected a list of coefficient matrices [{name}0, {name}1, ...], got"
+            f" {matrices!r:.60}"
+        )
+    if len(matrices) and all(np.ndim(M) == 1 for M in matrices):
+        raise InputError(
+            f"{name}: expected a list of coefficient matrices [{name}0, {name}1, ...], {name}(p) ="
+            f" {name}0 + p {name}1 + ..., got one matrix; write [{name}0]"
         )
     if not len(matrices):
         raise InputError(

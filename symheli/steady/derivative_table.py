@@ -180,6 +180,11 @@ def derivatives(family: LinearFamily) -> DerivativeTable:
     >>> bool((table["M_q"] < 0).all())
     True
     """
+    if not isinstance(family, LinearFamily):
+        raise InputError(
+            f"derivatives: expected a LinearFamily, got {type(family).__name__}; a family of one"
+            " airspeed is symheli.sweep(heli, [5.0])"
+        )
     if family.dt is not None:
         raise InputError(
             f"derivatives are those of continuous models; this family has dt = {family.dt} s"

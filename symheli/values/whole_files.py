@@ -63,6 +63,10 @@ def _reason(target: Path, error: OSError, size: int) -> str:
             f"{target}: the disk is full, {size / 1024:.0f} KiB are needed; free some space and try"
             " again"
         )
+    if target.is_dir():
+        return (
+            f"{target} is a folder: give the name of a file in it, such as {target / 'model.json'}"
+        )
     return f"{target}: cannot be written ({error.strerror or error}); choose another place"
 
 

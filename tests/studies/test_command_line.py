@@ -633,8 +633,13 @@ def test_long_jobs_get_their_options_and_show_their_result(
     assert json.loads(run(*arguments, "--json")[1]) == {"gain": 2.5}
 
 
-def test_interruption_says_what_was_kept(run, monkeypatch):
+@pytest.mark.parametrize("inside", [False, True])
+def test_interruption_says_what_was_kept(run, monkeypatch, inside):
+    """Also where compiled code has turned the interruption into an error of its own."""
+
     def interrupted(arguments):
+        if inside:
+            raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
         raise KeyboardInterrupt
 
     monkeypatch.setattr(study_command, "run", interrupted)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
@@ -218,12 +218,13 @@ class Controller:
         """Sample the controller by Tustin's rule at every frozen p and fit functions of the same
         degree; `closed` and `certify` then hold the inputs of the plant between the samples.
 
-        Raises `InputError` for a controller that is sampled, or a period that is not positive.
+        The promise stays where the sampled loop keeps it at frozen p, to a tenth; else `promised`
+        is NaN, and the `notes` say why. Raises `InputError` for a controller that is sampled, or a
+        period that is not positive, `SynthesisError` where the sampled loop is not stable.
         """
-        from synthesis.design.plant.sampling import tustin
+        from synthesis.design.loops.sampled_promise import sampled
 
-        model = tustin(self.model, dt)
-        return replace(self, model=model)
+        return sampled(self, dt)
 
     def reduce(self, order: int | None = None, *, loss: float | None = None) -> Controller:
         """Reduce to at most `order` states, or to the fewest with which the largest gain of the

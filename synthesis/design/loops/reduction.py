@@ -43,6 +43,11 @@ def reduced(controller: Controller, order: int) -> Controller:
     """
     if isinstance(order, bool) or not isinstance(order, int | np.integer) or order < 0:
         raise InputError(f"order: expected an integer >= 0, got {order!r}")
+    if order > controller.order:
+        raise InputError(
+            f"order: the controller has {controller.order} states, fewer than {order}; give at most"
+            f" {controller.order}"
+        )
     return controller if order >= controller.order else _FullController(controller).kept(order)
 
 
