@@ -87,7 +87,8 @@ def run(arguments: argparse.Namespace) -> Output:
             columns(rows, left=3),
             compiling,
             f"recursive estimator: {lines}",
-            f"solvers for matrix inequalities: {', '.join(solvers) or 'NONE'}",
+            f"solvers for matrix inequalities: {', '.join(solvers) or 'NONE'}; LYAPUNOV, of this"
+            " package",
             f"cache of compiled models: {cache} ({problem or 'writable'})",
         )
     )

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from studies.commands import given_model, options
@@ -14,6 +15,9 @@ from studies.output import Output, columns, progress
 from symheli.errors import InputError
 
 if TYPE_CHECKING:
+    from studies.loops.given import Loop
+    from symheli import LinearFamily, LPVStateSpace
+    from symheli.values import Signal
     from synthesis.design.loops.margins import Margins
 
 HELP = "gain, phase, delay and disk margins and attitude bandwidths over airspeed"
@@ -38,6 +42,13 @@ ARGUMENTS = (
         type=options.number,
     ),
     option("--points", "N", "airspeeds", options.at_least_one, 14),
+    option(
+        "--controller",
+        "FILE",
+        "table of TableController.save or symheli synthesize around --model, in place of"
+        " --feedback; of a vehicle see symheli specs --controller",
+        Path,
+    ),
     *given_model.WITHOUT_CHANNELS,
 )
 
@@ -52,21 +63,42 @@ def run(arguments: argparse.Namespace) -> Output:
 def _of_model(arguments: argparse.Namespace) -> Output:
     import numpy as np
 
-    from studies.loops.given import over_parameter
+    from symheli.values import Signal
 
-    gains = dict(arguments.feedback)
-    if not gains:
-        raise InputError("give the loop to analyse: --feedback d_lat=phi:-0.02")
+    loop, said = _loop(arguments)
     lpv = given_model.lpv_model(arguments)
     s = lpv.scheduling
     low, high = arguments.airspeeds or (s.low, s.high)
     values = np.linspace(low, high, arguments.points).tolist()
-    rows = list(over_parameter(lpv, gains, values))
-    head = f"{arguments.model}, {given_model.words(gains)}: the loop broken at each input"
+    return _of_loop(lpv, loop, values, Signal(s.name, s.unit), f"{arguments.model}, {said}")
+
+
+def _loop(arguments: argparse.Namespace) -> tuple[Loop, str]:
+    """The gains of --feedback or the table of --controller, and what they are in words."""
+    gains = dict(arguments.feedback)
+    if bool(gains) == (arguments.controller is not None):
+        raise InputError(
+            "give the loop to analyse, as --feedback d_lat=phi:-0.02 or as --controller FILE"
+        )
+    if gains:
+        return gains, given_model.words(gains)
+    from symheli import TableController
+
+    return TableController.load(arguments.controller).model, str(arguments.controller)
+
+
+def _of_loop(
+    model: LPVStateSpace | LinearFamily, loop: Loop, values: list[float], s: Signal, what: str
+) -> Output:
+    """The margins of a loop at values of the parameter `s`, as a table."""
+    from studies.loops.given import over_parameter
+
+    rows = list(over_parameter(model, loop, values))
+    head = f"{what}: the loop broken at each input"
     names = list(rows[0].margins)
     table = [
         ["", *(cell for u in names for cell in (u, *[""] * (len(MARGINS) - 1)))],
-        [f"{s.name}, {s.unit}", *MARGINS * len(names)],
+        [f"{s}, {s.unit}", *MARGINS * len(names)],
         ["", *UNITS * len(names)],
         *(
             [f"{row.p:.4g}", *(cell for u in names for cell in _margins(row.margins[u]))]
@@ -76,7 +108,7 @@ def _of_model(arguments: argparse.Namespace) -> Output:
     lines = [head, "", columns(table, left=0), "", LEGEND]
     data = {
         "loop": head,
-        "parameter": s.name,
+        "parameter": str(s),
         "values": values,
         "margins": {u: [_margin_entry(row.margins[u]) for row in rows] for u in names},
         "units": {"parameter": s.unit, "phase": "rad", "delay": "s"},
@@ -93,10 +125,10 @@ def _of_vehicle(arguments: argparse.Namespace) -> Output:
     from studies.loops.margins import DELAY, LATERAL, LONGITUDINAL, over_airspeed
 
     given_model.only_with_a_model(arguments)
-    if arguments.feedback:
+    if arguments.controller:
         raise InputError(
-            f"the loop of a vehicle is its roll hold d_lat = {HOLD:g} phi; --feedback goes with"
-            " --model FILE"
+            "--controller goes with --model FILE; of a vehicle, with its servos and delay:"
+            f" symheli specs {arguments.vehicle} --controller {arguments.controller}"
         )
     low, high = arguments.airspeeds or (0.0, 13.0)
     if not (0 <= low < high) or arguments.points <= arguments.degree:
@@ -105,6 +137,11 @@ def _of_vehicle(arguments: argparse.Namespace) -> Output:
         )
     progress(f"trimming and linearizing {arguments.vehicle} from {low:g} to {high:g} m/s")
     family = symheli.sweep(options.helicopter(arguments), np.linspace(low, high, arguments.points))  # type: ignore[arg-type]
+    if arguments.feedback:
+        gains = dict(arguments.feedback)
+        what = f"{arguments.vehicle} without servos and delay, {given_model.words(gains)}"
+        speeds = [float(v) for v in family.airspeeds]
+        return _of_loop(family, gains, speeds, family.axes[0], what)
     parts = [family.select(*axis) for axis in (LATERAL, LONGITUDINAL)]
     fitted = [part.interpolate("polynomial", arguments.degree) for part in parts]
     speeds = [float(v) for v in family.airspeeds]

@@ -45,6 +45,9 @@ after a step of the command: by how much it is exceeded, from 10 to 90 %, until 
 DECIMALS = {"dB": 1, "%": 0}
 """Shown, by unit; else two."""
 
+THROWN = ("d_lat", "d_lon", "d_ped")
+"""Controls of which --throw states the deflection at full output."""
+
 ARGUMENTS = (
     *options.vehicle(None, "vehicle file that is calibrated from the log"),
     positional("log", "flight log of deflections and motion", type=Path, metavar="LOG"),
@@ -165,6 +168,7 @@ def run(arguments: argparse.Namespace) -> Output:
             delay=arguments.delay,
         )
     lines = [
+        *_assumed(arguments),
         f"{', '.join(f'{n} {parameters.get(n, 0.0):g} -> {v:g}' for n, v in change.items())}",
         "",
         columns(table, left=2),
@@ -280,6 +284,19 @@ def _verdict(rows: list[LoopMargins]) -> str:
         f" {gain.gain - gain.gain_band:.1f} dB ({gain.control}, {gain.airspeed:g} m/s) and"
         f" {phase.phase - phase.phase_band:.0f} deg ({phase.control}, {phase.airspeed:g} m/s)."
     )
+
+
+def _assumed(arguments: argparse.Namespace) -> list[str]:
+    """The deflections that are assumed, said before the numbers that rest on them."""
+    given = dict(arguments.throw)
+    assumed = [u for u in THROWN if u not in given]
+    if not assumed:
+        return []
+    return [
+        f"ASSUMED, not measured: 45 deg at full output of {', '.join(assumed)}. Every margin below"
+        f" scales with it; measure it and add --throw {' '.join(f'{u}=RAD' for u in assumed)}.",
+        "",
+    ]
 
 
 def _listed(values: list[float]) -> str:

@@ -29,7 +29,8 @@ def run(arguments: argparse.Namespace) -> Output:
     """Load, verify in rational arithmetic; exit status 1 where a proof fails."""
     if len(arguments.files) == 1 and _reader(arguments.files[0]) is _verified:
         cert, verdict, data = _verified(arguments.files[0])
-        return Output(f"{cert.details}\n{verdict}", data, status=0 if data["exact"] else 1)
+        found = f"How it was found, and what it supposes:\n{cert.details}"
+        return Output(f"{verdict}\n\n{found}", data, status=0 if data["exact"] else 1)
     lines, proofs = [], []
     for file in arguments.files:
         _, verdict, data = _reader(file)(file)

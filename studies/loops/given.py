@@ -1,4 +1,4 @@
-"""Margins of the loops around any LPV model, each broken at its input, over the parameter."""
+"""Margins of the loops around any model over a parameter, each broken at its input."""
 
 from __future__ import annotations
 
@@ -6,8 +6,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import synthesis
-from symheli import LPVStateSpace
+from symheli import LinearFamily, LPVStateSpace
 from synthesis.design.loops.margins import Margins
+
+Loop = Mapping[tuple[str, str], float] | LPVStateSpace
+"""Feedback gains {(input, output): gain}, or a controller over the parameter."""
 
 
 @dataclass(frozen=True)
@@ -19,12 +22,14 @@ class BrokenAt:
 
 
 def over_parameter(
-    lpv: LPVStateSpace, gains: Mapping[tuple[str, str], float], values: Sequence[float]
+    model: LPVStateSpace | LinearFamily, loop: Loop, values: Sequence[float]
 ) -> Iterator[BrokenAt]:
-    """One entry a value, the model held there; the other loops stay closed."""
-    inputs = list(dict.fromkeys(u for u, _ in gains))
-    for p in values:
-        model = lpv.at(p)
-        yield BrokenAt(
-            p, {u: synthesis.margins(synthesis.analysis.open_loop(model, gains, u)) for u in inputs}
-        )
+    """One entry a value, the model and the controller held there; the other loops stay closed. Of a
+    family each of its models.
+    """
+    named = loop.outputs if isinstance(loop, LPVStateSpace) else [u for u, _ in loop]
+    tables = {
+        str(u): synthesis.margin_table(model, loop, str(u), values) for u in dict.fromkeys(named)
+    }
+    for k, p in enumerate(values):
+        yield BrokenAt(p, {u: table.rows[k][1] for u, table in tables.items()})

@@ -80,7 +80,7 @@ def test_identified_models_from_files_are_certified_and_exported(answer, run, tm
     [
         (("certify", "--states", "v"), "give --model FILE"),
         (("certify", "--model", "FAMILY", "--channel", "gust"), "--channel"),
-        (("margins", "--feedback", "d_lat=phi:-0.1"), "--feedback goes with --model"),
+        (("margins", "--controller", "t.json"), "symheli specs xcell60 --controller t.json"),
         (("export", "c", "--model", "FAMILY"), "c is written for a vehicle"),
         (("export", "model", "--model", "FAMILY"), "cannot be exported as C"),
         (("certify", "--model", "nowhere.json"), "No such file"),
