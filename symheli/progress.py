@@ -1,15 +1,22 @@
-"""Progress of long computations, reported to listeners; this module shows nothing itself.
+"""Progress of long computations, reported to listeners.
 
 A computation reports its tasks and their steps; `watched` sets the listener for everything that is
-called within it, in the same thread. Without a listener a report costs next to nothing.
+called within it, in the same thread. Without a listener a line on a terminal or in a notebook shows
+what takes longer than two seconds (SYMHELI_PROGRESS=0: nothing); elsewhere a report costs next to
+nothing.
 """
 
 from __future__ import annotations
 
+import os
+import sys
+import threading
+import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, replace
+from multiprocessing import parent_process
 from typing import TypeVar
 
 from symheli.errors import InputError
@@ -66,7 +73,7 @@ class Progress:
 
 Listener = Callable[[Progress], object]
 
-_listener: ContextVar[Listener | None] = ContextVar("listener", default=None)
+_listener: ContextVar[Listener | None] = ContextVar("listener")
 _depth: ContextVar[int] = ContextVar("depth", default=0)
 
 
@@ -95,14 +102,68 @@ def watched(listener: Listener | None) -> Iterator[None]:
     """
     if listener is not None and not callable(listener):
         raise InputError(f"listener: expected a function of a Progress, or None, got {listener!r}")
-    before = _listener.get(), _depth.get()
-    _listener.set(listener)
-    _depth.set(0)
+    before = _listener.set(listener), _depth.set(0)
     try:
         yield
     finally:
-        _listener.set(before[0])
-        _depth.set(before[1])
+        _listener.reset(before[0])
+        _depth.reset(before[1])
+
+
+class _Line:
+    """A listener that shows the outermost and the innermost task in one line of standard error."""
+
+    AFTER, EVERY = 2.0, 1.0
+    """Seconds until it is shown, and between two changes."""
+
+    def __init__(self) -> None:
+        self._open: list[Progress] = []
+        self._since, self._width = 0.0, 0
+        self._over: threading.Event | None = None
+        self._lock = threading.Lock()
+
+    def __call__(self, progress: Progress) -> None:
+        """Note where a task is; the outermost begins and ends the showing."""
+        self._open = [*self._open[: progress.depth], *([] if progress.over else [progress])]
+        if self._open and self._over is None:
+            self._since, self._over = time.monotonic(), threading.Event()
+            threading.Thread(target=self._show, args=(self._over,), daemon=True).start()
+        elif not self._open and self._over is not None:
+            with self._lock:
+                self._over.set()
+                self._over = None
+                if self._width:
+                    self._write("")
+
+    def _show(self, over: threading.Event) -> None:
+        wait = self.AFTER
+        while not over.wait(wait):
+            ends = self._open if len(self._open) < 3 else [self._open[0], self._open[-1]]
+            shown = "; ".join(map(str, ends))
+            with self._lock:
+                if not over.is_set():
+                    self._write(f"symheli: {shown}, {time.monotonic() - self._since:.0f} s")
+            wait = self.EVERY
+
+    def _write(self, text: str) -> None:
+        text = text[:LINE]
+        sys.stderr.write(f"\r{text:{self._width}}{'' if text else chr(13)}")
+        sys.stderr.flush()
+        self._width = len(text)
+
+
+LINE = 110
+"""Characters that are shown of the progress."""
+_line = _Line()
+
+
+def _usual() -> Listener | None:
+    """The line, in the main thread of a process of its own with a terminal or a notebook."""
+    seen = sys.stderr.isatty() or "ipykernel" in sys.modules
+    if not seen or os.environ.get("SYMHELI_PROGRESS") == "0":
+        return None
+    main = threading.current_thread() is threading.main_thread() and parent_process() is None
+    return _line if main else None
 
 
 class Task:
@@ -136,7 +197,11 @@ def task(title: str, total: float | None = None, *, percent: bool = False) -> It
     percentage is reported.
     """
     depth = _depth.get()
-    begun = Task(Progress(title, 0, total, depth=depth, percent=percent), _listener.get())
+    try:
+        listener = _listener.get()
+    except LookupError:  # nobody has asked
+        listener = _usual()
+    begun = Task(Progress(title, 0, total, depth=depth, percent=percent), listener)
     _depth.set(depth + 1)
     try:
         yield begun

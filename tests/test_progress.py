@@ -1,12 +1,17 @@
 """Long work tells how far it is, to whoever listens and to nobody else."""
 
+import contextlib
+import io
+import sys
+import time
+
 import numpy as np
 import pytest
 
 import identification as idn
 import symheli
 import synthesis
-from symheli import LPVStateSpace, Scheduling
+from symheli import LPVStateSpace, Scheduling, progress
 from symheli.progress import task, tracked
 
 
@@ -174,3 +179,37 @@ def test_estimators_tell_where_they_are(heard, method):
     idn.fit(arx, record, method=method)
     assert well_formed(heard)
     assert heard
+
+
+class Screen(io.StringIO):
+    """A terminal that keeps what is written."""
+
+    def isatty(self):
+        return True
+
+
+def test_long_work_shows_a_line_on_a_terminal_unasked_and_takes_it_away(monkeypatch):
+    screen = Screen()
+    monkeypatch.setattr(sys, "stderr", screen)
+    monkeypatch.setattr(progress._Line, "AFTER", 0.01)
+    monkeypatch.setattr(progress._Line, "EVERY", 0.01)
+    for _ in progress.tracked("flying", range(2)):
+        seen = screen.getvalue()
+        while screen.getvalue() == seen:  # ends, or the line never comes
+            time.sleep(0.001)
+    assert "symheli: flying: 1 of 2, 0 s" in screen.getvalue()
+    last = screen.getvalue().rsplit("\r", 2)
+    assert (last[1].strip(), last[2]) == ("", "")
+
+
+@pytest.mark.parametrize("how", ["environment", "listener", "no terminal"])
+def test_it_is_silent_where_that_is_asked_for_or_nobody_looks(monkeypatch, how):
+    screen = io.StringIO() if how == "no terminal" else Screen()
+    monkeypatch.setattr(sys, "stderr", screen)
+    monkeypatch.setattr(progress._Line, "AFTER", 0.001)
+    if how == "environment":
+        monkeypatch.setenv("SYMHELI_PROGRESS", "0")
+    with progress.watched(None) if how == "listener" else contextlib.nullcontext():
+        for _ in progress.tracked("flying", range(2)):
+            time.sleep(0.01)
+    assert screen.getvalue() == ""
