@@ -30,6 +30,7 @@ from symheli.values.summary import as_table, summarized
 if TYPE_CHECKING:
     import pandas
     import xarray
+    from matplotlib.axes import Axes
 
 LEAST_SQUARES = ("ls", "rls")
 """Methods that are biased by noise in the regressors; their covariance does not include the bias.
@@ -206,6 +207,15 @@ class LPVARXModel:
         """
         held = realization.held_value(p, self.structure.basis)
         return realization.at(self.coefficients, held, self.outputs, self.inputs, self.dt)
+
+    def plot(self, input: str | None = None, output: str | None = None) -> tuple[Axes, Axes]:
+        """Draw the frequency response from an input to an output (default: the first of each) at
+        values of the parameters; (magnitude, phase). Raises `UnknownNameError`.
+        """
+        from symheli.lpv.frozen_plots import bode
+
+        lpv = self.to_state_space()
+        return bode(lpv, input or lpv.inputs[0], output or lpv.outputs[0])
 
     def to_state_space(self, route: Literal["shifted", "direct"] | None = None) -> LPVStateSpace:
         """The discrete LPV model with static dependence on p(k) that responds exactly as this one,

@@ -5,11 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from symheli.errors import InputError
+from symheli.values.drawing import LINE, axes_of, plain
 from symheli.values.numbers import whole
+from symheli.values.summary import as_table
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True)
@@ -52,6 +58,17 @@ class AirspeedSchedule:
     holds: tuple[float, ...]
     start: float = 0.0
     lead: float = 2.0
+
+    _repr_html_ = as_table
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the commanded airspeed (m/s) over time (s)."""
+        time = np.linspace(0.0, self.duration, 1001)
+        ax = axes_of(ax, height=2.8)
+        ax.plot(time, self(time)[0], color=LINE)
+        ax.set_xlabel("time (s)")
+        ax.set_ylabel("commanded airspeed (m/s)")
+        return plain(ax)
 
     def __post_init__(self) -> None:
         if not len(self.targets) == len(self.accelerations) == len(self.holds):

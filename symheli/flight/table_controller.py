@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -47,8 +47,11 @@ from symheli.lpv.scheduling import UNSCHEDULED, Scheduling
 from symheli.values.arrays import Array
 from symheli.values.named_vector import NamedVector
 from symheli.values.signal import Signal, indices, signals
-from symheli.values.summary import summarized
+from symheli.values.summary import as_table, summarized
 from symheli.values.units import per_second, ratio
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,6 +142,7 @@ class TableController:
     parameter: Signal = SCHEDULING[0]
 
     __repr__ = summarized
+    _repr_html_ = as_table
 
     def __post_init__(self) -> None:
         for group in ("states", "inputs", "outputs"):
@@ -322,6 +326,14 @@ class TableController:
                 " the TableController itself instead of this model"
             )
         return ScheduledController(self.model, self.follow)
+
+    def plot(self, input: str | None = None, output: str | None = None) -> tuple[Axes, Axes]:
+        """Draw the frequency response from a measured signal to a command (default: the first of
+        each) at values of the parameter; (magnitude, phase). Raises `UnknownNameError`.
+        """
+        from symheli.lpv.frozen_plots import bode
+
+        return bode(self.model, input or self.model.inputs[0], output or self.model.outputs[0])
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the controller as JSON, every number exact; a reader sees the old file or the new

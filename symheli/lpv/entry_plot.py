@@ -31,9 +31,9 @@ def plot_entries(
     wanted: Sequence[str] | None,
     marker: str,
 ) -> Axes:
-    """Plot the `wanted` entries (default: the diagonal of A, the damping of each state by itself)
-    against `values` (K,) of `over`, each divided by its largest magnitude, which the legend gives
-    with its unit.
+    """Plot the `wanted` entries (default: the diagonal of A where it is not zero, the damping of
+    each state by itself) against `values` (K,) of `over`, each divided by its largest magnitude,
+    which the legend gives with its unit.
     """
     return draw_scaled(axes_of(ax), over, values, _selected(names, matrices, wanted), marker)
 
@@ -61,7 +61,10 @@ def plot_family(ax: Axes | None, family: LinearFamily, wanted: Sequence[str] | N
 
 def _selected(names: Names, matrices: Stacked, wanted: Sequence[str] | None) -> list[MatrixEntry]:
     every = list(entries(names, matrices))
-    return chosen(every, [f"A[{s}, {s}]" for s in names.states] if wanted is None else wanted)
+    if wanted is not None:
+        return chosen(every, wanted)
+    diagonal = chosen(every, [f"A[{s}, {s}]" for s in names.states])
+    return [e for e in diagonal if np.any(e.values)] or diagonal
 
 
 def draw_scaled(

@@ -383,8 +383,8 @@ class FlightRecord:
         return self.check_kinematics().corrected(self)
 
     def plot(self, names: Sequence[str] | None = None) -> Array:
-        """Axes (signals,) of these signals (default: all) against time; gaps stay empty. See
-        `symheli.records.record_plot`.
+        """Axes (signals,) of these signals against time; gaps stay empty. Default: all, of a flight
+        with many what was commanded and flown on one screen. See `symheli.records.record_plot`.
         """
         from symheli.records.record_plot import plot_record
 

@@ -1,4 +1,4 @@
-"""A record as a picture: one panel a signal over one time axis."""
+"""A record as a picture: one panel a signal, or what was commanded and flown on one screen."""
 
 from __future__ import annotations
 
@@ -19,17 +19,28 @@ if TYPE_CHECKING:
 
 MAX_PANELS = 6
 """Largest number of signals in one column."""
+SCREEN = (
+    ("airspeed", "airspeed_command"),
+    ("phi", "theta"),
+    ("p", "q", "r"),
+    ("d_lon", "d_lat", "d_col", "d_ped"),
+)
+"""Signals of a flight on one screen, by panel; dashed what they are held to, <name>_reference."""
 
 
 def plot_record(record: FlightRecord, names: Sequence[str] | None = None) -> Array:
-    """The signals `names` (default: all) against time (s), with their units: an array (signals,) of
-    matplotlib's Axes.
+    """The signals `names` against time (s), with their units: an array (signals,) of matplotlib's
+    Axes. Default: all, or of many signals, those of `SCREEN`, a panel for each of its rows.
 
     Shaded: gaps, and where a sample of that signal is missing; no line crosses them. A sample
     between two missing ones is a dot. A notebook shows their figure, a script at `pyplot.show()`;
     `axes[0].figure.savefig("record.png")` writes it. Raises `InputError` for no signals,
     `UnknownNameError` for those the record lacks.
     """
+    if names is None and len(record.signals) > MAX_PANELS:
+        panels = [[s for s in row if s in record.signals] for row in SCREEN]
+        if any(panels):
+            return _on_one_screen(record, [panel for panel in panels if panel])
     shown = record.select(
         record.signals if names is None else [names] if isinstance(names, str) else list(names)
     )
@@ -51,6 +62,31 @@ def plot_record(record: FlightRecord, names: Sequence[str] | None = None) -> Arr
     if record.note:
         figure.suptitle(record.note, fontsize=9)
     return axes[: len(shown.signals)]
+
+
+def _on_one_screen(record: FlightRecord, panels: Sequence[Sequence[str]]) -> Array:
+    """A panel for each list of signals of one unit, with their references dashed: (panels,) of
+    Axes.
+    """
+    figure = new_figure(8.5, 0.6 + 1.55 * len(panels))
+    axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False).ravel()
+    for ax, names in zip(axes, panels, strict=True):
+        shown = record.select(names)
+        for number, (signal, column) in enumerate(zip(shown.signals, shown.values.T, strict=True)):
+            dashed = "--" if signal.endswith("_command") else "-"
+            draw(
+                ax, shown, column, color=f"C{number}", linewidth=1.0, linestyle=dashed, label=signal
+            )
+            if (held := f"{signal}_reference") in record.signals:
+                reference = record.select([held])
+                style = {"color": f"C{number}", "linestyle": "--", "linewidth": 0.8}
+                draw(ax, reference, reference.values[:, 0], **style)
+        ax.set_ylabel(shown.signals[0].unit)
+        ax.legend(loc="upper right", ncols=len(names), fontsize=8, frameon=False)
+    axes[-1].set_xlabel("time (s)")
+    if record.note:
+        figure.suptitle(record.note, fontsize=9)
+    return axes
 
 
 def draw(ax: Axes, record: FlightRecord, column: Array, **style: object) -> None:

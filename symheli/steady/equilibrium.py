@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,10 +18,14 @@ from symheli.steady.newton import TOLERANCE, newton
 from symheli.steady.validity import Validity, in_a_ring, warn
 from symheli.values.aligned import columns, vector
 from symheli.values.arrays import Array
+from symheli.values.drawing import GREY, LINE, axes_of, plain
 from symheli.values.named_vector import NamedVector
 from symheli.values.operating_point import OperatingPoint
 from symheli.values.signal import Signal, rates
 from symheli.values.summary import as_table, summarized
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,6 +68,20 @@ class TrimPoint(OperatingPoint):
 
     __repr__ = summarized
     _repr_html_ = as_table
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw attitude, flapping and controls, those in radians, as bars in degrees."""
+        angles = [
+            (str(s), np.degrees(v))
+            for vector in (self.x, self.u)
+            for s, v in zip(vector.signals, vector.array, strict=True)
+            if s.unit == "rad"
+        ][::-1]
+        ax = axes_of(ax, 6.0, 3.2)
+        ax.barh([name for name, _ in angles], [v for _, v in angles], color=LINE)
+        ax.axvline(0.0, color=GREY, linewidth=0.8)
+        ax.set_xlabel("angle at trim (deg)")
+        return plain(ax)
 
     @property
     def success(self) -> bool:

@@ -40,6 +40,8 @@ def plot_certificate(certificate: Certificate, ax: Axes | None) -> Axes:
     ax.set_xticks(range(len(bounds)), list(bounds))
     ax.set_xlim(-0.5, len(bounds) - 0.5)
     ax.margins(y=0.2)
+    if certificate.kind.endswith("gain"):
+        ax.set_ylim(bottom=0.0)  # differences of a few per mille look like that
     ax.set_ylabel(
         "decay rate (1/s)" if certificate.kind == "decay rate" else f"{certificate.kind} (y per u)"
     )

@@ -126,4 +126,8 @@ def _finite(*gains: Mapping[Any, float]) -> list[float]:
 
 
 def _ticks(low: float, high: float) -> list[float]:
-    return [m * 10.0**e for e in range(-6, 7) for m in (1, 2, 5) if low <= m * 10.0**e <= high]
+    for steps in ((1, 2, 5), (1, 1.5, 2, 3, 4, 5, 7)):
+        ticks = [m * 10.0**e for e in range(-6, 7) for m in steps if low <= m * 10.0**e <= high]
+        if len(ticks) > 2:
+            break
+    return ticks

@@ -26,6 +26,8 @@ from synthesis.design.plant.refusals import conditions
 from synthesis.numerics.program.cone_program import LYAPUNOV, Solver
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
     from symheli.flight import ScheduledController
     from synthesis.design.plant.plant import Plant
 
@@ -136,6 +138,14 @@ class Controller:
     def at(self, *p: float) -> LinearModel:
         """Return the controller frozen at p, one value a parameter."""
         return self.model.at(*p)
+
+    def plot(self, input: str | None = None, output: str | None = None) -> tuple[Axes, Axes]:
+        """Draw the frequency response from a measurement to a control (default: the first of each)
+        at values of the parameters; (magnitude, phase). Raises `UnknownNameError`.
+        """
+        from symheli.lpv.frozen_plots import bode
+
+        return bode(self.model, input or self.model.inputs[0], output or self.model.outputs[0])
 
     @property
     def dt(self) -> float | None:

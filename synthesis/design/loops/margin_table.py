@@ -9,16 +9,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from symheli import LPVStateSpace
+from symheli.errors import InputError
 from symheli.lpv.frozen_plots import Model, frozen_at, parameters_of
-from symheli.values.drawing import label
+from symheli.values.drawing import BLUE, GREY, ORANGE, axes_of, label
 from symheli.values.labelled import frame
 from symheli.values.signal import Signal
+from symheli.values.summary import as_table
 from synthesis.design.loops.margins import Margins, margins, open_loop
 from synthesis.design.plant.as_controller import as_controller
 from synthesis.design.plant.plant import Plant
 
 if TYPE_CHECKING:
     import pandas
+    from matplotlib.axes import Axes
 
 COLUMNS = (
     Signal("gain down", "dB"),
@@ -53,6 +56,36 @@ class MarginTable:
         return "\n".join(["".join(heads), *lines])
 
     __repr__ = __str__
+    _repr_html_ = as_table
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw gain margins (dB) and the phase margin (deg, on the right) over the parameter.
+
+        Raises `InputError` for a table over several parameters or none.
+        """
+        if len(self.names) != 1:
+            raise InputError(
+                f"a picture is over one parameter, this table over {len(self.names)}: print it"
+            )
+        values = self.values()
+        ax = axes_of(ax)
+        ax.plot(values[:, 0], values[:, 2], "o-", color=BLUE, markersize=4, label="gain up (dB)")
+        if np.any(np.isfinite(values[:, 1])):
+            down = np.where(np.isfinite(values[:, 1]), -values[:, 1], np.nan)
+            ax.plot(values[:, 0], down, "v-", color=GREY, markersize=4, label="gain down (dB)")
+        ax.set_xlabel(label(self.names[0]))
+        ax.set_ylabel("gain margin (dB)")
+        ax.set_ylim(bottom=0.0)
+        right = ax.twinx()
+        right.plot(
+            values[:, 0], values[:, 3], "s--", color=ORANGE, markersize=4, label="phase (deg)"
+        )
+        right.set_ylabel("phase margin (deg)")
+        right.set_ylim(bottom=0.0)
+        ax.legend(
+            handles=[*ax.get_lines(), *right.get_lines()], loc="best", fontsize=8, frameon=False
+        )
+        return ax
 
     def to_frame(self) -> pandas.DataFrame:
         """A row a value of the parameters. Raises `InputError` without pandas."""

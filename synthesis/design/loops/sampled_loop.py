@@ -8,19 +8,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from symheli import LPVStateSpace, UncertainStateSpace
 from symheli.errors import InputError
 from symheli.threads import with_one_thread
-from symheli.values.summary import summarized
+from symheli.values.summary import as_table, summarized
 from synthesis.certify.questions.certificate import Certificate
 from synthesis.certify.questions.questions import l2_gain
 from synthesis.certify.statement.demand import Rate
 from synthesis.design.loops.controller import Controller
 from synthesis.design.plant.plant import Plant, require_plant
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 ROUNDING = 256 * np.finfo(float).eps
 """A misfit of an entry of the performance below this fraction of its own terms, at the same p, is
@@ -65,6 +68,11 @@ class SampledLoop:
     misfit: float = 0.0
 
     __repr__ = summarized
+    _repr_html_ = as_table
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the bounds of the certificate; see `Certificate.plot`."""
+        return self.certificate.plot(ax)
 
     @property
     def gamma(self) -> float:
