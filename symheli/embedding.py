@@ -24,9 +24,10 @@ from symheli.lpv.bases.product import Product
 from symheli.lpv.entries import entries
 from symheli.lpv.tools import Matrices
 from symheli.values.arrays import Array, frozen
+from symheli.values.html_table import as_table
 from symheli.values.named_vector import NamedVector
 from symheli.values.signal import Signal, signals
-from symheli.values.summary import as_table, summarized
+from symheli.values.summary import summarized
 
 NODES = (2, 4, 8, 16, 32, 64)
 """Numbers of nodes of the Gauss-Legendre quadrature, tried in turn."""

@@ -20,9 +20,9 @@ from symheli.dynamics import INPUTS, Dynamics, Governor, Name
 from symheli.environment import standard_atmosphere
 from symheli.errors import InputError, UnknownNameError
 from symheli.physics import inflow
+from symheli.values.html_table import as_table
 from symheli.values.named_vector import NamedVector
 from symheli.values.signal import Signal, signals
-from symheli.values.summary import as_table
 
 if TYPE_CHECKING:
     from symheli.equations import RightHandSide

@@ -62,8 +62,8 @@ def run(text, where, names):
     return examples.globs
 
 
-FLOOD = 1000
-"""Characters that no public value may print at a prompt."""
+FLOOD = 2500
+"""Characters that no public value may print at a prompt: a screen of 30 lines."""
 
 
 def check_short(names):

@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 from public_faces import TOP, faces, module, names
 
-from symheli.values.summary import as_table, summarized
+from symheli.values.html_table import as_table
+from symheli.values.summary import summarized
 
 pytestmark = pytest.mark.guard
 

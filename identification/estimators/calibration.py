@@ -28,9 +28,10 @@ from symheli.physics.attitude import euler_state, flight_state
 from symheli.progress import task
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
+from symheli.values.html_table import as_table
 from symheli.values.numbers import positive, whole
 from symheli.values.signal import Signal, indices
-from symheli.values.summary import as_table, summarized
+from symheli.values.summary import summarized
 from symheli.values.whole_files import write_text
 
 PRIOR = 0.5

@@ -17,8 +17,9 @@ from symheli.errors import ExcitationError, InputError
 from symheli.records import FlightRecord
 from symheli.values import Signal
 from symheli.values.arrays import Array
+from symheli.values.html_table import as_table
 from symheli.values.labelled import frame, per
-from symheli.values.summary import as_table, summarized
+from symheli.values.summary import summarized
 
 if TYPE_CHECKING:
     import pandas

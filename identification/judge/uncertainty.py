@@ -20,8 +20,9 @@ from identification.structure.regressors import Regression, as_records, stacked
 from symheli.errors import InputError
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array, frozen
+from symheli.values.html_table import as_table
 from symheli.values.numbers import whole
-from symheli.values.summary import as_table, summarized
+from symheli.values.summary import summarized
 
 
 class ResponseBand(NamedTuple):

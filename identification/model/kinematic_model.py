@@ -27,8 +27,9 @@ from symheli.lpv.bases import FunctionSpace
 from symheli.records import FlightRecord
 from symheli.values import NamedVector, Signal
 from symheli.values.arrays import Array, frozen
+from symheli.values.html_table import as_table
 from symheli.values.kinematics import RIGID_BODY
-from symheli.values.summary import as_table, summarized
+from symheli.values.summary import summarized
 
 if TYPE_CHECKING:
     import pandas

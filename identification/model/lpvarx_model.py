@@ -23,9 +23,10 @@ from symheli.lpv.bases import FunctionSpace
 from symheli.records import FlightRecord
 from symheli.values import NamedVector, Signal, signals
 from symheli.values.arrays import Array, frozen
+from symheli.values.html_table import as_table
 from symheli.values.numbers import whole
 from symheli.values.sample_period import JITTER, same_period
-from symheli.values.summary import as_table, summarized
+from symheli.values.summary import summarized
 
 if TYPE_CHECKING:
     import pandas

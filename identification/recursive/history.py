@@ -12,7 +12,8 @@ from identification.structure.kinematic_arx import KinematicARX
 from identification.structure.lpvarx import LPVARX
 from symheli.values import Signal
 from symheli.values.arrays import Array
-from symheli.values.summary import as_table, summarized
+from symheli.values.html_table import as_table
+from symheli.values.summary import summarized
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

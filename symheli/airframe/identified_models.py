@@ -17,8 +17,9 @@ from symheli.airframe.quantity import Quantity
 from symheli.airframe.vehicle_file import LINEAR
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.linear_model import LinearModel
+from symheli.values.html_table import as_table
 from symheli.values.signal import Signal
-from symheli.values.summary import as_table, summarized
+from symheli.values.summary import summarized
 from symheli.values.text_file import text_of
 
 

@@ -22,7 +22,8 @@ from symheli.integrate.side_by_side import SIDE_BY_SIDE, over_the_cores, workers
 from symheli.progress import task
 from symheli.records.flight_record import FlightRecord
 from symheli.values.arrays import Array
-from symheli.values.summary import as_table, summarized
+from symheli.values.html_table import as_table
+from symheli.values.summary import summarized
 
 CHUNK = 2 * SIDE_BY_SIDE.lanes
 """Number of flights that a worker process takes at a time."""

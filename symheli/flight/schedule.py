@@ -11,8 +11,8 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.values.drawing import LINE, axes_of, plain
+from symheli.values.html_table import as_table
 from symheli.values.numbers import whole
-from symheli.values.summary import as_table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

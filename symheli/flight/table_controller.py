@@ -45,9 +45,10 @@ from symheli.lpv.bases.interpolating import PiecewiseLinear
 from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.lpv.scheduling import UNSCHEDULED, Scheduling
 from symheli.values.arrays import Array
+from symheli.values.html_table import as_table
 from symheli.values.named_vector import NamedVector
 from symheli.values.signal import Signal, indices, signals
-from symheli.values.summary import as_table, summarized
+from symheli.values.summary import summarized
 from symheli.values.units import per_second, ratio
 
 if TYPE_CHECKING:

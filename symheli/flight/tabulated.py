@@ -16,7 +16,7 @@ from symheli.lpv.lpv_matrices import Matrices
 from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.values.arrays import Array
 from symheli.values.signal import Signal, indices
-from symheli.values.units import integral
+from symheli.values.units import per_second, quotient
 
 CHECKS_PER_INTERVAL = 4
 """Number of points between two knots at which a table is compared with its original."""
@@ -139,6 +139,16 @@ class Tabulated:
 
 
 def _integrated(rate: Signal) -> Signal:
-    """The command whose rate this is; where the rate has no unit, in the unit of its name."""
-    unit = None if rate.unit == "1" else integral(rate.unit)
-    return Signal(rate.removesuffix(RATE), unit)
+    """The command whose rate this is, in the unit that is a second's change of it: "m/s" of
+    "m/s^2", "km/h" of "km/h/s"; where the rate has no unit, in the unit of its name.
+    """
+    unit, name = rate.unit, rate.removesuffix(RATE)
+    if unit == "1":
+        return Signal(name)
+    whole = unit.removesuffix("/s")
+    if whole == unit or per_second(whole) != unit:
+        try:
+            whole = quotient(unit, "1/s")
+        except InputError:
+            whole = f"{unit} s"
+    return Signal(name, whole)

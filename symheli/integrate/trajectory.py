@@ -11,9 +11,10 @@ from symheli.errors import InputError
 from symheli.physics.attitude import euler_state
 from symheli.records.flight_record import FlightRecord
 from symheli.values.arrays import Array, frozen
+from symheli.values.html_table import as_table
 from symheli.values.named_vector import NamedVector
 from symheli.values.signal import Signal, indices, signals
-from symheli.values.summary import as_table, summarized
+from symheli.values.summary import summarized
 
 EULER = ("u", "v", "w", "p", "q", "r", "phi", "theta")
 INPUTS = ("d_lon", "d_lat", "d_col", "d_ped")

@@ -14,7 +14,7 @@ from symheli.lpv.lpv_matrices import Matrices
 from symheli.lpv.scheduling import Scheduling
 from symheli.values.arrays import Array, frozen
 from symheli.values.signal import Signal, signals
-from symheli.values.summary import as_table, summarized
+from symheli.values.summary import summarized
 
 
 class Block(NamedTuple):
@@ -47,7 +47,6 @@ class LFTMatrices:
     dt: float | None = None
 
     __repr__ = summarized
-    _repr_html_ = as_table
 
     def __post_init__(self) -> None:
         for group in ("states", "inputs", "outputs"):

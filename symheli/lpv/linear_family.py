@@ -19,9 +19,10 @@ from symheli.lpv.linear_models import LinearModels
 from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.lpv.scheduling import Rates
 from symheli.values.arrays import Array, frozen
+from symheli.values.html_table import as_table
 from symheli.values.operating_points import OperatingPoints
 from symheli.values.signal import Signal, signals
-from symheli.values.summary import as_table, summarized
+from symheli.values.summary import summarized
 
 if TYPE_CHECKING:
     import pandas

@@ -14,10 +14,11 @@ from symheli.lpv.equilibration import is_singular, loop_inverse
 from symheli.lpv.operators import Operators
 from symheli.values.aligned import matrix
 from symheli.values.arrays import Array, frozen
+from symheli.values.html_table import as_table
 from symheli.values.operating_point import OperatingPoint
 from symheli.values.sample_period import same_period
 from symheli.values.signal import Signal, indices, signals
-from symheli.values.summary import as_table, summarized
+from symheli.values.summary import summarized
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

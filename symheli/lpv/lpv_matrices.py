@@ -12,7 +12,7 @@ from symheli.lpv.bases.function_space import FunctionSpace
 from symheli.lpv.scheduling import RANGE_SLACK, Scheduling, check_all, parameters
 from symheli.values.arrays import Array, frozen
 from symheli.values.signal import Signal, signals
-from symheli.values.summary import as_table, summarized
+from symheli.values.summary import summarized
 
 
 class Matrices(NamedTuple):
@@ -45,7 +45,6 @@ class LPVMatrices:
     dt: float | None = None
 
     __repr__ = summarized
-    _repr_html_ = as_table
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "parameters", parameters(self.parameters))

@@ -32,8 +32,9 @@ from symheli.lpv.scheduling import (
 )
 from symheli.lpv.trim_schedule import TrimSchedule
 from symheli.values.arrays import Array
+from symheli.values.html_table import as_table
 from symheli.values.signal import Signal, indices, signals
-from symheli.values.summary import as_table, summarized
+from symheli.values.summary import summarized
 
 if TYPE_CHECKING:
     import pandas

@@ -10,9 +10,10 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.values.arrays import Array, frozen
 from symheli.values.drawing import axes_of, label, legend_beside, plain
+from symheli.values.html_table import as_table
 from symheli.values.labelled import frame
 from symheli.values.signal import Signal, indices, signals
-from symheli.values.summary import as_table, summarized
+from symheli.values.summary import summarized
 
 if TYPE_CHECKING:
     import pandas

@@ -17,8 +17,9 @@ from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.lpv.operators import Operators
 from symheli.lpv.scheduling import Rates, Scheduling
 from symheli.values.arrays import Array, frozen
+from symheli.values.html_table import as_table
 from symheli.values.signal import Signal, indices, signals
-from symheli.values.summary import as_table, summarized
+from symheli.values.summary import summarized
 
 SAFETY = 2.0
 """Safety factor of a covering set on the largest measured difference."""

@@ -22,9 +22,10 @@ from symheli.logs.signal_map import SignalMap
 from symheli.logs.ulog import read_ulog
 from symheli.logs.xplane import read_xplane
 from symheli.values.arrays import Array, frozen
+from symheli.values.html_table import as_table
 from symheli.values.sample_period import JITTER, period_of, warn_of_odd_steps
 from symheli.values.signal import Signal, indices, signals
-from symheli.values.summary import as_table, summarized
+from symheli.values.summary import summarized
 from symheli.values.units import to_si
 from symheli.values.whole_files import write_text
 

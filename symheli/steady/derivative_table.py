@@ -16,9 +16,10 @@ from symheli.lpv.linear_family import AIRSPEED, LinearFamily
 from symheli.values.arrays import Array, frozen
 from symheli.values.comma_separated import comma_separated
 from symheli.values.drawing import axes_of
+from symheli.values.html_table import as_table
 from symheli.values.labelled import dataset, frame
 from symheli.values.signal import Signal
-from symheli.values.summary import as_table, summarized
+from symheli.values.summary import summarized
 from symheli.values.units import quotient
 
 ROW = {"u": "X", "v": "Y", "w": "Z", "p": "L", "q": "M", "r": "N"}

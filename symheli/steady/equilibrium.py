@@ -19,10 +19,11 @@ from symheli.steady.validity import Validity, in_a_ring, warn
 from symheli.values.aligned import columns, vector
 from symheli.values.arrays import Array
 from symheli.values.drawing import GREY, LINE, axes_of, plain
+from symheli.values.html_table import as_table
 from symheli.values.named_vector import NamedVector
 from symheli.values.operating_point import OperatingPoint
 from symheli.values.signal import Signal, rates
-from symheli.values.summary import as_table, summarized
+from symheli.values.summary import summarized
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -25,10 +25,11 @@ from symheli.steady.newton import TOLERANCE
 from symheli.steady.steady_flights import ALONE, SteadyFlights
 from symheli.steady.validity import Validity, in_a_ring, warn
 from symheli.values.arrays import Array, frozen
+from symheli.values.html_table import as_table
 from symheli.values.named_vector import NamedVector
 from symheli.values.operating_points import OperatingPoints
 from symheli.values.signal import Signal, indices
-from symheli.values.summary import as_table, summarized
+from symheli.values.summary import summarized
 
 
 @dataclass(frozen=True, eq=False)

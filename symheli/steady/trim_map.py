@@ -16,9 +16,10 @@ from symheli.steady.steady_flights import SteadyFlights
 from symheli.steady.trim_batch import hover, one_after_another, trimmed, warn_of_trims
 from symheli.values.arrays import Array, frozen
 from symheli.values.comma_separated import comma_separated
+from symheli.values.html_table import as_table
 from symheli.values.labelled import dataset, frame
 from symheli.values.signal import Signal
-from symheli.values.summary import as_table, summarized
+from symheli.values.summary import summarized
 
 POWER = Signal("power", "W")
 OMEGA = Signal("Om")

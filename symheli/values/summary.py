@@ -9,8 +9,6 @@ import textwrap
 from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum
-from html import escape
-from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -29,11 +27,11 @@ def summarized(self: Any) -> str:
     with words of its own; else each field in some words, empty ones left out; an array says its
     shape, a long list how many it holds.
     """
-    if _has_words(self):
+    if has_words(self):
         return str(self)
-    rows = ", ".join(f"{name}={text}" for name, text in _rows(self))
+    shown = ", ".join(f"{name}={text}" for name, text in rows(self))
     return textwrap.fill(
-        f"{type(self).__name__}({rows})",
+        f"{type(self).__name__}({shown})",
         LINE,
         subsequent_indent="    ",
         break_long_words=False,
@@ -41,64 +39,13 @@ def summarized(self: Any) -> str:
     )
 
 
-def as_table(self: Any) -> str:
-    """The `_repr_html_` of such a value: what its `__repr__` says as a table."""
-    if _has_words(self):
-        return _html(str(self))
-    rows = "".join(
-        f'<tr><th style="text-align:left">{escape(name)}</th>'
-        f'<td style="text-align:left">{escape(text)}</td></tr>'
-        for name, text in _rows(self)
-    )
-    title = escape(type(self).__name__)
-    return f'<table><caption style="text-align:left">{title}</caption><tbody>{rows}</tbody></table>'
-
-
-def _has_words(value: Any) -> bool:
+def has_words(value: Any) -> bool:
     """Whether the class says itself what `print` shows."""
     return type(value).__str__ is not object.__str__
 
 
-def _html(text: str) -> str:
-    """Return lines of text as rows of a table: where lines have two spaces in a row, a cell for
-    each column of characters, a head of one line with those below it; other lines over its whole
-    width.
-    """
-    lines = text.splitlines()
-    blocks = [list(group) for _, group in groupby(lines, lambda line: "  " in line.strip())]
-    wide = [block if "  " in block[0].strip() else [] for block in blocks]
-    columns = [
-        _columns([*block, *following]) if block and len(block) == 1 else _columns(block)
-        for block, following in zip(wide, [*wide[2:], [], []], strict=False)
-    ]
-    width = max(map(len, columns), default=0) or 1
-    rows = []
-    for block, ends in zip(blocks, columns, strict=True):
-        for line in block:
-            cells = [line[a:b].strip() for a, b in ends] or [line.strip()]
-            span = f' colspan="{width}"' if not ends else ""
-            rows.append(
-                "".join(
-                    f'<td{span} style="text-align:{_side(cell)}">{escape(cell)}</td>'
-                    for cell in cells
-                )
-            )
-    return f"<table><tbody>{''.join(f'<tr>{row}</tr>' for row in rows)}</tbody></table>"
-
-
-def _columns(block: list[str]) -> list[tuple[int, int]]:
-    """Return (start, end) of the columns between which every line is blank."""
-    wide = max(map(len, block), default=0)
-    used = [any(line[k : k + 1].strip() for line in block) for k in range(wide)]
-    starts = [k for k in range(wide) if used[k] and (k == 0 or not used[k - 1])]
-    return list(zip(starts, [*starts[1:], wide], strict=False))
-
-
-def _side(cell: str) -> str:
-    return "right" if cell[:1].isdigit() or cell[:2].strip("-").isdigit() else "left"
-
-
-def _rows(value: Any) -> Iterator[tuple[str, str]]:
+def rows(value: Any) -> Iterator[tuple[str, str]]:
+    """Yield each field that is not empty, and what it is in some words."""
     names = (
         [f.name for f in fields(value) if f.repr] if is_dataclass(value) else list(value._fields)
     )

@@ -209,26 +209,6 @@ def per_second(unit: str) -> str:
         return f"{unit}/s"
 
 
-def integral(unit: str) -> str:
-    """The unit of the integral over time of something in `unit`, of which that is `per_second`:
-    "m/s" of "m/s^2", "km/h" of "km/h/s"; "1", which no unit was given for, stays.
-    """
-    if unit == "1":
-        return unit
-    for whole in (unit.removesuffix("/s"), *_whole(unit)):
-        if whole != unit and per_second(whole) == unit:
-            return whole
-    return f"{unit} s"
-
-
-def _whole(unit: str) -> list[str]:
-    """The SI unit of a quantity in `unit` times a second; none of a unit that is not known."""
-    try:
-        return [text(_combined(dimension(unit), dimension("s"), 1))]
-    except InputError:
-        return []
-
-
 def ratio(unit: str, other: str) -> float | None:
     """Return how many of `other` one `unit` is: 3.6 for "m/s" and "km/h"; None for another
     dimension, or for unknown and different units.

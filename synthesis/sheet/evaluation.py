@@ -16,9 +16,10 @@ from symheli.progress import tracked
 from symheli.threads import with_one_thread
 from symheli.values.aligned import columns
 from symheli.values.arrays import Array
+from symheli.values.html_table import as_table
 from symheli.values.labelled import frame
 from symheli.values.signal import Signal
-from symheli.values.summary import as_table, summarized
+from symheli.values.summary import summarized
 from synthesis.design.loops.actuated import actuated
 from synthesis.design.plant.as_controller import as_controller
 from synthesis.sheet.measures import MEASURES, AxisLoop

@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import Any, Literal
 
 from symheli.errors import InputError, UnknownNameError
+from symheli.values.html_table import as_table
 from symheli.values.numbers import positive
-from symheli.values.summary import as_table, summarized
+from symheli.values.summary import summarized
 
 SMALL_HELICOPTER = Path(__file__).parent / "small_helicopter.toml"
 

@@ -8,7 +8,7 @@ import numpy as np
 import identification
 import symheli
 import synthesis
-from symheli.values.summary import as_table
+from symheli.values.html_table import as_table
 
 TEXT = """trimmed at 5 m/s
          value   unit

@@ -17,8 +17,9 @@ from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.lpv.operators import Operators
 from symheli.lpv.scheduling import Scheduling
 from symheli.values.arrays import Array
+from symheli.values.html_table import as_table
 from symheli.values.signal import Signal, indices, signals
-from symheli.values.summary import as_table, summarized
+from symheli.values.summary import summarized
 
 if TYPE_CHECKING:
     from symheli.lpv.lft.sampling import HoldError

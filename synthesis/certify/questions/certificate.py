@@ -6,6 +6,7 @@ import math
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self, get_args
 
@@ -14,7 +15,7 @@ import numpy as np
 from symheli import Scheduling
 from symheli.errors import CertificateError, InputError
 from symheli.lazy import former_attribute
-from symheli.values.summary import as_table, summarized
+from symheli.values.summary import summarized
 from synthesis.certify.statement.kind import Kind
 from synthesis.certify.statement.outcome import Attempt, Seconds, Status
 from synthesis.certify.statement.trajectory import SchedulingTrajectory
@@ -172,7 +173,6 @@ class Certificate:
     proof: Proof | None = field(default=None, repr=False)
 
     __repr__ = summarized
-    _repr_html_ = as_table
 
     def __post_init__(self) -> None:
         """Check the form of the statement, then the order of the bounds.
@@ -336,6 +336,10 @@ class Certificate:
         elif self.attempts or self.hypotheses:
             lines.append(f"  {len(self.attempts)} programs tried, in .details")
         return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        lines = "".join(f"<tr><td>{escape(line)}</td></tr>" for line in str(self).splitlines())
+        return f"<table><tbody>{lines}</tbody></table>"
 
     def _summary(self) -> list[str]:
         """Return the first lines: kind, status and numbers."""

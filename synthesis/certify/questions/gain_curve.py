@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from symheli.lazy import former_attribute
+from symheli.values.html_table import as_table
 from symheli.values.labelled import frame
 from symheli.values.signal import Signal
-from symheli.values.summary import as_table, summarized
+from symheli.values.summary import summarized
 from synthesis.certify.questions.certificate import Certificate
 
 if TYPE_CHECKING:

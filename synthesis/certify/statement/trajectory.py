@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symheli.values.summary import as_table, summarized
+from symheli.values.summary import summarized
 
 Array = np.ndarray
 
@@ -23,4 +23,3 @@ class SchedulingTrajectory(NamedTuple):
     p: Array
 
     __repr__ = summarized
-    _repr_html_ = as_table

@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike
 from symheli import LinearModel, LPVStateSpace, UncertainStateSpace
 from symheli.errors import InputError
 from symheli.values.arrays import Array
+from symheli.values.html_table import as_table
 from symheli.values.named_vector import NamedVector
-from symheli.values.summary import as_table, summarized
+from symheli.values.summary import summarized
 from synthesis.certify.questions.certificate import Certificate
 from synthesis.certify.statement.demand import limits
 from synthesis.certify.statement.forms import Spline

@@ -12,9 +12,9 @@ from symheli import LPVStateSpace
 from symheli.errors import InputError
 from symheli.lpv.frozen_plots import Model, frozen_at, parameters_of
 from symheli.values.drawing import BLUE, GREY, ORANGE, axes_of, label
+from symheli.values.html_table import as_table
 from symheli.values.labelled import frame
 from symheli.values.signal import Signal
-from symheli.values.summary import as_table
 from synthesis.design.loops.margins import Margins, margins, open_loop
 from synthesis.design.plant.as_controller import as_controller
 from synthesis.design.plant.plant import Plant

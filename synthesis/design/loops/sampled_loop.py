@@ -15,7 +15,8 @@ import numpy as np
 from symheli import LPVStateSpace, UncertainStateSpace
 from symheli.errors import InputError
 from symheli.threads import with_one_thread
-from symheli.values.summary import as_table, summarized
+from symheli.values.html_table import as_table
+from symheli.values.summary import summarized
 from synthesis.certify.questions.certificate import Certificate
 from synthesis.certify.questions.questions import l2_gain
 from synthesis.certify.statement.demand import Rate

@@ -12,8 +12,9 @@ import numpy as np
 from symheli import LPVStateSpace
 from symheli.lpv.matrix_function import MatrixFunction, block, in_one_basis
 from symheli.threads import with_one_thread
+from symheli.values.html_table import as_table
 from symheli.values.signal import Signal
-from symheli.values.summary import as_table, summarized
+from symheli.values.summary import summarized
 from synthesis.certify.questions.certificate import Certificate
 from synthesis.certify.statement.demand import Rate, limits
 from synthesis.certify.statement.impose import Grid

@@ -17,8 +17,9 @@ from symheli.lpv.matrix_function import functions_of
 from symheli.lpv.mixing import ERROR, itself, mixed
 from symheli.lpv.scheduling import Rates
 from symheli.lpv.tools import lagged, lower_feedback
+from symheli.values.html_table import as_table
 from symheli.values.signal import Signal, indices, signals
-from symheli.values.summary import as_table, summarized
+from symheli.values.summary import summarized
 from symheli.values.units import per_second
 from synthesis.design.plant import parts
 from synthesis.design.plant.as_controller import as_controller
