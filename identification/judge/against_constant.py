@@ -16,6 +16,7 @@ from identification.judge.scores import Scores, horizons, percent, scores
 from identification.model.lpvarx_model import LPVARXModel
 from identification.structure.lpvarx import LPVARX
 from symheli.errors import ExcitationError, InputError, UnknownNameError
+from symheli.progress import tracked
 from symheli.records import FlightRecord
 from symheli.values.summary import summarized
 
@@ -277,7 +278,7 @@ def compare_constant(
         )
         structures[f"LTI{suffix}"] = arx.lti()
         found = []
-        for label, one in structures.items():
+        for label, one in tracked(f"models{suffix}", structures.items(), len(structures)):
             model = fit(one, training, method)
             found.append(
                 Scored(label=label, model=model, training=training, test=test, hold_p=hold_p)
