@@ -41,10 +41,11 @@ def facts(
     test_log: Path | None = None,
     used: Sequence[Segment] = (),
     slower: Mapping[str, float] = MappingProxyType({}),
+    in_place: Sequence[str] = (),
 ) -> dict[str, Any]:
     """What was read and used: `rows` in the file, `outside` the segments, --start and --stop, and
     what became of the rest; a log held out, if any; the segments that were `used`, and the steps
-    (s) of signals logged more seldom than the model's.
+    (s) of signals logged more seldom than the model's; options `in_place` of the map's entries.
     """
     model, test = result.scheduled, result.test
     scheduling = model.parameters[0]
@@ -56,6 +57,7 @@ def facts(
         "test_log": None if test_log is None else test_log.name,
         "used": [[one.start, one.stop, one.what] for one in used],
         "logged_every": dict(slower),
+        "in_place_of_the_map": list(in_place),
         "resampled": record.resampled,
         "format": kind,
         "rows_read": rows,
@@ -79,10 +81,18 @@ def facts(
 
 
 def text(
-    found: dict[str, Any], result: AgainstConstant, check: KinematicCheck | None = None
+    found: dict[str, Any],
+    result: AgainstConstant,
+    check: KinematicCheck | None = None,
+    *,
+    mended: str = "",
+    slow: str = "",
 ) -> str:
-    """The whole answer for a reader."""
+    """The whole answer for a reader: first what would mend a fit that diverges, `slow` modes
+    last.
+    """
     parts = [
+        *([mended, ""] if mended else []),
         *_read(found),
         *_structure(found, result),
         *([] if check is None else ["", *_compatibility(check)]),
@@ -97,6 +107,7 @@ def text(
         *(VERDICTS if result.verdict() and result.test is not None else ()),
         "",
         *_certainty(result),
+        slow,
     ]
     return "\n".join(parts).rstrip()
 
@@ -194,6 +205,7 @@ def _read(found: dict[str, Any]) -> list[str]:
             " --start and --stop"
         ),
         *(f"  segment: {a:.2f} to {b:.2f} s, {what}" for a, b, what in found["used"][:8]),
+        *(f"  {sentence}" for sentence in found["in_place_of_the_map"]),
         *(f"  {name}: logged every {step:.2g} s, interpolated" for name, step in late),
         (
             f"  used: {found['samples']} samples, dt {found['dt']:.5g} s, from {found['start']:.5g}"
@@ -308,7 +320,6 @@ def _certainty(result: AgainstConstant) -> list[str]:
             f"coefficients more than two standard errors from zero: {count} (coloured residuals"
             f" make the errors larger by: {colour})"
         ),
-        str(slow_modes(model, result.training)),
     ]
 
 

@@ -50,7 +50,9 @@ def in_order(
     forward = np.diff(time)[np.diff(time) > 0]
     step = float(np.median(forward)) if len(forward) else 1.0
     kept, shifts = _runs(time, values[known], step)
-    said.append((len(time) - sum(map(len, kept)), "with a time far from their neighbours' left out"))
+    said.append(
+        (len(time) - sum(map(len, kept)), "with a time far from their neighbours' left out")
+    )
     stamps = np.concatenate([time[run] + shift for run, shift in zip(kept, shifts, strict=True)])
     index = np.concatenate(kept)
     late = int(np.sum(stamps < np.maximum.accumulate(stamps)))
