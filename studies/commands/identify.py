@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import tempfile
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -226,6 +226,7 @@ def _identified(arguments: argparse.Namespace) -> Output:
         prepared.used,
         prepared.slower,
         _in_place(arguments),
+        prepared.units,
     )
     check = prepared.kinematics
 
@@ -426,7 +427,8 @@ class _Signals(NamedTuple):
 class _Prepared(NamedTuple):
     """A record ready to fit, the name of its scheduling signal, how many samples were read and
     `kept` in the segments and between start and stop, whether attitude and rates agree where the
-    log has them, the segments `used` (empty: all), and signals logged more seldom (their steps, s).
+    log has them, sentences on `units` that contradict each other, the segments `used` (empty: all),
+    and signals logged more seldom (their steps, s).
     """
 
     record: FlightRecord
@@ -434,6 +436,7 @@ class _Prepared(NamedTuple):
     samples: int
     kept: int
     kinematics: KinematicCheck | None
+    units: Sequence[str]
     used: tuple[Segment, ...]
     slower: Mapping[str, float]
 
@@ -456,7 +459,7 @@ def _prepared(
     """Read `log` and do to it what the options say, in the order of docs/identify.md; start and
     stop only where it is to be `cut`.
     """
-    from studies.log import flown
+    from studies.log import flown, units
     from studies.log.reading import COMBINED, read, read_mapped
     from symheli.records import conditioning
     from symheli.records.kinematics import lacking
@@ -499,6 +502,7 @@ def _prepared(
         record = record.with_signals({scheduling: "1"}, **{scheduling: np.zeros(len(record))})
     whole = record.between(arguments.start, arguments.stop) if cut else record
     check = None if lacking(whole.signals) else whole.check_kinematics()
+    wrong = units.contradicted(whole, _declared(arguments, log))
     record = record.select(
         list(dict.fromkeys([*signals.outputs, *signals.inputs, scheduling, *arguments.instruments]))
     )
@@ -514,7 +518,17 @@ def _prepared(
         columns = {n: seen.columns[s.column] for n, s in sources if s.column in seen.columns}
         flown.refuse_what_is_invented(columns, (*signals.outputs, *signals.inputs), shorter.dt, log)
         late = flown.slower(columns, shorter.dt)
-    return _Prepared(shorter, scheduling, samples, kept, check, used, late)
+    return _Prepared(shorter, scheduling, samples, kept, check, wrong, used, late)
+
+
+def _declared(arguments: argparse.Namespace, log: Path) -> dict[str, str]:
+    """Units by signal, as the map, the header or the options declare them."""
+    from symheli.logs.separated import SeparatedTable
+
+    if arguments.map:
+        return {n: s.unit for n, s in _map(arguments).signals.items() if s.unit}
+    header = SeparatedTable.read(log).units if _log_format(arguments, log) == "csv" else {}
+    return {**header, **dict(arguments.units)}
 
 
 def _write(arguments: argparse.Namespace, result: Any) -> Iterator[Path]:

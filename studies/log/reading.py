@@ -17,6 +17,7 @@ from symheli.logs.separated import SEPARATORS, SeparatedTable
 from symheli.logs.signal_map import SignalMap
 from symheli.records import FlightRecord
 from symheli.records.kinematics import COMPARED
+from symheli.records.tied_units import POSITIONS
 from symheli.values.sample_period import USUAL, units_of_step
 from symheli.values.signal import UNITS
 
@@ -112,7 +113,11 @@ def read(
     if format == "csv":
         table = SeparatedTable.read(path)
         known = table.units
-        signals = list(dict.fromkeys([*signals, *(n for n in COMPARED if n in table.names)]))
+        signals = list(
+            dict.fromkeys(
+                [*signals, *(n for n in (*COMPARED, "airspeed", *POSITIONS) if n in table.names)]
+            )
+        )
     declared = {
         name: units.get(name) or known.get(name) or UNITS.get(name) or _undeclared(name)
         for name in signals

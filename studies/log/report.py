@@ -42,10 +42,12 @@ def facts(
     used: Sequence[Segment] = (),
     slower: Mapping[str, float] = MappingProxyType({}),
     in_place: Sequence[str] = (),
+    units: Sequence[str] = (),
 ) -> dict[str, Any]:
     """What was read and used: `rows` in the file, `outside` the segments, --start and --stop, and
     what became of the rest; a log held out, if any; the segments that were `used`, and the steps
-    (s) of signals logged more seldom than the model's; options `in_place` of the map's entries.
+    (s) of signals logged more seldom than the model's; options `in_place` of the map's entries;
+    sentences on `units` that contradict each other.
     """
     model, test = result.scheduled, result.test
     scheduling = model.parameters[0]
@@ -58,6 +60,7 @@ def facts(
         "used": [[one.start, one.stop, one.what] for one in used],
         "logged_every": dict(slower),
         "in_place_of_the_map": list(in_place),
+        "units_contradict": list(units),
         "resampled": record.resampled,
         "format": kind,
         "rows_read": rows,
@@ -96,6 +99,7 @@ def text(
         *_read(found),
         *_structure(found, result),
         *([] if check is None else ["", *_compatibility(check)]),
+        *(["", *found["units_contradict"]] if found["units_contradict"] else []),
         "",
         str(result.scheduled.excitation),
         "",
