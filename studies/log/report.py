@@ -16,6 +16,7 @@ from identification.judge.against_constant import HORIZONS, PAYS, AgainstConstan
 from identification.judge.scores import Scores, percent
 from identification.model import LPVARXModel
 from identification.model.lpvarx_model import LEAST_SQUARES
+from studies.log.accuracy import OPEN, OpenGap, open_gap
 from studies.output import columns
 from symheli.logs.segments import Segment
 from symheli.records import FlightRecord, KinematicCheck, SensorCheck
@@ -91,9 +92,10 @@ def text(
     mended: str = "",
     slow: str = "",
 ) -> str:
-    """The whole answer for a reader: first what would mend a fit that diverges, `slow` modes
-    last.
+    """The whole answer for a reader: first what would mend a fit that diverges, last the `slow`
+    modes and how far noise leaves the model open.
     """
+    left_open = _open(result)
     parts = [
         *([mended, ""] if mended else []),
         *_read(found),
@@ -112,6 +114,7 @@ def text(
         "",
         *_certainty(result),
         slow,
+        *([str(left_open)] if left_open and left_open.gap > OPEN else []),
     ]
     return "\n".join(parts).rstrip()
 
@@ -152,6 +155,7 @@ def data(
             uncertainty(result.scheduled, result.training).standard_errors if certain else None
         ),
         "slow_modes": _slow(result) if certain else None,
+        "open_to": None if (left_open := _open(result)) is None else left_open._asdict(),
     }
 
 
@@ -290,6 +294,11 @@ def _horizons(result: AgainstConstant) -> list[str]:
         f"{p} is taken as measured: one step and 1 s hold it from the start of each prediction,"
         f" free runs follow it{known}"
     ]
+
+
+def _open(result: AgainstConstant) -> OpenGap | None:
+    model = result.scheduled
+    return open_gap(model, result.training) if model.method in LEAST_SQUARES else None
 
 
 def _slow(result: AgainstConstant) -> dict[str, Any]:
