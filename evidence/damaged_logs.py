@@ -380,7 +380,7 @@ def judged(log: Log, kind: str, damage: Damage, seed: int, whole: Outcome, folde
 
 
 def all_of(
-    chosen: Iterable[int] | None = None, every: int = 1, *, tell: bool = False
+    chosen: Iterable[int] | None = None, every: int = 1, *, seed: int = 0, tell: bool = False
 ) -> list[tuple[str, str, str, Outcome]]:
     """(log, kind, what, outcome) of each damaged version of the logs `chosen`, or of some of
     them.
@@ -396,7 +396,7 @@ def all_of(
                 raise RuntimeError(f"{log.name}: the undamaged log ends in {whole.words}")
             for k, (kind, what, damage) in enumerate(damages(log)):
                 if k % every == i % every:
-                    found = judged(log, kind, damage, 40 * i + k, whole, folder)
+                    found = judged(log, kind, damage, seed + 40 * i + k, whole, folder)
                     out.append((log.name, kind, what, found))
                     if tell:
                         print(log.name, kind, what, found.kind, found.words[:400], flush=True)
@@ -424,8 +424,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--write", action="store_true", help="keep the table in docs/identify.md")
     parser.add_argument("--tell", action="store_true", help="print each run")
+    parser.add_argument("--seed", type=int, default=0, help="of the damages")
     given = parser.parse_args()
-    found = all_of(tell=given.tell)
+    found = all_of(seed=given.seed, tell=given.tell)
     if given.write:
         keep(
             DOCS / "identify.md",

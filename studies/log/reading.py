@@ -18,8 +18,14 @@ from symheli.logs.signal_map import SignalMap
 from symheli.records import FlightRecord
 from symheli.records.kinematics import COMPARED
 from symheli.records.tied_units import POSITIONS
+from symheli.values.arrays import Array
 from symheli.values.sample_period import USUAL, units_of_step
 from symheli.values.signal import UNITS
+
+SCATTER = 0.1
+"""Part of a step by which stamps may be off an even clock and stand for it: the samples are even
+then, not their stamps.
+"""
 
 STILL = 1e-6
 """A scheduling signal that moves by less than this part of its size stays where it is."""
@@ -43,8 +49,8 @@ def read_mapped(path: Path, found: SignalMap, taken: str | None = None) -> Fligh
 def on_one_step(
     record: FlightRecord, dt: float | None, path: Path, taken: str | None
 ) -> FlightRecord:
-    """The record at steps of `dt` (s), or of its own where they are even, else of their median with
-    a `DataWarning`.
+    """The record at steps of `dt` (s), or of its own where they are even; else, with a
+    `DataWarning`, at the even steps that its stamps mean, or interpolated to their mean.
 
     Raises `InputError` where the time, `taken` in this unit (None: in s, as nobody said
     otherwise), makes steps that no flight record has, and those in another unit would be usual.
@@ -66,14 +72,32 @@ def on_one_step(
     try:
         record.dt  # noqa: B018  raises
     except InputError:
-        even = float(f"{step:.3g}")
-        warnings.warn(
-            f"{path}: the steps are uneven, the samples interpolated to {even:g} s, their median",
-            DataWarning,
-            stacklevel=3,
+        pass
+    else:
+        return record
+    grid, period, scatter = _grid(record)
+    if scatter <= SCATTER * period:
+        made = replace(record, time=grid)
+        told = (
+            f"the stamps scatter by up to {scatter:.2g} s around steps of {period:.5g} s, now even"
         )
-        return record.resample(even)
-    return record
+    else:
+        made = record.resample(float(f"{period:.3g}"))
+        told = f"the steps are uneven, the samples {made.resampled}"
+    warnings.warn(f"{path}: {told}", DataWarning, stacklevel=3)
+    return made
+
+
+def _grid(record: FlightRecord) -> tuple[Array, float, float]:
+    """Instants (n,) at one step nearest to the stamps, a phase for each part; that step, and by how
+    much a stamp is off at most, s.
+    """
+    parts = [np.arange(part.start, part.stop) for part in record.segments()]
+    counts = np.concatenate([part - part.mean() for part in parts])
+    centres = np.concatenate([np.full(len(part), record.time[part].mean()) for part in parts])
+    period = float(counts @ (record.time - centres) / (counts @ counts))
+    grid = centres + period * counts
+    return grid, period, float(np.abs(record.time - grid).max())
 
 
 @contextmanager

@@ -244,6 +244,7 @@ def _structure(found: dict[str, Any], result: AgainstConstant) -> list[str]:
             f"  fitted: {fitted} {found['training_samples']} samples, {incomplete} without a"
             f" complete regressor, by {_method(result)}"
         ),
+        *_too_short(result),
         f"  held out: {held} {found['held_out_samples']} samples",
         (
             f"  range of {arx.scheduling} in all that was read, which the model covers: {low:.4g}"
@@ -267,10 +268,23 @@ def _structure(found: dict[str, Any], result: AgainstConstant) -> list[str]:
     ]
 
 
+def _too_short(result: AgainstConstant) -> list[str]:
+    """Parts without a gap that hold no whole regressor."""
+    memory = result.scheduled.structure.memory
+    lengths = [part.stop - part.start for part in result.training.segments()]
+    short = [n for n in lengths if n <= memory]
+    if not short:
+        return []
+    parts = "1 part is" if len(short) == 1 else f"{len(short)} parts are"
+    return [f"  {parts} shorter than a regressor of {memory + 1} samples and left out"]
+
+
 def _method(result: AgainstConstant) -> str:
     model = result.scheduled
     strength = (
-        f" (first-stage F {model.details['first_stage_F']:.3g})"
+        f" (first-stage F {model.details['first_stage_F']:.3g},"
+        f" {model.details['without_instruments']} samples of parts too short for the instruments"
+        " left out)"
         if "first_stage_F" in model.details
         else ""
     )

@@ -67,7 +67,8 @@ def seen_slowly(found: SlowModes, given: Flags, again: Again) -> str:
     if not found.lost:
         return str(found)
     many = found.together
-    for n in dict.fromkeys(max(n, 2) for n in (many, many // 2, many // 4)):
+    tried = list(dict.fromkeys(max(n, 2) for n in (many // 4, many // 2, many, 2 * many)))
+    for n in tried:
         flags = {"decimate": n * given["decimate"]}
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -79,8 +80,8 @@ def seen_slowly(found: SlowModes, given: Flags, again: Again) -> str:
         if not seen.lost:
             return f"{found.statement}; tried: {_typed(flags)} leaves no mode unknown"
     return (
-        f"{found.statement}; no means up to {many} samples show it: record longer, or --method iv"
-        " --instruments with the external excitation"
+        f"{found.statement}; tried: --decimate {', '.join(map(str, tried))} show it no better:"
+        " record longer, or with the external excitation logged, --method iv --instruments NAME"
     )
 
 
