@@ -34,6 +34,9 @@ FLAGS = {
     'schedule on a command, or leave scheduling_at="now" out and score with hold_p=True': (
         "schedule on a command, or leave --scheduling-at now out"
     ),
+    'leave offset_rate out and take scheduling_at="lag", or schedule on a command': (
+        "--offset-rate no with --scheduling-at lag, or schedule on a command"
+    ),
     "record longer, or use fewer lags": "record longer",
 }
 """{what a library advises: the same in flags of `symheli identify`}."""
