@@ -18,7 +18,7 @@ import tempfile
 import traceback
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from pathlib import Path
@@ -37,10 +37,10 @@ FAR, OUTSIDE = OPEN, 0.1
 
 Rows = list[list[str]]
 Damage = Callable[[Rows, np.random.Generator], tuple[Rows, str]]
-"""Other rows (the header first), and what separates their cells."""
+"""A function from rows (the header first) to damaged ones and the separator of their cells."""
 
 Change = Callable[[np.ndarray, int], np.ndarray]
-"""Other stamps (n,), in ms, from a row on."""
+"""A function from stamps (n,), ms, and a row to damaged stamps."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Log:
 
 @dataclass
 class Outcome:
-    """What became of a run: "traceback", "refused", "wrong", "warned" or "sound", and the words."""
+    """The end of a run: "traceback", "refused", "wrong", "warned" or "sound", and the words."""
 
     kind: str
     words: str = ""
@@ -305,7 +305,7 @@ def damages(log: Log) -> list[tuple[str, str, Damage]]:
 
 
 def run(log: Log, rows: Rows, separator: str, folder: Path) -> Outcome:
-    """What `symheli identify` makes of these rows."""
+    """Identify a model from these rows and return the outcome."""
     file, saved = folder / "log.csv", folder / "model.json"
     saved.unlink(missing_ok=True)
     file.write_text("\n".join(separator.join(row) for row in rows) + "\n", "utf-8")
@@ -380,22 +380,20 @@ def judged(log: Log, kind: str, damage: Damage, seed: int, whole: Outcome, folde
 
 
 def all_of(
-    chosen: Iterable[int] | None = None, every: int = 1, *, seed: int = 0, tell: bool = False
+    kinds: Collection[str] = (), every: int = 1, *, seed: int = 0, tell: bool = False
 ) -> list[tuple[str, str, str, Outcome]]:
-    """(log, kind, what, outcome) of each damaged version of the logs `chosen`, or of some of
-    them.
+    """Return (log, kind, what, outcome) of each damaged version, of some kinds only where these are
+    given, or of every so many.
     """
     out = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for i, log in enumerate(logs()):
-            if chosen is not None and i not in chosen:
-                continue
             whole = run(log, log.rows, ",", folder)
             if whole.model is None:
                 raise RuntimeError(f"{log.name}: the undamaged log ends in {whole.words}")
             for k, (kind, what, damage) in enumerate(damages(log)):
-                if k % every == i % every:
+                if k % every == i % every and (not kinds or kind in kinds):
                     found = judged(log, kind, damage, seed + 40 * i + k, whole, folder)
                     out.append((log.name, kind, what, found))
                     if tell:

@@ -323,7 +323,9 @@ class Residuals:
         return np.concatenate(parts)
 
     def _blocks(self, unknowns: Array) -> Iterator[Array]:
-        """Of each stretch (measurements, coefficients, noise and its own initial outputs)."""
+        """Yield the Jacobian of each stretch (measurements, coefficients, noise and its own initial
+        outputs).
+        """
         noise, width = self.noise(unknowns), self.na * self.arx.ny * self.estimated
         for i, (run, v) in enumerate(self._left(unknowns)):
             full = np.zeros((*v.shape, self.first + width))

@@ -116,7 +116,7 @@ class SlowModes:
 
     @property
     def statement(self) -> str:
-        """What is known of them, without advice."""
+        """The text without advice."""
         if not self.lost:
             known = f"{len(self.modes)}, decay or growth of each known to a quarter"
             return f"slow modes: {known if self.modes else 'none'}"

@@ -317,7 +317,7 @@ def _map(arguments: argparse.Namespace) -> SignalMap:
 
 
 def _in_place(arguments: argparse.Namespace) -> list[str]:
-    """What options say in place of the signal map, in sentences."""
+    """Return a sentence for each option that replaces an entry of the signal map."""
     from symheli.logs.signal_map import SignalMap
 
     if not arguments.map:

@@ -20,7 +20,7 @@ OPEN = 0.15
 """nu-gap beyond which two models suit the same controllers no more, as a rule."""
 
 POINTS = (0.1, 0.5, 0.9)
-"""Where in the range of the scheduling models are held."""
+"""Shares of the range of the scheduling at which models are held."""
 
 
 class OpenGap(NamedTuple):

@@ -36,7 +36,7 @@ def diverging(result: AgainstConstant) -> list[str]:
 
 
 def mended(result: AgainstConstant, given: Flags, again: Again) -> str:
-    """What the fit loses and the flags that keep it, as far as they were tried; empty where it
+    """Name the outputs that the fit loses and the flags that keep them, as tried; empty where it
     loses nothing.
     """
     lost = diverging(result)
@@ -61,9 +61,7 @@ def mended(result: AgainstConstant, given: Flags, again: Again) -> str:
 
 
 def seen_slowly(found: SlowModes, given: Flags, again: Again) -> str:
-    """What is known of the slow modes, and the means that show those that are lost, if tried ones
-    do.
-    """
+    """Describe the slow modes, and name means that show those that are lost, if tried ones do."""
     if not found.lost:
         return str(found)
     many = found.together

@@ -68,7 +68,7 @@ def _means(column: str) -> str | None:
 def _sentence(
     tie: Tie, record: FlightRecord, columns: Mapping[str, str], declared: Mapping[str, str]
 ) -> str:
-    """What the pair shows, and the flags that would mend it."""
+    """Name the ratio of the pair, and the flags that would mend it."""
     signal, other = (columns.get(name, name) for name in (tie.signal, tie.other))
     change = "position" if tie.other in POSITIONS else other
     flags = [

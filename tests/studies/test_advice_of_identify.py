@@ -1,4 +1,4 @@
-"""What `identify` advises works: each flag in its words is typed, and what it was about is gone."""
+"""The advice of `identify` works: each flag in its words is typed, and its reason is gone."""
 
 import re
 import warnings
