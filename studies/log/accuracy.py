@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from symheli.errors import InputError
 from symheli.lpv.tools import LinearModels, nu_gaps
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
+from symheli.values.signal import Signal
 
 DRAWS = 20
 """Models drawn from the covariance; the furthest of so many is about the 95 % quantile."""
@@ -39,13 +41,9 @@ class OpenGap(NamedTuple):
         )
 
 
-def sizes(model: LPVARXModel, record: FlightRecord) -> dict[str, Array]:
-    """The standard deviations of the signals, as `nu_gap` takes them."""
-    each = (
-        np.array([float(np.nanstd(record[str(s)])) or 1.0 for s in signals])
-        for signals in (model.inputs, model.outputs)
-    )
-    return dict(zip(("input_scale", "output_scale"), each, strict=True))
+def _sizes(signals: Sequence[Signal], record: FlightRecord) -> Array:
+    """The standard deviations of signals, by which gaps are taken."""
+    return np.array([float(np.nanstd(record[str(s)])) or 1.0 for s in signals])
 
 
 def open_gap(model: LPVARXModel, record: FlightRecord) -> OpenGap | None:
@@ -54,11 +52,12 @@ def open_gap(model: LPVARXModel, record: FlightRecord) -> OpenGap | None:
     """
     low, high = model.structure.basis.ranges[0]
     drawn = uncertainty(model, record).draws(DRAWS)
-    scales, found = sizes(model, record), []
+    inputs, outputs, found = _sizes(model.inputs, record), _sizes(model.outputs, record), []
     for p in {low + share * (high - low) for share in POINTS[: model.structure.basis.size * 2]}:
         try:
             others = LinearModels.of([one.at(p) for one in drawn])
-            found.append(OpenGap(float(nu_gaps(model.at(p), others, **scales).max()), p))
+            gaps = nu_gaps(model.at(p), others, input_scale=inputs, output_scale=outputs)
+            found.append(OpenGap(float(gaps.max()), p))
         except InputError:
             return None
     return max(found)
