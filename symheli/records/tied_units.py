@@ -70,7 +70,7 @@ def _stretches(record: FlightRecord, *signals: Array) -> Array:
         for start in range(part.start, part.stop - length + 1, length - 1)
     ]
     index = np.array(rows, int).reshape(-1, length)
-    known: Array = np.isfinite(np.column_stack(signals)).all(axis=1)
+    known = np.asarray(np.isfinite(np.column_stack(signals)).all(axis=1))
     return index[known[index].all(axis=1)]
 
 
