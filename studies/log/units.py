@@ -53,11 +53,8 @@ def contradicted(record: FlightRecord, declared: Mapping[str, str]) -> list[str]
     units of the log by column, SI where one is not there.
     """
     record, columns = named_by_signals(record)
-    return [
-        _sentence(tie, record, columns, declared)
-        for tie in tied_units(record)
-        if not tie.of_one_unit
-    ]
+    found = [tie for tie in tied_units(record) if not tie.of_one_unit]
+    return [said for tie in found if (said := _sentence(tie, record, columns, declared))]
 
 
 def _means(column: str) -> str | None:
@@ -68,7 +65,9 @@ def _means(column: str) -> str | None:
 def _sentence(
     tie: Tie, record: FlightRecord, columns: Mapping[str, str], declared: Mapping[str, str]
 ) -> str:
-    """Name the ratio of the pair, and the flags that would mend it."""
+    """Name the ratio of the pair, and the flags that would mend it; empty where wind may have made
+    it.
+    """
     signal, other = (columns.get(name, name) for name in (tie.signal, tie.other))
     change = "position" if tie.other in POSITIONS else other
     flags = [
@@ -76,6 +75,8 @@ def _sentence(
         for name, factor in ((tie.signal, 1 / tie.ratio), (tie.other, tie.ratio))
         for unit in _units(name, factor, record, declared.get(columns.get(name, name)))
     ]
+    if not flags and tie.signal == "airspeed":  # wind makes any ratio
+        return ""
     advice = " or ".join(flags) or f"check the units of {signal} and {other}"
     return (
         f"units: {signal} is {tie.ratio:.3g} times what {change} says: one of the two is in another"

@@ -27,8 +27,10 @@ AGREES = 0.7
 FEWEST = 10
 """Least number of stretches that decide."""
 
-UNSURE = 1.3
-"""Factor by which the ratio of one unit may miss 1: wind, bank and noise make no more."""
+UNSURE = {"airspeed": 1.5, "p": 5.0, "q": 5.0}
+"""Factor by which the ratio of one unit may miss 1: wind, bank and the noise of small motions make
+no more, and no other unit of angles is that near.
+"""
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,7 @@ class Tie:
     @property
     def of_one_unit(self) -> bool:
         """Whether the ratio can be that of the units as declared."""
-        return 1 / UNSURE < self.ratio < UNSURE
+        return 1 / UNSURE[self.signal] < self.ratio < UNSURE[self.signal]
 
 
 def tied_units(record: FlightRecord) -> tuple[Tie, ...]:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import symheli
 from studies.log.units import contradicted
 from symheli import FlightRecord
 from symheli.records.tied_units import tied_units
@@ -83,3 +84,17 @@ def test_signals_that_do_not_move_together_say_nothing():
     units = {"q": "rad/s", "theta": "rad"}
     noise = {n: rng.standard_normal(3000) for n in units}
     assert tied_units(FlightRecord.from_arrays(TIME, units, **noise)) == ()
+
+
+def test_noise_of_small_motions_and_wind_are_no_other_unit():
+    """Bank hardly moves in this flight; its noise makes 1.6 of the ratio."""
+    record = symheli.fly(
+        symheli.Helicopter.load("xcell60", governor="ideal"),
+        symheli.AirspeedSchedule.transition(0.0, 8.0, acceleration=2.0),
+        excitation=symheli.Excitation({"d_lon": 0.012}, seed=1),
+        noise_db=40,
+        wind=(4.0, 2.0, 0.0),
+        seed=1,
+    )
+    assert len(tied_units(record)) > 1
+    assert contradicted(record, {}) == []
