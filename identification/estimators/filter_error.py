@@ -189,7 +189,7 @@ class FilterError(Method):
             there = arx.moved(z.tolist())
             moved = [there.again(record, arx) for record in records]
             data = stacked(there, moved)
-        theta, _ = instrumental_variables(there, moved, data, self.simulator)
+        theta, *_ = instrumental_variables(there, moved, data, self.simulator)
         simulated, left = self._simulated(there, moved)
         left = self.misfit * left
         air = self.gust**2, float(np.exp(-records[0].dt / self.gust_time))

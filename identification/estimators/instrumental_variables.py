@@ -96,7 +96,7 @@ class InstrumentalVariables(Method):
         remark where they are weak.
         """
         source = source_of(self.instruments)
-        theta, weakest = instrumental_variables(arx, records, data, source)
+        theta, weakest, known = instrumental_variables(arx, records, data, source)
         error = np.mean((data.y - data.phi @ theta) ** 2, axis=0)
         residual = np.sqrt(error / np.mean(data.y**2, axis=0).clip(TINY))
         covariance = None
@@ -104,7 +104,11 @@ class InstrumentalVariables(Method):
             covariance = _of_flown(arx, records, data, source, theta)
         return Estimate(
             theta=theta,
-            details={"first_stage_F": weakest.F, "weakest": weakest.direction},
+            details={
+                "first_stage_F": weakest.F,
+                "weakest": weakest.direction,
+                "without_instruments": len(data.phi) - known,
+            },
             remarks=_weakness(weakest) if np.any(residual > NOISE_FREE) else (),
             covariance=covariance,
         )
@@ -164,9 +168,9 @@ def instrumental_variables(
     records: Sequence[FlightRecord],
     data: Regression,
     source: InstrumentSource | FlightSource,
-) -> tuple[Array, FirstStage]:
-    """theta (n, ny) by two-stage least squares with more instruments than unknowns, and how strong
-    they are where they are weakest.
+) -> tuple[Array, FirstStage, int]:
+    """theta (n, ny) by two-stage least squares with more instruments than unknowns, how strong they
+    are where they are weakest, and how many samples have all of them.
 
     Each instrument is an excitation signal r(k-l) times f(p); offsets, and the increment of p,
     instrument themselves (p is taken as free of the noise). Stage one projects the regressors on
@@ -188,7 +192,7 @@ def instrumental_variables(
         phi, y = data.phi[known][:, regressors], data.y[known][:, outputs]
         theta[regressors[:, None], outputs] = _two_stages(phi, y, W, Q, names, source)
         strengths.append(first_stage(phi, Q, names, own[regressors]))
-    return theta, min(strengths)
+    return theta, min(strengths), int(known.sum())
 
 
 def _two_stages(

@@ -235,7 +235,8 @@ def _rows(arx: LPVARX, record: FlightRecord, source: InstrumentSource, first: in
                 slice(part.start, max(part.stop - lag, part.start)),
             )
             functions = f[then] if at_lag else f[here]
-            block[here] = (r[then][:, :, None] * functions[:, None, :]).reshape(len(functions), -1)
+            products = r[then][:, :, None] * functions[:, None, :]
+            block[here] = products.reshape(len(functions), block.shape[1])
         parts.append(block)
     offsets = np.full(
         (n, (arx.offset + arx.offset_rate * len(arx.parameters)) * f.shape[1]), np.nan

@@ -3,25 +3,32 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
 import numpy as np
 from scipy.optimize import least_squares
 
+from identification.design.excitation import RANK_TOLERANCE
 from identification.estimators.instrumental_variables import starting_point
 from identification.estimators.instruments import Instruments, source_of
 from identification.estimators.method import Estimate, Method, not_settled
 from identification.estimators.refined_instruments import RefinedInstruments
 from identification.model.noise_model import NoiseModel
-from identification.model.stretches import Stretch, contracted, free_of, stretches
+from identification.model.stretches import Stretch, contracted, filtered, free_of, stretches
 from identification.structure.lpvarx import LPVARX
 from identification.structure.regressors import Regression
 from symheli.errors import ExcitationError, InputError
+from symheli.progress import task
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 from symheli.values.numbers import whole
+
+WORSE = 4.0
+"""Sum of squares, over the least so far, beyond which a free run from measured outputs refuses its
+model.
+"""
 
 ADVICE = "allow more evaluations, or fit a smaller structure"
 """Advice where the search stops early."""
@@ -272,30 +279,82 @@ class Residuals:
 
     def jacobian(self, unknowns: Array) -> Array:
         """(measurements, unknowns), by the filters that the sensitivities obey."""
-        noise, parts = self.noise(unknowns), []
-        for i, (run, v) in enumerate(self._left(unknowns)):
-            full = np.zeros((*v.shape, len(unknowns)))
-            self._by_model(full, run, i, unknowns)
-            full = noise.filtered(full / self.scale[None, :, None])
-            full[:, :, len(self.row) : self.first] = noise.by_coefficients(v, noise.filtered(v))
-            parts.append(full[self._kept(run)])
+        parts, own = [], self.first
+        for block in self._blocks(unknowns):
+            width = block.shape[1] - self.first
+            full = np.zeros((len(block), len(unknowns)))
+            full[:, : self.first], full[:, own : own + width] = np.split(block, [self.first], 1)
+            parts.append(full)
+            own += width
         return np.concatenate(parts)
+
+    def settled(self, unknowns: Array) -> Array:
+        """The unknowns with the initial outputs that leave the least squares beside the others."""
+        if not self.estimated:
+            return unknowns
+        out, width, noise = unknowns.copy(), self.na * self.arx.ny, self.noise(unknowns)
+        out[self.first :] = 0.0
+        with np.errstate(all="ignore"):
+            for i, (run, v) in enumerate(self._left(out)):
+                kept = self._kept(run)
+                by_past = np.zeros((*v.shape, width))
+                self._by_past(by_past, run, self.theta(unknowns))
+                by_past, left = (noise.filtered(part)[kept] for part in (by_past, v))
+                if np.isfinite(by_past).all() and np.isfinite(left).all():
+                    best = np.linalg.lstsq(by_past, -left, rcond=None)[0]
+                    out[self.first + i * width : self.first + (i + 1) * width] = best
+        return out
+
+    def reduced_jacobian(self, settled: Array) -> Array:
+        """(measurements, coefficients and noise): what initial outputs that settle anew do not
+        undo.
+
+        Their columns touch one stretch each and are projected out there. Source: Kaufman (1975),
+        BIT 15, for the variable projection of Golub and Pereyra.
+        """
+        parts = []
+        for block in self._blocks(settled):
+            by_others, by_past = np.split(block, [self.first], axis=1)
+            if by_past.size:
+                U, size, _ = np.linalg.svd(by_past, full_matrices=False)
+                U = U[:, size > RANK_TOLERANCE * size[0]]
+                by_others = by_others - U @ (U.T @ by_others)
+            parts.append(by_others)
+        return np.concatenate(parts)
+
+    def _blocks(self, unknowns: Array) -> Iterator[Array]:
+        """Yield the Jacobian of each stretch (measurements, coefficients, noise and its own initial
+        outputs).
+        """
+        noise, width = self.noise(unknowns), self.na * self.arx.ny * self.estimated
+        for i, (run, v) in enumerate(self._left(unknowns)):
+            full = np.zeros((*v.shape, self.first + width))
+            self._by_model(full, run, i, unknowns)
+            full = noise.filtered(full)
+            full[:, :, len(self.row) : self.first] = noise.by_coefficients(v, noise.filtered(v))
+            yield full[self._kept(run)]
 
     def _by_model(self, full: Array, run: Stretch, i: int, unknowns: Array) -> None:
         """Fill in how what is left of stretch i answers coefficients and initial outputs."""
         n = len(self.row)
         if self.enters == "equation":
-            full[:, :, :n] = run.spread_out(run.regressors())
+            full[:, :, :n] = run.spread_out(run.regressors()) / self.scale[:, None]
             return
-        theta, width = self.theta(unknowns), self.na * self.arx.ny
+        theta = self.theta(unknowns)
         model = self._from(run, i, unknowns)
         phi = model.with_outputs(model.free_run(theta)).regressors()
-        spread = model.spread(theta, phi, np.eye(width) if self.estimated else None)
-        full[-len(spread) :, :, :n] = spread[:, :, :n]
+        spread = model.spread(theta, phi)
+        full[-len(spread) :, :, :n] = spread / self.scale[:, None]
         if self.estimated:
-            own = slice(self.first + i * width, self.first + (i + 1) * width)
-            full[-len(spread) :, :, own] = spread[:, :, n:]
-            full[: self.na, :, own] = np.eye(width).reshape(self.na, self.arx.ny, width)
+            self._by_past(full[:, :, self.first :], run, theta)
+
+    def _by_past(self, out: Array, run: Stretch, theta: Array) -> None:
+        """Fill in how what is left of a stretch answers its initial outputs, newest first."""
+        width = out.shape[2]
+        A = run.lag_coefficients(theta)
+        out[self.na :] = filtered(A, np.zeros((len(A), self.arx.ny, width)), np.eye(width))
+        out[: self.na] = np.eye(width).reshape(self.na, self.arx.ny, width)
+        out /= self.scale[:, None]
 
     def _left(self, unknowns: Array) -> list[tuple[Stretch, Array]]:
         """Each stretch with what the model without noise leaves of it, less its sign."""
@@ -338,8 +397,10 @@ def prediction_error(
     """Minimise the prediction errors over coefficients, noise model (and initial outputs) from the
     best of the coefficients `starts`.
 
-    A start whose free run diverges is first drawn in (`contracted`). Exact derivatives;
-    trust-region reflective search of SciPy.
+    A start whose free run diverges is first drawn in (`contracted`). Initial outputs, in which the
+    errors are linear, are settled at each evaluation, so that a record of many parts has no more
+    unknowns than one. Models that run from the measured outputs `WORSE` than one before are
+    refused: settled outputs keep an unstable mode still. Trust-region reflective search of SciPy.
 
     Raises `ExcitationError` where the records hold no stretch to simulate.
     """
@@ -354,20 +415,35 @@ def prediction_error(
         )
     problem = Residuals(arx, runs, options)
     candidates = [problem.start(contracted(arx, theta, runs)) for theta in starts]
-    best = min(
-        candidates, key=lambda unknowns: float(np.sum(np.square(problem.residuals(unknowns))))
+    best, rest = min(
+        ((problem.settled(unknowns), unknowns[problem.first :]) for unknowns in candidates),
+        key=lambda pair: _cost(problem, pair[0]),
     )
-    found = least_squares(
-        problem.residuals,
-        best,
-        jac=problem.jacobian,  # type: ignore[arg-type]
-        method="trf",
-        x_scale="jac",
-        max_nfev=options.evaluations,
-        ftol=options.tolerance,
-        xtol=options.tolerance,
-        gtol=options.tolerance,
-    )
+    runs_free: list[float] = [_cost(problem, np.concatenate([best[: problem.first], rest]))]
+    with task(f"{options.shorthand}: evaluations, at most", options.evaluations) as search:
+
+        def residuals(own: Array) -> Array:
+            search.step()
+            unknowns = np.concatenate([own, rest])
+            runs_free.append(_cost(problem, unknowns))
+            error = problem.residuals(problem.settled(unknowns))
+            return error if runs_free[-1] <= WORSE * min(runs_free) else np.full_like(error, np.inf)
+
+        def jacobian(own: Array) -> Array:
+            return problem.reduced_jacobian(problem.settled(np.concatenate([own, rest])))
+
+        found = least_squares(
+            residuals,
+            best[: problem.first],
+            jac=jacobian,  # type: ignore[arg-type]
+            method="trf",
+            x_scale="jac",
+            max_nfev=options.evaluations,
+            ftol=options.tolerance,
+            xtol=options.tolerance,
+            gtol=options.tolerance,
+        )
+    found.x = problem.settled(np.concatenate([found.x, rest]))
     noise = problem.noise(found.x)
     error = np.concatenate(
         [noise.filtered(v)[-len(run.target) :] for run, v in problem._left(found.x)]
@@ -388,3 +464,10 @@ def prediction_error(
         residual_covariance=None if white else covariance,
         noise=None if white else noise,
     )
+
+
+def _cost(problem: Residuals, unknowns: Array) -> float:
+    """The sum of squares; infinite where a run diverges."""
+    with np.errstate(all="ignore"):
+        cost = float(np.sum(np.square(problem.residuals(unknowns))))
+    return cost if np.isfinite(cost) else np.inf

@@ -39,11 +39,12 @@ from symheli.values.numbers import whole
 
 Filter = Callable[[Array], Array]
 
+SIMPLER = 'where the model is simpler than the plant, method "iv" is the better one'
 ADVICE = (
     'a plant that is unstable in open loop needs instruments=("name", ...), the external'
-    ' excitation; where the model is simpler than the plant, method "iv" is the better one'
+    f" excitation; {SIMPLER}"
 )
-"""Advice where the iteration stops early."""
+"""Advice where the iteration stops early, with instruments and without."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +111,7 @@ class RefinedInstruments(Method):
                 "converged": found.converged,
                 "noise": found.noise.ar.tolist(),
             },
-            remarks=() if found.converged else (not_settled(self, ADVICE),),
+            remarks=() if found.converged else (not_settled(self, SIMPLER if source else ADVICE),),
         )
 
 
@@ -148,7 +149,8 @@ def refined_instruments(
     excitation explains of them (see `explained`): an observer driven by these takes the place of
     the simulation, and filters, so that the plant may be unstable.
 
-    Raises `ExcitationError` where the response does not determine every coefficient. Source:
+    Raises `ExcitationError` where the first response does not determine every coefficient; where a
+    later one does not, the iteration ends with the coefficients before it. Source:
     Laurain, Toth, Gilson and Garnier (2010), Refined instrumental variable methods for
     identification of LPV Box-Jenkins models, Automatica 46, 959-967.
     """
@@ -176,7 +178,12 @@ def refined_instruments(
         ]
         Z, X, y = (np.concatenate(part) for part in zip(*parts, strict=True))
         found = np.zeros_like(theta)
-        found[row, output] = _instrumented(arx, Z, X, y)
+        try:
+            found[row, output] = _instrumented(arx, Z, X, y)
+        except ExcitationError:
+            if iteration == 1:
+                raise
+            return Refinement(theta, noise, iteration, False)
         change = np.linalg.norm((found - theta)[row, output] * column_scale(X)) / max(
             np.linalg.norm(y), 1e-300
         )

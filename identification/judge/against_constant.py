@@ -12,10 +12,11 @@ import numpy as np
 from identification.design.leakage import MADE_OF_OUTPUTS, share_from_outputs
 from identification.estimators.estimate import fit
 from identification.estimators.method import Method
-from identification.judge.scores import Scores, horizons, percent, scores
+from identification.judge.scores import LOST, Scores, horizons, percent, scores
 from identification.model.lpvarx_model import LPVARXModel
 from identification.structure.lpvarx import LPVARX
 from symheli.errors import ExcitationError, InputError, UnknownNameError
+from symheli.progress import tracked
 from symheli.records import FlightRecord
 from symheli.values.summary import summarized
 
@@ -175,7 +176,7 @@ class AgainstConstant:
         lpv, lti = self._fits(output)
         found = self._differences(output)
         numbers = (
-            f"{percent(lpv[h])} against {percent(lti[h])} % {where} ({found[h]})"
+            f"{_against(lpv[h], lti[h])} {where} ({found[h]})"
             for h, where in zip(HORIZONS[1:], ("1 s ahead", "in free run"), strict=True)
         )
         verdict = self.verdict_on(output)
@@ -190,6 +191,16 @@ class AgainstConstant:
                     " the model; hold out a part of the record"
                 )
             yield {h: fits[output] for h, fits in one.held_out.by_horizon.items()}
+
+
+def _against(one: float, other: float) -> str:
+    """Two fits in percent beside each other."""
+    words = percent(one), percent(other)
+    if words == (LOST, LOST):
+        return "both diverge"
+    return (
+        f"{words[0]} % against {LOST}" if words[1] == LOST else f"{words[0]} against {words[1]} %"
+    )
 
 
 def difference(one: float, other: float) -> str:
@@ -277,7 +288,7 @@ def compare_constant(
         )
         structures[f"LTI{suffix}"] = arx.lti()
         found = []
-        for label, one in structures.items():
+        for label, one in tracked(f"models{suffix}", structures.items(), len(structures)):
             model = fit(one, training, method)
             found.append(
                 Scored(label=label, model=model, training=training, test=test, hold_p=hold_p)
@@ -302,7 +313,7 @@ def compare_constant(
                 without, with_it = (_mean_fits(models[0].in_sample) for models in (first, second))
                 first, second = (second, first) if with_it > without else (first, second)
                 numbers = (
-                    f"{one:.1f} % 1 s ahead and {free:.1f} % in free run {how}"
+                    f"{_mean(one)} 1 s ahead and {_mean(free)} in free run {how}"
                     for (one, free), how in ((with_it, "with it"), (without, "without"))
                 )
                 note = (
@@ -319,6 +330,10 @@ def compare_constant(
         leak=leak,
         trim_note=note,
     )
+
+
+def _mean(fit: float) -> str:
+    return f"{fit:.1f} %" if fit > LEAST else "useless"
 
 
 def _mean_fits(found: Scores) -> tuple[float, float]:

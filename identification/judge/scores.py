@@ -185,6 +185,9 @@ def predicted(
     return model.predict(record, horizon)
 
 
+LOST = "diverges"
+"""The word for a fit that is beyond all numbers."""
+
 DIVERGES = -1e4
 """Percent: a prediction off by a hundred times what the signal varies has left it for good."""
 
@@ -193,4 +196,4 @@ def percent(value: float) -> str:
     """A fit in words where it is no number, or one that says no more than the word."""
     if np.isnan(value):
         return "no data"
-    return "diverges" if value <= DIVERGES else f"{value:.1f}"
+    return LOST if value <= DIVERGES else f"{value:.1f}"

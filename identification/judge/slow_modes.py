@@ -105,21 +105,36 @@ class SlowModes:
         """Modes that noise leaves unknown."""
         return tuple(mode for mode in self.modes if mode.lost)
 
-    def __str__(self) -> str:
+    @property
+    def together(self) -> int:
+        """Samples a mean at which the worst lost mode would not be slow."""
+        return max(round(self._worst.period / self.dt), 2)
+
+    @property
+    def _worst(self) -> SlowMode:
+        return max(self.lost, key=lambda m: m.error / abs(m.s))
+
+    @property
+    def statement(self) -> str:
+        """The text without advice."""
         if not self.lost:
             known = f"{len(self.modes)}, decay or growth of each known to a quarter"
             return f"slow modes: {known if self.modes else 'none'}"
-        worst = max(self.lost, key=lambda m: m.error / abs(m.s))
-        at, together = (
-            ", ".join(f"{value:.3g}" for value in worst.p),
-            max(round(worst.period / self.dt), 2),
-        )
+        worst = self._worst
+        at = ", ".join(f"{value:.3g}" for value in worst.p)
         return (
             f"slow modes: NOT known at {1 / self.dt:.3g} Hz: the pole {worst.s:.2g} 1/s at p = {at}"
             f" is uncertain by {2 * worst.standard_error:.2g} (two standard errors) and moves by"
-            f" {worst.shift:.2g} where the residuals are taken for noise of the sensors; for this"
-            f" mode identify at about {1 / (self.dt * together):.2g} Hz (means of {together}"
-            " samples, delay 0), or by instruments"
+            f" {worst.shift:.2g} where the residuals are taken for noise of the sensors"
+        )
+
+    def __str__(self) -> str:
+        if not self.lost:
+            return self.statement
+        return (
+            f"{self.statement}; for this mode identify at about"
+            f" {1 / (self.dt * self.together):.2g} Hz (means of {self.together} samples, delay 0),"
+            " or by instruments"
         )
 
 

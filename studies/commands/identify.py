@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import tempfile
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from studies.log.suggestion import Suggestion
     from symheli.logs.contents import Contents
     from symheli.logs.segments import Segment
+    from symheli.logs.signal_map import SignalMap
     from symheli.logs.survey import Survey
     from symheli.records import FlightRecord, KinematicCheck
 
@@ -167,8 +168,17 @@ ARGUMENTS = (
 
 def run(arguments: argparse.Namespace) -> Output:
     """Read, preprocess, fit and validate; or survey the log, where no fit is requested."""
-    from identification.judge import compare_constant
-    from studies.log import in_feedback, report
+    from studies.log.advice import advised_in_flags
+
+    with advised_in_flags():
+        return _identified(arguments)
+
+
+def _identified(arguments: argparse.Namespace) -> Output:
+    """The answer, with the advice of the libraries as it is."""
+    from identification.judge import compare_constant, slow_modes
+    from identification.model.lpvarx_model import LEAST_SQUARES
+    from studies.log import in_feedback, report, tried
 
     if arguments.log.suffix.lower() == ".toml":
         raise InputError(
@@ -215,9 +225,21 @@ def run(arguments: argparse.Namespace) -> Output:
         arguments.test,
         prepared.used,
         prepared.slower,
+        _in_place(arguments),
+        prepared.units,
     )
     check = prepared.kinematics
-    text, data = report.text(facts, result, check), report.data(facts, result, check)
+
+    def again(flags: Mapping[str, Any]) -> tuple[LPVARX, FlightRecord, FlightRecord | None]:
+        other = argparse.Namespace(**{**vars(arguments), **flags})
+        return _requested(other, kind)[:3]
+
+    mended, slow = tried.mended(result, vars(arguments), again), ""
+    if result.scheduled.method in LEAST_SQUARES:
+        found = slow_modes(result.scheduled, result.training)
+        slow = tried.seen_slowly(found, vars(arguments), again)
+    text = report.text(facts, result, check, mended=mended, slow=slow)
+    data = {**report.data(facts, result, check), "diverges": tried.diverging(result)}
     if arguments.loop:
         found = in_feedback.judged(result, arguments.loop)
         text = "\n\n".join([text, in_feedback.text(found)])
@@ -274,26 +296,57 @@ def _format(arguments: argparse.Namespace) -> Format:
 
 
 def _log_format(arguments: argparse.Namespace, log: Path) -> Format:
-    """Return the format of a log: the map's, the given one, or that of its content."""
+    """Return the format of a log: the given one, the map's, or that of its content."""
+    given = _map(arguments).format if arguments.map and arguments.format == "auto" else None
+    return given or (format_of(log) if arguments.format == "auto" else arguments.format)
+
+
+def _map(arguments: argparse.Namespace) -> SignalMap:
+    """The signal map, with the options that are given in place of its entries."""
     from symheli.logs.signal_map import SignalMap
 
-    given = SignalMap.load(arguments.map).format if arguments.map else None
-    if given is None and arguments.format != "auto":
-        given = arguments.format
-    return given or format_of(log)
+    found = SignalMap.load(arguments.map)
+    if arguments.format != "auto":
+        found = replace(found, format=arguments.format)
+    return found.over(
+        time=arguments.time,
+        time_unit=arguments.time_unit,
+        dt=arguments.dt,
+        units=dict(arguments.units),
+    )
+
+
+def _in_place(arguments: argparse.Namespace) -> list[str]:
+    """Return a sentence for each option that replaces an entry of the signal map."""
+    from symheli.logs.signal_map import SignalMap
+
+    if not arguments.map:
+        return []
+    own, used = SignalMap.load(arguments.map), _map(arguments)
+    pairs = [
+        (f"--{name.replace('_', '-')} {new}", f"{name} = {old}")
+        for name in ("format", "time", "time_unit", "dt")
+        if (new := getattr(used, name)) != (old := getattr(own, name)) and old is not None
+    ]
+    pairs += [
+        (f"--units {name}={used.signals[name].unit}", f"{name} in {source.unit}")
+        for name, source in own.signals.items()
+        if source.unit not in (None, used.signals[name].unit)
+    ]
+    return [f"{flag} in place of {entry} of {arguments.map.name}" for flag, entry in pairs]
 
 
 def _contents(arguments: argparse.Namespace, log: Path) -> Contents:
     """Return all columns of a log, or of a table the signals of the map."""
+    from studies.log.reading import read_mapped
     from symheli.logs.column import Column
     from symheli.logs.contents import Contents
-    from symheli.records import FlightRecord
 
     kind = _log_format(arguments, log)
     if not arguments.map or kind in OWN_CLOCKS:
         status = log.stat() if log.is_file() else None
         return _all_of(log, kind, *((status.st_mtime_ns, status.st_size) if status else (0, 0)))
-    record = FlightRecord.from_map(log, arguments.map)
+    record = read_mapped(log, _map(arguments), arguments.time_unit)
     columns = {str(s): Column(record.time, record[s], s.unit) for s in record.signals}
     return Contents("mapped", columns)
 
@@ -374,7 +427,8 @@ class _Signals(NamedTuple):
 class _Prepared(NamedTuple):
     """A record ready to fit, the name of its scheduling signal, how many samples were read and
     `kept` in the segments and between start and stop, whether attitude and rates agree where the
-    log has them, the segments `used` (empty: all), and signals logged more seldom (their steps, s).
+    log has them, sentences on `units` that contradict each other, the segments `used` (empty: all),
+    and signals logged more seldom (their steps, s).
     """
 
     record: FlightRecord
@@ -382,6 +436,7 @@ class _Prepared(NamedTuple):
     samples: int
     kept: int
     kinematics: KinematicCheck | None
+    units: Sequence[str]
     used: tuple[Segment, ...]
     slower: Mapping[str, float]
 
@@ -404,10 +459,9 @@ def _prepared(
     """Read `log` and do to it what the options say, in the order of docs/identify.md; start and
     stop only where it is to be `cut`.
     """
-    from studies.log import flown
-    from studies.log.reading import COMBINED, read
-    from symheli.logs.signal_map import SignalMap
-    from symheli.records import FlightRecord, conditioning
+    from studies.log import flown, units
+    from studies.log.reading import COMBINED, read, read_mapped
+    from symheli.records import conditioning
     from symheli.records.kinematics import lacking
 
     combined, scheduling = arguments.scheduling_from, signals.scheduling
@@ -418,7 +472,7 @@ def _prepared(
         *arguments.instruments,
     ]
     if arguments.map:
-        record = FlightRecord.from_map(log, arguments.map)
+        record = read_mapped(log, _map(arguments), arguments.time_unit)
     else:
         kind = format_of(log) if arguments.format == "auto" else arguments.format
         record = read(
@@ -448,6 +502,7 @@ def _prepared(
         record = record.with_signals({scheduling: "1"}, **{scheduling: np.zeros(len(record))})
     whole = record.between(arguments.start, arguments.stop) if cut else record
     check = None if lacking(whole.signals) else whole.check_kinematics()
+    wrong = units.contradicted(whole, _declared(arguments, log))
     record = record.select(
         list(dict.fromkeys([*signals.outputs, *signals.inputs, scheduling, *arguments.instruments]))
     )
@@ -459,11 +514,21 @@ def _prepared(
     shorter = conditioning.decimate(record, arguments.decimate)
     late: dict[str, float] = {}
     if seen is not None and arguments.map:
-        sources = SignalMap.load(arguments.map).signals.items()
+        sources = _map(arguments).signals.items()
         columns = {n: seen.columns[s.column] for n, s in sources if s.column in seen.columns}
         flown.refuse_what_is_invented(columns, (*signals.outputs, *signals.inputs), shorter.dt, log)
         late = flown.slower(columns, shorter.dt)
-    return _Prepared(shorter, scheduling, samples, kept, check, used, late)
+    return _Prepared(shorter, scheduling, samples, kept, check, wrong, used, late)
+
+
+def _declared(arguments: argparse.Namespace, log: Path) -> dict[str, str]:
+    """Units by signal, as the map, the header or the options declare them."""
+    from symheli.logs.separated import SeparatedTable
+
+    if arguments.map:
+        return {n: s.unit for n, s in _map(arguments).signals.items() if s.unit}
+    header = SeparatedTable.read(log).units if _log_format(arguments, log) == "csv" else {}
+    return {**header, **dict(arguments.units)}
 
 
 def _write(arguments: argparse.Namespace, result: Any) -> Iterator[Path]:

@@ -10,7 +10,9 @@ import numpy as np
 
 from identification.judge.against_constant import AgainstConstant, Scored
 from identification.judge.scores import percent, predicted, steps
+from symheli.records import FlightRecord
 from symheli.records.record_plot import draw, shade_missing
+from symheli.values.arrays import Array
 from symheli.values.drawing import label, windowless_figure
 from symheli.values.whole_files import write_bytes
 
@@ -30,7 +32,7 @@ def figure(result: AgainstConstant) -> Figure:
     A dashed line marks where the held-out part begins; free runs start anew there and behind each
     gap. The titles give the fits of each model on the held-out part (on all where nothing is), one
     step, 1 s and free run, in percent. The axes hold what was measured: a prediction may leave
-    them.
+    them, and one that leaves them by more than their height is drawn to there.
     """
     model, parts = result.scheduled, [r for r in (result.training, result.test) if r is not None]
     heights = [1.9] * len(model.outputs) + [1.2]
@@ -43,8 +45,12 @@ def figure(result: AgainstConstant) -> Figure:
         gridspec_kw={"width_ratios": [3, 2], "height_ratios": heights},
     )
     shown = [*model.outputs, model.parameters[0]]
+    measured = np.concatenate([part.columns(model.outputs) for part in parts])
     for part in parts:
-        drawn = {h: predicted(model, part, n, result.hold_p) for h, n in steps(model.dt).items()}
+        drawn = {
+            h: _until_lost(part, predicted(model, part, n, result.hold_p), measured)
+            for h, n in steps(model.dt).items()
+        }
         for i, (row, name) in enumerate(zip(axes, shown, strict=True)):
             for ax in row:
                 draw(
@@ -92,6 +98,20 @@ def figure(result: AgainstConstant) -> Figure:
         fontsize=9,
     )
     return picture
+
+
+def _until_lost(part: FlightRecord, values: Array, measured: Array) -> Array:
+    """Predictions (n, ny), missing from where one of them leaves for good to the end of its part of
+    the record.
+    """
+    low, high = np.nanmin(measured, axis=0), np.nanmax(measured, axis=0)
+    span, out = np.where(high > low, high - low, 1.0), values.copy()
+    for piece in part.segments():
+        with np.errstate(invalid="ignore"):
+            beyond = (values[piece] > high + span) | (values[piece] < low - span)
+        if len(lost := np.flatnonzero(beyond.any(axis=1))):
+            out[piece.start + lost[0] : piece.stop] = np.nan
+    return out
 
 
 def save(picture: Figure, path: Path) -> Path:

@@ -3,17 +3,29 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from symheli.errors import InputError, UnknownNameError
+from symheli.errors import DataWarning, InputError, UnknownNameError
 from symheli.logs.format import OWN_CLOCKS, Format
 from symheli.logs.separated import SEPARATORS, SeparatedTable
+from symheli.logs.signal_map import SignalMap
 from symheli.records import FlightRecord
 from symheli.records.kinematics import COMPARED
+from symheli.records.tied_units import POSITIONS
+from symheli.values.arrays import Array
+from symheli.values.sample_period import USUAL, units_of_step
 from symheli.values.signal import UNITS
+
+SCATTER = 0.1
+"""Part of a step by which stamps may be off an even clock and stand for it: the samples are even
+then, not their stamps.
+"""
 
 STILL = 1e-6
 """A scheduling signal that moves by less than this part of its size stays where it is."""
@@ -22,6 +34,78 @@ COMBINED = "speed"
 """The scheduling signal made of --scheduling-from."""
 TIMES = ("t", "time")
 """Columns taken as the time where none is named."""
+
+
+def read_mapped(path: Path, found: SignalMap, taken: str | None = None) -> FlightRecord:
+    """The record by a signal map, on one step; `taken` is the unit of time that was given."""
+    step = found.step(path)
+    if step is not None:
+        found = replace(found, dt=None)
+    with _steps_told_here():
+        record = FlightRecord.from_map(path, found)
+    return on_one_step(record, step, path, taken or found.time_unit)
+
+
+def on_one_step(
+    record: FlightRecord, dt: float | None, path: Path, taken: str | None
+) -> FlightRecord:
+    """The record at steps of `dt` (s), or of its own where they are even; else, with a
+    `DataWarning`, at the even steps that its stamps mean, or interpolated to their mean.
+
+    Raises `InputError` where the time, `taken` in this unit (None: in s, as nobody said
+    otherwise), makes steps that no flight record has, and those in another unit would be usual.
+    """
+    step = float(np.median(np.diff(record.time)))
+    if not USUAL[0] <= step <= USUAL[1]:
+        said = "" if taken is None else f" in {taken}"
+        others = units_of_step(step, taken or "s")
+        if others and not (taken == "s" and step > USUAL[1]):
+            advice = " or ".join(f"--time-unit {u} ({s:.3g} s)" for u, s in others.items())
+            raise InputError(
+                f"{path}: the samples are {step:.6g} s apart if the time is{said or ' in s'}; give"
+                f" {advice}"
+            )
+        told = f"the samples are {step:.6g} s apart"
+        warnings.warn(told if taken else f"{told}: is the time in s?", DataWarning, stacklevel=3)
+    if dt is not None:
+        return record.resample(dt)
+    try:
+        record.dt  # noqa: B018  raises
+    except InputError:
+        pass
+    else:
+        return record
+    grid, period, scatter = _grid(record)
+    if scatter <= SCATTER * period:
+        made = replace(record, time=grid)
+        told = (
+            f"the stamps scatter by up to {scatter:.2g} s around steps of {period:.5g} s, now even"
+        )
+    else:
+        made = record.resample(float(f"{period:.3g}"))
+        told = f"the steps are uneven, the samples {made.resampled}"
+    warnings.warn(f"{path}: {told}", DataWarning, stacklevel=3)
+    return made
+
+
+def _grid(record: FlightRecord) -> tuple[Array, float, float]:
+    """Instants (n,) at one step nearest to the stamps, a phase for each part; that step, and by how
+    much a stamp is off at most, s.
+    """
+    parts = [np.arange(part.start, part.stop) for part in record.segments()]
+    counts = np.concatenate([part - part.mean() for part in parts])
+    centres = np.concatenate([np.full(len(part), record.time[part].mean()) for part in parts])
+    period = float(counts @ (record.time - centres) / (counts @ counts))
+    grid = centres + period * counts
+    return grid, period, float(np.abs(record.time - grid).max())
+
+
+@contextmanager
+def _steps_told_here() -> Iterator[None]:
+    """Without the note that readers make on odd steps."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "the samples are .* s apart")
+        yield
 
 
 def read(
@@ -34,7 +118,8 @@ def read(
     units: Mapping[str, str],
     time_unit: str | None = None,
 ) -> FlightRecord:
-    """Return the record, on a uniform step if `dt` (s) is given; a time column is in `time_unit`.
+    """Return the record on a uniform step, `dt` (s) if it is given; a time column is in
+    `time_unit`.
 
     X-Plane logs declare their units. Of a table, what `check_kinematics` compares is read too where
     it is there. Elsewhere `units` declares those of `signals`, before the header of a table; the
@@ -42,7 +127,7 @@ def read(
     `dt` together resample. Raises `InputError`.
     """
     if format == "xplane":
-        return FlightRecord.from_xplane(path, dt)
+        return on_one_step(FlightRecord.from_xplane(path, dt), None, path, "s")
     if format in OWN_CLOCKS:
         raise InputError(
             f"{path}: the columns of an autopilot's log are named in a signal map, --map FILE.toml;"
@@ -52,7 +137,11 @@ def read(
     if format == "csv":
         table = SeparatedTable.read(path)
         known = table.units
-        signals = list(dict.fromkeys([*signals, *(n for n in COMPARED if n in table.names)]))
+        signals = list(
+            dict.fromkeys(
+                [*signals, *(n for n in (*COMPARED, "airspeed", *POSITIONS) if n in table.names)]
+            )
+        )
     declared = {
         name: units.get(name) or known.get(name) or UNITS.get(name) or _undeclared(name)
         for name in signals
@@ -60,15 +149,16 @@ def read(
     for name in units:
         if name not in declared:
             raise UnknownNameError("signal in --units", name, declared)
-    if format == "mat":
-        record = FlightRecord.from_mat(path, time or "t", declared, time_unit or "s")
-    else:
-        column = time or _time_column(path, dt)
-        record = FlightRecord.from_csv(
-            path, column, declared, dt if column is None else None, time_unit
-        )
-        time = column
-    return record.resample(dt) if dt is not None and time is not None else record
+    with _steps_told_here():
+        if format == "mat":
+            record = FlightRecord.from_mat(path, time or "t", declared, time_unit or "s")
+        else:
+            time = time or _time_column(path, dt)
+            record = FlightRecord.from_csv(
+                path, time, declared, dt if time is None else None, time_unit
+            )
+            time_unit = time_unit or known.get(time or "")
+    return on_one_step(record, None if time is None else dt, path, time_unit)
 
 
 def _undeclared(name: str) -> str:

@@ -16,6 +16,7 @@ from identification.judge.against_constant import HORIZONS, PAYS, AgainstConstan
 from identification.judge.scores import Scores, percent
 from identification.model import LPVARXModel
 from identification.model.lpvarx_model import LEAST_SQUARES
+from studies.log.accuracy import OPEN, OpenGap, open_gap
 from studies.output import columns
 from symheli.logs.segments import Segment
 from symheli.records import FlightRecord, KinematicCheck, SensorCheck
@@ -41,10 +42,13 @@ def facts(
     test_log: Path | None = None,
     used: Sequence[Segment] = (),
     slower: Mapping[str, float] = MappingProxyType({}),
+    in_place: Sequence[str] = (),
+    units: Sequence[str] = (),
 ) -> dict[str, Any]:
     """What was read and used: `rows` in the file, `outside` the segments, --start and --stop, and
     what became of the rest; a log held out, if any; the segments that were `used`, and the steps
-    (s) of signals logged more seldom than the model's.
+    (s) of signals logged more seldom than the model's; options `in_place` of the map's entries;
+    sentences on `units` that contradict each other.
     """
     model, test = result.scheduled, result.test
     scheduling = model.parameters[0]
@@ -56,6 +60,8 @@ def facts(
         "test_log": None if test_log is None else test_log.name,
         "used": [[one.start, one.stop, one.what] for one in used],
         "logged_every": dict(slower),
+        "in_place_of_the_map": list(in_place),
+        "units_contradict": list(units),
         "resampled": record.resampled,
         "format": kind,
         "rows_read": rows,
@@ -79,13 +85,23 @@ def facts(
 
 
 def text(
-    found: dict[str, Any], result: AgainstConstant, check: KinematicCheck | None = None
+    found: dict[str, Any],
+    result: AgainstConstant,
+    check: KinematicCheck | None = None,
+    *,
+    mended: str = "",
+    slow: str = "",
 ) -> str:
-    """The whole answer for a reader."""
+    """The whole answer for a reader: first what would mend a fit that diverges, last the `slow`
+    modes and how far noise leaves the model open.
+    """
+    left_open = _open(result)
     parts = [
+        *([mended, ""] if mended else []),
         *_read(found),
         *_structure(found, result),
         *([] if check is None else ["", *_compatibility(check)]),
+        *(["", *found["units_contradict"]] if found["units_contradict"] else []),
         "",
         str(result.scheduled.excitation),
         "",
@@ -97,6 +113,8 @@ def text(
         *(VERDICTS if result.verdict() and result.test is not None else ()),
         "",
         *_certainty(result),
+        slow,
+        *([str(left_open)] if left_open and left_open.gap > OPEN else []),
     ]
     return "\n".join(parts).rstrip()
 
@@ -137,6 +155,7 @@ def data(
             uncertainty(result.scheduled, result.training).standard_errors if certain else None
         ),
         "slow_modes": _slow(result) if certain else None,
+        "open_to": None if (left_open := _open(result)) is None else left_open._asdict(),
     }
 
 
@@ -194,6 +213,7 @@ def _read(found: dict[str, Any]) -> list[str]:
             " --start and --stop"
         ),
         *(f"  segment: {a:.2f} to {b:.2f} s, {what}" for a, b, what in found["used"][:8]),
+        *(f"  {sentence}" for sentence in found["in_place_of_the_map"]),
         *(f"  {name}: logged every {step:.2g} s, interpolated" for name, step in late),
         (
             f"  used: {found['samples']} samples, dt {found['dt']:.5g} s, from {found['start']:.5g}"
@@ -224,6 +244,7 @@ def _structure(found: dict[str, Any], result: AgainstConstant) -> list[str]:
             f"  fitted: {fitted} {found['training_samples']} samples, {incomplete} without a"
             f" complete regressor, by {_method(result)}"
         ),
+        *_too_short(result),
         f"  held out: {held} {found['held_out_samples']} samples",
         (
             f"  range of {arx.scheduling} in all that was read, which the model covers: {low:.4g}"
@@ -247,10 +268,23 @@ def _structure(found: dict[str, Any], result: AgainstConstant) -> list[str]:
     ]
 
 
+def _too_short(result: AgainstConstant) -> list[str]:
+    """Parts without a gap that hold no whole regressor."""
+    memory = result.scheduled.structure.memory
+    lengths = [part.stop - part.start for part in result.training.segments()]
+    short = [n for n in lengths if n <= memory]
+    if not short:
+        return []
+    parts = "1 part is" if len(short) == 1 else f"{len(short)} parts are"
+    return [f"  {parts} shorter than a regressor of {memory + 1} samples and left out"]
+
+
 def _method(result: AgainstConstant) -> str:
     model = result.scheduled
     strength = (
-        f" (first-stage F {model.details['first_stage_F']:.3g})"
+        f" (first-stage F {model.details['first_stage_F']:.3g},"
+        f" {model.details['without_instruments']} samples of parts too short for the instruments"
+        " left out)"
         if "first_stage_F" in model.details
         else ""
     )
@@ -274,6 +308,11 @@ def _horizons(result: AgainstConstant) -> list[str]:
         f"{p} is taken as measured: one step and 1 s hold it from the start of each prediction,"
         f" free runs follow it{known}"
     ]
+
+
+def _open(result: AgainstConstant) -> OpenGap | None:
+    model = result.scheduled
+    return open_gap(model, result.training) if model.method in LEAST_SQUARES else None
 
 
 def _slow(result: AgainstConstant) -> dict[str, Any]:
@@ -308,7 +347,6 @@ def _certainty(result: AgainstConstant) -> list[str]:
             f"coefficients more than two standard errors from zero: {count} (coloured residuals"
             f" make the errors larger by: {colour})"
         ),
-        str(slow_modes(model, result.training)),
     ]
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.logs.column import Column
 from symheli.logs.files import Table, positive, seconds_in
+from symheli.logs.order import in_order
 from symheli.logs.separated import SeparatedTable
 from symheli.values.arrays import Array
 from symheli.values.signal import Signal
@@ -32,7 +33,8 @@ def read_csv(
 
     `time` names the time column (in `time_unit`; default that of its header, or s); None where the
     file has none: its rows are then `dt` (s) apart. Empty cells are missing samples (NaN). Raises
-    `InputError` for a file that is no table, a cell that is no number, or a time missing.
+    `InputError` for a file that is no table and a cell that is no number. Rows are put in order as
+    `in_order` says.
     """
     if (time is None) == (dt is None):
         raise InputError(
@@ -56,12 +58,7 @@ def read_csv(
     if time is None:
         return positive(dt or 0.0) * np.arange(len(table.rows)), values, known
     seconds = factor * columns[time]
-    if np.isnan(seconds).any():
-        raise InputError(
-            f"{path}: the time is missing in row {int(np.flatnonzero(np.isnan(seconds))[0]) + 1} of"
-            f" column {time!r}"
-        )
-    return seconds, values, known
+    return *in_order(seconds, values, path), known
 
 
 def csv_columns(path: str | os.PathLike[str]) -> dict[str, Column]:

@@ -15,6 +15,7 @@ from symheli.logs.column import Column
 from symheli.logs.files import Table, bounded, error_text, seconds_in
 from symheli.logs.format import is_hdf5
 from symheli.logs.mat5 import MAX_INFLATED, check_mat5
+from symheli.logs.order import in_order
 
 NUMBERS = {
     *("double", "single", "logical"),
@@ -40,7 +41,8 @@ def read_mat(
             raise InputError(
                 f"{file}: {name!r} has {len(vector)} samples, the time {time!r} has {n}"
             )
-    return factor * vectors[time], {name: vectors[name] for name in units}, dict(units)
+    columns = {name: vectors[name] for name in units}
+    return *in_order(factor * vectors[time], columns, file), dict(units)
 
 
 def mat_columns(path: str | os.PathLike[str]) -> dict[str, Column]:

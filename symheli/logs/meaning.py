@@ -29,9 +29,19 @@ CONTROLS = ("lon", "lat", "col", "ped")
 """Longitudinal and lateral cyclic, collective, pedals: commands, in whatever the log has."""
 
 NAMES = {
-    "p": ("p", "rollrate", "rollspeed", "gyrox", "gyrx", "wx", "omegax"),
-    "q": ("q", "pitchrate", "pitchspeed", "gyroy", "gyry", "wy", "omegay"),
-    "r": ("r", "yawrate", "yawspeed", "gyroz", "gyrz", "wz", "omegaz"),
+    "p": ("p", "rollrate", "rollspeed", "gyroroll", "rollgyro", "gyrox", "gyrx", "wx", "omegax"),
+    "q": (
+        "q",
+        "pitchrate",
+        "pitchspeed",
+        "gyropitch",
+        "pitchgyro",
+        "gyroy",
+        "gyry",
+        "wy",
+        "omegay",
+    ),
+    "r": ("r", "yawrate", "yawspeed", "gyroyaw", "yawgyro", "gyroz", "gyrz", "wz", "omegaz"),
     "phi": ("phi", "roll", "rollangle", "bank"),
     "theta": ("theta", "pitch", "pitchangle"),
     "psi": ("psi", "yaw", "heading", "hdg"),
@@ -44,10 +54,13 @@ NAMES = {
     "w": ("w", "wbody", "vzbody", "vz"),
     "lon": ("dlon", "lon", "sticklon", "longitudinal", "elevator", "elev", "pitchstick"),
     "lat": ("dlat", "lat", "sticklat", "lateral", "aileron", "ailrn", "ail", "rollstick"),
-    "col": ("dcol", "col", "stickcol", "collective", "throttle", "thr"),
+    "col": ("dcol", "col", "coll", "stickcol", "collective", "throttle", "thr"),
     "ped": ("dped", "ped", "stickped", "pedal", "pedals", "rudder", "ruddr", "rud", "yawstick"),
 }
 """Names in tables, small letters and digits alone, the best first."""
+
+CHANNELS = ("rcou", "rcout", "rcin", "rc", "servo")
+"""Words before the name of a control: RCOU_elev."""
 
 SUFFIXES = {
     **dict.fromkeys(("radps", "rads", "radpersec"), "rad/s"),
@@ -191,7 +204,10 @@ def _by_name(columns: Mapping[str, Column]) -> dict[str, list[Guess]]:
     found: dict[str, list[tuple[int, Guess]]] = {signal: [] for signal in NAMES}
     for column, content in columns.items():
         name, suffix = plain_name(column)
+        channel = next((c for c in CHANNELS if name.startswith(c)), "")
         for signal, names in NAMES.items():
+            if signal in CONTROLS and name.removeprefix(channel) in names:
+                name = name.removeprefix(channel)
             if name in names:
                 unit, why = _unit(signal, content.values)
                 if column in UNITS and why == "name":

@@ -147,7 +147,7 @@ class SeparatedTable:
                 mixed = (
                     "; the decimal sign is a comma elsewhere in this file"
                     if comma and _number(cell, False) is not None
-                    else ""
+                    else "; leave the cell of a missing sample empty"
                 )
                 raise InputError(
                     f"{self.path}: column {name!r}, row {i + 1}: expected a number, got"

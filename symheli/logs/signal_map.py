@@ -22,7 +22,8 @@ from __future__ import annotations
 import math
 import os
 import tomllib
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 from symheli.errors import InputError, UnknownNameError
@@ -63,8 +64,12 @@ class SignalMap:
     dt: float | None = None
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> SignalMap:
-        """Load a map from a TOML file; raise `InputError` with the file and the invalid entry."""
+    def load(cls, path: str | os.PathLike[str] | SignalMap) -> SignalMap:
+        """Load a map from a TOML file, or return one that is loaded; raise `InputError` with the
+        file and the invalid entry.
+        """
+        if isinstance(path, SignalMap):
+            return path
         try:
             table = tomllib.loads(text(path))
         except tomllib.TOMLDecodeError as error:
@@ -85,6 +90,26 @@ class SignalMap:
         if dt is not None and not (isinstance(dt, int | float) and math.isfinite(dt) and dt > 0):
             raise InputError(f"{path}: dt must be a positive number of seconds, got {dt!r}")
         return cls(signals, kind, table.get("time"), table.get("time_unit"), dt)
+
+    def over(
+        self,
+        *,
+        time: str | None = None,
+        time_unit: str | None = None,
+        dt: float | None = None,
+        units: Mapping[str, str] | None = None,
+    ) -> SignalMap:
+        """The map with what is given in place of its own; raises `UnknownNameError` for the unit of
+        a signal it lacks.
+        """
+        signals = dict(self.signals)
+        for name, unit in (units or {}).items():
+            if name not in signals:
+                raise UnknownNameError("signal of the map in units", name, signals)
+            signals[name] = replace(signals[name], unit=unit)
+        return SignalMap(
+            signals, self.format, time or self.time, time_unit or self.time_unit, dt or self.dt
+        )
 
     def read(self, log: str | os.PathLike[str]) -> Table:
         """Time (s), the mapped signals and their units."""

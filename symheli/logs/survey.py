@@ -22,6 +22,9 @@ GAP = 1.5
 CLOCKS = ("t", "time", "timestamp", "timeus", "timems", "timestampus", "timestampms", "stamp")
 """Plain names of columns that may be the time."""
 
+FORWARD = 0.8
+"""Least part of the rows of a clock that come after the row above."""
+
 WINDOW = 25
 """Rows over which an angle is held against its rate: the noise of the rate averages out."""
 
@@ -135,9 +138,9 @@ def _time_of(held: Mapping[str, Column]) -> tuple[str | None, str]:
     for name, column in sorted(held.items(), key=lambda item: item[0] not in ("t", "time")):
         plain, _ = plain_name(name)
         values = column.values
-        if plain not in CLOCKS or len(values) < 2 or not np.all(np.diff(values) > 0):
+        if plain not in CLOCKS or len(values) < 2 or np.mean(np.diff(values) > 0) < FORWARD:
             continue
-        step = float(np.median(np.diff(values)))
+        step = float(np.nanmedian(np.diff(values)))
         declared = column.unit if column.unit and to_si(column.unit)[1] == "s" else None
         for unit in [declared] if declared else ["s", "ms", "us", "ns"]:
             if declared or USUAL[0] <= to_si(unit)[0] * step <= USUAL[1]:
@@ -146,6 +149,7 @@ def _time_of(held: Mapping[str, Column]) -> tuple[str | None, str]:
 
 
 def _clock(name: str, unit: str, stamps: np.ndarray) -> LogClock:
+    stamps = stamps[np.isfinite(stamps)]
     stamps = stamps[forward(stamps)]
     steps = np.diff(stamps)
     step = float(np.median(steps))

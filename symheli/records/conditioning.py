@@ -12,6 +12,7 @@ from scipy.signal import butter, sosfilt, sosfilt_zi, sosfiltfilt
 from symheli.errors import InputError
 from symheli.records.flight_record import GAP, FlightRecord
 from symheli.values.arrays import Array
+from symheli.values.sample_period import JITTER
 
 
 def with_norm(record: FlightRecord, parts: Sequence[str], name: str = "speed") -> FlightRecord:
@@ -184,7 +185,8 @@ def decimate(record: FlightRecord, n: int) -> FlightRecord:
 
     Within a mean the output has heard the input already: y(k) depends on u(k), whatever it did
     before. Identify with delay 0; the record remembers (`resampled`), and `fit` warns. No other
-    filter avoids it: between slow samples what is band-limited is known from both sides.
+    filter avoids it: between slow samples what is band-limited is known from both sides. No mean
+    reaches across a gap; what a part leaves over at its ends is left out.
 
     Parameters
     ----------
@@ -201,7 +203,7 @@ def decimate(record: FlightRecord, n: int) -> FlightRecord:
     Raises
     ------
     InputError
-        Another n, or fewer than two means.
+        Another n, or one that leaves no two means in a row.
 
     Examples
     --------
@@ -213,21 +215,30 @@ def decimate(record: FlightRecord, n: int) -> FlightRecord:
         raise InputError(f"expected a whole number of samples >= 1 to take together, got {n!r}")
     if n == 1:
         return record
-    times, values = [], []
+    step = float(np.median(np.diff(record.time)))
+    clear, middle = GAP * (1 + JITTER) * n * step, 0.5 * (n - 1) * step
+    times: list[Array] = []
+    values: list[Array] = []
     for part in record.segments():
-        rows = (part.stop - part.start) // n
-        stop = part.start + rows * n
-        times.append(record.time[part.start : stop].reshape(rows, n).mean(axis=1))
-        values.append(
-            record.values[part.start : stop].reshape(rows, n, len(record.signals)).mean(axis=1)
-        )
-    if sum(map(len, times)) < 2:
+        time = record.time[part]
+        # means beside a gap stand so far apart that they show it
+        first = int(np.searchsorted(time + middle, times[-1][-1] + clear)) if times else 0
+        rows = (len(time) - first) // n
+        if rows > 0:
+            keep = slice(part.start + first, part.start + first + rows * n)
+            times.append(record.time[keep].reshape(rows, n).mean(axis=1))
+            values.append(record.values[keep].reshape(rows, n, -1).mean(axis=1))
+    made = np.concatenate(times) if times else np.zeros(0)
+    if len(made) < 2 or np.median(np.diff(made)) > GAP * n * step:
+        longest = max(part.stop - part.start for part in record.segments())
         raise InputError(
-            f"taking {n} samples together leaves fewer than two; the record has {len(record)}"
+            f"taking {n} samples together leaves fewer than two in a row: {len(made)} in all, the"
+            f" longest part without a gap has {longest} of the {len(record)} samples; take fewer"
+            " together (--decimate)"
         )
     return replace(
         record,
-        time=np.concatenate(times),
+        time=made,
         values=np.concatenate(values),
         resampled=f"means of {n} samples",
     )

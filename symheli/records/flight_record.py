@@ -290,10 +290,10 @@ class FlightRecord:
 
     @classmethod
     def from_map(
-        cls, path: str | os.PathLike[str], signal_map: str | os.PathLike[str]
+        cls, path: str | os.PathLike[str], signal_map: str | os.PathLike[str] | SignalMap
     ) -> FlightRecord:
-        """Read any of these logs by a TOML file that assigns columns to signals; see
-        `symheli.logs.signal_map`.
+        """Read any of these logs by a TOML file (or what was loaded of one) that assigns columns to
+        signals; see `symheli.logs.signal_map`.
         """
         found = SignalMap.load(signal_map)
         record = replace(cls._from_table(*found.read(path), path), resampled=found.resampled(path))

@@ -25,6 +25,10 @@ USUAL = 1e-4, 1.0
 """Seconds between samples of a flight; a step beyond these is rather a time in another unit."""
 
 
+SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+"""Seconds in a unit of time."""
+
+
 def same_period(first: float | None, second: float | None, tolerance: float = SAME) -> bool:
     """Whether two sample periods (s; None: continuous time) are one, to `tolerance` of the
     smaller.
@@ -57,6 +61,15 @@ def period_of(steps: Array, last: float) -> float:
     return mean
 
 
+def units_of_step(step: float, taken: str = "s") -> dict[str, float]:
+    """{unit: step in s} of the other units of time in which a step of so many s, which was `taken`
+    in one, is that of a flight record.
+    """
+    number = step / SECONDS[taken]
+    found = {unit: number * factor for unit, factor in SECONDS.items() if unit != taken}
+    return {unit: value for unit, value in found.items() if USUAL[0] <= value <= USUAL[1]}
+
+
 def warn_of_odd_steps(time: Array) -> None:
     """Warn (`DataWarning`) where the median step of `time` (s) is implausible for a flight record,
     which suggests another unit.
@@ -64,11 +77,7 @@ def warn_of_odd_steps(time: Array) -> None:
     step, (least, most) = float(np.median(np.diff(time))), USUAL
     if least <= step <= most:
         return
-    meant = [
-        unit
-        for unit, factor in (("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9))
-        if least <= step * factor <= most
-    ]
+    meant = list(units_of_step(step))
     far = (
         f"; if the time is in {' or '.join(meant)}, say so: time_unit={meant[0]!r} (--time-unit"
         f" {meant[0]})"

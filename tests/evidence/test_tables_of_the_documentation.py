@@ -19,6 +19,7 @@ import pytest
 import synthesis
 from evidence import (
     box_jenkins,
+    damaged_logs,
     logs,
     r50,
     specs,
@@ -172,6 +173,12 @@ def one_public_log():
         assert same(then, float(now), rel=0.01)
 
 
+def damages_by_text():
+    shown = KEPT["identify.md", "damaged logs"].text.splitlines()
+    *_, row, _ = damaged_logs.table(damaged_logs.all_of(("text",))).splitlines()
+    assert row in shown
+
+
 def faults_of_one_entry(package, entry):
     """As many inputs, no more faults: how many of them are refused is the draw's."""
     code = (
@@ -307,6 +314,7 @@ ROWS = {
     ("tubes.md", "amplitudes"): tube_in_hover,
     ("tubes.md", "vtol"): tube_of_the_planar_vtol,
     ("identify.md", "public logs"): one_public_log,
+    ("identify.md", "damaged logs"): damages_by_text,
     ("identified.md", "xcell60 under real conditions"): flight_with_servos_of_the_worst_seed,
     ("identification.md", "Box-Jenkins system"): coefficient_of_the_box_jenkins_system,
     ("checks.md", "fuzzing identification"): lambda: faults_of_one_entry(

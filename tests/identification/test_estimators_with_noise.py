@@ -266,6 +266,31 @@ def test_sensitivities_are_the_derivatives_of_the_prediction_error(method):
     )  # central differences: h^2 and 1e-16 / h
 
 
+@pytest.mark.parametrize("method", [idn.methods.OutputError(), idn.methods.BoxJenkins(ar=1)])
+def test_settled_initial_outputs_leave_the_gradient_of_the_others(method):
+    """Kaufman's Jacobian is not that of the projected errors, but their gradient is the same."""
+    truth = Truth(structure(**MIMO))
+    record = truth.record(moving(120), noise=0.1, noise_seed=51)
+    t = record.time.copy()
+    t[40:] += 9.0
+    t[80:] += 9.0
+    record = FlightRecord(t, record.values, record.signals)
+    white = not isinstance(method, idn.methods.BoxJenkins)
+    problem = Residuals(truth.arx, stretches(truth.arx, [record], outputs=not white), method)
+    x = problem.settled(problem.start(0.95 * truth.theta))
+    full = problem.jacobian(x).T @ problem.residuals(x)
+    np.testing.assert_allclose(full[problem.first :], 0.0, atol=1e-9)
+
+    def cost(own):
+        there = problem.settled(np.concatenate([own, x[problem.first :]]))
+        return 0.5 * np.sum(problem.residuals(there) ** 2)
+
+    h, own = 1e-6, x[: problem.first]
+    slopes = [(cost(own + h * e) - cost(own - h * e)) / (2 * h) for e in np.eye(len(own))]
+    gradient = problem.reduced_jacobian(x).T @ problem.residuals(x)
+    np.testing.assert_allclose(gradient, slopes, atol=1e-6 * np.abs(gradient).max())
+
+
 def test_output_error_bridges_missing_outputs_and_finds_where_each_stretch_starts():
     truth = Truth(structure(na=2, nb=1))
     record = truth.record(moving(400))

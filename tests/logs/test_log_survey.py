@@ -549,3 +549,26 @@ def test_a_fit_beyond_all_measure_is_called_by_its_word():
     assert [percent(v) for v in (-1.3e29, -np.inf, -250.0, 98.76, np.nan)] == [
         *("diverges", "diverges", "-250.0", "98.8", "no data")
     ]
+
+
+def test_columns_named_by_axis_and_unit_are_suggested(look, answer, tmp_path):
+    f = flight()
+    pulses = 1500 + 400 * f["lon"] / np.abs(f["lon"]).max()
+    log = table(
+        tmp_path / "log.csv",
+        {
+            "TimeMS": np.round(1e3 * f["t"]) + 12345,
+            "GyroPitch_dps": np.degrees(f["q"]),
+            "PitchAngle_deg": np.degrees(f["theta"]),
+            "RCOU_elev": pulses,
+            "Airspeed": f["airspeed"],
+        },
+    )
+    seen, _ = look(log)
+    guessed = {one["guess"]["signal"]: one for one in seen["columns"] if one["guess"]}
+    assert guessed["q"]["name"] == "GyroPitch_dps"
+    assert guessed["q"]["guess"]["unit"] == "deg/s"
+    assert guessed["lon"]["guess"]["unit"] == "us"
+    command = seen["suggested_command"]
+    assert {"GyroPitch_dps=deg/s", "RCOU_elev=us"} <= set(command)
+    assert answer(*command[2:])["read"]["units_contradict"] == []

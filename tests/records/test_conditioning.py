@@ -78,3 +78,27 @@ def test_impossible_filters_are_refused():
         low_pass(record(100), 25.0)
     with pytest.raises(UnknownNameError):
         low_pass(record(100), 5.0, leave=["speed"])
+
+
+@pytest.mark.parametrize("n", [2, 3, 7])
+@pytest.mark.parametrize("lost", [(40,), (40, 44, 90), (50, 51), tuple(range(60, 73))])
+def test_means_lie_inside_parts_and_show_the_gaps(n, lost):
+    time = 0.02 * np.arange(200)
+    kept = np.delete(np.arange(200), lost)
+    rec = FlightRecord.from_arrays(time[kept], {"k": "1"}, k=kept.astype(float))
+    slow = decimate(rec, n)
+    assert slow.dt == pytest.approx(0.02 * n)
+    np.testing.assert_allclose(slow["k"], slow.time / 0.02)  # means of instants in a row
+    spans = [slow["k"] - (n - 1) / 2, slow["k"] + (n - 1) / 2]
+    for k in lost:
+        assert not np.any((spans[0] <= k) & (k <= spans[1]))
+        assert any(
+            slow["k"][part.start] > k for part in slow.segments()[1:]
+        )  # a part begins behind it
+
+
+def test_more_samples_than_any_part_has_are_refused():
+    kept = np.delete(np.arange(60), [10, 20, 30, 40, 50])
+    rec = FlightRecord.from_arrays(0.02 * kept, {"k": "1"}, k=kept.astype(float))
+    with pytest.raises(InputError, match="the longest part without a gap has 10 of the 55"):
+        decimate(rec, 9)

@@ -340,8 +340,8 @@ def test_identify_reads_milliseconds_and_decimal_commas_and_asks_where_the_unit_
     with warnings.catch_warnings():
         warnings.simplefilter("default")  # as at a prompt, where a note is printed
         status, _, error = run("identify", other, *STRUCTURE, *UNITS)
-    assert status == 0
-    assert "the samples are 50 s apart; if the time is in ms, say so" in error
+    assert status == 1
+    assert "the samples are 50 s apart if the time is in s; give --time-unit ms (0.05 s)" in error
     other.write_text(other.read_text().replace("t ;", "clock ;", 1))
     status, _, error = run("identify", other, *STRUCTURE, *UNITS)
     assert status == 1

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from evidence.damaged_logs import pitch_with_lost_rows
+
 BEGIN = "print('begins', flush=True)\n"
 LIMIT = 2.0
 """Seconds of processor time, which other work on the machine does not make longer."""
@@ -209,6 +211,21 @@ def test_an_interrupt_is_answered_within_two_seconds(what):
     err, status, seconds = interrupted(child)
     assert err.rstrip().endswith("KeyboardInterrupt")
     assert status == -signal.SIGINT
+    assert seconds < LIMIT + ENDING
+
+
+@pytest.mark.slow
+def test_an_interrupted_identification_ends_in_a_sentence(tmp_path):
+    """Of a log of many parts, in the middle of the search."""
+    log, file = pitch_with_lost_rows(), tmp_path / "log.csv"
+    file.write_text("\n".join(map(",".join, log.rows)), "utf-8")
+    child = begun("-m", "studies.cli", "identify", str(file), *log.options, "--method", "oe")
+    worked(child.pid, 5.0)
+    err, status, seconds = interrupted(child)
+    assert status == 130
+    assert err.splitlines()[-1].startswith("symheli: interrupted; nothing was written")
+    assert "oe: evaluations, at most: " in err
+    assert "Traceback" not in err
     assert seconds < LIMIT + ENDING
 
 

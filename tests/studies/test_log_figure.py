@@ -5,7 +5,7 @@ import pytest
 
 from identification import LPVARX, Polynomial
 from identification.judge import compare_constant
-from studies.log.figure import COLOURS, figure
+from studies.log.figure import COLOURS, _until_lost, figure
 from symheli.records import FlightRecord
 
 
@@ -33,3 +33,17 @@ def test_the_picture_holds_the_predictions_that_were_scored():
     assert drawn.get_title(loc="left").startswith("y (rad): LPV, degree 1 ")
     assert scheduling.get_title(loc="left") == "p (m/s)"
     assert close.get_xlim() == pytest.approx((test.time[0], test.time[-1]))
+
+
+def test_a_run_that_leaves_is_drawn_to_there_and_begins_anew_behind_a_gap():
+    t = 0.1 * np.arange(60)
+    t[30:] += 5.0
+    y = np.sin(t)
+    record = FlightRecord.from_arrays(t, {"y": "rad"}, y=y)
+    away = y.copy()
+    away[10:30] *= 10.0 ** np.arange(20)
+    shown = _until_lost(record, away[:, None], y[:, None])[:, 0]
+    lost = np.flatnonzero(np.isnan(shown))
+    np.testing.assert_array_equal(lost, np.arange(lost[0], 30))
+    assert 10 < lost[0] < 14
+    np.testing.assert_array_equal(np.delete(shown, lost), np.delete(away, lost))
