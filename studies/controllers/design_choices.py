@@ -69,6 +69,9 @@ BACK_OFFS = (BACK_OFF, 1.6, 2.0)
 half the sample frequency: polynomials in airspeed do not follow those that are.
 """
 
+GAIN = 7.0
+"""Largest gain worth a design: a gust of its size moves the helicopter by seven sizes."""
+
 SERVO_RATE = 3.0
 """Rate limit of every servo, rad/s of blade pitch; assumed, the source of the servos gives none."""
 
@@ -116,6 +119,9 @@ class DesignChoices:
     delay: float = choice(DELAY, "delay from a command to its servo, s: whole samples", least=0)
     back_off: tuple[float, ...] = choice(
         BACK_OFFS, "multiples of the least gain for which the controller is computed, tried in turn"
+    )
+    gain: float = choice(
+        GAIN, "largest gain that is worth a design: refused where no controller keeps it", least=0
     )
     order: int = choice(
         0, "order of the controller; 0: the least for at most 3 % more gain", least=0

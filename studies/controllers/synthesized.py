@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 import time
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -37,6 +37,7 @@ from studies.controllers.plant import (
     flown_plant,
     of_family,
 )
+from studies.controllers.reach import require_possible
 from symheli import (
     AirspeedSchedule,
     FlightPlan,
@@ -54,7 +55,7 @@ from symheli.errors import CompilerWarning, InputError, SynthesisError, Validity
 from symheli.flight import ScheduledController, TableState, fly_batch
 from symheli.flight.controller import Entered
 from symheli.flight.flight_data import FlightData
-from symheli.progress import task
+from symheli.progress import Progress, Task, task, watched
 from symheli.values.arrays import Array
 from symheli.values.named_vector import NamedVector
 from symheli.values.signal import indices
@@ -70,6 +71,8 @@ LOOKED_AT = 9
 """Airspeeds at which the frozen gain of the loop is."""
 MAX_STATES_OF_SPLINE = 12
 """Number of states of the loop above which P(p) is affine in airspeed."""
+PROGRAM = "digits of the least level"
+"""Task that reports a semidefinite program."""
 RANGE_MARGINS = (0.04, 0.08)
 """Fractions of the range, at its ends, that the simulated transition leaves free."""
 
@@ -147,10 +150,14 @@ def synthesized(choices: DesignChoices, given: Given | None = None) -> Synthesiz
     is only flown. Raises `SynthesisError` where there is no controller, with the reason.
     """
     seconds: dict[str, float] = {}
+    with _timed("looking for what is possible", seconds):
+        known = None if given is None else model_of(choices, given)
+        held = _held(known, choices)
+        require_possible(choices, None if known is None else smooth(known), held)
     with _timed("trimming and linearizing", seconds):
-        model = model_of(choices, given)
+        model = model_of(choices, given) if known is None else known
         design, flying = plants(model, choices)
-    with _timed("designing", seconds):
+    with _timed("designing", seconds) as designing, watched(_programs(designing)):
         made = synthesis.output_feedback(
             design, back_off=choices.back_off, fastest=math.pi / choices.period
         )
@@ -227,10 +234,17 @@ def _airspeed(model: LPVStateSpace, choices: DesignChoices) -> Scheduling:
 
 def plants(model: LPVStateSpace, choices: DesignChoices) -> tuple[Plant, Plant]:
     """Return the plant of the design, in continuous time, and that of the simulation, sampled."""
-    if model.dt is None:
-        return design_plant(model, choices.period / 2, choices), flown_plant(model, choices)
-    smooth = of_degree(continuous(model), DEGREE)  # the half sample of the hold is in it
-    return design_plant(smooth, 0.0, choices), flown_plant(model, choices)
+    return design_plant(smooth(model), _held(model, choices), choices), flown_plant(model, choices)
+
+
+def smooth(model: LPVStateSpace) -> LPVStateSpace:
+    """Return the model in continuous time; the half sample of the hold is in a sampled one."""
+    return model if model.dt is None else of_degree(continuous(model), DEGREE)
+
+
+def _held(model: LPVStateSpace | None, choices: DesignChoices) -> float:
+    """Return the half sample, s, that a command is held for, where the model does not have it."""
+    return choices.period / 2 if model is None or model.dt is None else 0.0
 
 
 def tabulated(made: synthesis.Controller, plant: Plant, choices: DesignChoices) -> TableController:
@@ -319,8 +333,18 @@ def _limits(choices: DesignChoices) -> dict[str, tuple[float, float]]:
 
 
 @contextmanager
-def _timed(step: str, seconds: dict[str, float]) -> Iterator[None]:
+def _timed(step: str, seconds: dict[str, float]) -> Iterator[Task]:
     begin = time.perf_counter()
-    with task(step):
-        yield
+    with task(step) as under_way:
+        yield under_way
     seconds[step] = time.perf_counter() - begin
+
+
+def _programs(designing: Task) -> Callable[[Progress], None]:
+    """Return a listener that counts semidefinite programs: their digits begin again with each."""
+
+    def listener(progress: Progress) -> None:
+        if progress.over and progress.task == PROGRAM:
+            designing.step("programs solved")
+
+    return listener
