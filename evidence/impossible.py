@@ -87,7 +87,7 @@ def refusal(name: str, changes: Mapping[str, Any]) -> str:
     if name.startswith("two lags"):
         given = lags()
         own = {"vehicle": "", "model": "lags", "airspeeds": (0.0, 2.0), "degree": 1}
-        changes = {**own, "disturbances": ("u_w", "v_w"), **changes}
+        changes = {**own, "disturbances": ("u_w", "v_w"), "sizes": sized(40.0), **changes}
     try:
         synthesized(DesignChoices(**changes), given)
     except SynthesisError as error:

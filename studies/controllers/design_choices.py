@@ -25,6 +25,7 @@ from symheli.errors import InputError
 from symheli.flight import XCELL_SERVOS
 from symheli.values.whole_files import write_text
 from synthesis.design.plant.parts import DISTURBANCE
+from symheli.lpv.mixing import ERROR
 
 TOP, RATE = 13.0, 3.0
 """Highest airspeed, m/s, and largest acceleration, m/s^2."""
@@ -75,6 +76,9 @@ GAIN = 7.0
 SERVO_RATE = 3.0
 """Rate limit of every servo, rad/s of blade pitch; assumed, the source of the servos gives none."""
 
+TURBULENCE = 3.9
+"""Turbulence that is flown, m/s: half of light, in which flights keep to the certificate."""
+
 NOISE_SHARE = 1 / 3
 """Share of the noise that counts as 1: the standard deviation that is flown."""
 
@@ -112,6 +116,12 @@ class DesignChoices:
     )
     controls: tuple[str, ...] = choice(CONTROLS, "outputs of the controller")
     measurements: tuple[str, ...] = choice(MEASUREMENTS, "inputs of the controller")
+    references: tuple[str, ...] = choice(
+        (),
+        'measurements that follow a command, such as ["theta"]; theta_reference in sizes: its size'
+        " (default: that of theta)",
+        empty=True,
+    )
     disturbances: tuple[str, ...] = choice(
         GUSTS, "gusts, m/s; the name of a control: a disturbance added to it"
     )
@@ -133,7 +143,7 @@ class DesignChoices:
         4, "simulated transitions in turbulence, each with its own gusts", least=1
     )
     turbulence: float = choice(
-        7.7, "turbulence level: mean wind at 20 ft (Dryden), m/s; 7.7 is light", least=0
+        TURBULENCE, "turbulence level: mean wind at 20 ft (Dryden), m/s; 7.7 is light", least=0
     )
     sizes: Mapping[str, float] = field(
         default_factory=lambda: {**dict.fromkeys(GUSTS, GUST), **SIZES},
@@ -170,6 +180,12 @@ class DesignChoices:
             wrong += [] if self.noise.get(y, 0) > 0 else [f"noise: give {y} a number > 0"]
         for name in (*self.disturbances, *self.measurements, *self.controls):
             wrong += [] if self.sizes.get(name, 0) > 0 else [f"sizes: give {name} a number > 0"]
+        missing = [y for y in self.references if y not in self.measurements]
+        if missing:
+            wrong.append(
+                f"references: {', '.join(missing)} not among the measurements,"
+                f" {', '.join(self.measurements)}"
+            )
         for u, numbers in self.servos.items():
             if len(numbers) not in (2, 4):
                 wrong.append(f"servos: {u} expected 2 or 4 numbers, got {list(numbers)}")
@@ -222,13 +238,23 @@ class DesignChoices:
 
     @property
     def sizes_of_performance(self) -> dict[str, float]:
-        """Sizes of measurements, then commands."""
-        return {name: self.sizes[name] for name in (*self.measurements, *self.controls)}
+        """Sizes of measurements, then commands, by their names in the plant."""
+        names = (*self.measurements, *self.controls)
+        return {self.error(name): self.sizes[name] for name in names}
 
     @property
     def sizes_of_disturbances(self) -> dict[str, float]:
-        """Sizes of the disturbances by their names in the plant."""
-        return {self.disturbance(name): self.sizes[name] for name in self.disturbances}
+        """Sizes of the disturbances and references by their names in the plant."""
+        own = {self.disturbance(name): self.sizes[name] for name in self.disturbances}
+        return own | {f"{y}_reference": self.size_of_reference(y) for y in self.references}
+
+    def size_of_reference(self, name: str) -> float:
+        """Return the size of the command that a measurement follows."""
+        return self.sizes.get(f"{name}_reference", self.sizes[name])
+
+    def error(self, name: str) -> str:
+        """Return the name of a measurement in the plant: one that follows a command is an error."""
+        return f"{name}{ERROR}" if name in self.references else name
 
     def disturbance(self, name: str) -> str:
         """Return the name of a disturbance in the plant, a separate one where it is added to a

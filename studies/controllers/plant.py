@@ -71,21 +71,22 @@ def actuator(servo: Servo, name: str, late: float) -> LinearModel:
 
 def unweighted(model: LPVStateSpace, choices: DesignChoices = STUDY) -> Plant:
     """Return the plant with gusts, controls, and the measured states and commands as
-    performance.
+    performance; what follows a command has its reference.
     """
-    return Plant(
+    plant = Plant(
         model,
-        disturbances=signals(choices.sizes_of_disturbances),
-        performance=signals(choices.sizes_of_performance),
+        disturbances=signals([choices.disturbance(name) for name in choices.disturbances]),
+        performance=signals((*choices.measurements, *choices.controls)),
         controls=signals(choices.controls),
         measurements=signals(choices.measurements),
     )
+    return plant.with_reference(choices.references) if choices.references else plant
 
 
 def weighted(plant: Plant, choices: DesignChoices = STUDY) -> Plant:
     """Return the plant with every signal in its size, and noise on the measurements."""
     sizes = {name: 1 / size for name, size in choices.sizes_of_performance.items()}
-    noise = {name: choices.noise[name] for name in choices.measurements}
+    noise = {choices.error(name): choices.noise[name] for name in choices.measurements}
     return plant.weighted({**choices.sizes_of_disturbances, **sizes}).with_noise(noise)
 
 
@@ -107,13 +108,18 @@ def flown_plant(model: LPVStateSpace, choices: DesignChoices = STUDY) -> Plant:
     """Return the plant of the certificate: the servos unchanged, the delay exact, sampled; a
     sampled model stays unchanged.
     """
+    return weighted(behind_servos(model, choices), choices)
+
+
+def behind_servos(model: LPVStateSpace, choices: DesignChoices = STUDY) -> Plant:
+    """Return that plant without sizes and noise."""
     servos = {u: choices.servo(u) for u in choices.controls}
     behind = unweighted(model, choices).with_servo(
         {u: s for u, s in servos.items() if s is not None}
     )
     if model.dt is None:
         behind = behind.sampled(choices.period, degree=SAMPLED_DEGREE)
-    return weighted(behind.with_delay(choices.delay) if choices.delay else behind, choices)
+    return behind.with_delay(choices.delay) if choices.delay else behind
 
 
 def closed(plant: Plant, controller: object) -> LPVStateSpace:

@@ -161,6 +161,7 @@ def _whole(model: LPVStateSpace, choices: DesignChoices, held: float) -> Plant:
             a,
             controls=_controls(model.inputs, choices),
             measurements=tuple(dict.fromkeys((*a.measurements, *states))),
+            references=(),
         ),
     )
 

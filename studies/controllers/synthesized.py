@@ -28,7 +28,8 @@ from studies.controllers.identified_plant import (
     with_gusts,
 )
 from studies.controllers.in_airspeed import of_degree
-from studies.controllers.measures import Measures, measured
+from studies.controllers.judged import Judged, judged, travel_of
+from studies.controllers.measures import STEP_FOR, STEP_SHARE, Measures, measured
 from studies.controllers.plant import (
     baseline,
     closed,
@@ -38,6 +39,7 @@ from studies.controllers.plant import (
     of_family,
 )
 from studies.controllers.reach import require_possible
+from studies.controllers.stepped import STEP_AT, Stepped
 from symheli import (
     AirspeedSchedule,
     FlightPlan,
@@ -73,8 +75,10 @@ MAX_STATES_OF_SPLINE = 12
 """Number of states of the loop above which P(p) is affine in airspeed."""
 PROGRAM = "digits of the least level"
 """Task that reports a semidefinite program."""
-RANGE_MARGINS = (0.04, 0.08)
-"""Fractions of the range, at its ends, that the simulated transition leaves free."""
+RANGE_MARGIN, RATE_SHARE = 0.2, 0.5
+"""Fraction of the range, at either end, that the simulated transition leaves to gusts, and of the
+permitted acceleration that it commands.
+"""
 
 Given = LinearFamily | LPVARXModel | KinematicModel
 
@@ -84,7 +88,8 @@ class Synthesized:
     """Results of a synthesis.
 
     `made`: the controller of the synthesis; `table`: what flies; `sampled`: the proof of its loop;
-    `flights`, `measures`: each transition; none without a vehicle; `seconds` of each step.
+    `flights`, `measures`: each transition; none without a vehicle; `judged`: the specification
+    sheet, None where the controller has none of its axes; `seconds` of each step.
     """
 
     choices: DesignChoices
@@ -93,6 +98,7 @@ class Synthesized:
     sampled: SampledLoop
     flights: tuple[FlightData, ...] = ()
     measures: tuple[Measures, ...] = ()
+    judged: Judged | None = None
     seconds: Mapping[str, float]
 
     @property
@@ -165,6 +171,8 @@ def synthesized(choices: DesignChoices, given: Given | None = None) -> Synthesiz
         table = tabulated(made, flying, choices)
     with _timed("certifying", seconds):
         sampled = certified(table, flying, made.promised)
+    with _timed("specification sheet", seconds):
+        sheet = judged(table, model, choices, exact=given is None)
     flights: tuple[FlightData, ...] = ()
     if choices.vehicle:
         with _timed("flying", seconds):
@@ -176,6 +184,7 @@ def synthesized(choices: DesignChoices, given: Given | None = None) -> Synthesiz
         sampled=sampled,
         flights=flights,
         measures=tuple(measured(flights, choices)),
+        judged=sheet,
         seconds=seconds,
     )
 
@@ -299,15 +308,19 @@ def flights_of(table: TableController, choices: DesignChoices) -> tuple[FlightDa
     """
     heli = Helicopter.load(choices.vehicle, governor="pi")
     low, high = choices.airspeeds
-    ends = low + RANGE_MARGINS[0] * (high - low), high - RANGE_MARGINS[1] * (high - low)
+    ends = low + RANGE_MARGIN * (high - low), high - RANGE_MARGIN * (high - low)
     controller: object = table
     if len(table.outputs) < len(heli.inputs):
         ideal = Helicopter.load(choices.vehicle, governor="ideal")
         lqr = symheli.flight.gain_scheduled_lqr(ideal, low, high, choices.period)
         controller = BesideAutopilot(table, lqr.scheduled_controller)
+    for y in choices.references:
+        size, until = STEP_SHARE * choices.size_of_reference(y), STEP_AT + STEP_FOR
+        controller = Stepped(controller, y, size, until)
     servos = {u: choices.servo(u) for u in map(str, heli.inputs)}
+    acceleration = RATE_SHARE * choices.acceleration or 1.0
     plan = FlightPlan(
-        AirspeedSchedule.transition(*ends, acceleration=choices.acceleration or 1.0, hold=3.0),
+        AirspeedSchedule.transition(*ends, acceleration=acceleration, hold=3.0),
         dt=choices.period,
         controller=controller,
         wind=Wind(STEADY, turbulence=Dryden(choices.turbulence, ALTITUDE))
@@ -325,11 +338,7 @@ def flights_of(table: TableController, choices: DesignChoices) -> tuple[FlightDa
 
 def _limits(choices: DesignChoices) -> dict[str, tuple[float, float]]:
     """The travel of the controls, where there is a vehicle."""
-    if not choices.vehicle:
-        return {}
-    heli = Helicopter.load(choices.vehicle, governor="ideal")
-    travel = dict(zip(map(str, heli.inputs), map(float, heli.travel), strict=True))
-    return {u: (-travel[u], travel[u]) for u in choices.controls}
+    return {u: (-most, most) for u, most in travel_of(choices).items()}
 
 
 @contextmanager
