@@ -90,7 +90,8 @@ def sentences(found: Synthesized) -> list[str]:
     """Return further remarks."""
     a = found.choices
     worst = found.sampled.certificate.frozen
-    out = [
+    out = [] if found.judged is None else list(_of_sheet(found.judged.table))
+    out += [
         f"{', '.join(a.controls)} from {', '.join(a.measurements)}, every {1000 * a.period:g} ms,"
         f" commands {1000 * a.delay:g} ms late.",
         f"At an airspeed held the gain is {worst:.3g} at worst; what the airspeed's motion costs"
@@ -103,8 +104,6 @@ def sentences(found: Synthesized) -> list[str]:
         "The proof is of the model that was fitted over airspeed, its servos linear: what the fit"
         " misses, limits and the drift of the trim are not in it."
     )
-    if found.judged is not None:
-        out += list(_of_sheet(found.judged.table))
     if found.measures:
         speed = max(one.speed for one in found.measures)
         attitude = math.degrees(max(one.attitude for one in found.measures))
