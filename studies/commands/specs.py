@@ -258,4 +258,3 @@ def _data(table: SpecificationTable, missing: dict[str, str]) -> dict[str, Any]:
             for name in table.controllers
         },
     }
-

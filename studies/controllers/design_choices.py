@@ -23,9 +23,9 @@ from studies.choices import (
 from symheli import Servo
 from symheli.errors import InputError
 from symheli.flight import XCELL_SERVOS
+from symheli.lpv.mixing import ERROR
 from symheli.values.whole_files import write_text
 from synthesis.design.plant.parts import DISTURBANCE
-from symheli.lpv.mixing import ERROR
 
 TOP, RATE = 13.0, 3.0
 """Highest airspeed, m/s, and largest acceleration, m/s^2."""
@@ -123,7 +123,9 @@ class DesignChoices:
         empty=True,
     )
     disturbances: tuple[str, ...] = choice(
-        GUSTS, "gusts, m/s; the name of a control: a disturbance added to it"
+        GUSTS,
+        "gusts, m/s; the name of a control: a disturbance added to it, d_lon_disturbance in sizes: its"
+        " size (default: that of d_lon)",
     )
     period: float = choice(PERIOD, "sample period of the controller, s")
     delay: float = choice(DELAY, "delay from a command to its servo, s: whole samples", least=0)
@@ -245,7 +247,10 @@ class DesignChoices:
     @property
     def sizes_of_disturbances(self) -> dict[str, float]:
         """Sizes of the disturbances and references by their names in the plant."""
-        own = {self.disturbance(name): self.sizes[name] for name in self.disturbances}
+        own = {}
+        for name in self.disturbances:
+            within = self.disturbance(name)
+            own[within] = self.sizes.get(within, self.sizes[name])
         return own | {f"{y}_reference": self.size_of_reference(y) for y in self.references}
 
     def size_of_reference(self, name: str) -> float:

@@ -144,7 +144,8 @@ def _known(choices: DesignChoices) -> DesignChoices:
 def _controls(inputs: Sequence[object], choices: DesignChoices) -> tuple[str, ...]:
     """Return the chosen controls, then other inputs of known size that are no disturbances."""
     known = {*CONTROLS, *choices.sizes} & set(_known(choices).sizes)
-    more = (u for u in map(str, inputs) if u in known and u not in choices.disturbances)
+    others = {*choices.disturbances, *choices.sizes_of_disturbances}
+    more = (u for u in map(str, inputs) if u in known and u not in others)
     return tuple(dict.fromkeys((*choices.controls, *more)))
 
 
@@ -166,9 +167,7 @@ def _whole(model: LPVStateSpace, choices: DesignChoices, held: float) -> Plant:
     )
 
 
-def require_possible(
-    choices: DesignChoices, given: LPVStateSpace | None, held: float
-) -> None:
+def require_possible(choices: DesignChoices, given: LPVStateSpace | None, held: float) -> None:
     """Raise `SynthesisError` where no controller keeps the largest gain asked for at some airspeed
     held, with what to add.
     """

@@ -4,13 +4,17 @@ of commands from travel and gains, range and signals from the model.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+
+import numpy as np
 
 import symheli
 from identification.model import LPVARXModel
 from studies.controllers.design_choices import DELAY, GUST, GUSTS, NOISE, SIZES, DesignChoices
 from symheli import Helicopter, LinearFamily, LPVStateSpace
 from symheli.values.units import ratio
+from synthesis.design.plant.parts import DISTURBANCE
 
 EFFECTS = {
     "d_lon": ("a1", 0.0378),
@@ -28,6 +32,10 @@ UNKNOWN_SIZE, NOISE_OF_SIZE = 1.0, 0.1
 """Size of a signal of a model without a usual one, in its unit, and its noise as a fraction of it.
 """
 DIGITS = 2
+ADDED = 0.2
+"""Size of the disturbance added to a command of a model without gusts, of that of the command."""
+WITHIN = 1.0
+"""Time, s, within which a command of its size moves some output of a model by its size."""
 
 
 def for_vehicle(choices: DesignChoices) -> DesignChoices:
@@ -61,7 +69,13 @@ def for_model(
     gusts = [name for name in GUSTS if name in inputs]
     controls = [u for u in inputs if u not in GUSTS]
     measurements = [str(y) for y in model.outputs if not vehicle or str(y) in NOISE]
-    sizes = {n: SIZES.get(n, UNKNOWN_SIZE) for n in (*measurements, *controls)}
+    sizes = {y: SIZES.get(y, UNKNOWN_SIZE) for y in measurements}
+    sizes |= _commands(model, controls, sizes)
+    added = (
+        {}
+        if gusts
+        else {f"{u}{DISTURBANCE}": float(f"{ADDED * sizes[u]:.{DIGITS}g}") for u in controls}
+    )
     noise = {y: NOISE.get(y, NOISE_OF_SIZE * sizes[y]) for y in measurements}
     period = choices.period if model.dt is None else model.dt
     made = replace(
@@ -73,12 +87,32 @@ def for_model(
         controls=tuple(controls),
         measurements=tuple(measurements),
         disturbances=tuple(gusts or controls),
-        sizes={**dict.fromkeys(gusts, GUST), **sizes},
+        sizes={**dict.fromkeys(gusts, GUST), **sizes, **added},
         noise=noise,
         servos={u: servo for u, servo in choices.servos.items() if u in controls},
         degree=min(choices.degree, _degree(given)),
     )
     return for_vehicle(made) if vehicle else made
+
+
+def _commands(
+    model: LPVStateSpace, controls: Sequence[str], sizes: Mapping[str, float]
+) -> dict[str, float]:
+    """Return the size of each command, for which a step moves some output by its size within
+    `WITHIN` s, in the middle of the range.
+    """
+    middle = 0.5 * sum(model.box[0])
+    at = model.at(middle).select(inputs=controls, outputs=list(sizes))
+    moved = (
+        np.abs(at.step_response(WITHIN).values).max(axis=0)
+        / np.array(list(sizes.values()))[:, None]
+    )
+    peak = moved.max(axis=0)
+    usual = (SIZES.get(u, UNKNOWN_SIZE) for u in controls)
+    return {
+        u: float(f"{1 / most:.{DIGITS}g}") if most > 0 else size
+        for u, most, size in zip(controls, peak, usual, strict=True)
+    }
 
 
 def _degree(given: object) -> int:
@@ -89,8 +123,7 @@ def _degree(given: object) -> int:
 
 
 def state_space(given: object) -> LPVStateSpace:
-    """Return a given model over its own range, with the gusts that it has or that follow from it.
-    """
+    """Return a given model over its own range, with the gusts that it has or that follow from it."""
     from identification.model import KinematicModel
     from studies.controllers.identified_plant import moving_with_commands, with_gusts
 

@@ -73,6 +73,8 @@ LOOKED_AT = 9
 """Airspeeds at which the frozen gain of the loop is."""
 MAX_STATES_OF_SPLINE = 12
 """Number of states of the loop above which P(p) is affine in airspeed."""
+ALTERNATING = -0.5
+"""Real part of a pole of a sampled model below which it alternates from sample to sample."""
 PROGRAM = "digits of the least level"
 """Task that reports a semidefinite program."""
 RANGE_MARGIN, RATE_SHARE = 0.2, 0.5
@@ -89,7 +91,8 @@ class Synthesized:
 
     `made`: the controller of the synthesis; `table`: what flies; `sampled`: the proof of its loop;
     `flights`, `measures`: each transition; none without a vehicle; `judged`: the specification
-    sheet, None where the controller has none of its axes; `seconds` of each step.
+    sheet, None where the controller has none of its axes; `idle`: why the controller commands nothing, where it does; `seconds` of each
+    step.
     """
 
     choices: DesignChoices
@@ -99,6 +102,7 @@ class Synthesized:
     flights: tuple[FlightData, ...] = ()
     measures: tuple[Measures, ...] = ()
     judged: Judged | None = None
+    idle: str = ""
     seconds: Mapping[str, float]
 
     @property
@@ -185,6 +189,7 @@ def synthesized(choices: DesignChoices, given: Given | None = None) -> Synthesiz
         flights=flights,
         measures=tuple(measured(flights, choices)),
         judged=sheet,
+        idle="" if np.any(table.matrices) else _idle(model),
         seconds=seconds,
     )
 
@@ -334,6 +339,23 @@ def flights_of(table: TableController, choices: DesignChoices) -> tuple[FlightDa
         warnings.simplefilter("ignore", ValidityWarning)
         warnings.simplefilter("ignore", CompilerWarning)
         return fly_batch(heli, [plan], seeds=range(choices.flights)).data
+
+
+def _idle(model: LPVStateSpace) -> str:
+    """Return why a controller commands nothing, and what to do."""
+    said = "The controller commands nothing: with these sizes no command lowers the gain; give"
+    said += " the commands larger sizes, or the deviations smaller ones."
+    if model.dt is None:
+        return said
+    poles = np.linalg.eigvals(model.matrices(np.linspace(*model.box[0], LOOKED_AT)).A)
+    worst = float(poles.real.min())
+    if worst > ALTERNATING:
+        return said
+    return (
+        f"The controller commands nothing: the model has a pole at z = {worst:.2f}, near half the"
+        " sample frequency, where no servo follows and the fit knows noise alone: identify at a"
+        " coarser step (--decimate 2), or with fewer lags."
+    )
 
 
 def _limits(choices: DesignChoices) -> dict[str, tuple[float, float]]:

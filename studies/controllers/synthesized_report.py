@@ -91,6 +91,8 @@ def sentences(found: Synthesized) -> list[str]:
     a = found.choices
     worst = found.sampled.certificate.frozen
     out = [] if found.judged is None else list(_of_sheet(found.judged.table))
+    if found.idle:
+        out.append(found.idle)
     out += [
         f"{', '.join(a.controls)} from {', '.join(a.measurements)}, every {1000 * a.period:g} ms,"
         f" commands {1000 * a.delay:g} ms late.",
@@ -377,8 +379,13 @@ def disturbed(found: Synthesized) -> Figure:
     at = loop.at(0.5 * sum(a.airspeeds)).select(inputs=names)
     made = at.step_response(WINDOW)
     figure, axes = plt.subplots(
-        2, len(names), figsize=(2.2 * len(names) + 1.0, 4.2), sharex=True, sharey="row",
-        squeeze=False, layout="constrained",
+        2,
+        len(names),
+        figsize=(2.2 * len(names) + 1.0, 4.2),
+        sharex=True,
+        sharey="row",
+        squeeze=False,
+        layout="constrained",
     )
     n = len(a.measurements)
     for k, name in enumerate(names):

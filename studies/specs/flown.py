@@ -14,9 +14,9 @@ import numpy as np
 
 from studies.controllers.design_choices import CONTROLS, DELAY, PERIOD, SERVO_RATE
 from studies.controllers.flown import HIGH, LOW, WINDS, plan
-from studies.controllers.stepped import STEP_AT, Stepped
 from studies.controllers.measures import AT_THE_STOP, heading, noise_of, of_flight, rms, to_body
 from studies.controllers.measures import MEASUREMENTS as MEASURED
+from studies.controllers.stepped import STEP_AT, Stepped
 from studies.setup.flights import autopilot_for
 from studies.specs.of_vehicle import FLIGHTS_FROM, OfVehicle, digest_of, share_met
 from symheli import AirspeedSchedule, FlightPlan, Helicopter, LPVStateSpace
