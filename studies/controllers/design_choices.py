@@ -118,14 +118,12 @@ class DesignChoices:
     measurements: tuple[str, ...] = choice(MEASUREMENTS, "inputs of the controller")
     references: tuple[str, ...] = choice(
         (),
-        'measurements that follow a command, such as ["theta"]; theta_reference in sizes: its size'
-        " (default: that of theta)",
+        'measurements that follow a command, ["theta"]; its size: theta_reference in sizes',
         empty=True,
     )
     disturbances: tuple[str, ...] = choice(
         GUSTS,
-        "gusts, m/s; the name of a control: a disturbance added to it, d_lon_disturbance in sizes: its"
-        " size (default: that of d_lon)",
+        "gusts, m/s; a control: a disturbance added to it, as large as d_lon_disturbance in sizes",
     )
     period: float = choice(PERIOD, "sample period of the controller, s")
     delay: float = choice(DELAY, "delay from a command to its servo, s: whole samples", least=0)

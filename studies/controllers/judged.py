@@ -1,6 +1,4 @@
-"""The specification sheet of a designed table: margins, bandwidths and levels over airspeed, and the
-responses to commands.
-"""
+"""The specification sheet of a designed table over airspeed, and its responses to commands."""
 
 from __future__ import annotations
 

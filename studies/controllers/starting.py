@@ -53,7 +53,7 @@ def for_vehicle(choices: DesignChoices) -> DesignChoices:
         if x in FLAPPING:
             gain /= abs(float(hover.A[i, i]))
         most = SHARE_OF_TRAVEL * travel[u]
-        sizes[u] = float(f"{min(effect / gain, most) if gain else most:.{DIGITS}g}")
+        sizes[u] = _rounded(min(effect / gain, most) if gain else most)
     return replace(choices, sizes=sizes)
 
 
@@ -71,11 +71,7 @@ def for_model(
     measurements = [str(y) for y in model.outputs if not vehicle or str(y) in NOISE]
     sizes = {y: SIZES.get(y, UNKNOWN_SIZE) for y in measurements}
     sizes |= _commands(model, controls, sizes)
-    added = (
-        {}
-        if gusts
-        else {f"{u}{DISTURBANCE}": float(f"{ADDED * sizes[u]:.{DIGITS}g}") for u in controls}
-    )
+    added = {f"{u}{DISTURBANCE}": _rounded(ADDED * sizes[u]) for u in controls if not gusts}
     noise = {y: NOISE.get(y, NOISE_OF_SIZE * sizes[y]) for y in measurements}
     period = choices.period if model.dt is None else model.dt
     made = replace(
@@ -103,16 +99,17 @@ def _commands(
     """
     middle = 0.5 * sum(model.box[0])
     at = model.at(middle).select(inputs=controls, outputs=list(sizes))
-    moved = (
-        np.abs(at.step_response(WITHIN).values).max(axis=0)
-        / np.array(list(sizes.values()))[:, None]
-    )
-    peak = moved.max(axis=0)
+    moved = np.abs(at.step_response(WITHIN).values).max(axis=0)
+    peak = (moved / np.array(list(sizes.values()))[:, None]).max(axis=0)
     usual = (SIZES.get(u, UNKNOWN_SIZE) for u in controls)
     return {
-        u: float(f"{1 / most:.{DIGITS}g}") if most > 0 else size
+        u: _rounded(1 / most) if most > 0 else size
         for u, most, size in zip(controls, peak, usual, strict=True)
     }
+
+
+def _rounded(size: float) -> float:
+    return float(f"{size:.{DIGITS}g}")
 
 
 def _degree(given: object) -> int:

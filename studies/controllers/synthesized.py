@@ -91,8 +91,8 @@ class Synthesized:
 
     `made`: the controller of the synthesis; `table`: what flies; `sampled`: the proof of its loop;
     `flights`, `measures`: each transition; none without a vehicle; `judged`: the specification
-    sheet, None where the controller has none of its axes; `idle`: why the controller commands nothing, where it does; `seconds` of each
-    step.
+    sheet, None where the controller has none of its axes; `idle`: why the controller commands
+    nothing, where it does; `seconds` of each step.
     """
 
     choices: DesignChoices

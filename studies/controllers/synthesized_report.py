@@ -282,6 +282,7 @@ def page(found: Synthesized) -> str:
     templates = environment()
     a = found.choices
     pictures = drawn(list(_figures(found)), a.out / "figures")
+    sheet = [("margins", SHEET, "", _of_margins(found))] if found.judged is not None else []
     name = Helicopter.load(a.vehicle).vehicle.title if a.vehicle else a.model
     text = templates.get_template("controller.html.j2").render(
         style=Markup((FOLDER / "page.css").read_text(encoding="utf-8")),
@@ -291,6 +292,7 @@ def page(found: Synthesized) -> str:
         answer=answer(found),
         sentences=sentences(found),
         gains=gains(found),
+        sheet=drawn(sheet, a.out / "figures"),
         margins=margins(found),
         missed=_missed(found),
         hypotheses=found.sampled.certificate.hypotheses,
@@ -322,13 +324,17 @@ def _missed(found: Synthesized) -> list[list[str]]:
     ]
 
 
-def _figures(found: Synthesized) -> Iterator[tuple[str, str, str, Figure]]:
-    if found.judged is not None:
-        from synthesis.sheet.picture import figure_of
+def _of_margins(found: Synthesized) -> Figure:
+    """The design margins of the axes that the controller has, one below the other."""
+    from synthesis.sheet.picture import figure_of
 
-        yield "margins", SHEET, "", figure_of(found.judged.table, _axes(found.judged.table))
-        if found.judged.steps:
-            yield "steps", STEPS, "", steps(found.judged)
+    assert found.judged is not None  # noqa: S101 - asked before
+    return figure_of(found.judged.table, _axes(found.judged.table))
+
+
+def _figures(found: Synthesized) -> Iterator[tuple[str, str, str, Figure]]:
+    if found.judged is not None and found.judged.steps:
+        yield "steps", STEPS, "", steps(found.judged)
     yield "gusts", GUSTS, "", disturbed(found)
     if found.flights:
         yield "flights", FLIGHT.format(n=len(found.flights)), "", flights(found)

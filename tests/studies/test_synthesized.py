@@ -119,7 +119,8 @@ def test_the_table_the_proof_and_the_page_are_of_what_was_asked_for(
     assert told["flown"] is None
     assert told["frozen"] <= told["proven"] < math.inf
     assert {path.name for path in out.iterdir()} == {
-        *("certificate.json", "controller.json", "numbers.json", "report.html", "synthesize.toml")
+        *("certificate.json", "controller.json", "numbers.json", "report.html", "synthesize.toml"),
+        "figures",
     }
     assert symheli.TableController.load(out / TABLE).matrices.tobytes() == (
         found.table.matrices.tobytes()
@@ -140,8 +141,13 @@ def test_what_is_shown_fits_a_terminal_and_names_what_is_known(found):
     said = text(found, [])
     assert max(map(len, said.splitlines())) <= 100
     assert f"{found.sampled.gamma:.3g}" in said.splitlines()[0]
-    lost = replace(found, measures=(SimpleNamespace(**dict.fromkeys(MEASURED, 0.5), lost=True),))
-    assert "1 of 1 were lost" in text(lost, [])
+    flight = SimpleNamespace(**dict.fromkeys(MEASURED, 0.5), lost=True, left=("d_lat at its stop",))
+    said = " ".join(text(replace(found, measures=(flight,)), []).split())
+    assert "1 of 1 were lost" in said
+    assert "Flight 1 left the hypotheses: d_lat at its stop." in said
+    above = SimpleNamespace(**{**dict.fromkeys(MEASURED, 0.5), "ratio": 99.0}, lost=False, left=())
+    said = " ".join(text(replace(found, measures=(above,)), []).split())
+    assert "Flight 1 reached 99, above the proven gain, and left no hypothesis" in said
 
 
 @pytest.mark.slow
