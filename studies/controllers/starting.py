@@ -120,7 +120,7 @@ def _degree(given: object) -> int:
 
 
 def state_space(given: object) -> LPVStateSpace:
-    """Return a given model over its own range, with the gusts that it has or that follow from it."""
+    """Return a given model over its own range, with the gusts that it has."""
     from identification.model import KinematicModel
     from studies.controllers.identified_plant import moving_with_commands, with_gusts
 
