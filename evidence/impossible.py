@@ -9,10 +9,13 @@ import time
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+import numpy as np
+
 import symheli
 from studies.controllers.design_choices import CONTROLS, GUST, GUSTS, NOISE, SIZES, DesignChoices
 from studies.controllers.synthesized import synthesized
 from symheli.errors import SynthesisError
+from symheli.values.signal import signals
 
 LIMIT = 5.0
 """Processor time within which each must be answered, s."""
@@ -59,16 +62,10 @@ CASES: dict[str, dict[str, Any]] = {
 
 def lags() -> symheli.LinearFamily:
     """u and v over airspeed, each unstable and driven by its own control: nothing couples them."""
-    names = ["u", "v"], ["d_lon", "d_lat", "u_w", "v_w"], ["u", "v"]
-    B = [[5.0, 0.0, 1.0, 0.0], [0.0, 5.0, 0.0, 1.0]]
+    names = signals(("u", "v")), signals(("d_lon", "d_lat", "u_w", "v_w")), signals(("u", "v"))
+    B = np.array([[5.0, 0.0, 1.0, 0.0], [0.0, 5.0, 0.0, 1.0]])
     models = [
-        symheli.LinearModel(
-            [[0.3 - 0.1 * V, 0.0], [0.0, 0.2]],
-            B,
-            [[1.0, 0.0], [0.0, 1.0]],
-            [[0.0] * 4] * 2,
-            *names,
-        )
+        symheli.LinearModel(np.diag([0.3 - 0.1 * V, 0.2]), B, np.eye(2), np.zeros((2, 4)), *names)
         for V in (0.0, 1.0, 2.0)
     ]
     return symheli.LinearFamily.from_models([0.0, 1.0, 2.0], models)

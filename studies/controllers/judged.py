@@ -50,7 +50,8 @@ def judged(
         for axis in sheet.axes.values()
     ):
         return None
-    speeds = np.linspace(*choices.airspeeds, POINTS).tolist()
+    low, high = choices.airspeeds
+    speeds = np.linspace(low, high, POINTS).tolist()
     servos = {u: servo for u in choices.controls if (servo := choices.servo(u)) is not None}
     travel = travel_of(choices)
     if choices.vehicle:
