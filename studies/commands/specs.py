@@ -239,7 +239,7 @@ def _data(table: SpecificationTable, missing: dict[str, str]) -> dict[str, Any]:
             name: {
                 "verdict": table.verdict(name),
                 "stable": table.stable[name],
-                "specifications": [_entry(table, name, r) for r in table.reached(name)],
+                "specifications": table.entries(name),
                 "proven": [
                     {
                         "axis": p.specification.axis,
@@ -255,23 +255,4 @@ def _data(table: SpecificationTable, missing: dict[str, str]) -> dict[str, Any]:
             }
             for name in table.controllers
         },
-    }
-
-
-def _entry(table: SpecificationTable, name: str, reached: Any) -> dict[str, Any]:
-    spec = reached.specification
-    over = table.over(name, spec.axis, spec.name) if spec.kind == "frozen" else None
-    return {
-        "axis": spec.axis,
-        "name": spec.name,
-        "kind": spec.kind,
-        "unit": spec.unit,
-        "level_1": spec.level_1,
-        "level_2": spec.level_2,
-        "source": spec.source,
-        "counts": spec.counts,
-        "worst": reached.value,
-        "at": reached.at,
-        "margin": reached.margin,
-        "values": over,
     }

@@ -50,6 +50,7 @@ def run(arguments: argparse.Namespace) -> Output:
     given = {name: getattr(arguments, name) for name in OVERRIDE}
     choices = DesignChoices.read(arguments.file, {k: v for k, v in given.items() if v is not None})
     if arguments.write_config is not None:
+        choices = choices if arguments.file else _starting(choices, arguments.vehicle)
         return options.choices_written(choices.text, arguments.write_config)
     from studies.controllers import synthesized_report as report
     from studies.controllers.synthesized import synthesized
@@ -59,6 +60,15 @@ def run(arguments: argparse.Namespace) -> Output:
     failed = not found.sampled.certificate.verified or found.lost > 0
     data = {**report.data(found), "written": written}
     return Output(report.text(found, written), data, status=int(failed))
+
+
+def _starting(choices: DesignChoices, vehicle: str | None) -> DesignChoices:
+    """The choices with what follows from the vehicle or from the model."""
+    from studies.controllers import starting
+
+    if (given := _given(choices)) is None:
+        return starting.for_vehicle(choices)
+    return starting.for_model(choices, starting.state_space(given), given, vehicle or "")
 
 
 def _given(choices: DesignChoices):

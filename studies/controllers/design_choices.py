@@ -23,6 +23,7 @@ from studies.choices import (
 from symheli import Servo
 from symheli.errors import InputError
 from symheli.flight import XCELL_SERVOS
+from symheli.lpv.mixing import ERROR
 from symheli.values.whole_files import write_text
 from synthesis.design.plant.parts import DISTURBANCE
 
@@ -69,8 +70,14 @@ BACK_OFFS = (BACK_OFF, 1.6, 2.0)
 half the sample frequency: polynomials in airspeed do not follow those that are.
 """
 
+GAIN = 7.0
+"""Largest gain worth a design: a gust of its size moves the helicopter by seven sizes."""
+
 SERVO_RATE = 3.0
 """Rate limit of every servo, rad/s of blade pitch; assumed, the source of the servos gives none."""
+
+TURBULENCE = 3.9
+"""Turbulence that is flown, m/s: half of light, in which flights keep to the certificate."""
 
 NOISE_SHARE = 1 / 3
 """Share of the noise that counts as 1: the standard deviation that is flown."""
@@ -109,13 +116,22 @@ class DesignChoices:
     )
     controls: tuple[str, ...] = choice(CONTROLS, "outputs of the controller")
     measurements: tuple[str, ...] = choice(MEASUREMENTS, "inputs of the controller")
+    references: tuple[str, ...] = choice(
+        (),
+        'measurements that follow a command, ["theta"]; its size: theta_reference in sizes',
+        empty=True,
+    )
     disturbances: tuple[str, ...] = choice(
-        GUSTS, "gusts, m/s; the name of a control: a disturbance added to it"
+        GUSTS,
+        "gusts, m/s; a control: a disturbance added to it, as large as d_lon_disturbance in sizes",
     )
     period: float = choice(PERIOD, "sample period of the controller, s")
     delay: float = choice(DELAY, "delay from a command to its servo, s: whole samples", least=0)
     back_off: tuple[float, ...] = choice(
         BACK_OFFS, "multiples of the least gain for which the controller is computed, tried in turn"
+    )
+    gain: float = choice(
+        GAIN, "largest gain that is worth a design: refused where no controller keeps it", least=0
     )
     order: int = choice(
         0, "order of the controller; 0: the least for at most 3 % more gain", least=0
@@ -127,7 +143,7 @@ class DesignChoices:
         4, "simulated transitions in turbulence, each with its own gusts", least=1
     )
     turbulence: float = choice(
-        7.7, "turbulence level: mean wind at 20 ft (Dryden), m/s; 7.7 is light", least=0
+        TURBULENCE, "turbulence level: mean wind at 20 ft (Dryden), m/s; 7.7 is light", least=0
     )
     sizes: Mapping[str, float] = field(
         default_factory=lambda: {**dict.fromkeys(GUSTS, GUST), **SIZES},
@@ -164,6 +180,12 @@ class DesignChoices:
             wrong += [] if self.noise.get(y, 0) > 0 else [f"noise: give {y} a number > 0"]
         for name in (*self.disturbances, *self.measurements, *self.controls):
             wrong += [] if self.sizes.get(name, 0) > 0 else [f"sizes: give {name} a number > 0"]
+        missing = [y for y in self.references if y not in self.measurements]
+        if missing:
+            wrong.append(
+                f"references: {', '.join(missing)} not among the measurements,"
+                f" {', '.join(self.measurements)}"
+            )
         for u, numbers in self.servos.items():
             if len(numbers) not in (2, 4):
                 wrong.append(f"servos: {u} expected 2 or 4 numbers, got {list(numbers)}")
@@ -216,13 +238,26 @@ class DesignChoices:
 
     @property
     def sizes_of_performance(self) -> dict[str, float]:
-        """Sizes of measurements, then commands."""
-        return {name: self.sizes[name] for name in (*self.measurements, *self.controls)}
+        """Sizes of measurements, then commands, by their names in the plant."""
+        names = (*self.measurements, *self.controls)
+        return {self.error(name): self.sizes[name] for name in names}
 
     @property
     def sizes_of_disturbances(self) -> dict[str, float]:
-        """Sizes of the disturbances by their names in the plant."""
-        return {self.disturbance(name): self.sizes[name] for name in self.disturbances}
+        """Sizes of the disturbances and references by their names in the plant."""
+        own = {}
+        for name in self.disturbances:
+            within = self.disturbance(name)
+            own[within] = self.sizes.get(within, self.sizes[name])
+        return own | {f"{y}_reference": self.size_of_reference(y) for y in self.references}
+
+    def size_of_reference(self, name: str) -> float:
+        """Return the size of the command that a measurement follows."""
+        return self.sizes.get(f"{name}_reference", self.sizes[name])
+
+    def error(self, name: str) -> str:
+        """Return the name of a measurement in the plant: one that follows a command is an error."""
+        return f"{name}{ERROR}" if name in self.references else name
 
     def disturbance(self, name: str) -> str:
         """Return the name of a disturbance in the plant, a separate one where it is added to a

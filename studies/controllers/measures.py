@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -11,6 +11,7 @@ import numpy as np
 from studies.controllers.covered import uncovered
 from studies.controllers.design_choices import CONTROLS, GUSTS, MEASUREMENTS, DesignChoices
 from studies.controllers.plant import STUDY
+from studies.controllers.stepped import STEP_AT
 from symheli.flight import FlightPlan
 from symheli.flight.disturbance import Disturbances
 from symheli.flight.equipment import Readings
@@ -20,6 +21,9 @@ from symheli.values.arrays import Array
 
 if TYPE_CHECKING:
     from synthesis.tubes import Tube
+
+STEP_FOR, STEP_SHARE = 2.0, 0.5
+"""How long a reference is stepped in flight, s, and by which share of its size."""
 
 AT_THE_STOP = 0.999
 """Share of the travel."""
@@ -34,7 +38,8 @@ class Measures:
     `attitude`: largest bank or pitch, rad; `stops`: share of the time with a command at a stop;
     `ratio`: see `energy_ratio`; `outside`, `faster`: share of the time with a forward airspeed
     outside the range and with a change of it above the permitted rate; `beyond`: share of the time
-    with an airspeed that the equations of the helicopter are not known to hold for.
+    with an airspeed that the equations of the helicopter are not known to hold for; `left`: each
+    hypothesis of the certificate that the flight left, and when.
     """
 
     lost: bool
@@ -49,6 +54,7 @@ class Measures:
     beyond: float
     wind: float
     uncovered: str
+    left: tuple[str, ...] = ()
 
 
 def measured(
@@ -69,11 +75,16 @@ def of_flight(
     true = {y: column[y] - noise[:, i] for i, y in enumerate(MEASUREMENTS)}
     gusts, forward = air(column, true, flown.plan)
     z = performance(column, true, choices)
+    time = np.arange(flown.kept) * flown.plan.dt
+    steps = {y: commanded(choices, y, time) for y in choices.references}
+    for y, step in steps.items():
+        z[:, choices.measurements.index(y)] -= step / choices.sizes[y]
+    references = [step / choices.size_of_reference(y) for y, step in steps.items()]
     winds = [
         gusts[:, GUSTS.index(g)] / choices.sizes[g] for g in choices.disturbances if g in GUSTS
     ]
     noises = [noise[:, MEASUREMENTS.index(y)] / choices.noise[y] for y in choices.measurements]
-    w = np.column_stack([*winds, *noises])
+    w = np.column_stack([*winds, *references, *noises])
     commands = np.column_stack([column[f"{u}_command"] for u in CONTROLS])
     low, high = choices.airspeeds
     change = np.gradient(forward, flown.plan.dt) if len(forward) > 1 else np.zeros(len(forward))
@@ -90,7 +101,43 @@ def of_flight(
         beyond=float(np.mean(column["airspeed"] > Validity.of(flown.heli).harmless[0])),
         wind=float(np.linalg.norm(np.column_stack([column[n] for n in WIND]), axis=1).max()),
         uncovered=uncovered(flown, tubes),
+        left=tuple(_left(time, forward, change, commands, travel, choices)),
     )
+
+
+def _left(
+    time: Array, forward: Array, change: Array, commands: Array, travel: Array, a: DesignChoices
+) -> Iterator[str]:
+    """Yield each hypothesis of the certificate that a flight left: for how long, and when first."""
+    low, high = a.airspeeds
+    at_stop = np.abs(commands) >= AT_THE_STOP * travel
+    checks = [
+        (f"airspeed below {low:g} m/s", forward < low, np.maximum(low - forward, 0.0), "m/s"),
+        (f"airspeed above {high:g} m/s", forward > high, np.maximum(forward - high, 0.0), "m/s"),
+        (
+            f"|dV/dt| above {a.acceleration:g} m/s^2",
+            np.abs(change) > a.acceleration,
+            np.maximum(np.abs(change) - a.acceleration, 0.0),
+            "m/s^2",
+        ),
+    ]
+    for what, outside, excess, unit in checks:
+        if outside.any():
+            yield (
+                f"{what} at {time[outside][0]:.1f} s first, {100 * outside.mean():.1f} % of the"
+                f" time, by {excess.max():.2g} {unit} at most"
+            )
+    for i, u in enumerate(CONTROLS):
+        if at_stop[:, i].any():
+            yield f"{u} at its stop at {time[at_stop[:, i]][0]:.1f} s first: no linear model"
+
+
+def commanded(choices: DesignChoices, name: str, time: Array) -> Array:
+    """Return the command (n,) of a measurement over time: half its size, from `STEP_AT` for
+    `STEP_FOR` s.
+    """
+    on = (time >= STEP_AT - 1e-9) & (time < STEP_AT + STEP_FOR - 1e-9)
+    return np.where(on, STEP_SHARE * choices.size_of_reference(name), 0.0)
 
 
 def performance(

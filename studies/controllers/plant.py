@@ -20,6 +20,10 @@ from synthesis.design.plant import parts
 STUDY = DesignChoices()
 
 
+ROUNDING = 1e-9
+"""Fraction of a feedthrough by which its change over airspeed is rounding."""
+
+
 def baseline(heli: Helicopter, choices: DesignChoices = STUDY) -> LPVStateSpace:
     """The helicopter over airspeed with its controls and gusts, interpolated element by element."""
     speeds = np.linspace(choices.airspeeds[0], choices.airspeeds[1], choices.points).tolist()
@@ -69,23 +73,39 @@ def actuator(servo: Servo, name: str, late: float) -> LinearModel:
     )
 
 
+def lag(name: str, corner: float) -> LinearModel:
+    """Return the lag that keeps a control from acting on an output directly by D(p), as it does
+    in the continuous model of a sampled one; at 2/dt rad/s it is half a sample late.
+    """
+    return LinearModel(
+        np.array([[-corner]]),
+        np.array([[corner]]),
+        np.array([[1.0]]),
+        np.zeros((1, 1)),
+        (Signal(f"{name}_hold", "rad"),),
+        (Signal(f"{name}_command", "rad"),),
+        (Signal(name, "rad"),),
+    )
+
+
 def unweighted(model: LPVStateSpace, choices: DesignChoices = STUDY) -> Plant:
     """Return the plant with gusts, controls, and the measured states and commands as
-    performance.
+    performance; what follows a command has its reference.
     """
-    return Plant(
+    plant = Plant(
         model,
-        disturbances=signals(choices.sizes_of_disturbances),
-        performance=signals(choices.sizes_of_performance),
+        disturbances=signals([choices.disturbance(name) for name in choices.disturbances]),
+        performance=signals((*choices.measurements, *choices.controls)),
         controls=signals(choices.controls),
         measurements=signals(choices.measurements),
     )
+    return plant.with_reference(choices.references) if choices.references else plant
 
 
 def weighted(plant: Plant, choices: DesignChoices = STUDY) -> Plant:
     """Return the plant with every signal in its size, and noise on the measurements."""
     sizes = {name: 1 / size for name, size in choices.sizes_of_performance.items()}
-    noise = {name: choices.noise[name] for name in choices.measurements}
+    noise = {choices.error(name): choices.noise[name] for name in choices.measurements}
     return plant.weighted({**choices.sizes_of_disturbances, **sizes}).with_noise(noise)
 
 
@@ -98,8 +118,12 @@ def design_plant(
     servos = {u: choices.servo(u) for u in choices.controls}
     late = choices.delay + held
     actuators = {u: actuator(servo, u, late) for u, servo in servos.items() if servo is not None}
-    behind = unweighted(model, choices).with_servo(actuators)
     bare = [u for u, servo in servos.items() if servo is None]
+    columns = indices(bare, model.inputs, "input")
+    for u, i in zip(bare, columns, strict=True):
+        if np.abs(model.D[1:, :, i]).max(initial=0) > ROUNDING * np.abs(model.D[:, :, i]).max():
+            actuators[u] = lag(u, 2 / choices.period)
+    behind = unweighted(model, choices).with_servo(actuators)
     return weighted(behind.with_delay(late, bare, order=1) if bare and late else behind, choices)
 
 
@@ -107,13 +131,18 @@ def flown_plant(model: LPVStateSpace, choices: DesignChoices = STUDY) -> Plant:
     """Return the plant of the certificate: the servos unchanged, the delay exact, sampled; a
     sampled model stays unchanged.
     """
+    return weighted(behind_servos(model, choices), choices)
+
+
+def behind_servos(model: LPVStateSpace, choices: DesignChoices = STUDY) -> Plant:
+    """Return that plant without sizes and noise."""
     servos = {u: choices.servo(u) for u in choices.controls}
     behind = unweighted(model, choices).with_servo(
         {u: s for u, s in servos.items() if s is not None}
     )
     if model.dt is None:
         behind = behind.sampled(choices.period, degree=SAMPLED_DEGREE)
-    return weighted(behind.with_delay(choices.delay) if choices.delay else behind, choices)
+    return behind.with_delay(choices.delay) if choices.delay else behind
 
 
 def closed(plant: Plant, controller: object) -> LPVStateSpace:

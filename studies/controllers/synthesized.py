@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 import time
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -28,7 +28,8 @@ from studies.controllers.identified_plant import (
     with_gusts,
 )
 from studies.controllers.in_airspeed import of_degree
-from studies.controllers.measures import Measures, measured
+from studies.controllers.judged import Judged, judged, travel_of
+from studies.controllers.measures import STEP_FOR, STEP_SHARE, Measures, measured
 from studies.controllers.plant import (
     baseline,
     closed,
@@ -37,6 +38,8 @@ from studies.controllers.plant import (
     flown_plant,
     of_family,
 )
+from studies.controllers.reach import require_possible
+from studies.controllers.stepped import STEP_AT, Stepped
 from symheli import (
     AirspeedSchedule,
     FlightPlan,
@@ -54,7 +57,7 @@ from symheli.errors import CompilerWarning, InputError, SynthesisError, Validity
 from symheli.flight import ScheduledController, TableState, fly_batch
 from symheli.flight.controller import Entered
 from symheli.flight.flight_data import FlightData
-from symheli.progress import task
+from symheli.progress import Progress, Task, task, watched
 from symheli.values.arrays import Array
 from symheli.values.named_vector import NamedVector
 from symheli.values.signal import indices
@@ -70,8 +73,14 @@ LOOKED_AT = 9
 """Airspeeds at which the frozen gain of the loop is."""
 MAX_STATES_OF_SPLINE = 12
 """Number of states of the loop above which P(p) is affine in airspeed."""
-RANGE_MARGINS = (0.04, 0.08)
-"""Fractions of the range, at its ends, that the simulated transition leaves free."""
+ALTERNATING = -0.5
+"""Real part of a pole of a sampled model below which it alternates from sample to sample."""
+PROGRAM = "digits of the least level"
+"""Task that reports a semidefinite program."""
+RANGE_MARGIN, RATE_SHARE = 0.2, 0.5
+"""Fraction of the range, at either end, that the simulated transition leaves to gusts, and of the
+permitted acceleration that it commands.
+"""
 
 Given = LinearFamily | LPVARXModel | KinematicModel
 
@@ -81,7 +90,9 @@ class Synthesized:
     """Results of a synthesis.
 
     `made`: the controller of the synthesis; `table`: what flies; `sampled`: the proof of its loop;
-    `flights`, `measures`: each transition; none without a vehicle; `seconds` of each step.
+    `flights`, `measures`: each transition; none without a vehicle; `judged`: the specification
+    sheet, None where the controller has none of its axes; `idle`: why the controller commands
+    nothing, where it does; `seconds` of each step.
     """
 
     choices: DesignChoices
@@ -90,6 +101,8 @@ class Synthesized:
     sampled: SampledLoop
     flights: tuple[FlightData, ...] = ()
     measures: tuple[Measures, ...] = ()
+    judged: Judged | None = None
+    idle: str = ""
     seconds: Mapping[str, float]
 
     @property
@@ -147,10 +160,14 @@ def synthesized(choices: DesignChoices, given: Given | None = None) -> Synthesiz
     is only flown. Raises `SynthesisError` where there is no controller, with the reason.
     """
     seconds: dict[str, float] = {}
+    with _timed("looking for what is possible", seconds):
+        known = None if given is None else model_of(choices, given)
+        held = _held(known, choices)
+        require_possible(choices, None if known is None else smooth(known), held)
     with _timed("trimming and linearizing", seconds):
-        model = model_of(choices, given)
+        model = model_of(choices, given) if known is None else known
         design, flying = plants(model, choices)
-    with _timed("designing", seconds):
+    with _timed("designing", seconds) as designing, watched(_programs(designing)):
         made = synthesis.output_feedback(
             design, back_off=choices.back_off, fastest=math.pi / choices.period
         )
@@ -158,6 +175,8 @@ def synthesized(choices: DesignChoices, given: Given | None = None) -> Synthesiz
         table = tabulated(made, flying, choices)
     with _timed("certifying", seconds):
         sampled = certified(table, flying, made.promised)
+    with _timed("specification sheet", seconds):
+        sheet = judged(table, model, choices, exact=given is None)
     flights: tuple[FlightData, ...] = ()
     if choices.vehicle:
         with _timed("flying", seconds):
@@ -169,6 +188,8 @@ def synthesized(choices: DesignChoices, given: Given | None = None) -> Synthesiz
         sampled=sampled,
         flights=flights,
         measures=tuple(measured(flights, choices)),
+        judged=sheet,
+        idle="" if np.any(table.matrices) else _idle(model),
         seconds=seconds,
     )
 
@@ -227,10 +248,17 @@ def _airspeed(model: LPVStateSpace, choices: DesignChoices) -> Scheduling:
 
 def plants(model: LPVStateSpace, choices: DesignChoices) -> tuple[Plant, Plant]:
     """Return the plant of the design, in continuous time, and that of the simulation, sampled."""
-    if model.dt is None:
-        return design_plant(model, choices.period / 2, choices), flown_plant(model, choices)
-    smooth = of_degree(continuous(model), DEGREE)  # the half sample of the hold is in it
-    return design_plant(smooth, 0.0, choices), flown_plant(model, choices)
+    return design_plant(smooth(model), _held(model, choices), choices), flown_plant(model, choices)
+
+
+def smooth(model: LPVStateSpace) -> LPVStateSpace:
+    """Return the model in continuous time; the half sample of the hold is in a sampled one."""
+    return model if model.dt is None else of_degree(continuous(model), DEGREE)
+
+
+def _held(model: LPVStateSpace | None, choices: DesignChoices) -> float:
+    """Return the half sample, s, that a command is held for, where the model does not have it."""
+    return choices.period / 2 if model is None or model.dt is None else 0.0
 
 
 def tabulated(made: synthesis.Controller, plant: Plant, choices: DesignChoices) -> TableController:
@@ -285,15 +313,19 @@ def flights_of(table: TableController, choices: DesignChoices) -> tuple[FlightDa
     """
     heli = Helicopter.load(choices.vehicle, governor="pi")
     low, high = choices.airspeeds
-    ends = low + RANGE_MARGINS[0] * (high - low), high - RANGE_MARGINS[1] * (high - low)
+    ends = low + RANGE_MARGIN * (high - low), high - RANGE_MARGIN * (high - low)
     controller: object = table
     if len(table.outputs) < len(heli.inputs):
         ideal = Helicopter.load(choices.vehicle, governor="ideal")
         lqr = symheli.flight.gain_scheduled_lqr(ideal, low, high, choices.period)
         controller = BesideAutopilot(table, lqr.scheduled_controller)
+    for y in choices.references:
+        size, until = STEP_SHARE * choices.size_of_reference(y), STEP_AT + STEP_FOR
+        controller = Stepped(controller, y, size, until)
     servos = {u: choices.servo(u) for u in map(str, heli.inputs)}
+    acceleration = RATE_SHARE * choices.acceleration or 1.0
     plan = FlightPlan(
-        AirspeedSchedule.transition(*ends, acceleration=choices.acceleration or 1.0, hold=3.0),
+        AirspeedSchedule.transition(*ends, acceleration=acceleration, hold=3.0),
         dt=choices.period,
         controller=controller,
         wind=Wind(STEADY, turbulence=Dryden(choices.turbulence, ALTITUDE))
@@ -309,18 +341,41 @@ def flights_of(table: TableController, choices: DesignChoices) -> tuple[FlightDa
         return fly_batch(heli, [plan], seeds=range(choices.flights)).data
 
 
+def _idle(model: LPVStateSpace) -> str:
+    """Return why a controller commands nothing, and what to do."""
+    said = "The controller commands nothing: with these sizes no command lowers the gain; give"
+    said += " the commands larger sizes, or the deviations smaller ones."
+    if model.dt is None:
+        return said
+    poles = np.linalg.eigvals(model.matrices(np.linspace(*model.box[0], LOOKED_AT)).A)
+    worst = float(poles.real.min())
+    if worst > ALTERNATING:
+        return said
+    return (
+        f"The controller commands nothing: the model has a pole at z = {worst:.2f}, near half the"
+        " sample frequency, where no servo follows and the fit knows noise alone: identify at a"
+        " coarser step (--decimate 2), or with fewer lags."
+    )
+
+
 def _limits(choices: DesignChoices) -> dict[str, tuple[float, float]]:
     """The travel of the controls, where there is a vehicle."""
-    if not choices.vehicle:
-        return {}
-    heli = Helicopter.load(choices.vehicle, governor="ideal")
-    travel = dict(zip(map(str, heli.inputs), map(float, heli.travel), strict=True))
-    return {u: (-travel[u], travel[u]) for u in choices.controls}
+    return {u: (-most, most) for u, most in travel_of(choices).items()}
 
 
 @contextmanager
-def _timed(step: str, seconds: dict[str, float]) -> Iterator[None]:
+def _timed(step: str, seconds: dict[str, float]) -> Iterator[Task]:
     begin = time.perf_counter()
-    with task(step):
-        yield
+    with task(step) as under_way:
+        yield under_way
     seconds[step] = time.perf_counter() - begin
+
+
+def _programs(designing: Task) -> Callable[[Progress], None]:
+    """Return a listener that counts semidefinite programs: their digits begin again with each."""
+
+    def listener(progress: Progress) -> None:
+        if progress.over and progress.task == PROGRAM:
+            designing.step("programs solved")
+
+    return listener

@@ -16,6 +16,7 @@ from studies.controllers.design_choices import CONTROLS, DELAY, PERIOD, SERVO_RA
 from studies.controllers.flown import HIGH, LOW, WINDS, plan
 from studies.controllers.measures import AT_THE_STOP, heading, noise_of, of_flight, rms, to_body
 from studies.controllers.measures import MEASUREMENTS as MEASURED
+from studies.controllers.stepped import STEP_AT, Stepped
 from studies.setup.flights import autopilot_for
 from studies.specs.of_vehicle import FLIGHTS_FROM, OfVehicle, digest_of, share_met
 from symheli import AirspeedSchedule, FlightPlan, Helicopter, LPVStateSpace
@@ -35,8 +36,8 @@ ACCELERATIONS = (1.0, 3.0)
 SHARE = 0.95
 """Share of the flights that meet a value: the value shown is the one they do not exceed."""
 
-STEP_AT, STEP_FOR = 1.0, 4.0
-"""When an attitude is commanded, and how long the flight goes on, s."""
+STEP_FOR = 4.0
+"""How long a flight goes on after an attitude is commanded, s."""
 
 PULSE = 0.2
 """How long a yaw rate is commanded, s, so that the heading changes by what a second of the axis's
@@ -146,37 +147,6 @@ def measured(one: FlightData) -> dict[tuple[str, str], float]:
         out["effort", u] = 100 * rms(command - column[f"{u}_reference"]) / float(travel)
         out["stops", u] = 100 * float(np.mean(np.abs(command) >= AT_THE_STOP * travel))
     return out
-
-
-@dataclass(frozen=True, eq=False)
-class Stepped:
-    """A controller whose command of one signal is `size` larger from `STEP_AT` to `until`, s."""
-
-    controller: ScheduledController
-    signal: str
-    size: float
-    until: float = math.inf
-
-    @property
-    def dt(self) -> float:
-        """Sample period, s."""
-        return self.controller.dt
-
-    def init(self) -> tuple[int, Any]:
-        """Samples so far, and the state of the controller."""
-        return 0, self.controller.init()
-
-    def step(
-        self, state: tuple[int, Any], measured: NamedVector, reference: NamedVector, p: NamedVector
-    ) -> tuple[Array, tuple[int, Any]]:
-        """Commands (4,), rad, and the state at the next sample."""
-        k, inner = state
-        if STEP_AT <= k * self.dt < self.until:
-            values = np.array(measured.array)
-            values[measured.signals.index(self.signal)] -= self.size
-            measured = NamedVector(measured.signals, values)
-        u, inner = self.controller.step(inner, measured, reference, p)
-        return u, (k + 1, inner)
 
 
 @dataclass(frozen=True, eq=False)

@@ -143,6 +143,35 @@ class SpecificationTable:
             for spec in self.sheet.specifications
         ]
 
+    def missed(self, controller: str) -> list[Reached]:
+        """Return the counted entries that miss Level 1, the furthest first."""
+        each = [r for r in self.reached(controller) if r.specification.counts and r.margin < 0]
+        return sorted(each, key=lambda r: r.margin)
+
+    def entries(self, controller: str) -> list[dict[str, Any]]:
+        """Return every specification with its boundaries, its worst value and those over the
+        parameter, by name.
+        """
+        return [
+            {
+                "axis": r.specification.axis,
+                "name": r.specification.name,
+                "kind": r.specification.kind,
+                "unit": r.specification.unit,
+                "level_1": r.specification.level_1,
+                "level_2": r.specification.level_2,
+                "source": r.specification.source,
+                "counts": r.specification.counts,
+                "worst": r.value,
+                "at": r.at,
+                "margin": r.margin,
+                "values": self.over(controller, r.specification.axis, r.specification.name)
+                if r.specification.kind == "frozen"
+                else None,
+            }
+            for r in self.reached(controller)
+        ]
+
     def mark(self, controller: str) -> Reached:
         """Return the counted entry with the least design margin: 0 or more where the controller is
         in Level 1 in all that was computed.
@@ -375,17 +404,7 @@ def specifications(
             own = {u: servo for u, servo in (servos or {}).items() if u in driven}
             bare = bare.select(inputs=driven)
             plants[k, driven, K.dt] = actuated(bare, own, delay, K.dt)
-        loops = {
-            axis.name: AxisLoop(
-                plant=plants[k, driven, K.dt],
-                controller=K,
-                axis=axis,
-                travel=(travel or {}).get(axis.control, math.nan),
-                rate_limit=(rate_limit or {}).get(axis.control, math.nan),
-            )
-            for axis in sheet.axes.values()
-            if axis.control in driven and axis.response in K.inputs
-        }
+        loops = axis_loops(plants[k, driven, K.dt], K, sheet, travel, rate_limit)
         if not loops:
             raise InputError(
                 f"{name}: the controller has none of the axes of the sheet,"
@@ -405,6 +424,27 @@ def specifications(
         stable=stable,
         seconds=seconds,
     )
+
+
+def axis_loops(
+    plant: LinearModel,
+    K: LinearModel,
+    sheet: Sheet,
+    travel: Mapping[str, float] | None = None,
+    rate_limit: Mapping[str, float] | None = None,
+) -> dict[str, AxisLoop]:
+    """Return the loop of every axis of a sheet that the frozen controller has."""
+    return {
+        axis.name: AxisLoop(
+            plant=plant,
+            controller=K,
+            axis=axis,
+            travel=(travel or {}).get(axis.control, math.nan),
+            rate_limit=(rate_limit or {}).get(axis.control, math.nan),
+        )
+        for axis in sheet.axes.values()
+        if axis.control in K.outputs and axis.response in K.inputs
+    }
 
 
 def frozen_controller(given: Any, plant: LinearModel, parameter: Signal, p: float) -> LinearModel:

@@ -92,6 +92,12 @@ class AxisLoop:
         names = ("response", "control", *("coupled" for _ in coupled))
         return replace(found, outputs=signals(names))
 
+    @property
+    def answers(self) -> bool:
+        """Whether the controller moves its control for the response at all."""
+        K = self.controller.select(inputs=[self.axis.response], outputs=[self.axis.control])
+        return bool(np.any(K.D) or (np.any(K.B) and np.any(K.C)))
+
     @cached_property
     def rejection(self) -> LinearModel:
         """From a disturbance added to the response to their sum: the sensitivity at the output."""
@@ -116,8 +122,10 @@ class AxisLoop:
         if ("bandwidth", band) not in self._kept:
             T = self.closed.select(outputs=["response"])
             rate = self.axis.type == "rate"
-            self._kept["bandwidth", band] = attitude_bandwidth(
-                integral(T) if rate else T, band, command=True
+            self._kept["bandwidth", band] = (
+                attitude_bandwidth(integral(T) if rate else T, band, command=True)
+                if self.answers
+                else Bandwidth(*(math.nan,) * 4)
             )
         return self._kept["bandwidth", band]
 

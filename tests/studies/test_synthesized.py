@@ -13,8 +13,11 @@ import pytest
 import identification
 import symheli
 import synthesis
+from evidence import impossible, random_designs
 from studies import cli
+from studies.controllers import starting
 from studies.controllers.design_choices import DesignChoices
+from studies.controllers.measures import _left
 from studies.controllers.synthesized import (
     BesideAutopilot,
     model_of,
@@ -24,6 +27,7 @@ from studies.controllers.synthesized import (
 )
 from studies.controllers.synthesized_report import TABLE, gains, text
 from symheli.errors import InputError, SynthesisError
+from symheli.progress import watched
 from synthesis.numerics.linear.norm import norm
 
 SMALL = """
@@ -119,7 +123,8 @@ def test_the_table_the_proof_and_the_page_are_of_what_was_asked_for(
     assert told["flown"] is None
     assert told["frozen"] <= told["proven"] < math.inf
     assert {path.name for path in out.iterdir()} == {
-        *("certificate.json", "controller.json", "numbers.json", "report.html", "synthesize.toml")
+        *("certificate.json", "controller.json", "numbers.json", "report.html", "synthesize.toml"),
+        "figures",
     }
     assert symheli.TableController.load(out / TABLE).matrices.tobytes() == (
         found.table.matrices.tobytes()
@@ -140,8 +145,13 @@ def test_what_is_shown_fits_a_terminal_and_names_what_is_known(found):
     said = text(found, [])
     assert max(map(len, said.splitlines())) <= 100
     assert f"{found.sampled.gamma:.3g}" in said.splitlines()[0]
-    lost = replace(found, measures=(SimpleNamespace(**dict.fromkeys(MEASURED, 0.5), lost=True),))
-    assert "1 of 1 were lost" in text(lost, [])
+    flight = SimpleNamespace(**dict.fromkeys(MEASURED, 0.5), lost=True, left=("d_lat at its stop",))
+    said = " ".join(text(replace(found, measures=(flight,)), []).split())
+    assert "1 of 1 were lost" in said
+    assert "Flight 1 left the hypotheses: d_lat at its stop." in said
+    above = SimpleNamespace(**{**dict.fromkeys(MEASURED, 0.5), "ratio": 99.0}, lost=False, left=())
+    said = " ".join(text(replace(found, measures=(above,)), []).split())
+    assert "Flight 1 reached 99, above the proven gain, and left no hypothesis" in said
 
 
 @pytest.mark.slow
@@ -163,6 +173,97 @@ def test_a_model_sampled_otherwise_than_the_controller_is_refused(small, family)
 
     with pytest.raises(InputError, match=r"sampled every 0\.1 s, the controller every 0\.02 s"):
         model_of(asked, Sampled())  # type: ignore[arg-type]
+
+
+# --- what is possible -----------------------------------------------------------------------------
+
+
+def test_an_impossible_design_is_refused_with_what_to_add_and_possible_with_it():
+    name = "two lags, one control"
+    changes = impossible.CASES[name]
+    said = impossible.refusal(name, changes)
+    assert "the mode at" in said
+    assert "add to controls d_lon and to measurements u: least gain" in said
+    every = {"controls": ("d_lat", "d_lon"), "measurements": ("v", "u")}
+    assert impossible.refusal(name, {**changes, **every}) == ""
+
+
+@pytest.mark.slow
+def test_twenty_impossible_designs_are_answered_in_five_seconds_of_processor():
+    assert len(impossible.CASES) == 20
+    for name, said, seconds in impossible.answers():
+        assert "add to" in said or "divided by" in said or "times 10" in said or "delay" in said, (
+            name
+        )
+        assert seconds < impossible.LIMIT, name
+
+
+def test_a_gain_above_the_largest_is_refused_before_any_program(small, family):
+    asked, heard = replace(DesignChoices.read(small, {}), gain=0.01), []
+    no_controller = "by Riccati equations: no controller keeps a gain"
+    with watched(heard.append), pytest.raises(SynthesisError, match=no_controller):
+        synthesized(asked, family)
+    assert {p.task for p in heard} == {"looking for what is possible"}
+
+
+def test_the_count_of_programs_does_not_begin_again(small, family):
+    heard = []
+    with watched(heard.append):
+        synthesized(DesignChoices.read(small, {}), family)
+    counts = [p.done for p in heard if p.task == "designing"]
+    assert counts == sorted(counts)
+    assert counts[-1] >= 1
+
+
+# --- first choices, references, flights ----------------------------------------------------------
+
+
+def test_first_choices_of_the_x_cell_are_the_defaults_and_others_have_its_effects():
+    assert starting.for_vehicle(DesignChoices()) == DesignChoices()
+    other = starting.for_vehicle(DesignChoices(vehicle="yamaha_r50"))
+    hover = symheli.linearize(symheli.Helicopter.load("yamaha_r50", governor="ideal"), 0.0)
+    a1, d_lon = list(hover.states).index("a1"), list(hover.inputs).index("d_lon")
+    tilt = hover.B[a1, d_lon] / hover.A[a1, a1]
+    assert other.sizes["d_lon"] == pytest.approx(min(0.0378 / abs(tilt), 0.025), rel=0.05)
+
+
+def test_what_is_written_for_a_model_has_its_range_signals_and_controls_and_runs(
+    tmp_path, capsys, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    identified(tmp_path / "model.json", dt=0.05)
+    assert cli.main(["synthesize", "--model", "model.json", "--write-config", "my.toml"]) == 0
+    asked = DesignChoices.read(tmp_path / "my.toml", {})
+    assert (asked.vehicle, asked.airspeeds, asked.period) == ("", (0.0, 10.0), 0.05)
+    assert (asked.controls, asked.measurements) == (("d_lat",), ("v",))
+    assert asked.disturbances == ("d_lat",)
+    assert cli.main(["synthesize", "my.toml", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out.split("\n", 1)[1])["verified"]
+
+
+def test_a_command_is_followed_where_one_is_asked_for(small, family):
+    asked = replace(DesignChoices.read(small, {}), references=("v",))
+    made = synthesized(asked, family)
+    assert "v_reference" in made.sampled.loop.inputs
+    assert "weighted_v_error" in made.sampled.loop.outputs
+    assert tuple(map(str, made.table.inputs)) == ("v",)
+    assert made.sampled.certificate.verified
+    with pytest.raises(InputError, match="references: q not among the measurements, v"):
+        replace(asked, references=("q",))
+
+
+def test_a_flight_says_which_hypothesis_it_left_and_when():
+    time, asked = 0.02 * np.arange(100), DesignChoices()
+    forward, change = np.where(time > 1.0, 13.5, 5.0), np.where(time > 0.5, 3.4, 0.0)
+    commands = np.zeros((100, 4))
+    commands[80:, 2] = 0.2
+    said = list(_left(time, forward, change, commands, np.full(4, 0.2), asked))
+    assert said[0].startswith(
+        "airspeed above 13 m/s at 1.0 s first, 49.0 % of the time, by 0.5 m/s"
+    )
+    assert said[1].startswith("|dV/dt| above 3 m/s^2 at 0.5 s first")
+    assert said[2] == "d_col at its stop at 1.6 s first: no linear model"
+    assert not list(_left(time, 5 + 0 * time, 0 * time, 0 * commands, np.full(4, 0.2), asked))
 
 
 # --- a model that symheli identify has saved ------------------------------------------------------
@@ -236,6 +337,37 @@ def test_an_identified_model_over_something_else_is_refused(tmp_path, capsys, ot
     assert said in said_of(tmp_path, capsys)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(6))
+def test_random_settings_of_identified_models_end_in_a_design_or_a_sentence(seed, record):
+    """`evidence.random_designs` runs eighty."""
+    assert random_designs.outcome(seed, record)
+
+
+@pytest.fixture(scope="module")
+def record():
+    return random_designs.flown()
+
+
+@pytest.mark.slow
+def test_the_first_choices_for_a_longitudinal_log_end_in_a_controller(tmp_path, capsys, record):
+    structure = identification.LPVARX(
+        outputs=("u", "w", "q", "theta"),
+        inputs=("d_lon", "d_col"),
+        scheduling="airspeed_command",
+        na=2,
+        nb=2,
+        delay=1,
+        basis=identification.Polynomial(2, 0.0, 10.0),
+        offset=True,
+    )
+    model = identification.fit(structure, record).save(tmp_path / "model.json")
+    mine = tmp_path / "my.toml"
+    assert cli.main(["synthesize", "--model", str(model), "--write-config", str(mine)]) == 0
+    assert cli.main(["synthesize", str(mine), "--out", str(tmp_path / "made")]) == 0
+    assert "Misses Level 1" in capsys.readouterr().out
+
+
 def test_what_an_identified_model_does_not_have_is_not_asked_of_it(tmp_path, capsys):
     identified(tmp_path / "model.json")
     gusts = OF_IDENTIFIED.replace('["d_lat"]\ndelay', '["v_w", "d_lat"]\ndelay')
@@ -304,6 +436,8 @@ def test_the_defaults_give_a_proven_controller_that_flies(tmp_path, capsys):
     assert told["flown"]["largest"] < told["proven"] < 1.3 * told["frozen"]
     assert told["states"]["flown"] < told["states"]["designed"]
     assert not any(flight["lost"] for flight in told["flights"])
+    assert told["met_every_hypothesis"] >= 3
+    assert told["sheet"]["missed"]
 
 
 def with_known_kinematics():

@@ -18,8 +18,8 @@ from synthesis.certify.statement.sentences import motion
 Array = np.ndarray
 
 NEGLIGIBLE_ENTRY = 1e-12
-"""Entries below this fraction of both their row's and their column's largest entry are rounding,
-and so is their misfit.
+"""Entries below this fraction of the largest of their row of [A B] or [C D] are rounding, and so is
+their misfit.
 """
 
 VERIFIED = (
@@ -100,19 +100,18 @@ def fitted(model: object) -> tuple[str, ...]:
     count = {1: 41, 2: 13}.get(len(model.parameters), 5)
     axes = [np.linspace(s.low, s.high, count) for s in model.parameters]
     matrices = model.matrices(axes[0] if len(axes) == 1 else tensor_grid(axes))
-    worst, place = 0.0, ""
-    for name, own, residual in zip("ABCD", matrices, model.residuals.matrices, strict=True):
-        if not residual.size:
-            continue
-        size, off = np.abs(own).max(axis=0), np.abs(residual).max(axis=0)
-        size = np.maximum(size, off)
-        real = size > NEGLIGIBLE_ENTRY * np.minimum(
-            size.max(axis=0, keepdims=True), size.max(axis=1, keepdims=True)
-        )
-        ratio = np.where(real & (size > 0), off / np.where(size > 0, size, 1.0), 0.0)
-        if ratio.max() > worst:
-            worst, (i, j) = float(ratio.max()), np.unravel_index(int(ratio.argmax()), ratio.shape)
-            place = f", in {name}[{i + 1}, {j + 1}]"
+    misfits = model.residuals.matrices
+    own, off = (
+        np.abs(np.block([[A, B], [C, D]])).max(axis=0) for A, B, C, D in (matrices, misfits)
+    )
+    size = np.maximum(own, off)
+    real = size > NEGLIGIBLE_ENTRY * size.max(axis=1, keepdims=True, initial=0.0)
+    ratio = np.where(real, off / np.where(real, size, 1.0), 0.0)
+    worst, place = float(ratio.max(initial=0.0)), ""
+    if worst:
+        i, j = np.unravel_index(int(ratio.argmax()), ratio.shape)
+        rows, of = (*model.states, *model.outputs), (*model.states, *model.inputs)
+        place = f", {size[i, j]:.2g}, from {of[j]} to {rows[i]}"
     what = (
         "the interpolated model"
         if model.dt is None

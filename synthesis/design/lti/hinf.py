@@ -52,6 +52,9 @@ MAX_DOUBLINGS = 40
 exists.
 """
 
+MAX_TRIALS = 1000
+"""Largest number of levels tried: a slack that jumps takes more of them than halving does."""
+
 NOT_KEPT = "the loop of the central controller for gamma = {:.6g} does not keep that level"
 NO_LEVEL = "the Riccati equations have no solution at any level, for no known reason"
 NO_LEAST = (
@@ -288,10 +291,14 @@ def _smallest(
     if below.obstacle is None:
         return 0.0, None
     good, bad = high, below
+    ends = {
+        math.log(low): low,
+        math.log(high): high,
+    }  # exp(log(high)) may round below it, unreached
 
     def slack(log_gamma: float) -> float:
         nonlocal good, bad
-        trial = normal.trial(math.exp(log_gamma))
+        trial = normal.trial(ends.get(log_gamma) or math.exp(log_gamma))
         if trial.obstacle is None:
             good = min(good, trial.gamma)
         elif trial.gamma > bad.gamma:
@@ -299,5 +306,5 @@ def _smallest(
         # 0, a root met exactly, would end the search with `good` wherever above it was
         return min(trial.slack, 1.0) or -sys.float_info.min
 
-    optimize.brentq(slack, math.log(low), math.log(high), xtol=accuracy)
+    optimize.brentq(slack, *ends, xtol=accuracy, maxiter=MAX_TRIALS)
     return good, bad.obstacle

@@ -10,6 +10,8 @@ from scipy import linalg
 
 from symheli import LinearModel
 from synthesis import hinf
+from synthesis.design.lti.central import Obstacle, RiccatiTrial
+from synthesis.design.lti.hinf import ROUGH_ACCURACY, _smallest
 from synthesis.design.plant.generalized import Generalized, continuous_plant, sampled_controller
 from synthesis.numerics.linear.norm import norm, to_continuous
 
@@ -189,6 +191,26 @@ def test_slicot_reaches_no_lower_level(seed):
     except slycot.exceptions.SlycotError:
         return
     assert norm(*P.closed(*below))[0] >= optimum * (1 - 1e-7)
+
+
+def test_a_level_at_the_feedthrough_is_bracketed_by_what_was_tried():
+    """The Riccati equations have a solution at `high` and none at exp(log(high)), one bit below."""
+    feedthrough = next(
+        D for D in np.arange(2.0, 3.0, 0.01) if math.exp(math.log(D * (1 + 1e-6))) < D * (1 + 1e-6)
+    )
+    high = feedthrough * (1 + 1e-6)
+
+    class OnTheEdge:
+        def least(self):
+            return feedthrough
+
+        def trial(self, gamma):
+            reached = gamma >= high
+            obstacle = None if reached else Obstacle.CONTROL
+            return RiccatiTrial(gamma, obstacle, 1.0 if reached else -1.0)
+
+    found = _smallest(OnTheEdge(), 1.0, ROUGH_ACCURACY)
+    assert found == (high, Obstacle.CONTROL)
 
 
 def test_python_control_finds_a_controller_no_better():

@@ -1,0 +1,97 @@
+"""The specification sheet of a designed table over airspeed, and its responses to commands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+import symheli
+from studies.controllers.design_choices import SERVO_RATE, DesignChoices
+from studies.controllers.plant import behind_servos
+from symheli import Helicopter, LinearModel, LPVStateSpace, TableController
+from symheli.values.arrays import Array
+from synthesis.design.loops.actuated import actuated
+from synthesis.sheet.evaluation import (
+    SpecificationTable,
+    axis_loops,
+    frozen_controller,
+    specifications,
+)
+from synthesis.sheet.sheet import Sheet
+
+POINTS = 7
+"""Airspeeds of the sheet."""
+WINDOW = 4.0
+"""Length of a response, s."""
+NAME = "controller"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Judged:
+    """A sheet, and by axis and airspeed (m/s) the response to a step of its command: (times,
+    response, control), for a command of 1.
+    """
+
+    table: SpecificationTable
+    steps: dict[str, dict[float, tuple[Array, Array, Array]]]
+
+
+def judged(
+    table: TableController, model: LPVStateSpace, choices: DesignChoices, *, exact: bool
+) -> Judged | None:
+    """Return the sheet of a table; None where it has none of the axes.
+
+    `exact`: the vehicle is linearized at every airspeed; otherwise the loop is that of the model.
+    """
+    sheet = Sheet.load()
+    if not any(
+        axis.control in table.outputs and axis.response in table.inputs
+        for axis in sheet.axes.values()
+    ):
+        return None
+    low, high = choices.airspeeds
+    speeds = np.linspace(low, high, POINTS).tolist()
+    servos = {u: servo for u in choices.controls if (servo := choices.servo(u)) is not None}
+    travel = travel_of(choices)
+    if choices.vehicle:
+        heli = Helicopter.load(choices.vehicle, governor="ideal")
+        sheet = sheet.at_length(heli.vehicle.sections["main_rotor"]["radius"].value)
+    delay = 0.0
+    if exact:
+        family = symheli.sweep(heli, speeds, inputs=choices.controls)
+        plant = family.select(choices.states) if choices.states else family
+        delay = choices.delay
+    else:
+        plant = behind_servos(model, replace(choices, references=())).nominal
+        plant = plant.select(inputs=choices.controls, outputs=choices.measurements)
+        servos = {}
+    found = specifications(
+        plant,
+        {NAME: table.model},
+        sheet,
+        at=speeds,
+        servos=servos,
+        delay=delay,
+        travel=travel,
+        rate_limit=dict.fromkeys(choices.controls, SERVO_RATE),
+    )
+    steps: dict[str, dict[float, tuple[Array, Array, Array]]] = {}
+    for v in (speeds[0], speeds[POINTS // 2], speeds[-1]):
+        bare: LinearModel = plant.at(v)
+        K = frozen_controller(table.model, bare, found.parameter, v)
+        behind = actuated(bare.select(inputs=K.outputs), servos, delay, K.dt)
+        for name, loop in axis_loops(behind, K, sheet).items():
+            if loop.stable:
+                made = loop.closed.step_response(WINDOW)
+                steps.setdefault(name, {})[v] = made.time, *made.values[:, :2, 0].T
+    return Judged(table=found, steps=steps)
+
+
+def travel_of(choices: DesignChoices) -> dict[str, float]:
+    """Return the largest deflection of each control, rad; none without a vehicle."""
+    if not choices.vehicle:
+        return {}
+    heli = Helicopter.load(choices.vehicle, governor="ideal")
+    every = dict(zip(map(str, heli.inputs), map(float, heli.travel), strict=True))
+    return {u: every[u] for u in choices.controls if u in every}
