@@ -111,7 +111,11 @@ def fitted(model: object) -> tuple[str, ...]:
     if worst:
         i, j = np.unravel_index(int(ratio.argmax()), ratio.shape)
         rows, of = (*model.states, *model.outputs), (*model.states, *model.inputs)
-        place = f", {size[i, j]:.2g}, from {of[j]} to {rows[i]}"
+        part = 100 * off[i, j] / size[i].max()
+        place = (
+            f", {size[i, j]:.2g}, from {of[j]} to {rows[i]}, which is {part:.2g} % of the largest"
+            " entry of its row"
+        )
     what = (
         "the interpolated model"
         if model.dt is None

@@ -49,7 +49,10 @@ def test_rounding_of_a_row_is_no_misfit():
     off = [np.zeros((2, *M.shape[1:])) for M in (model.A, model.B, model.C, model.D)]
     off[0][1, 0, 1], off[1][0, 1, 1] = 0.0005, 1e-18
     (said,) = fitted(replace(model, residuals=FitResiduals(np.array([0.0, 1.0]), *off)))
-    assert said.endswith("by at most 0.1 % of its largest value, 0.5, from servo to q")
+    assert said.endswith(
+        "by at most 0.1 % of its largest value, 0.5, from servo to q, which"
+        " is 0.05 % of the largest entry of its row"
+    )
 
 
 def test_the_misfit_of_a_sampled_model_is_measured_from_its_own_samples():
