@@ -6,7 +6,7 @@ import inspect
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field, fields, replace
-from typing import Any, Literal, ParamSpec, TypedDict, TypeVar, get_args
+from typing import Any, Literal, TypedDict, TypeVar, get_args
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from symheli.flight.sensor import Sensor
 from symheli.flight.servo import Servo, one_each
 from symheli.values.numbers import whole
 
-P, R = ParamSpec("P"), TypeVar("R")
+F = TypeVar("F", bound=Callable[..., Any])
 
 MIN_SAMPLE_PERIOD = 1e-6
 """Least sample period, s."""
@@ -184,7 +184,7 @@ def plan_of(given: AirspeedSchedule | FlightPlan, options: Options) -> FlightPla
     return FlightPlan(given, **options)  # type: ignore[arg-type]
 
 
-def shows_options(function: Callable[P, R]) -> Callable[P, R]:
+def shows_options(function: F) -> F:
     """The function, whose signature shows the options of a flight by name in `help` and completion,
     with the values that a `FlightPlan` has for them.
     """
