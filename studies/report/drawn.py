@@ -28,6 +28,9 @@ LARGEST = 110_000
 COLOURS = 64
 """Colours of a PNG in the page."""
 
+READABLE = 76.0
+"""Pixels of the screen an inch of a figure needs at least for its words to be read."""
+
 APART = 3.0
 """Of a curve in a PNG the highest and the lowest point of every so many points of the width."""
 
@@ -75,7 +78,8 @@ def drawn(pictures: Iterable[tuple[str, str, str, Figure]], folder: Path) -> lis
         if len(svg) > LARGEST:
             svg, numbers["points"] = _pixels(svg, files["png"]), points
         data = "".join(f' data-{key}="{escape(_packed(what))}"' for key, what in numbers.items())
-        words = f'<svg role="img" aria-label="{escape(caption)}"{data}'
+        least = f"--least: {READABLE * figure.get_figwidth():.0f}px"  # narrow screens scroll
+        words = f'<svg role="img" aria-label="{escape(caption)}" style="{least}"{data}'
         out.append(Drawn(name, caption, source, svg.replace("<svg", words, 1)))
     return out
 
