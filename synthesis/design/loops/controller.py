@@ -306,7 +306,10 @@ class Controller:
         return self.scheduled_controller.step(state, measured, reference, p)
 
     def __str__(self) -> str:
-        names = ", ".join(s.name for s in self.model.parameters)
+        names = ", ".join(
+            f"{s.name} {'that may jump' if s.rate == math.inf else f'(rate {s.rate})'}"
+            for s in self.plant.parameters
+        )
         time = "continuous" if self.dt is None else f"sampled every {self.dt:g} s"
         least = "" if self.optimum is None else f", least {self.optimum:.6g}"
         promised = (
