@@ -47,10 +47,12 @@ def run(arguments: argparse.Namespace) -> Output:
     """Everything, and what came of it; status 1 where nothing is proven or a flight was lost."""
     from studies.controllers.design_choices import DesignChoices
 
+    options.file_or_vehicle(arguments)
     given = {name: getattr(arguments, name) for name in OVERRIDE}
     choices = DesignChoices.read(arguments.file, {k: v for k, v in given.items() if v is not None})
+    if arguments.file is None:
+        choices = _starting(choices, arguments.vehicle)
     if arguments.write_config is not None:
-        choices = choices if arguments.file else _starting(choices, arguments.vehicle)
         return options.choices_written(choices.text, arguments.write_config)
     from studies.controllers import synthesized_report as report
     from studies.controllers.synthesized import synthesized
