@@ -58,7 +58,8 @@ def lazily(
         return value
 
     def names() -> list[str]:
-        return sorted({*vars(sys.modules[package]), *home, *modules})
+        own = {name for name in vars(sys.modules[package]) if name.startswith("__")}
+        return sorted(own | {*home, *modules})
 
     return find, names, sorted(home)
 
