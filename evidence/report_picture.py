@@ -12,6 +12,8 @@ import os
 import shutil
 from pathlib import Path
 
+from symheli.extras import extra
+
 PICTURE = Path(__file__).resolve().parents[1] / "docs" / "report.png"
 SCREEN = {"width": 1280, "height": 900}
 """Pixels of the screen."""
@@ -20,7 +22,9 @@ SCREEN = {"width": 1280, "height": 900}
 def taken(page: Path, picture: Path) -> Path:
     """Write the first screen of a page as a picture of few colours and return its path."""
     from PIL import Image
-    from playwright.sync_api import sync_playwright
+
+    with extra("test", "the picture of a report"):
+        from playwright.sync_api import sync_playwright
 
     command = os.environ.get("CHROMIUM") or shutil.which("chromium")
     with sync_playwright() as run:
