@@ -37,8 +37,8 @@ SPEEDS = (0.0, 6.5, 13.0)
 STEPS = 5
 """Most changes of the sizes."""
 COMMAND, SLOWER, DEVIATION = 2.0, 1.5, 0.7
-"""Factors of a change: on a command of an axis that is slow, by which one of an axis that is fast is
-divided, and on the deviation of an axis that is slow.
+"""Factors of a change: on the command of a slow axis; by which that of a fast axis is divided; on
+the deviation of a slow axis.
 """
 AXES = {
     "roll": ("d_lat", "v"),
@@ -144,8 +144,8 @@ def missed(table: SpecificationTable) -> dict[tuple[Entry, float], float]:
 
 
 def changed(choices: DesignChoices, within: Mapping[Entry, float]) -> tuple[DesignChoices, str]:
-    """Return the sizes after one step of the rule, and the change in words; `within`: what is missed
-    and a point design meets, with its design margin.
+    """Return the sizes after one step of the rule, and the change in words; `within`: what is
+    missed and a point design meets, with its design margin, %.
     """
     sizes, noise, words = dict(choices.sizes), dict(choices.noise), []
     floor = DesignChoices().noise
@@ -181,9 +181,7 @@ def probes(choices: DesignChoices) -> Iterator[DesignChoices]:
         for command, deviation in AXES.values():
             sizes[command] *= commands
             sizes[deviation] *= deviations
-        yield replace(
-            choices, sizes=sizes, noise={y: noise * n for y, n in choices.noise.items()}
-        )
+        yield replace(choices, sizes=sizes, noise={y: noise * n for y, n in choices.noise.items()})
 
 
 def steps(vehicle: str) -> Iterator[list[str]]:
