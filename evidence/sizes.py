@@ -147,8 +147,7 @@ def changed(choices: DesignChoices, within: Mapping[Entry, float]) -> tuple[Desi
     """Return the sizes after one step of the rule, and the change in words; `within`: what is
     missed and a point design meets, with its design margin, %.
     """
-    sizes, noise, words = dict(choices.sizes), dict(choices.noise), []
-    floor = DesignChoices().noise
+    sizes, words = dict(choices.sizes), []
     for axis, (command, deviation) in AXES.items():
         own = {n: m for (a, n), m in within.items() if a == axis and n not in UNTOUCHED}
         if not own:
@@ -159,23 +158,18 @@ def changed(choices: DesignChoices, within: Mapping[Entry, float]) -> tuple[Desi
             sizes[command] = min(COMMAND * sizes[command], most)
             sizes[deviation] *= DEVIATION
             words.append(f"{axis} faster ({furthest})")
-        elif noise[deviation] > 1.01 * NOISE_SHARE * floor[deviation]:
-            for y in noise:
-                noise[y] = max(noise[y] / COMMAND, NOISE_SHARE * floor[y])
-            words.append(f"noise down ({axis}, {furthest})")
         else:
             sizes[command] /= SLOWER
             words.append(f"{axis} slower ({furthest})")
-    return replace(choices, sizes=sizes, noise=noise), "; ".join(words)
+    return replace(choices, sizes=sizes), "; ".join(words)
 
 
 def probes(choices: DesignChoices) -> Iterator[DesignChoices]:
-    """Yield sizes whose point designs tell what can be met: as given, quick, quiet, slow."""
+    """Yield sizes whose point designs tell what can be met: as given, quick, quiet."""
     for commands, deviations, noise in (
         (1.0, 1.0, 1.0),
         (4.0, 0.5, NOISE_SHARE),
         (2.0, 0.5, NOISE_SHARE / 2),
-        (0.5, 1.0, NOISE_SHARE),
     ):
         sizes = dict(choices.sizes)
         for command, deviation in AXES.values():
@@ -239,8 +233,8 @@ HEAD = (
 
 
 def picture(path: Path, vehicle: str = "xcell60") -> None:
-    """Draw bandwidth, worst gain margin and control travel of each axis in hover over a factor on
-    the sizes of all commands, of point designs.
+    """Draw bandwidth, worst gain margin and control travel of each axis over a factor on
+    the sizes of all commands, of point designs in the middle.
     """
     import matplotlib
 
