@@ -165,11 +165,12 @@ def changed(choices: DesignChoices, within: Mapping[Entry, float]) -> tuple[Desi
 
 
 def probes(choices: DesignChoices) -> Iterator[DesignChoices]:
-    """Yield sizes whose point designs tell what can be met: as given, quick, quiet."""
+    """Yield sizes whose point designs tell what can be met: as given, quick, quiet, slow."""
     for commands, deviations, noise in (
         (1.0, 1.0, 1.0),
         (4.0, 0.5, NOISE_SHARE),
         (2.0, 0.5, NOISE_SHARE / 2),
+        (0.5, 1.0, NOISE_SHARE),
     ):
         sizes = dict(choices.sizes)
         for command, deviation in AXES.values():
