@@ -29,7 +29,7 @@ ARGUMENTS = (
     *vehicle(
         None, "(without FILE) packaged airframe or TOML file (default: xcell60)", in_place=False
     ),
-    option("--seeds", "N", "(without FILE) number of seeds (default: 20)", at_least_one),
+    option("--seeds", "N", "(without FILE) seeds beside the default one, 20", at_least_one),
     option(
         "--show",
         "QUANTITY",
