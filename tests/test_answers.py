@@ -60,9 +60,8 @@ PYTHON = {
     ),
     "one printed form as a word": (
         lambda s: symheli.Helicopter.load("xcell60", printed="nothing"),
-        UnknownNameError,
-        "unknown printed option 'i'",
-        "known: lateral_flapping, flapping_sign, fuselage_downwash, rotor_reaction,",
+        InputError,
+        "printed: expected a list of names, such as ['nothing']",
     ),
     "a number for a vehicle": (
         lambda s: symheli.Helicopter.load(5),

@@ -65,6 +65,7 @@ def _of_model(arguments: argparse.Namespace) -> Output:
 
     from symheli.values import Signal
 
+    options.refuse(arguments, options.OF_A_VEHICLE, "on a model from a file, --model")
     loop, said = _loop(arguments)
     lpv = given_model.lpv_model(arguments)
     s = lpv.scheduling
@@ -138,6 +139,7 @@ def _of_vehicle(arguments: argparse.Namespace) -> Output:
     progress(f"trimming and linearizing {arguments.vehicle} from {low:g} to {high:g} m/s")
     family = symheli.sweep(options.helicopter(arguments), np.linspace(low, high, arguments.points))  # type: ignore[arg-type]
     if arguments.feedback:
+        options.refuse(arguments, ["degree"], "on the exact models, whose loop --feedback closes")
         gains = dict(arguments.feedback)
         what = f"{arguments.vehicle} without servos and delay, {given_model.words(gains)}"
         speeds = [float(v) for v in family.airspeeds]

@@ -425,5 +425,7 @@ def feedback_matrix(
         if not isinstance(pair, tuple) or len(pair) != 2:
             raise InputError(f"feedback: expected {pairs}, got the key {pair!r:.80}")
         u, y = pair
-        K[indices([u], inputs, "input")[0], indices([y], outputs, "output")[0]] = finite(gain, f"gain from {y} to {u}")
+        K[indices([u], inputs, "input")[0], indices([y], outputs, "output")[0]] = finite(
+            gain, f"gain from {y} to {u}"
+        )
     return K

@@ -192,9 +192,7 @@ def trim(
         acceleration=acceleration,
         altitude=altitude,
     )
-    problem = Equilibrium(
-        heli if altitude is None else heli.at_altitude(altitude), condition
-    )
+    problem = Equilibrium(heli if altitude is None else heli.at_altitude(altitude), condition)
     z = problem.search(
         problem.guess() if start is None else problem.unknowns_of(start), continuation
     )

@@ -28,7 +28,9 @@ def finite(value: Any, name: str, unit: str = "") -> float:
     except (TypeError, ValueError):
         number = math.nan
     if not math.isfinite(number):
-        raise InputError(f"{name}: expected a finite number{unit and f' of {unit}'}, got {value!r:.80}")
+        raise InputError(
+            f"{name}: expected a finite number{unit and f' of {unit}'}, got {value!r:.80}"
+        )
     return number
 
 
