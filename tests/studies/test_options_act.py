@@ -163,10 +163,14 @@ def stubbed(monkeypatch, folder):
     from symheli import export as exports
 
     monkeypatch.chdir(folder)
-    for module in (symheli, synthesis, synthesis.analysis):
-        for name in ("trim", "sweep", "l2_gain", "stability", "lft_gain", "lft_stability"):
-            if hasattr(module, name):
-                monkeypatch.setattr(module, name, reached)
+    stubs = (
+        (symheli, ("trim", "sweep")),
+        (synthesis, ("l2_gain", "stability", "lft_gain")),
+        (synthesis.analysis, ("lft_stability",)),
+    )
+    for module, names in stubs:
+        for name in names:
+            monkeypatch.setattr(module, name, reached)
     loop = SimpleNamespace(to_lft=lambda: SimpleNamespace(reduce=lambda: None))
     monkeypatch.setattr(lateral, "lateral_loop", lambda *_, **__: loop)
     monkeypatch.setattr(experiments, "design", reached)
@@ -174,10 +178,13 @@ def stubbed(monkeypatch, folder):
     monkeypatch.setattr(campaign, "run_campaign", reached)
     monkeypatch.setattr(calibrate, "record_of", lambda a, _: (a.map, a.start, a.stop))
     monkeypatch.setattr(idn, "calibrate", reached)
-    for module in (exports, identifiers):
-        for name in ("write_c", "write_mat", "write_estimator", "write_model"):
-            if hasattr(module, name):
-                monkeypatch.setattr(module, name, lambda *_, **__: ())
+    writers = (
+        (exports, ("write_c", "write_mat")),
+        (identifiers, ("write_estimator", "write_model")),
+    )
+    for module, names in writers:
+        for name in names:
+            monkeypatch.setattr(module, name, lambda *_, **__: ())
 
 
 def vanished(words):
