@@ -1,6 +1,7 @@
 """An option that is given is read by the work, or refused: alone, and beside every other."""
 
 import argparse
+from functools import cache
 from itertools import combinations
 from types import SimpleNamespace
 
@@ -81,6 +82,7 @@ MODES = {
     "linearize": ["linearize"],
     "derivatives": ["derivatives"],
     "vehicles": ["vehicles"],
+    "reference of vehicles": ["vehicles", "--reference"],
     **{f"export {kind}": ["export", kind] for kind in ("c", "identifier", "mat", "latex")},
     "export model": ["export", "model", "--model", "model.json"],
     "export mat of a model": ["export", "mat", "--model", "model.json"],
@@ -117,8 +119,11 @@ def reached(*_, **__):
     raise Reached
 
 
+_parser = cache(cli.parser)
+
+
 def options_of(verb):
-    (verbs,) = (a for a in cli.parser()._actions if isinstance(a.choices, dict))
+    (verbs,) = (a for a in _parser()._actions if isinstance(a.choices, dict))
     return [
         action
         for action in verbs.choices[verb]._actions
@@ -163,6 +168,7 @@ def stubbed(monkeypatch, folder):
     from symheli import export as exports
 
     monkeypatch.chdir(folder)
+    monkeypatch.setattr(cli, "parser", _parser)
     stubs = (
         (symheli, ("trim", "sweep")),
         (synthesis, ("l2_gain", "stability", "lft_gain")),
