@@ -171,6 +171,7 @@ def parser() -> Parser:
         sub = verbs.add_parser(verb, help=module.HELP, description=module.HELP)
         kept = getattr(module, "kept", _nothing_written)
         sub.set_defaults(run=module.run, usage=sub.format_usage, kept=kept, every_verb=whole)
+        sub.set_defaults(default_of=sub.get_default)
         add(sub, module.ARGUMENTS)
         sub.add_argument("--json", action="store_true", help="print what a program would read")
     return whole

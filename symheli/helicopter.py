@@ -134,6 +134,8 @@ class Helicopter:
         """Load a packaged airframe by name (`symheli.airframe.vehicle.vehicles()`) or a vehicle
         TOML file by path. With `allow_code` the Python files that it names as parts are run.
         """
+        if isinstance(printed, str):
+            raise InputError(f"printed: expected a list of names, such as [{printed!r}]")
         loaded = load_vehicle(vehicle, allow_code=allow_code)
         return cls(loaded, governor, float(density), frozenset(printed), float(smoothing))
 

@@ -248,6 +248,8 @@ def compare_frozen(
     ([True, True], 0)
     """
     points, frequencies = list(reference), whole(frequencies, "frequencies", 2)
+    if not points or not models:
+        raise InputError("compare_frozen: give models={name: ...} and reference={point: ...}")
     at = points[len(points) // 2] if responses_at is None and points else responses_at
     if at not in points or (mode is not None and set(mode) != set(points)):
         raise InputError(

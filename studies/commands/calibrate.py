@@ -78,6 +78,8 @@ def run(arguments: argparse.Namespace) -> Output:
 
     if arguments.write is not None and arguments.write.suffix != ".toml":
         raise InputError(f"--write: expected a file that ends in .toml, got {arguments.write}")
+    if arguments.servo is None:
+        options.refuse(arguments, ["delay"], "without --servo")
     if arguments.vehicle is None:
         arguments.vehicle = str(arguments.logs.pop(0))
     if not arguments.logs:

@@ -146,6 +146,7 @@ def _lateral(arguments: argparse.Namespace) -> tuple[LPVStateSpace, str]:
 
 def _given(arguments: argparse.Namespace) -> tuple[LPVStateSpace, str]:
     """The loop of --model, and what it is."""
+    options.refuse(arguments, options.OF_A_VEHICLE, "on a model from a file, --model")
     if arguments.channel:
         raise InputError(
             "--channel selects a channel of a vehicle's lateral loop; for a model give --inputs and"
@@ -164,6 +165,7 @@ def _given(arguments: argparse.Namespace) -> tuple[LPVStateSpace, str]:
 
 def _refuse_form(arguments: argparse.Namespace) -> None:
     given = ("memory", "across", "segments", "grading")
+    options.refuse(arguments, ["rate"], "on an LFT test, --lft, where the parameter may jump")
     names = [name for name in given if getattr(arguments, name)]
     names += ["order"] if arguments.order > 1 else []
     if names:

@@ -58,6 +58,7 @@ def run(arguments: argparse.Namespace) -> Output:
 
     if arguments.flown or arguments.plan:
         return _flown(arguments)
+    options.refuse(arguments, ("sweeps", "map"), "without --flown")
     axis = AXES[arguments.axis]
     attitude = math.radians(arguments.attitude_deg)
     limits = {"phi": attitude, "theta": attitude, "p": arguments.rate, "q": arguments.rate}
@@ -92,6 +93,8 @@ def _flown(arguments: argparse.Namespace) -> Output:
 
     if not (arguments.flown and arguments.plan):
         raise InputError("give --flown LOG together with --plan plan.json")
+    held = ("vehicle", "axis", "flights", "attitude_deg", "rate", "write")
+    options.refuse(arguments, held, "on --flown, for which --plan holds everything")
     records = [
         FlightRecord.load(log)
         if log.suffix == ".npz"

@@ -59,8 +59,31 @@ ARGUMENTS = (
 )
 
 
+IDENTIFIER = {
+    *("outputs", "inputs", "na", "nb", "delay", "degree", "offset"),
+    *("forgetting", "directional", "single"),
+}
+EFFECTIVE: dict[str, set[str]] = {
+    "c": {*options.OF_A_VEHICLE},
+    "identifier": {*options.OF_A_VEHICLE, *IDENTIFIER, "airspeeds"},
+    "model": {"single"},
+    "controller": set(),
+    "mat": {*options.OF_A_VEHICLE, "airspeeds", "points"},
+    "latex": {*options.OF_A_VEHICLE},
+    "markdown": {*options.OF_A_VEHICLE},
+}
+"""Options that have an effect on a format, beside --out and --model."""
+OPTIONS = set[str]().union(*EFFECTIVE.values())
+
+
 def run(arguments: argparse.Namespace) -> Output:
-    """Write the file(s) and list them."""
+    """Write the file(s) and list them; raises `InputError` for an option that has no effect on
+    them.
+    """
+    idle = OPTIONS - EFFECTIVE[arguments.format] - {"model"}
+    if arguments.model and arguments.format == "mat":
+        idle |= {*options.OF_A_VEHICLE, "airspeeds", "points"}
+    options.refuse(arguments, sorted(idle), f"on the format {arguments.format}")
     if arguments.format == "model":
         return _list(_model(arguments))
     if arguments.format == "controller":

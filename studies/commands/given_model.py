@@ -78,6 +78,7 @@ def lpv_model(arguments: argparse.Namespace) -> LPVStateSpace:
     given = read(arguments.model)
     if isinstance(given, LinearFamily):
         return given.select(arguments.states).interpolate("polynomial", arguments.degree)
+    options.refuse(arguments, ["degree"], "on an identified model, which is not interpolated")
     if arguments.states:
         raise InputError("--states selects states of a family; an identified model keeps its own")
     return given.to_state_space()

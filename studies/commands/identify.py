@@ -47,6 +47,12 @@ FIT_OPTIONS = (
 identified at once.
 """
 
+OF_A_FIT = (
+    *("smooth_scheduling", "scheduling_at", "commanded", "na", "nb", "delay", "degree"),
+    *("no_offset", "offset_rate", "method", "start", "stop", "segments", "decimate", "train"),
+)
+"""Options of a fit that do not request one."""
+
 ONE_MODEL = {
     "plot": "draws the fits of",
     "bands": "draws the coefficients of",
@@ -190,6 +196,9 @@ def _identified(arguments: argparse.Namespace) -> Output:
     if not any(getattr(arguments, name) for name in FIT_OPTIONS):
         seen = _contents(arguments, arguments.log)
         if not _at_once(arguments, kind, seen):
+            options.refuse(
+                arguments, OF_A_FIT, "on the survey of a log; --outputs and --inputs request a fit"
+            )
             return _survey(arguments, seen)
     structure, training, test, prepared = _requested(arguments, kind)
     record = prepared.record
@@ -206,6 +215,7 @@ def _identified(arguments: argparse.Namespace) -> Output:
                 )
         if arguments.method != "ls":
             raise InputError("--orders compares models of least squares; leave --method out")
+        options.refuse(arguments, ("na", "nb", "degree"), "on --orders, which compares many")
         return _orders(replace(structure, offset_rate=trim == "moving"), training, test, hold)
     result = compare_constant(
         structure,

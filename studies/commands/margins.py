@@ -65,6 +65,7 @@ def _of_model(arguments: argparse.Namespace) -> Output:
 
     from symheli.values import Signal
 
+    options.refuse(arguments, options.OF_A_VEHICLE, "on a model from a file, --model")
     loop, said = _loop(arguments)
     lpv = given_model.lpv_model(arguments)
     s = lpv.scheduling
@@ -131,14 +132,16 @@ def _of_vehicle(arguments: argparse.Namespace) -> Output:
             f" symheli specs {arguments.vehicle} --controller {arguments.controller}"
         )
     low, high = arguments.airspeeds or (0.0, 13.0)
-    if not (0 <= low < high) or arguments.points <= arguments.degree:
+    gains = dict(arguments.feedback)
+    if gains:
+        options.refuse(arguments, ["degree"], "on the exact models, whose loop --feedback closes")
+    if not (0 <= low < high) or (not gains and arguments.points <= arguments.degree):
         raise InputError(
             "expected 0 <= LOW < HIGH and more points than the degree of the interpolation"
         )
     progress(f"trimming and linearizing {arguments.vehicle} from {low:g} to {high:g} m/s")
     family = symheli.sweep(options.helicopter(arguments), np.linspace(low, high, arguments.points))  # type: ignore[arg-type]
-    if arguments.feedback:
-        gains = dict(arguments.feedback)
+    if gains:
         what = f"{arguments.vehicle} without servos and delay, {given_model.words(gains)}"
         speeds = [float(v) for v in family.airspeeds]
         return _of_loop(family, gains, speeds, family.axes[0], what)

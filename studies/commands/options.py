@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -304,6 +304,20 @@ def _is_a_vehicle(path: Path) -> bool:
         return "body" in tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
         return False  # whoever reads it says what is wrong
+
+
+def refuse(arguments: argparse.Namespace, names: Iterable[str], why: str) -> None:
+    """Raise `InputError` where one of these options is given another value than its default; `why`
+    says for what it has no effect.
+    """
+    given = [n for n in names if getattr(arguments, n) != arguments.default_of(n)]
+    if given:
+        listed = ", ".join(f"--{name.replace('_', '-')}" for name in given)
+        raise InputError(f"{listed}: no effect {why}; leave it out")
+
+
+OF_A_VEHICLE = ("vehicle", "governor", "printed")
+"""Options without effect where a model comes from a file."""
 
 
 def helicopter(arguments: argparse.Namespace) -> Helicopter:

@@ -86,6 +86,10 @@ def run(arguments: argparse.Namespace) -> Output:
     low, high = arguments.airspeeds or (0.0, 13.0)
     if not 0 <= low < high or arguments.points < 2:
         raise InputError("expected 0 <= LOW < HIGH and at least two points")
+    if not arguments.flown:
+        options.refuse(arguments, ["flights"], "without --flown")
+    if not arguments.proven:
+        options.refuse(arguments, ["rate"], "without --proven")
     sheet = Sheet.load(arguments.sheet).select(arguments.axes)
     vehicle, of_study = _study(arguments)
     of = OfVehicle(

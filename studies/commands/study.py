@@ -51,6 +51,7 @@ def run(arguments: argparse.Namespace) -> Output:
     options.file_or_vehicle(arguments)
     configuration = _configuration(arguments)
     if arguments.write_config is not None:
+        options.refuse(arguments, ["resume"], "on --write-config, which runs nothing")
         return options.choices_written(configuration.text, arguments.write_config)
     from studies.transition.study import run_study
 

@@ -124,6 +124,11 @@ def run(arguments: argparse.Namespace) -> Output:
 
     if not arguments.set:
         raise InputError("nothing is changed: give --set NAME=VALUE, such as ATC_RAT_RLL_P=0.15")
+    if arguments.as_it_is:
+        from_the_flight = ("draws", "start", "stop", "gust", "window", "map")
+        options.refuse(arguments, from_the_flight, "on --as-it-is, which takes no calibration")
+    if arguments.prove is None:
+        options.refuse(arguments, ["rate"], "without --prove")
     parameters = read_parameters(arguments.parameters or arguments.log)
     change = dict(arguments.set)
     before = HelicopterLoops.from_parameters(parameters, throw=dict(arguments.throw))

@@ -35,6 +35,7 @@ def run(arguments: argparse.Namespace) -> Output:
     from symheli.steady.validity import Validity, warn
 
     if arguments.reference:
+        options.refuse(arguments, ["vehicle"], "on the reference, which is that of every vehicle")
         text = reference()
         return Output(text.rstrip("\n"), {"reference": text})
     if arguments.toml:

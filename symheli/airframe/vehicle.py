@@ -182,6 +182,11 @@ def load_vehicle(name_or_path: str | os.PathLike[str], *, allow_code: bool = Fal
     A Python file that it names as a part is run only with `allow_code`. Raises `InputError` with
     every wrong or missing entry of the file: its line, what was expected and what came.
     """
+    if not isinstance(name_or_path, str | os.PathLike):
+        raise InputError(
+            f"vehicle: expected a name, one of {', '.join(vehicles())}, or a .toml file, got"
+            f" {name_or_path!r:.80}"
+        )
     given = os.fspath(name_or_path)
     if given.endswith(".toml"):
         path = Path(given)

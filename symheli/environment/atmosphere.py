@@ -6,6 +6,7 @@ import math
 from typing import NamedTuple
 
 from symheli.errors import InputError
+from symheli.values.numbers import finite
 
 GRAVITY = 9.80665  # m/s^2, by which the geopotential metre is defined
 GAS_CONSTANT = 287.05287  # J/(kg K), dry air
@@ -73,7 +74,8 @@ def standard_atmosphere(altitude: float, warmer: float = 0.0) -> Air:
     >>> round(air.density, 3), round(air.temperature, 2)
     (1.007, 275.15)
     """
-    if not (math.isfinite(altitude) and -2000.0 <= altitude <= CEILING):
+    altitude = finite(altitude, "altitude", "m")
+    if not (-2000.0 <= altitude <= CEILING):
         raise InputError(
             f"altitude: expected -2000 .. {CEILING:.0f} m above sea level, got {altitude}; feet"
             " times 0.3048 are metres"

@@ -11,7 +11,7 @@ from scipy.signal import chirp
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.values.arrays import frozen
-from symheli.values.numbers import whole
+from symheli.values.numbers import by_name, finite, whole
 
 Kind = Literal["multisine", "prbs", "chirp", "sweep"]
 
@@ -83,7 +83,10 @@ class Excitation:
                 f"period: a sweep holds its lowest frequency for two cycles,"
                 f" {2 / self.band[0]:.3g} s, and must be longer, got {self.period:g} s"
             )
-        if not all(np.isfinite(a) and a >= 0 for a in self.amplitude.values()):
+        by_name(self.amplitude, "amplitude", "{input: rad}, such as {'d_lon': 0.01}")
+        for name, size in self.amplitude.items():
+            finite(size, f"amplitude of {name}", "rad")
+        if not all(a >= 0 for a in self.amplitude.values()):
             raise InputError(f"amplitudes must be >= 0 rad, got {dict(self.amplitude)}")
 
     def __call__(self, time: np.ndarray) -> dict[str, np.ndarray]:

@@ -157,6 +157,8 @@ def check_order(order: int, model: LPVStateSpace | LinearModel) -> None:
     """Raises `InputError` unless there are more states than `order`."""
     nx = len(model.states)
     if not isinstance(order, int) or isinstance(order, bool) or not 0 < order < nx:
+        if nx < 2:
+            raise InputError(f"order: a model of {nx} states cannot be truncated")
         raise InputError(
             f"order: expected an integer from 1 to {nx - 1} (the model has {nx} states), got"
             f" {order!r}"

@@ -15,6 +15,7 @@ from symheli.lpv.operators import Operators
 from symheli.values.aligned import matrix
 from symheli.values.arrays import Array, frozen
 from symheli.values.html_table import as_table
+from symheli.values.numbers import by_name, finite
 from symheli.values.operating_point import OperatingPoint
 from symheli.values.sample_period import same_period
 from symheli.values.signal import Signal, indices, signals
@@ -419,6 +420,12 @@ def feedback_matrix(
 ) -> np.ndarray:
     """K (nu, ny) of u = K y from {(input, output): gain}; raises `UnknownNameError`."""
     K = np.zeros((len(inputs), len(outputs)))
-    for (u, y), gain in gains.items():
-        K[indices([u], inputs, "input")[0], indices([y], outputs, "output")[0]] = float(gain)
+    pairs = "{(input, output): gain}"
+    for pair, gain in by_name(gains, "feedback", pairs).items():
+        if not isinstance(pair, tuple) or len(pair) != 2:
+            raise InputError(f"feedback: expected {pairs}, got the key {pair!r:.80}")
+        u, y = pair
+        K[indices([u], inputs, "input")[0], indices([y], outputs, "output")[0]] = finite(
+            gain, f"gain from {y} to {u}"
+        )
     return K

@@ -127,6 +127,11 @@ def sampled_alike(*models: LinearModel) -> tuple[LinearModel, ...]:
     """Return discrete models as they are, continuous ones after one bilinear transformation, which
     preserves gains and the nu-gap; raise `InputError` unless they have one sample period.
     """
+    for model in models:
+        if not isinstance(model, LinearModel):
+            raise InputError(
+                f"expected a LinearModel, got {type(model).__name__}; an LPV model has .at(p)"
+            )
     periods = [m.dt for m in models]
     if not all(same_period(dt, periods[0]) for dt in periods):
         raise InputError(

@@ -11,6 +11,7 @@ import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.values.arrays import Array, frozen
+from symheli.values.numbers import finite
 from symheli.values.units import per_second, ratio
 
 if TYPE_CHECKING:
@@ -68,7 +69,15 @@ class Scheduling:
     rate: Limit = math.inf
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high):
+        if not (isinstance(self.name, str) and isinstance(self.unit, str)):
+            raise InputError(
+                "scheduling: expected a name and a unit before the range, as"
+                f" Scheduling('airspeed', 'm/s', 0.0, 13.0), got {self.name!r:.40} and"
+                f" {self.unit!r:.40}"
+            )
+        for end in ("low", "high"):
+            finite(getattr(self, end), f"scheduling {self.name}: {end}")
+        if not self.low < self.high:
             raise InputError(
                 f"scheduling {self.name}: expected finite low < high, got [{self.low}, {self.high}]"
             )

@@ -12,6 +12,7 @@ from symheli.values.arrays import Array, frozen
 from symheli.values.drawing import axes_of, label, legend_beside, plain
 from symheli.values.html_table import as_table
 from symheli.values.labelled import frame
+from symheli.values.numbers import positive
 from symheli.values.signal import Signal, indices, signals
 from symheli.values.summary import summarized
 
@@ -88,8 +89,7 @@ class StepResponse:
 
 def step_response(model: LinearModel, duration: float, samples: int) -> StepResponse:
     """See `LinearModel.step_response`."""
-    if not (np.isfinite(duration) and duration > 0):
-        raise InputError(f"duration: expected a number of seconds > 0, got {duration!r}")
+    duration = positive(duration, "duration, s")
     if model.dt is None:
         if samples < 2:
             raise InputError(f"samples: expected at least 2, got {samples}")

@@ -12,6 +12,7 @@ from scipy.signal import butter, sosfilt, sosfilt_zi, sosfiltfilt
 from symheli.errors import InputError
 from symheli.records.flight_record import GAP, FlightRecord
 from symheli.values.arrays import Array
+from symheli.values.numbers import finite
 from symheli.values.sample_period import JITTER
 
 
@@ -278,6 +279,8 @@ def split(record: FlightRecord, fraction: float) -> tuple[FlightRecord, FlightRe
     >>> len(training), len(test)
     (350, 150)
     """
+    if not 0 < finite(fraction, "fraction") <= 1:
+        raise InputError(f"fraction: expected a part of the time in (0, 1], got {fraction!r:.80}")
     steps = np.diff(record.time)
     flown = record.time[0] + np.concatenate([[0.0], np.cumsum(_without_gaps(steps))])
     elapsed = flown if np.any(steps > GAP * np.median(steps)) else record.time

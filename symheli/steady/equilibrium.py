@@ -184,17 +184,15 @@ def trim(
     """
     require(heli, "trim(heli, airspeed=5.0)")
     condition = FlightCondition(
-        float(airspeed),
-        climb_rate=float(climb_rate),
-        turn_rate=float(turn_rate),
-        sideslip=float(sideslip),
-        wind=tuple(float(v) for v in wind),  # type: ignore[arg-type]
-        acceleration=float(acceleration),
-        altitude=None if altitude is None else float(altitude),
+        airspeed,
+        climb_rate=climb_rate,
+        turn_rate=turn_rate,
+        sideslip=sideslip,
+        wind=wind,  # type: ignore[arg-type]
+        acceleration=acceleration,
+        altitude=altitude,
     )
-    problem = Equilibrium(
-        heli if altitude is None else heli.at_altitude(float(altitude)), condition
-    )
+    problem = Equilibrium(heli if altitude is None else heli.at_altitude(altitude), condition)
     z = problem.search(
         problem.guess() if start is None else problem.unknowns_of(start), continuation
     )

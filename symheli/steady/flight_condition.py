@@ -9,7 +9,18 @@ from typing import Any
 import numpy as np
 
 from symheli.errors import InputError
+from symheli.values.numbers import finite
 from symheli.values.signal import signals
+
+NUMBERS = {
+    "airspeed": "m/s",
+    "climb_rate": "m/s",
+    "turn_rate": "rad/s",
+    "sideslip": "rad",
+    "acceleration": "m/s^2",
+    "altitude": "m",
+}
+"""Unit of each number of a flight condition."""
 
 DEMAND = signals(
     ("forward", "right", "down", "turn_rate", "wind_n", "wind_e", "wind_d", "acceleration"),
@@ -64,19 +75,19 @@ class FlightCondition:
     altitude: float | None = None
 
     def __post_init__(self) -> None:
-        values = [
-            self.airspeed,
-            self.climb_rate,
-            self.turn_rate,
-            self.sideslip,
-            self.acceleration,
-            *self.wind,
-            self.altitude or 0.0,
-        ]
-        if len(self.wind) != 3:
+        for name, unit in NUMBERS.items():
+            if (given := getattr(self, name)) is not None or name != "altitude":
+                object.__setattr__(self, name, finite(given, name, unit))
+        if np.shape(self.wind) != (3,):
             raise InputError(f"wind: expected (north, east, down) in m/s, got {self.wind!r:.80}")
-        if not all(math.isfinite(v) for v in values):
-            raise InputError(f"a flight condition needs finite numbers, got {self!r}")
+        wind = tuple(finite(v, "wind", "m/s") for v in self.wind)
+        object.__setattr__(self, "wind", wind)
+        if abs(self.sideslip) > 2 * math.pi:
+            degrees = f"math.radians({self.sideslip:g})"
+            raise InputError(
+                f"sideslip: expected rad, within a full circle, got {self.sideslip:g}; degrees are"
+                f" {degrees}"
+            )
         if self.airspeed < 0:
             raise InputError(
                 f"airspeed must be >= 0 m/s, got {self.airspeed}; rearward flight is sideslip = pi"

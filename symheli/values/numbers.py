@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
+from collections.abc import Mapping
 from typing import Any
 
 from symheli.errors import InputError
@@ -18,6 +19,26 @@ def whole(value: Any, name: str, least: int = 0) -> int:
     if number < least or isinstance(value, bool):
         raise InputError(f"{name}: expected a whole number >= {least}, got {value!r:.80}")
     return number
+
+
+def finite(value: Any, name: str, unit: str = "") -> float:
+    """The value as a float; raises `InputError` unless it is one finite number."""
+    try:
+        number = math.nan if isinstance(value, str) else float(value)
+    except (TypeError, ValueError):
+        number = math.nan
+    if not math.isfinite(number):
+        raise InputError(
+            f"{name}: expected a finite number{unit and f' of {unit}'}, got {value!r:.80}"
+        )
+    return number
+
+
+def by_name(value: Any, name: str, shape: str) -> Mapping[Any, Any]:
+    """The value; raises `InputError` unless it is a mapping, of the `shape` that is shown."""
+    if not isinstance(value, Mapping):
+        raise InputError(f"{name}: expected {shape}, got {value!r:.80}")
+    return value
 
 
 def positive(value: Any, name: str) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 
 from symheli.errors import UnknownNameError
 from symheli.lpv.lft_matrices import Block, LFTMatrices
-from symheli.lpv.linear_model import LinearModel
+from symheli.lpv.linear_model import LinearModel, feedback_matrix
 from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.lpv.operators import Operators
 from symheli.lpv.scheduling import Scheduling
@@ -299,11 +299,7 @@ class LFT(Operators, LFTMatrices):
         """
         from symheli.lpv.lft.algebra import close
 
-        K = np.zeros((len(self.inputs), len(self.outputs)))
-        for (u, y), gain in gains.items():
-            K[indices([u], self.inputs, "input")[0], indices([y], self.outputs, "output")[0]] = (
-                float(gain)
-            )
+        K = feedback_matrix(gains, self.inputs, self.outputs)
         return close(
             self, K, np.eye(len(self.inputs)), np.eye(len(self.outputs)), self.inputs, self.outputs
         )

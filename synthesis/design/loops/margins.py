@@ -14,6 +14,7 @@ from symheli.errors import InputError
 from symheli.lpv.linear_model import feedback_matrix
 from symheli.lpv.lower_feedback import PREFIX, apart
 from symheli.values.signal import indices
+from synthesis.numerics.linear.model import as_model
 from synthesis.numerics.linear.norm import crossings, norm, of_one_size, pace_of, to_continuous
 
 Array = np.ndarray
@@ -192,6 +193,7 @@ def margins(loop: LinearModel) -> Margins:
     >>> print(f"{found.phase:.4f} rad, {found.delay:.4f} s")
     1.5708 rad, 0.7854 s
     """
+    loop = as_model(loop)
     if len(loop.inputs) != 1 or len(loop.outputs) != 1:
         raise InputError(
             f"margins need a loop of one input and one output, got {len(loop.inputs)} and"
@@ -281,6 +283,7 @@ def disk_margin(loop: LinearModel) -> float:
     >>> print(f"{disk_margin(open_loop(plant, {('u', 'y'): -2.0}, 'u')):.3f}")
     2.000
     """
+    loop = as_model(loop)
     if len(loop.inputs) != len(loop.outputs):
         raise InputError(
             f"a loop needs as many outputs as inputs, got {len(loop.outputs)} and"

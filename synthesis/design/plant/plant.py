@@ -18,6 +18,7 @@ from symheli.lpv.mixing import ERROR, itself, mixed
 from symheli.lpv.scheduling import Rates
 from symheli.lpv.tools import lagged, lower_feedback
 from symheli.values.html_table import as_table
+from symheli.values.numbers import by_name
 from symheli.values.signal import Signal, indices, signals
 from symheli.values.summary import summarized
 from symheli.values.units import per_second
@@ -264,7 +265,7 @@ class Plant:
         measurement.
         """
         plant = self
-        for name, size in sizes.items():
+        for name, size in by_name(sizes, "noise", "{measurement: size}").items():
             noise, size = Signal(f"{name}_noise", "1"), parts.positive(size, f"the noise of {name}")
             plant = plant._with_own_measurement(name)._with_disturbance(noise, {name: size})
         return plant
@@ -274,7 +275,7 @@ class Plant:
         {control: size} per unit of each: what a control costs beside what its weights ask.
         """
         plant = self
-        for name, size in sizes.items():
+        for name, size in by_name(sizes, "cost", "{control: size}").items():
             (i,) = indices([name], self.controls, "control")
             cost, size = Signal(f"{name}_cost", "1"), parts.positive(size, f"the cost of {name}")
             across: dict[str, float] = {self.controls[i]: size}
