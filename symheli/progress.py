@@ -113,8 +113,8 @@ def watched(listener: Listener | None) -> Iterator[None]:
 class _Line:
     """A listener that shows the outermost and the innermost task in one line of standard error."""
 
-    AFTER, EVERY = 2.0, 1.0
-    """Seconds until it is shown, and between two changes."""
+    AFTER, EVERY, WIDEST = 2.0, 1.0, 110
+    """Seconds until it is shown, and between two changes; characters of it at most."""
 
     def __init__(self) -> None:
         self._open: list[Progress] = []
@@ -138,32 +138,27 @@ class _Line:
     def _show(self, over: threading.Event) -> None:
         wait = self.AFTER
         while not over.wait(wait):
-            ends = self._open if len(self._open) < 3 else [self._open[0], self._open[-1]]
-            shown = "; ".join(map(str, ends))
+            shown = "; ".join(map(str, dict.fromkeys([*self._open[:1], *self._open[-1:]])))
             with self._lock:
                 if not over.is_set():
                     self._write(f"symheli: {shown}, {time.monotonic() - self._since:.0f} s")
             wait = self.EVERY
 
     def _write(self, text: str) -> None:
-        text = text[:LINE]
+        text = text[: self.WIDEST]
         sys.stderr.write(f"\r{text:{self._width}}{'' if text else chr(13)}")
         sys.stderr.flush()
         self._width = len(text)
 
 
-LINE = 110
-"""Characters that are shown of the progress."""
 _line = _Line()
 
 
 def _usual() -> Listener | None:
     """The line, in the main thread of a process of its own with a terminal or a notebook."""
     seen = sys.stderr.isatty() or "ipykernel" in sys.modules
-    if not seen or os.environ.get("SYMHELI_PROGRESS") == "0":
-        return None
     main = threading.current_thread() is threading.main_thread() and parent_process() is None
-    return _line if main else None
+    return _line if seen and main and os.environ.get("SYMHELI_PROGRESS") != "0" else None
 
 
 class Task:
