@@ -339,6 +339,10 @@ def trimmed(arguments: argparse.Namespace) -> tuple[Helicopter, TrimPoint]:
             f"--airspeed must be >= 0 m/s, got {speed:g}; rearward flight is --airspeed"
             f" {-speed:g} --sideslip-deg 180"
         )
+    if abs(arguments.sideslip_deg) > 360:
+        raise InputError(
+            f"--sideslip-deg {arguments.sideslip_deg:g} is beyond a full circle: give -180 to 180"
+        )
     if abs(climb) > speed:
         raise InputError(
             f"--climb-rate {climb:g} exceeds the --airspeed of {speed:g} m/s of the total velocity;"
