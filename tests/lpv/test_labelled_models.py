@@ -213,5 +213,5 @@ def test_a_step_response_is_exact_at_its_samples(ax, pd):
     assert step.plot(ax) is ax
     np.testing.assert_array_equal(drawn(ax)["y"], step.values[:, 0, 0])
     assert step.to_frame()["y from u"].iloc[-1] == step.values[-1, 0, 0]
-    with pytest.raises(InputError, match="seconds > 0"):
+    with pytest.raises(InputError, match="duration, s: expected a number > 0"):
         lag.step_response(0.0)

@@ -306,9 +306,13 @@ class Controller:
         return self.scheduled_controller.step(state, measured, reference, p)
 
     def __str__(self) -> str:
-        names = ", ".join(
-            f"{s.name} {'that may jump' if s.rate == math.inf else f'(rate {s.rate})'}"
+        rates = {
+            s.name: s.rate if isinstance(s.rate, str) else f"{s.rate:g}"
             for s in self.plant.parameters
+        }
+        names = ", ".join(
+            f"{name} {'that may jump' if rate == 'inf' else f'(rate {rate})'}"
+            for name, rate in rates.items()
         )
         time = "continuous" if self.dt is None else f"sampled every {self.dt:g} s"
         least = "" if self.optimum is None else f", least {self.optimum:.6g}"
