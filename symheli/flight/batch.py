@@ -14,7 +14,7 @@ from symheli.errors import CompilerWarning, FlightLostError, InputError
 from symheli.flight.controller import ScheduledController
 from symheli.flight.flight_data import FlightData
 from symheli.flight.flights import Flights
-from symheli.flight.plan import FlightPlan, Options, plan_of, shows_options
+from symheli.flight.plan import FlightPlan, Options, plan_of
 from symheli.flight.schedule import AirspeedSchedule
 from symheli.flight.validity import warn_of_flown
 from symheli.helicopter import Helicopter
@@ -99,7 +99,6 @@ class FlightBatch(Sequence[FlightRecord]):
         return out
 
 
-@shows_options
 def fly_batch(
     heli: Helicopter,
     schedules: Schedules,

@@ -20,7 +20,7 @@ from symheli.errors import InputError
 from symheli.flight.batch import CHUNK, Progress, Schedules, fly_in_chunks, plans_of
 from symheli.flight.flight_data import FlightData, signals_of
 from symheli.flight.flight_dataset import FlightDataset
-from symheli.flight.plan import FlightPlan, Options, shows_options
+from symheli.flight.plan import FlightPlan, Options
 from symheli.flight.plan_text import described
 from symheli.flight.validity import warn_of_plans
 from symheli.helicopter import Helicopter
@@ -30,7 +30,6 @@ from symheli.values.arrays import Array
 from symheli.values.signal import Signal, indices
 
 
-@shows_options
 def fly_campaign(
     heli: Helicopter,
     schedules: Schedules,
