@@ -84,11 +84,13 @@ def test_nothing_is_cut_and_the_console_is_silent(opened, width):
 
 SCROLLS = """() => [...document.querySelectorAll("figure .scroll, .equation .scroll")]
     .filter((e) => e.scrollWidth > e.clientWidth + 1 || e.scrollHeight > e.clientHeight + 1)
+    .filter((e) => !(innerWidth <= 640 && e.querySelector('svg[style*="--least"]'))) // readable
     .map((e) => (e.closest("[id]") || {}).id)"""
 
 
 @pytest.mark.parametrize("width", [390, 1280])
 def test_figures_and_equations_fit_the_page_without_scrolling(opened, width):
+    """But for a wide figure on a narrow screen, which scrolls so that its words can be read."""
     page, said = opened(width)
     assert page.evaluate(SCROLLS) == []
     panels = page.locator("svg.panel").count()
