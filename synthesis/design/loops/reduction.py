@@ -10,7 +10,7 @@ Goddard and Glover, CDC 1996). The analysis of the loop shows whether it was too
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import cached_property
 
@@ -20,6 +20,7 @@ from symheli import LPVStateSpace
 from symheli.errors import InputError, SynthesisError
 from symheli.lpv.balanced_truncation import response_gramians
 from symheli.lpv.bases.polynomials import lobatto_points
+from symheli.lpv.tools import lower_feedback
 from synthesis.design.loops.controller import Controller
 from synthesis.numerics.linear.norm import norm, stable
 
@@ -148,26 +149,48 @@ class _FullController:
 
 def frozen_gain(controller: Controller) -> float:
     """Return the largest H-infinity norm of the frozen loops, inf where one is not stable."""
-    loop: LPVStateSpace = controller.closed()
-    every = zip(*loop.matrices(_conditions(loop)), strict=True)
-    return max(norm(*each, loop.dt)[0] for each in every)
+    return max(norm(*each, controller.loop_plant.dt)[0] for each in _loops(controller))
 
 
 def gramians(controller: Controller) -> tuple[Array, Array]:
     """Return the reachability and observability Gramians (n, n) of the controller's states in the
     loop: means over frozen p, each in units of its own size.
     """
-    closed: LPVStateSpace = controller.closed()
-    n = controller.order
-    A, B, C, _ = closed.matrices(_conditions(closed))
+    n, dt = controller.order, controller.loop_plant.dt
     P, Q = np.zeros((n, n)), np.zeros((n, n))
-    for each in zip(A, B, C, strict=True):
-        if not stable(np.linalg.eigvals(each[0]), closed.dt):
+    loops = list(_loops(controller))
+    for A, B, C, _ in loops:
+        if not stable(np.linalg.eigvals(A), dt):
             raise SynthesisError(NOT_STABLE)
-        seen, reach = response_gramians(*each, closed.dt)
+        seen, reach = response_gramians(A, B, C, dt)
         P += reach[-n:, -n:]
         Q += seen[-n:, -n:]
-    return P / len(A), Q / len(A)
+    return P / len(loops), Q / len(loops)
+
+
+def _loops(controller: Controller) -> Iterator[tuple[Array, Array, Array, Array]]:
+    """A, B, C, D of the closed loops at frozen p; where no basis holds the loop as a function of
+    p, plant and controller are closed at each p.
+    """
+    try:
+        loop: LPVStateSpace = controller.closed()
+    except InputError:
+        return _closed_apart(controller)
+    return zip(*loop.matrices(_conditions(loop)), strict=True)
+
+
+def _closed_apart(controller: Controller) -> Iterator[tuple[Array, Array, Array, Array]]:
+    plant, model = controller.loop_plant, controller.model
+    names = [str(s.name) for s in plant.model.parameters]
+    own = [names.index(str(s.name)) for s in model.parameters]
+    for p in _conditions(plant.model).reshape(-1, len(names)):
+        loop = lower_feedback(
+            plant.model.at(*p),
+            model.at(*p[own]),
+            inputs=plant.disturbances,
+            outputs=plant.performance,
+        )
+        yield loop.A[0], loop.B[0], loop.C[0], loop.D[0]
 
 
 def _conditions(loop: LPVStateSpace) -> Array:

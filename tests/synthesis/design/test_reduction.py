@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from scheduled_plants import frozen, spring, spring_controller
 
+import symheli
+import synthesis
 from symheli import LinearModel, LPVStateSpace
 from symheli.errors import InputError, SynthesisError
 from synthesis import hinf, output_feedback
@@ -129,3 +131,33 @@ def test_a_loop_that_is_not_stable_is_not_reduced(made):
     wrong = replace(made, model=replace(made.model, C=-40 * made.model.C))
     with pytest.raises(SynthesisError, match="not stable at every frozen p"):
         wrong.reduce(1)
+
+
+def test_a_loop_through_feedthroughs_that_both_depend_on_p_is_closed_at_frozen_p():
+    """u = -(1 + p)(x + p u / 2) about x' = -x + w + u: 1 / (1 + k) with k = 1 at both ends and
+    more between; as a function of p the loop is rational, which no basis holds.
+    """
+    p = symheli.Scheduling("p", "1", low=0.0, high=1.0)
+    model = LPVStateSpace.polynomial(
+        [[[-1.0]]],
+        [[[1.0, 1.0]]],
+        [[[1.0], [1.0]]],
+        [np.zeros((2, 2)), [[0.0, 0.0], [0.0, 0.5]]],
+        p,
+        inputs=["w", "u"],
+        outputs=["z", "y"],
+    )
+    plant = synthesis.Plant(model, ["w"], ["z"], ["u"], ["y"])
+    gain = LPVStateSpace.polynomial(
+        [np.zeros((0, 0))],
+        [np.zeros((0, 1))],
+        [np.zeros((1, 0))],
+        [[[-1.0]], [[-1.0]]],
+        p,
+        inputs=["y"],
+        outputs=["u"],
+    )
+    made = synthesis.Controller.of(plant, gain)
+    with pytest.raises(InputError, match="rational"):
+        made.closed()
+    assert frozen_gain(made) == pytest.approx(0.5, rel=1e-6)
