@@ -264,9 +264,14 @@ def _drawn_radius(
         )
     m, n = P.shape[:2]
     white = np.random.default_rng(seed).standard_normal((draws, m * n))
-    root = symmetric_root(P.reshape(m * n, m * n))
-    error = (white @ root).reshape(draws, m, n).swapaxes(1, 2)
-    D = np.linalg.solve(left, error) @ np.linalg.inv(right)
+    joint = P.reshape(m * n, m * n)
+    unit = np.sqrt(np.diag(joint))  # with units 1e8 apart a root of P itself loses the small ones
+    unit = np.where(unit > 0, unit, 1.0)
+    error = (white @ symmetric_root(joint / np.outer(unit, unit))) * unit
+    error = error.reshape(draws, m, n).swapaxes(1, 2)
+    rows, columns = np.abs(left).max(axis=1), np.abs(right).max(axis=0)
+    D = np.linalg.solve(left / rows[:, None], error / rows[:, None] / columns)
+    D = D @ np.linalg.inv(right / columns)
     return float(np.sort(np.linalg.norm(D, 2, axis=(1, 2)))[rank - 1])
 
 
