@@ -99,12 +99,15 @@ class StructuredController(Controller):
     __repr__ = summarized
 
     def gain(self, name: str, p: Any) -> Array:
-        """Return a gain at p: (K,) values, or one, of the one parameter, (K, m) of several."""
+        """Return a gain at p: (K,) values, or one, of the one parameter; of m parameters (K, m),
+        or one point (m,).
+        """
         own = self.structure.coefficients(self.gains)[name]
-        basis = self.structure.basis
+        basis, m = self.structure.basis, len(self.plant.nominal.parameters)
+        points = np.asarray(p, float)
         if basis is None or len(own) < basis.size:
-            return np.full(np.shape(p), own[0])
-        return basis(p) @ own
+            return np.full(np.shape(points)[: np.ndim(points) - (m > 1)], own[0])
+        return np.asarray(basis(points) @ own)
 
     def on(self, specification: int) -> Controller:
         """Return the controller on the plant with the channels of one specification alone, to

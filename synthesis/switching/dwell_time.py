@@ -47,6 +47,10 @@ DECAYS = (0.3, 0.5, 0.7, 0.85, 0.95, 0.99)
 """Fractions of it that are tried for an average dwell time, and where A moves with p."""
 ACCURACY = 1e-3
 """Relative accuracy of the least dwell time."""
+LEAST_RADIUS = 1e-3
+"""Spectral radius of a sampled mode below which it counts as one of this: a nilpotent mode has no
+decay rate, and fractions of one that is too large leave no P.
+"""
 LONGEST, LARGEST_GROWTH = 1e4, 1e6
 """Longest dwell time that is tried, in time constants of the slowest mode, and largest mu."""
 
@@ -179,14 +183,20 @@ def dwell_time(
     if average:
         found = search.average()
         if within is None or found is None:
-            return found or _none(own, True, SOLVED_NONE)
+            return found or _refused(own, True)
         too_long = found.seconds > within
         return _none(own, True, f"{found.seconds:g} s were proven") if too_long else found
     found = search.least() if within is None else search.at(SHORT * within) or search.at(within)
-    return found or _none(own, False, SOLVED_NONE)
+    return found or _refused(own, False)
 
 
-SOLVED_NONE = "the inequalities have no solution that passes the exact check; try more parts"
+SOLVED_NONE = "the inequalities have no solution that passes the exact check"
+
+
+def _refused(modes: Modes, average: bool) -> DwellTime:
+    """No proof, with what may bring one: continuous P(t) has parts, sampled P has every sample."""
+    more = "" if average or modes.dt is not None else "; try more parts"
+    return _none(modes, average, SOLVED_NONE + more)
 
 
 def _none(modes: Modes, average: bool, why: str) -> DwellTime:
@@ -271,7 +281,10 @@ class _ModeSearch:
             steps = math.floor(seconds / dt * (1 + 1e-9))
             seconds = steps * dt
         fixed = all(self.fixed)
-        for fraction in SPARE_DECAYS if fixed else DECAYS:
+        fractions = SPARE_DECAYS if fixed else DECAYS
+        if dt is not None:
+            fractions = (0.0, *fractions)  # no cubic function of time that would need the room
+        for fraction in fractions:
             decay = fraction * self.rate
             motions = [self._motion(i, decay) for i in range(len(self.middle))]
             P = self._candidate(decay, [self._through(G, seconds) for G in motions], 1.0 + FLOOR)
@@ -416,4 +429,4 @@ def _decay(A: Array, dt: float | None) -> float:
     poles = np.linalg.eigvals(A)
     if dt is None:
         return -float(poles.real.max(initial=-math.inf))
-    return -math.log(max(float(np.abs(poles).max(initial=0.0)), 1e-300)) / dt
+    return -math.log(max(float(np.abs(poles).max(initial=0.0)), LEAST_RADIUS)) / dt

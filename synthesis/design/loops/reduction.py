@@ -13,6 +13,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -181,11 +182,12 @@ def _loops(controller: Controller) -> Iterator[tuple[Array, Array, Array, Array]
 
 def _closed_apart(controller: Controller) -> Iterator[tuple[Array, Array, Array, Array]]:
     plant, model = controller.loop_plant, controller.model
-    names = [str(s.name) for s in plant.model.parameters]
+    open_loop: Any = plant.model
+    names = [str(s.name) for s in open_loop.parameters]
     own = [names.index(str(s.name)) for s in model.parameters]
-    for p in _conditions(plant.model).reshape(-1, len(names)):
-        loop = lower_feedback(
-            plant.model.at(*p),
+    for p in _conditions(open_loop).reshape(-1, len(names)):
+        loop: Any = lower_feedback(
+            open_loop.at(*p),
             model.at(*p[own]),
             inputs=plant.disturbances,
             outputs=plant.performance,
