@@ -20,10 +20,10 @@ from synthesis.certify.lower_bounds.perturbation import worst_perturbation
 from synthesis.certify.questions.adjoint import ADJOINT, FAR_ABOVE, backwards
 from synthesis.certify.questions.apart import apart
 from synthesis.certify.questions.certificate import Certificate
-from synthesis.certify.questions.finer import ABOVE_FROZEN, finer
+from synthesis.certify.questions.finer import ABOVE_FROZEN, by_coefficients, finer, over_jumps
 from synthesis.certify.questions.general_search import General
 from synthesis.certify.questions.hypotheses import VERIFIED, hypotheses
-from synthesis.certify.questions.ladder import Found, Ladder
+from synthesis.certify.questions.ladder import CLOSE_TO_LOWER, Found, Ladder
 from synthesis.certify.questions.one_parameter_search import OneParameter
 from synthesis.certify.questions.problem import BoundProblem
 from synthesis.certify.statement.impose import Grid
@@ -81,8 +81,15 @@ def certify(problem: BoundProblem) -> Certificate:
     )
     if math.isinf(limit.value) if problem.gains else limit.value >= 0:
         return report.nothing(Status.GROWING, beaten)
-    ladder = route(problem)
-    best = ladder.search(math.inf if stability else abs(frozen.value))
+    ladder, level = route(problem), math.inf if stability else abs(frozen.value)
+    best = ladder.search(level)
+    for other in (over_jumps, by_coefficients) if stability else (by_coefficients,):
+        again = None if best.proof is not None else other(problem)
+        if again is not None:
+            first, ladder = ladder, route(again)
+            report, best = Report(again), ladder.search(level)
+            ladder.attempts[:0] = first.attempts
+            ladder.spent += first.spent
     if best.proof is None and stability:
         start = time.perf_counter()
         worst = growing(model.source, demand, search)
@@ -92,7 +99,11 @@ def certify(problem: BoundProblem) -> Certificate:
     cert = report.found(best, beaten, ladder)
     if stability:
         return cert
-    second = ((ABOVE_FROZEN, finer, ()), (FAR_ABOVE, backwards, (ADJOINT,)))
+    second = (
+        (1 + CLOSE_TO_LOWER, over_jumps, ()),
+        (ABOVE_FROZEN, finer, ()),
+        (FAR_ABOVE, backwards, (ADJOINT,)),
+    )
     for above, other, added in second:
         again = other(problem) if cert.gamma > above * frozen.value else None
         if again is not None:
@@ -164,7 +175,8 @@ class Report:
     def found(self, best: Found, beaten: Beaten, ladder: Ladder) -> Certificate:
         """Write the certificate of the best proof found."""
         if best.proof is None:
-            status = Status.without_proof(best.answer)
+            growth = self.problem.demand.kind == "decay rate" and math.isfinite(best.bound)
+            status = Status.GROWTH if growth else Status.without_proof(best.answer)
         else:
             status = Status.UNPROVEN if isinstance(self.problem.impose, Grid) else Status.PROVEN
         return self._made(best, beaten, ladder, status)
@@ -177,7 +189,8 @@ class Report:
         names = {"stability": (), "decay rate": ("alpha", "upper", "frozen")}.get(
             kind, ("gamma", "lower", "frozen")
         )
-        values = (best.bound if proven else nothing, beaten.limit, beaten.frozen)
+        told = proven or status is Status.GROWTH
+        values = (best.bound if told else nothing, beaten.limit, beaten.frozen)
         bounds = dict(zip(names, values, strict=False))
         spent = ladder.spent if ladder else np.zeros(3)
         return Certificate(

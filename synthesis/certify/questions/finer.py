@@ -1,4 +1,4 @@
-"""A second search over several parameters, with P of a higher degree."""
+"""Second searches where the first found nothing, or a bound far above the frozen one."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 
 from synthesis.certify.questions.problem import BoundProblem
-from synthesis.certify.statement.impose import SumOfSquares
+from synthesis.certify.statement.impose import Bernstein, SumOfSquares, Vertices
 from synthesis.numerics.program.cone_program import LYAPUNOV, Solver
 from synthesis.numerics.program.lyapunov_program import MAX_STATES_GENERAL
 
@@ -32,3 +32,22 @@ def finer(problem: BoundProblem) -> BoundProblem | None:
     if states + inputs <= MAX_ROWS and len(problem.model.parameters) == 2:
         return problem._replace(form=form, impose=SumOfSquares())
     return problem._replace(form=form, solver=Solver(LYAPUNOV))
+
+
+def over_jumps(problem: BoundProblem) -> BoundProblem | None:
+    """Return the problem of a sampled model with P(p) on both sides of a jump of p, as the general
+    search has it; None where p does not jump or that was asked already.
+    """
+    return problem._replace(general=True) if problem.jumps else None
+
+
+def by_coefficients(problem: BoundProblem) -> BoundProblem | None:
+    """Return the problem of `Vertices` with one inequality per Bernstein coefficient, which asks
+    for no convexity; None for other relaxations.
+    """
+    if not isinstance(problem.impose, Vertices):
+        return None
+    given = problem.impose
+    return problem._replace(
+        impose=Bernstein(margins=given.margins, floor=given.floor), general=True
+    )

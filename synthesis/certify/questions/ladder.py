@@ -258,7 +258,11 @@ class Ladder(ABC):
         low, high = max(best.bound, 0.0), limit
         while True:
             found = self._tried(shape, 0.0, trial)
-            if found.proof is None or found.bound > 0:
+            if found.proof is not None and not found.bound > 0:
+                # growth that is bounded: no proof of decay, but a number to name
+                found = Found(max(found.bound, best.bound), None, found.answer)
+                best = found if best.proof is None else best
+            else:
                 best = best.or_better(found, -1.0)
             if found.answer is Answer.UNTRIED:
                 return best

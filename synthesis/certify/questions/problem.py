@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -23,7 +24,7 @@ Model = LPVStateSpace | LFT | UncertainStateSpace
 class BoundProblem(NamedTuple):
     """A model in polynomial pieces, the kind of bound and the options; `uncertain`: the set of
     models for which the bound must hold, with `model` as its nominal one; `usual`: whether form,
-    impose and solver were left out.
+    impose and solver were left out; `general`: whether the general search is asked for.
     """
 
     model: Pieces
@@ -34,6 +35,7 @@ class BoundProblem(NamedTuple):
     search: LowerBoundSearch | None
     uncertain: UncertainStateSpace | None = None
     usual: bool = False
+    general: bool = False
 
     @property
     def one_parameter(self) -> bool:
@@ -46,6 +48,20 @@ class BoundProblem(NamedTuple):
             and isinstance(self.impose, Bernstein)
             and self.impose.subdivision == 0
             and not (isinstance(self.form, Spline) and self.form.total_degree is not None)
+            and not self.general
+        )
+
+    @property
+    def jumps(self) -> bool:
+        """Whether the fast search kept P constant since p may jump between samples; the general one
+        has P(p) before and P(p+) after.
+        """
+        return (
+            self.one_parameter
+            and self.model.dt is not None
+            and math.isinf(self.demand.rates[0])
+            and self.uncertain is None
+            and isinstance(self.form, Spline)
         )
 
     @property

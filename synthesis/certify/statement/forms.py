@@ -94,7 +94,8 @@ class Spline(_InP):
         and `stability` of one parameter 3 in continuous and 2 in discrete time (more than 12
         states: 2 and 1), for several 2 and 1, but as for one in a parameter whose rate is another.
         A gain of several that is far above the worst frozen one is computed with degree 4 too.
-        Where p may jump P is constant, whatever the degree.
+        Where p may jump P is constant in continuous time, whatever the degree; sampled, a constant
+        P is tried first.
     segments : int or tuple, optional
         Of P in every parameter; several numbers are tried in turn until the bound is good enough,
         each an integer or a tuple of one a parameter. By default 16 and 32, in discrete time 8 and

@@ -136,6 +136,8 @@ class SumOfSquares(_Strictly):
 class Vertices(_Strictly):
     """At the corners, with convexity along every axis: sufficient; exact for multi-affine LMIs.
 
+    Where no P meets that, the coefficients of `Bernstein` are tried, which ask for no convexity.
+
     Parameters
     ----------
     margins, floor

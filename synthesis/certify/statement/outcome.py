@@ -20,12 +20,13 @@ class Status(Enum):
         "no certificate exists: a scheduling trajectory within the limits makes the state grow"
     )
     INFEASIBLE = (
-        "no Lyapunov function of this form exists, to the solver's accuracy; the model may still be"
-        " stable"
+        "no Lyapunov function of this form meets the inequalities imposed, to the solver's"
+        " accuracy; the model may still be stable"
     )
     UNPROVEN = (
         "unproven on a grid: the inequalities hold at its points, between them nothing is known"
     )
+    GROWTH = "no decay is proven: the best bound found is one of growth, alpha < 0"
     FAILED = "solver failed: what it returned could not be verified"
     UNTRIED = "not tried: the programs of this form are too large for the solver; nothing is known"
 
