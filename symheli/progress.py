@@ -20,6 +20,7 @@ from multiprocessing import parent_process
 from typing import TypeVar
 
 from symheli.errors import InputError
+from symheli.values.tracking import watch_by
 
 T = TypeVar("T")
 
@@ -216,3 +217,6 @@ def tracked(title: str, items: Iterable[T], total: float | None = None) -> Itera
         for item in items:
             yield item
             own.step()
+
+
+watch_by(tracked)

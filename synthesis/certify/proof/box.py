@@ -19,7 +19,7 @@ import numpy as np
 from symheli.lpv.bases.polynomials import factors_of
 from symheli.lpv.lpv_matrices import Matrices
 from symheli.lpv.scheduling import Scheduling
-from symheli.progress import tracked
+from symheli.values.tracking import tracked
 from synthesis.certify.proof import pointwise
 from synthesis.certify.proof.inequalities import Pair, decrease, output_form, positivity
 from synthesis.certify.statement.box import BoxLyapunov

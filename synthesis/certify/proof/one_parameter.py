@@ -13,7 +13,7 @@ import numpy as np
 
 from symheli.lpv.lpv_matrices import LPVMatrices, Matrices
 from symheli.lpv.scheduling import Scheduling
-from symheli.progress import tracked
+from symheli.values.tracking import tracked
 from synthesis.certify.proof import pointwise
 from synthesis.certify.proof.inequalities import Statement, lmi_polynomials
 from synthesis.certify.statement.demand import Demand
