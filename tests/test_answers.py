@@ -941,13 +941,13 @@ PYTHON = {
     "a certificate from a picture": (
         lambda s: synthesis.Certificate.load(s.picture),
         InputError,
-        "picture.png: expected a certificate as JSON, got another or a damaged file",
-        "write it again with Certificate.save",
+        "picture.png: expected a proven statement as JSON, got another or a damaged file",
+        "write it again with its .save",
     ),
     "a certificate from a model": (
         lambda s: synthesis.Certificate.load(s.family_file),
         InputError,
-        "family.json: expected the schema 'symheli certificate'",
+        "family.json: expected the schema 'symheli statement'",
         "this file was not written by Certificate.save",
     ),
     "no objectives": (

@@ -16,10 +16,11 @@ from symheli.lpv.bases.function_space import FunctionSpace, tensor_grid
 from symheli.lpv.bases.interpolating import CubicSpline, PiecewiseLinear
 from symheli.lpv.bases.polynomial import Polynomial
 from symheli.lpv.bases.product import Product
+from symheli.lpv.given_parameters import with_rates
 from symheli.lpv.linear_models import LinearModels
 from symheli.lpv.lpv_matrices import Matrices
 from symheli.lpv.lpv_state_space import LPVStateSpace
-from symheli.lpv.scheduling import Rates, Scheduling, with_rates
+from symheli.lpv.scheduling import Rates, Scheduling
 from symheli.lpv.trim_schedule import TrimSchedule
 from symheli.values.arrays import Array
 from symheli.values.signal import Signal

@@ -16,20 +16,13 @@ from symheli.lpv.bases.function_space import FunctionSpace
 from symheli.lpv.bases.polynomials import coefficients_of, lobatto_points, polynomials
 from symheli.lpv.bases.rescaled import rescaled
 from symheli.lpv.bases.restricted import Restricted
+from symheli.lpv.given_parameters import unit_sizes, with_rates
 from symheli.lpv.linear_model import LinearModel, feedback_matrix
 from symheli.lpv.lpv_matrices import LPVMatrices, Matrices
 from symheli.lpv.monomials import as_blocks
 from symheli.lpv.operators import Operators
 from symheli.lpv.recentred import centre, recentred
-from symheli.lpv.scheduling import (
-    UNSCHEDULED,
-    Rates,
-    Scheduling,
-    check_all,
-    parameters,
-    unit_sizes,
-    with_rates,
-)
+from symheli.lpv.scheduling import UNSCHEDULED, Rates, Scheduling, check_all, parameters
 from symheli.lpv.trim_schedule import TrimSchedule
 from symheli.values.arrays import Array
 from symheli.values.html_table import as_table

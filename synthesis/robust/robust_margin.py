@@ -17,7 +17,7 @@ from symheli.threads import with_one_thread
 from symheli.values.summary import summarized
 from synthesis.certify.lower_bounds.frozen import frozen_gain, worst_over
 from synthesis.certify.questions.questions import stability
-from synthesis.certify.statement.demand import Rate
+from synthesis.certify.statement.rates import Rate
 from synthesis.robust.lower_bound import ACCURACY, ROUGH, best_reals, worst_closing
 from synthesis.robust.structure import BlockLoop, DynamicBlock, loop_at, loop_of
 from synthesis.robust.uncertain import uncertain

@@ -18,7 +18,7 @@ from symheli.values.arrays import Array, frozen
 from symheli.values.numbers import positive
 from symheli.values.signal import indices
 from symheli.values.summary import summarized
-from synthesis.certify.statement.demand import Rate
+from synthesis.certify.statement.rates import Rate
 from synthesis.numerics.program.bases import dependence
 from synthesis.numerics.program.cone_program import Solver, general_solver
 from synthesis.sets.proof import holds
@@ -94,7 +94,7 @@ class InvariantSet(ProvenSet):
     __repr__ = summarized
 
     @property
-    def stored(self) -> Mapping[str, Any]:
+    def shape_stored(self) -> Mapping[str, Any]:
         """Values that a file holds of the set beside its statement."""
         return {"shape": self.shape, "alpha": self.alpha, "shares": self.shares}
 

@@ -84,7 +84,7 @@ class LowComplexitySet(ProvenSet):
     __repr__ = summarized
 
     @property
-    def stored(self) -> Mapping[str, Any]:
+    def shape_stored(self) -> Mapping[str, Any]:
         """Values that a file holds of the set beside its statement."""
         return {"V": self.V}
 
@@ -106,8 +106,8 @@ class LowComplexitySet(ProvenSet):
         z = np.linalg.solve(self.V, x.reshape(-1, len(self.V)).T)
         return np.abs(z).max(axis=0).reshape(x.shape[:-1])
 
-    def verify(self) -> bool:
-        """Check every sum again, in rational arithmetic."""
+    def verify(self, rigorous: bool = True) -> bool:
+        """Check every sum again, in rational arithmetic always."""
         number = rational()
         V = exact(self.V, number)
         W = _inverse(V)

@@ -16,7 +16,7 @@ from symheli.values.arrays import Array
 from symheli.values.signal import Signal, indices
 from symheli.values.summary import summarized
 from synthesis.certify.questions.hypotheses import drifting
-from synthesis.certify.statement.demand import Rate, limits
+from synthesis.certify.statement.rates import Rate, limits
 from synthesis.certify.statement.sentences import motion
 from synthesis.design.plant.as_controller import as_controller
 from synthesis.numerics.program.bases import moves

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from scipy import linalg
@@ -18,11 +18,14 @@ from symheli.values.arrays import Array, frozen
 from symheli.values.numbers import positive, whole
 from symheli.values.signal import Signal
 from symheli.values.summary import summarized
+from synthesis.certify.questions.certificate_file import decoded, encoded
+from synthesis.certify.statement.proven_statement import ProvenStatement
+from synthesis.numerics.polynomial.matrix import PolynomialMatrix
 from synthesis.numerics.polynomial.pieces import pieces
 from synthesis.numerics.program.affine_program import AffineProgram, BernsteinCell
 from synthesis.numerics.program.answer import Answer
 from synthesis.numerics.program.cone_program import Solver, general_solver
-from synthesis.switching.inequality import Modes, holds
+from synthesis.switching.inequality import DEGREE, Modes, holds, long_enough
 
 POINT = BernsteinCell(np.zeros((1, 1)), np.ones((1, 1)))
 """The cell of a program without a scheduling parameter."""
@@ -56,7 +59,7 @@ LONGEST, LARGEST_GROWTH = 1e4, 1e6
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class DwellTime:
+class DwellTime(ProvenStatement):
     """The dwell time for which a switched model is proven exponentially stable.
 
     Attributes
@@ -101,22 +104,106 @@ class DwellTime:
     modes: Modes
     why: str = ""
 
+    reader: ClassVar[str] = "dwell-time"
+
     __repr__ = summarized
 
-    def verify(self) -> bool:
-        """Check it again from the numbers it has."""
-        return len(self.P) > 0 and holds(self.modes, self.P, self.lengths, self.decay, self.growth)
+    def verify(self, rigorous: bool = True) -> bool:
+        """Check it again from the numbers it has, in rational arithmetic always."""
+        return (
+            len(self.P) > 0
+            and self.average == (not len(self.lengths))
+            and long_enough(self.seconds, self.lengths, self.decay, self.growth, self.modes.dt)
+            and holds(self.modes, self.P, self.lengths, self.decay, self.growth)
+        )
 
-    def __str__(self) -> str:
-        kind = "average dwell time" if self.average else "dwell time"
-        if not self.verified:
-            return f"no {kind} proven: {self.why}"
+    @property
+    def bound(self) -> float:
+        """The dwell time, s."""
+        return self.seconds
+
+    @property
+    def claim(self) -> str:
+        """The claim in one sentence, with numbers and units."""
         signals = (
             f"whose average dwell time is above {self.seconds:.6g} s"
             if self.average
             else f"that stays at least {self.seconds:.6g} s in each mode"
         )
-        return f"proven: exponentially stable for every signal {signals}"
+        return f"exponentially stable for every signal {signals}"
+
+    @property
+    def conditions(self) -> tuple[str, ...]:
+        """Conditions of the claim, each a sentence made from the numbers of the proof."""
+        dt = self.modes.dt
+        time = "in continuous time" if dt is None else f"sampled every {dt!r} s"
+        n = self.modes.A[0][0].shape[0]
+        pairs = ", ".join(f"{i} to {j}" for i, j in sorted(self.modes.jumps))
+        ranges = [
+            f"A of mode {i} is anywhere in its range at every time, over {len(own[0].box)}"
+            f" parameter(s) in {len(own)} piece(s)"
+            for i, own in enumerate(self.modes.A)
+            if any(any(piece.degrees) for piece in own)
+        ]
+        return (
+            f"{len(self.modes.A)} linear modes of {n} states, {time}",
+            f"switches happen from {pairs or 'no mode to another'}, with the jumps in the file",
+            *ranges,
+        )
+
+    @property
+    def facts(self) -> Mapping[str, Any]:
+        """Kind, bounds and conditions as data that JSON holds."""
+        kind = "average dwell time" if self.average else "dwell time"
+        return {"kind": kind, "seconds": self.seconds, "modes": len(self.modes.A)}
+
+    @property
+    def stored(self) -> dict[str, Any]:
+        """Values of a file: modes, jumps and P, as JSON holds them."""
+        if not self.verified:
+            raise InputError(f"only a proven dwell time is saved; here {self.why}")
+        names = ("seconds", "average", "P", "lengths", "decay", "growth")
+        jumps = [[i, j, encoded(np.array(J))] for (i, j), J in self.modes.jumps.items()]
+        return {
+            "kind": self.facts["kind"],
+            **{name: encoded(getattr(self, name)) for name in names},
+            "modes": [encoded(each) for each in self.modes.A],
+            "jumps": jumps,
+            "dt": self.modes.dt,
+        }
+
+    @classmethod
+    def restored(cls, content: Mapping[str, Any]) -> DwellTime:
+        """Return the dwell time of a file, proven anew."""
+        values = {name: decoded(content[name]) for name in ("P", "lengths")}
+        numbers = {name: float(content[name]) for name in ("seconds", "decay", "growth")}
+        A = tuple(decoded(each) for each in content["modes"])
+        n = A[0][0].shape[0]
+        for piece in (piece for each in A for piece in each):
+            if not isinstance(piece, PolynomialMatrix) or piece.shape != (n, n):
+                raise InputError("modes: expected square polynomial matrices of one size")
+        jumps = {
+            (int(i), int(j)): frozen(decoded(J), "jump", (n, n)) for i, j, J in content["jumps"]
+        }
+        if not all(i != j and {i, j} <= set(range(len(A))) for i, j in jumps):
+            raise InputError("jumps: expected pairs of different modes")
+        dt = content["dt"]
+        modes = Modes(A, jumps, None if dt is None else positive(dt, "dt"))
+        P = tuple(frozen(M, "P", (None, n, n)) for M in values["P"])
+        own = len(values["lengths"])
+        count = own + 1 if dt is not None else DEGREE * own + 1
+        if len(P) != len(A) or any(len(M) != count for M in P):
+            raise InputError(f"P: expected {count} matrices of each of {len(A)} modes")
+        found = cls(
+            average=content["average"] is True, verified=False, P=P,
+            lengths=frozen(values["lengths"], "lengths", (None,)), modes=modes,
+            why="the inequalities do not hold in exact arithmetic", **numbers,
+        )  # fmt: skip
+        return replace(found, verified=True, why="") if found.verify() else found
+
+    def __str__(self) -> str:
+        kind = "average dwell time" if self.average else "dwell time"
+        return f"proven: {self.claim}" if self.verified else f"no {kind} proven: {self.why}"
 
 
 @with_one_thread
@@ -279,7 +366,9 @@ class _ModeSearch:
         dt = self.modes.dt
         if dt is not None:
             steps = math.floor(seconds / dt * (1 + 1e-9))
-            seconds = steps * dt
+            if steps < 1:
+                return None  # every switch comes after a sample at least
+            seconds = math.nextafter(steps * dt, math.inf)  # not below the exact product
         fixed = all(self.fixed)
         fractions = SPARE_DECAYS if fixed else DECAYS
         if dt is not None:
@@ -317,7 +406,7 @@ class _ModeSearch:
             least = 2 * decay if dt is None else -math.log1p(-decay) / dt  # as it is proven
             made = replace(
                 _none(self.modes, True, ""),
-                seconds=math.log(high) / least * (1 + 4 * np.finfo(float).eps),
+                seconds=math.log(high) / least * (1 + 64 * np.finfo(float).eps),
                 P=tuple(M[None] for M in P), lengths=none, decay=decay, growth=high,
             )  # fmt: skip
             if (best is None or made.seconds < best.seconds) and made.verify():
@@ -330,7 +419,8 @@ class _ModeSearch:
         """
         fastest = 1 / max(float(np.abs(np.linalg.eigvals(A)).max()) for A in self.middle)
         logs = np.linspace(math.log1p(seconds / fastest), 0.0, finer * self.parts + 1)
-        return -np.diff(fastest * np.expm1(logs))
+        # a little less, so that the sum of the rounded lengths is not above the dwell time
+        return -np.diff(fastest * np.expm1(logs)) * (1 - 8 * np.finfo(float).eps)
 
     def _motion(self, i: int, decay: float) -> Array:
         """Return the matrix of the motion by which P of a mode moves: of a fixed A its own, grown

@@ -16,7 +16,9 @@ Switching in Systems and Control, 2003, theorem 3.2).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from fractions import Fraction
 from typing import Any, NamedTuple
 
 from symheli.values.arrays import Array
@@ -90,3 +92,42 @@ def _changes(
 
 def _sum(F: PolynomialMatrix) -> PolynomialMatrix:
     return F + F.T
+
+
+def long_enough(
+    seconds: float, lengths: Sequence[float] | Array, decay: float, growth: float, dt: float | None
+) -> bool:
+    """Whether P on segments of these `lengths` proves a dwell time of so many seconds; without
+    segments, whether `decay` and `growth` prove it as an average: mu < exp(2 lambda T), sampled mu
+    < (1 - lambda)^(-T/dt). In rational arithmetic.
+    """
+    if not 0 < seconds < math.inf:
+        return False
+    T, period = Fraction(seconds), None if dt is None else Fraction(dt)
+    if len(lengths):
+        whole = sum(map(Fraction, lengths)) if period is None else len(lengths) * period
+        return (decay, growth) == (0.0, 1.0) and whole <= T
+    if not (0 < decay < math.inf and 1 <= growth < math.inf):
+        return False
+    if period is None:
+        return Fraction(growth) < _exponential(2 * Fraction(decay) * T)
+    if decay >= 1:
+        return False
+    per_sample = Fraction(-math.log1p(-decay) * (1 - 1e-15))
+    below = _exponential(per_sample, above=True) * (1 - Fraction(decay)) <= 1
+    return below and Fraction(growth) < _exponential(per_sample * T / period)
+
+
+TERMS = 60
+"""Terms of the exponential series beyond twice its argument: the rest is below 2^-60 of it."""
+
+
+def _exponential(x: Fraction, above: bool = False) -> Fraction:
+    """A rational below exp(x), x >= 0, or above it: the series, and a bound of what it leaves."""
+    x = Fraction(math.floor(x * 2**80) + above, 2**80)  # few digits keep the series fast
+    term = total = Fraction(1)
+    count = TERMS + 2 * math.ceil(x)
+    for k in range(1, count):
+        term = term * x / k
+        total += term
+    return total + 2 * term if above else total

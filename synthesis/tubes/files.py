@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -53,7 +54,7 @@ def written_loop(loop: Deviations) -> dict[str, Any]:
     return {**own, "gust": loop.gust}
 
 
-def read_loop(content: dict[str, Any]) -> Deviations:
+def read_loop(content: Mapping[str, Any]) -> Deviations:
     """The loop so written; raises `ValueError` for damaged values."""
     model, reference = _read_flight(content) if "vehicle" in content else _read_model(content)
     gust = float(numbers(content["gust"]))
@@ -68,7 +69,7 @@ def _written(r: Reference) -> dict[str, Any]:
     return {"limits": limits, "equipment": r.equipment.written(), **arrays}
 
 
-def _read_flight(content: dict[str, Any]) -> tuple[Helicopter, Reference]:
+def _read_flight(content: Mapping[str, Any]) -> tuple[Helicopter, Reference]:
     with tempfile.TemporaryDirectory(prefix="symheli-") as folder:
         file = Path(folder) / f"{Path(str(content['name'])).name}.toml"
         file.write_text(content["vehicle"], encoding="utf-8")
@@ -105,7 +106,7 @@ def _written_motions(r: Motions) -> dict[str, Any]:
     }
 
 
-def _read_model(content: dict[str, Any]) -> tuple[Any, Motions]:
+def _read_model(content: Mapping[str, Any]) -> tuple[Any, Motions]:
     model, reference = equations.read(content["model"]), equations.read(content["reference"])
     names = ("gain", "schedule", "rate", "others", "pieces", "states", "inputs")
     motions = Motions(reference, **{name: content[name] for name in names})

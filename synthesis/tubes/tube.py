@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import math
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise, product
-from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import casadi
 import numpy as np
@@ -22,8 +19,7 @@ from symheli.flight import Servo
 from symheli.lazy import former_attribute
 from symheli.progress import Task, task, tracked
 from symheli.values.summary import summarized
-from symheli.values.whole_files import write_text
-from synthesis.certify.questions.certificate_file import DAMAGED, content_of
+from synthesis.certify.statement.proven_statement import ProvenStatement
 from synthesis.numerics.program.cone_program import Solver
 from synthesis.tubes.controllers import Choice
 from synthesis.tubes.deviations import CommandCell, Deviations
@@ -44,7 +40,6 @@ from synthesis.tubes.travel import why_not_free
 
 Array = np.ndarray
 
-SCHEMA, VERSION = "symheli tube", 4
 INTERVAL = 1.0
 """Largest distance of the nodes of reference, feedback and P along airspeed, m/s."""
 DOWNWARD = 0.75
@@ -80,7 +75,7 @@ TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Tube:
+class Tube(ProvenStatement):
     """The deviations e = x - x_r with e'P e <= 1, which the nonlinear model does not leave.
 
     Made by `tube`; `verify` proves it again from these fields alone.
@@ -127,6 +122,7 @@ class Tube:
     verified: bool
     why: str
     gains: tuple[LocalGain, ...] = ()
+    reader: ClassVar[str] = "tube"
 
     proven = former_attribute("proven", "verified")
 
@@ -247,8 +243,8 @@ class Tube:
             raise InputError("no bound was proven: over less of the tube there may be one")
         return replace(self, gains=(*self.gains, found))
 
-    def verify(self) -> bool:
-        """Enclose the equations again and check the inequality in exact arithmetic."""
+    def verify(self, rigorous: bool = True) -> bool:
+        """Enclose the equations again and check the inequality, in exact arithmetic always."""
         return not self._refused()
 
     def _refused(self, over: Sequence[Enclosed] | None = None) -> str:
@@ -292,15 +288,38 @@ class Tube:
         own = (self.P[nodes], self.nodes[nodes])
         return holds(*own, made.cell, made.over, made.factor, by)
 
-    def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write the tube as JSON: equations (the vehicle file, or the operations of the model),
-        feedback and proof.
+    @property
+    def claim(self) -> str:
+        """The claim in one sentence, with numbers and units."""
+        sizes = zip(self.deviations.states, self.half_widths, strict=True)
+        each = ", ".join(f"{name} {width:.3g}" for name, width in sizes)
+        bounds = "".join(f"; {gain}" for gain in self.gains)
+        return f"invariant tube of the nonlinear equations: deviations (SI) at most {each}{bounds}"
+
+    @property
+    def conditions(self) -> tuple[str, ...]:
+        """Conditions of the claim, each a sentence made from the numbers of the proof."""
+        return self.hypotheses
+
+    @property
+    def facts(self) -> Mapping[str, Any]:
+        """Kind, bounds and conditions as data that JSON holds."""
+        return {
+            "kind": "invariant tube",
+            "airspeeds": self.nodes.tolist(),
+            "gust": self.deviations.gust,
+            "half_widths": self.half_widths.tolist(),
+        }
+
+    @property
+    def stored(self) -> dict[str, Any]:
+        """Values of a file: equations (the vehicle file, or the operations of the model), feedback
+        and proof.
         """
         if not self.verified:
             raise InputError(f"only a proven tube is saved; here {self.why}")
-        content = {
-            "schema": SCHEMA,
-            "version": VERSION,
+        return {
+            "kind": "tube",
             **written_loop(self.deviations),
             "P": self.P.tolist(),
             "cells": [[cell.interval, *map(list, cell.ranges)] for cell in self.cells],
@@ -308,23 +327,16 @@ class Tube:
             "multipliers": [written_multipliers(by) for by in self.multipliers],
             "gains": [gain.written for gain in self.gains],
         }
-        return write_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> Tube:
-        """Read a tube and prove it again; `verified` says whether that succeeded."""
-        content = content_of(path, SCHEMA, VERSION, "a tube", "Tube.save")
-        try:
-            found = _read(content)
-            why = found._refused()
-        except InputError as error:
-            raise InputError(f"{path}: {error}") from None
-        except DAMAGED as error:
-            raise InputError(f"{path}: damaged, a value is invalid or missing ({error})") from None
+    def restored(cls, content: Mapping[str, Any]) -> Tube:
+        """Return the tube of a file, proven anew."""
+        found = _read(content)
+        why = found._refused()
         return replace(found, verified=not why, why=why)
 
 
-def _read(content: dict[str, Any]) -> Tube:
+def _read(content: Mapping[str, Any]) -> Tube:
     loop = read_loop(content)
     n, k, count = len(loop.states), len(loop.reference.nodes), len(content["cells"])
     cells = []

@@ -11,9 +11,10 @@ import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.equilibration import is_singular
+from symheli.lpv.given_parameters import unit_sizes
 from symheli.lpv.lft.model import LFT
 from symheli.lpv.lft_matrices import Block, parts
-from symheli.lpv.scheduling import Scheduling, unit_sizes
+from symheli.lpv.scheduling import Scheduling
 from symheli.values.arrays import Array
 from symheli.values.sample_period import same_period
 from symheli.values.signal import Signal, distinct

@@ -56,6 +56,11 @@ class LFTEvidence(NamedTuple):
         """The parameters of the LFT."""
         return self.lft.parameters
 
+    @property
+    def matrices(self) -> LFTMatrices:
+        """The LFT."""
+        return self.lft
+
     def fault(self, proof: QuadraticStorage, kind: str, rates: tuple[float, ...]) -> str | None:
         """Return why the proof does not belong to this LFT and statement, before any inequality is
         checked; None where it does.

@@ -40,7 +40,7 @@ from synthesis.certify.lower_bounds.paths import (
     steps,
 )
 from synthesis.certify.lower_bounds.periodic import Lifted, multiplier, ratio_from_rest, worst_input
-from synthesis.certify.statement.demand import Rate, rates
+from synthesis.certify.statement.rates import Rate, rates
 from synthesis.certify.statement.trajectory import SchedulingTrajectory
 
 Array = np.ndarray

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from symheli.lpv.bases.polynomials import factors_of
-from symheli.lpv.lpv_matrices import Matrices
+from symheli.lpv.lpv_matrices import LPVMatrices, Matrices
 from symheli.lpv.scheduling import Scheduling
 from symheli.values.tracking import tracked
 from synthesis.certify.proof import pointwise
@@ -67,6 +67,11 @@ class BoxEvidence(NamedTuple):
     def parameters(self) -> tuple[Scheduling, ...]:
         """The parameters of the model."""
         return self.model.parameters
+
+    @property
+    def matrices(self) -> LPVMatrices:
+        """The model."""
+        return self.model.source
 
     def fault(self, P: BoxLyapunov, kind: str, rates: tuple[float, ...]) -> str | None:
         """Return why P does not belong to this model and statement, before any inequality is

@@ -134,6 +134,11 @@ class IntervalEvidence(NamedTuple):
         """The parameter of the model, as a tuple."""
         return (self.lpv.scheduling,)
 
+    @property
+    def matrices(self) -> LPVMatrices:
+        """The model."""
+        return self.lpv
+
     def fault(self, P: Lyapunov, kind: str, rates: tuple[float, ...]) -> str | None:
         """Return why P does not belong to this model and statement, before any inequality is
         checked; None where it does.

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from html import escape
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self, get_args
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol, Self, get_args
 
 import numpy as np
 
@@ -18,6 +16,8 @@ from symheli.lazy import former_attribute
 from symheli.values.summary import summarized
 from synthesis.certify.statement.kind import Kind
 from synthesis.certify.statement.outcome import Attempt, Seconds, Status
+from synthesis.certify.statement.proven_statement import ProvenStatement
+from synthesis.certify.statement.sentences import claim, conditions
 from synthesis.certify.statement.trajectory import SchedulingTrajectory
 
 if TYPE_CHECKING:
@@ -34,6 +34,11 @@ class Evidence(Protocol):
     @property
     def parameters(self) -> tuple[Scheduling, ...]:
         """The scheduling parameters of the model."""
+        ...
+
+    @property
+    def matrices(self) -> Any:
+        """The model, as matrices with their functions of p."""
         ...
 
     def fault(self, lyapunov: Any, kind: Kind, rates: tuple[float, ...], /) -> str | None:
@@ -79,7 +84,7 @@ class Proof(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Certificate:
+class Certificate(ProvenStatement):
     """A certificate is a bound that holds for every p(t) within its range and rates, with its proof
     and its hypotheses.
 
@@ -96,8 +101,8 @@ class Certificate:
         No upper bound can be smaller: from trajectories actually computed (inf: the state grows);
         NaN for the other kinds.
     alpha : float
-        Proven decay rate, 1/s: |x(t)| <= c exp(-alpha t) |x(0)|; -inf where nothing was proven, NaN
-        for the other kinds.
+        Proven decay rate, 1/s: |x(t)| <= c exp(-alpha t) |x(0)|; below 0, and not verified, where
+        the best bound found is one of growth; -inf where there is none, NaN for the other kinds.
     upper : float
         No larger decay rate can be proven, 1/s; NaN for the other kinds.
     frozen : float
@@ -272,28 +277,62 @@ class Certificate:
             # numbers too large or of no use to compute with show nothing
             return False
 
-    def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write everything `load` and `verify` need into a JSON file, every double exactly.
+    reader: ClassVar[str] = "certificate"
 
-        Raises `SymheliError` where the file cannot be written, `InputError` for a model that no
-        file can hold (a basis of user-defined functions). The trim schedule and the misfit of the
-        model stay behind: what they mean is among the hypotheses.
+    @property
+    def why(self) -> str:  # type: ignore[override]
+        """Why nothing is proven; empty where something is."""
+        if self.verified:
+            return ""
+        return self.fault or self.status.value
+
+    @property
+    def claim(self) -> str:
+        """The claim in one sentence, with numbers and units."""
+        return claim(self.kind, self.bound)
+
+    @property
+    def conditions(self) -> tuple[str, ...]:
+        """Conditions of the claim, made from the numbers of the proof: how the parameters move, the
+        perturbations, the model in the file.
+        """
+        return () if self.proof is None else conditions(self.proof.evidence, self.rates)
+
+    @property
+    def facts(self) -> Mapping[str, Any]:
+        """Kind, bounds and conditions as data that JSON holds."""
+        names = ("kind", "rates", "gamma", "alpha")
+        return {name: getattr(self, name) for name in names} | {"status": self.status.name}
+
+    @property
+    def stored(self) -> dict[str, Any]:
+        """Values of a file. The trim schedule and the misfit of the model stay behind: what they
+        mean is among the hypotheses.
         """
         from synthesis.certify.questions.certificate_file import written
 
-        return written(self, path)
+        return written(self)
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> Certificate:
-        """Load a certificate from a file and check its bound against its proof in floating point.
+    def restored(cls, content: Mapping[str, Any]) -> Self:
+        """Return the certificate of a file, its bound checked against its proof in floating point;
+        `verify()` then decides in exact arithmetic.
 
         Raises `InputError` for a file that is not a certificate, `CertificateError` if it is
-        inconsistent or its proof does not hold; `verify(rigorous=True)` then decides in exact
-        arithmetic. Lower bounds, trajectories and hypotheses on the model are as they were written.
+        inconsistent or its proof does not hold. Lower bounds, trajectories and hypotheses on the
+        model are as they were written.
         """
         from synthesis.certify.questions.certificate_file import read
 
-        return read(path)
+        return read(content)  # type: ignore[return-value]
+
+    def proven_of(self, model: Any) -> bool:
+        """Return whether the claim is about exactly this model: the same matrices at every p, the
+        same ranges and sample period; names of signals may differ.
+        """
+        from synthesis.certify.questions.certificate_file import same_model
+
+        return self.proof is not None and same_model(self.proof.evidence.matrices, model)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Frozen, attained and proven bound, the bracket between the last two shaded; returns the

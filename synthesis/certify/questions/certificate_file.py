@@ -9,12 +9,9 @@ again in floating point.
 
 from __future__ import annotations
 
-import json
 import math
-import os
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,7 +22,6 @@ from symheli.lpv.lft_matrices import Block, LFTMatrices
 from symheli.lpv.lpv_matrices import LPVMatrices
 from symheli.lpv.scheduling import Scheduling
 from symheli.values import Signal
-from symheli.values.whole_files import write_text
 from synthesis.certify.lft import proof as lft_proof
 from synthesis.certify.lft.multipliers import Multiplier
 from synthesis.certify.proof import box, one_parameter
@@ -42,9 +38,6 @@ from synthesis.certify.statement.units import Scaling
 from synthesis.numerics.polynomial.matrix import PolynomialMatrix
 from synthesis.numerics.polynomial.motion import Motion
 from synthesis.numerics.polynomial.pieces import model_pieces, pieces
-
-SCHEMA = "symheli certificate"
-VERSION = 1
 
 
 def _former_units(
@@ -78,6 +71,7 @@ the class.
 """
 WORDS = {kind: word for word, kind in TYPES.items()}
 
+HEAD = {"schema", "version", "statement"}
 LATER = ("perturbation",)
 """Fields that files of this version may lack: they were written before the field existed."""
 
@@ -89,74 +83,28 @@ ROUTES = {
 DERIVED = {"pieces", "model"}
 
 
-def written(cert: Certificate, path: str | os.PathLike[str]) -> Path:
-    """Write the certificate; see `Certificate.save`."""
+def written(cert: Certificate) -> dict[str, Any]:
+    """Return what a file holds of the certificate; see `Certificate.stored`."""
     statement = {f.name: getattr(cert, f.name) for f in fields(cert) if f.name != "proof"}
-    content = {
-        "schema": SCHEMA,
-        "version": VERSION,
+    return {
         **encoded({**statement, "status": cert.status.name}),
         "proof": None if cert.proof is None else _encoded_proof(cert.proof),
     }
-    return write_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
 
 
-def read(path: str | os.PathLike[str]) -> Certificate:
-    """Read a certificate; see `Certificate.load`."""
-    content = content_of(path, SCHEMA, VERSION, "a certificate", "Certificate.save")
-    try:
-        with np.errstate(all="ignore"):
-            cert = _certificate(content)
-    except CertificateError as error:
-        raise CertificateError(f"{path}: {error}") from None
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
-    except DAMAGED as error:
-        raise InputError(f"{path}: damaged, a value is invalid ({error})") from None
+def read(content: Mapping[str, Any]) -> Certificate:
+    """Return the certificate that a file holds; see `Certificate.restored`."""
+    cert = _certificate(content)
     if cert.verified and not cert.verify():
         why = cert.fault or "the inequalities do not hold with this bound"
-        raise CertificateError(f"{path}: the proof does not establish the certified bound: {why}")
+        raise CertificateError(f"the proof does not establish the certified bound: {why}")
     return cert
-
-
-DAMAGED = (
-    *(TypeError, ValueError, AttributeError, LookupError),
-    *(ArithmeticError, RecursionError, np.linalg.LinAlgError),
-)
-"""Errors that values of a damaged file raise."""
-
-
-def content_of(
-    path: str | os.PathLike[str], schema: str, version: int, what: str, writer: str
-) -> dict[str, Any]:
-    """Read a JSON file of this schema and version, which `writer` writes; raise `InputError` for
-    any other.
-    """
-    try:
-        content = json.loads(Path(path).read_text(encoding="utf-8"), parse_constant=_refused)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
-    except (ValueError, RecursionError) as error:
-        raise InputError(
-            f"{path}: expected {what} as JSON, got another or a damaged file ({error});"
-            f" write it again with {writer}"
-        ) from None
-    if not isinstance(content, dict) or content.get("schema") != schema:
-        raise InputError(
-            f"{path}: expected the schema {schema!r}; this file was not written by {writer}"
-        )
-    if content.get("version") != version or isinstance(content.get("version"), bool):
-        raise InputError(
-            f"{path}: expected version {version} of the schema, got {content.get('version')!r:.60};"
-            " read it with the version of symheli that wrote it"
-        )
-    return content
 
 
 def _certificate(content: Mapping[str, Any]) -> Certificate:
     names = {f.name for f in fields(Certificate)}
     content = {**dict.fromkeys(LATER), **content}
-    missing, foreign = names - content.keys(), content.keys() - names - {"schema", "version"}
+    missing, foreign = names - content.keys(), content.keys() - names - HEAD
     if missing or foreign:
         raise InputError(
             f"expected the fields of a certificate; missing: {', '.join(sorted(missing)) or 'none'}"
@@ -291,5 +239,20 @@ def decoded(value: Any) -> Any:
     return kind(**{name: decoded(v) for name, v in value.items() if name != "type"})
 
 
-def _refused(constant: str) -> None:
-    raise ValueError(f"{constant} is not JSON")
+def same_model(own: Any, other: Any) -> bool:
+    """Whether a model is exactly the one of a proof: its numbers, functions of p, ranges and sample
+    period; names of signals and rates may differ. Raises `InputError` for what is no such model.
+    """
+    kind = LFTMatrices if isinstance(own, LFTMatrices) else LPVMatrices
+    if not isinstance(other, kind):
+        wanted = "an LFT" if kind is LFTMatrices else "an LPVStateSpace"
+        raise InputError(f"the proof is about {wanted}, got {type(other).__name__}")
+    return _numbers(own) == _numbers(other)
+
+
+def _numbers(model: Any) -> Any:
+    content = encoded(model)
+    sizes = [len(content.pop(group)) for group in ("states", "inputs", "outputs")]
+    for s in content.get("parameters") or [block["scheduling"] for block in content["blocks"]]:
+        s.pop("rate")
+    return sizes, content

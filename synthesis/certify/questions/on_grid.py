@@ -20,9 +20,9 @@ from symheli.lpv.tools import Matrices
 from synthesis.certify.questions.certificate import Certificate
 from synthesis.certify.questions.hypotheses import hypotheses
 from synthesis.certify.questions.problem import Model
-from synthesis.certify.statement.demand import Rate, limits
 from synthesis.certify.statement.impose import Grid, Imposed
 from synthesis.certify.statement.outcome import Attempt, Seconds, Status
+from synthesis.certify.statement.rates import Rate, limits
 from synthesis.certify.statement.scaling import dissipative, model_scaling
 from synthesis.numerics.linear.norm import norm
 from synthesis.numerics.program.affine_program import AffineProgram, BernsteinCell, from_lower

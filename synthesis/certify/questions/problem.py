@@ -9,10 +9,11 @@ from typing import NamedTuple
 from symheli import LFT, LPVStateSpace, Scheduling, UncertainStateSpace
 from symheli.errors import InputError
 from synthesis.certify.lower_bounds.lower_bound import LowerBoundSearch
-from synthesis.certify.statement.demand import Demand, Rate, limits
+from synthesis.certify.statement.demand import Demand
 from synthesis.certify.statement.forms import HigherOrder, LaggedParameter, LyapunovForm, Spline
 from synthesis.certify.statement.impose import Bernstein, Grid, Imposed, SumOfSquares, Vertices
 from synthesis.certify.statement.kind import Kind
+from synthesis.certify.statement.rates import Rate, limits
 from synthesis.numerics.polynomial.motion import Motion
 from synthesis.numerics.polynomial.pieces import Pieces, pieces
 from synthesis.numerics.program.cone_program import LYAPUNOV, Solver, general_solver

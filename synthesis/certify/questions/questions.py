@@ -11,9 +11,9 @@ from synthesis.certify.questions.certificate import Certificate
 from synthesis.certify.questions.certify import certify
 from synthesis.certify.questions.on_grid import gain_on_grid
 from synthesis.certify.questions.problem import Model, pose
-from synthesis.certify.statement.demand import Rate
 from synthesis.certify.statement.forms import LyapunovForm, Spline
 from synthesis.certify.statement.impose import Imposed
+from synthesis.certify.statement.rates import Rate
 from synthesis.numerics.program.cone_program import Solver
 
 

@@ -6,9 +6,6 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from symheli import Scheduling
-from symheli.errors import InputError, UnknownNameError
-from symheli.lpv.scheduling import Rates, with_rates
 from synthesis.certify.statement.kind import Kind
 from synthesis.numerics.polynomial.motion import Motion
 
@@ -59,32 +56,3 @@ class Demand(NamedTuple):
         return dt is not None or all(
             math.isfinite(r) or d == 0 for r, d in zip(self.rates, degrees, strict=True)
         )
-
-
-Rate = Rates | None
-"""Rate limit, in units of p per second: one for all parameters, one for each in order, or {name:
-rate}; the name of a parameter states that it is the rate; None: the parameter's own.
-"""
-
-
-def limits(parameters: Sequence[Scheduling], rate: Rate) -> tuple[Scheduling, ...]:
-    """Return the parameters with the requested limits; raise `InputError` for a wrong number of
-    them or one that is not >= 0, `UnknownNameError` for a name.
-    """
-    if rate is None:
-        return tuple(parameters)
-    try:
-        return with_rates(parameters, rate)
-    except UnknownNameError:
-        raise
-    except (TypeError, ValueError) as error:
-        units = ", ".join(f"{s.name} ({s.unit}/s)" for s in parameters)
-        raise InputError(
-            "rate must be >= 0 (math.inf: arbitrarily fast), one for all, one for each of"
-            f" {units}, or by name, got {rate!r} ({error})"
-        ) from error
-
-
-def rates(parameters: Sequence[Scheduling], rate: Rate) -> tuple[float, ...]:
-    """Return one number a parameter; raise `InputError` where the rate is another parameter."""
-    return tuple(s.limit for s in limits(parameters, rate))

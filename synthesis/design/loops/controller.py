@@ -17,10 +17,10 @@ from symheli.values.html_table import as_table
 from symheli.values.named_vector import NamedVector
 from symheli.values.summary import summarized
 from synthesis.certify.questions.certificate import Certificate
-from synthesis.certify.statement.demand import limits
 from synthesis.certify.statement.forms import Spline
 from synthesis.certify.statement.impose import Bernstein
 from synthesis.certify.statement.outcome import Attempt
+from synthesis.certify.statement.rates import limits
 from synthesis.design.plant.as_controller import as_controller
 from synthesis.design.plant.diagnosis import decided
 from synthesis.design.plant.refusals import conditions

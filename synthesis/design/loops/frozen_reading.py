@@ -14,7 +14,7 @@ from symheli.lazy import former_attribute
 from symheli.lpv.linear_model import LinearModel
 from symheli.threads import with_one_thread
 from synthesis.certify.questions.questions import stability
-from synthesis.certify.statement.demand import Rate, limits
+from synthesis.certify.statement.rates import Rate, limits
 from synthesis.design.plant.as_controller import as_controller
 from synthesis.design.plant.plant import Plant, require_plant
 

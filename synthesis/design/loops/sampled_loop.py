@@ -19,7 +19,7 @@ from symheli.values.html_table import as_table
 from symheli.values.summary import summarized
 from synthesis.certify.questions.certificate import Certificate
 from synthesis.certify.questions.questions import l2_gain
-from synthesis.certify.statement.demand import Rate
+from synthesis.certify.statement.rates import Rate
 from synthesis.design.loops.controller import Controller
 from synthesis.design.plant.plant import Plant, require_plant
 

@@ -16,9 +16,9 @@ from symheli.values.html_table import as_table
 from symheli.values.signal import Signal
 from symheli.values.summary import summarized
 from synthesis.certify.questions.certificate import Certificate
-from synthesis.certify.statement.demand import Rate, limits
 from synthesis.certify.statement.impose import Grid
 from synthesis.certify.statement.outcome import Attempt
+from synthesis.certify.statement.rates import Rate, limits
 from synthesis.design.lpv.existence import Existence, Solution, imposed_at
 from synthesis.design.lpv.fitted import Fitted
 from synthesis.design.lpv.frozen_stability import frozen_stability

@@ -12,8 +12,8 @@ from symheli.lpv import series
 from symheli.lpv.mixing import itself, mixed
 from symheli.values.sample_period import same_period
 from symheli.values.signal import Signal
-from synthesis.certify.statement.demand import Rate
 from synthesis.certify.statement.impose import Grid
+from synthesis.certify.statement.rates import Rate
 from synthesis.design.loops.controller import Controller
 from synthesis.design.lpv.output_feedback import output_feedback
 from synthesis.design.lpv.search import BACK_OFF

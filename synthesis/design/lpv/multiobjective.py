@@ -17,8 +17,8 @@ from symheli.errors import InputError
 from symheli.lpv.bases import FunctionSpace
 from symheli.threads import with_one_thread
 from symheli.values.signal import indices
-from synthesis.certify.statement.demand import Rate, limits
 from synthesis.certify.statement.outcome import Attempt
+from synthesis.certify.statement.rates import Rate, limits
 from synthesis.design.loops.controller import Controller
 from synthesis.design.lpv.fitted import fitted, in_plant_units
 from synthesis.design.lpv.objectives import H2, L2, EnergyToPeak, Objective, PoleRegion

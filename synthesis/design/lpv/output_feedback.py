@@ -12,9 +12,9 @@ from symheli import UncertainStateSpace
 from symheli.errors import SynthesisError
 from symheli.lpv.bases.polynomials import lobatto_points
 from symheli.threads import with_one_thread
-from synthesis.certify.statement.demand import Rate, limits
 from synthesis.certify.statement.impose import Grid
 from synthesis.certify.statement.outcome import Attempt
+from synthesis.certify.statement.rates import Rate, limits
 from synthesis.design.loops.controller import Controller
 from synthesis.design.lpv.at_rest import at_rest
 from synthesis.design.lpv.existence import MATRIX_BOUNDS, Divisions, Existence, Solution, imposed_at

@@ -9,9 +9,9 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.threads import with_one_thread
-from synthesis.certify.statement.demand import Rate, limits
 from synthesis.certify.statement.impose import Grid
 from synthesis.certify.statement.outcome import Attempt
+from synthesis.certify.statement.rates import Rate, limits
 from synthesis.design.loops.controller import Controller
 from synthesis.design.lpv.existence import Existence, Solution, imposed_at
 from synthesis.design.lpv.fitted import in_plant_units

@@ -8,7 +8,7 @@ from models import lag
 from symheli import Scheduling
 from symheli.errors import InputError, UnknownNameError
 from synthesis import l2_gain, lower_bound, stability
-from synthesis.certify.statement.demand import rates
+from synthesis.certify.statement.rates import rates
 
 SPEED, MASS = (
     Scheduling("airspeed", "m/s", 0.0, 13.0, 3.0),

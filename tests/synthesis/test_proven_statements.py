@@ -1,0 +1,206 @@
+"""Every proven statement: saved, read by the one reader, verified, printed from its numbers."""
+
+import json
+import random
+from functools import cache
+from math import inf, log
+
+import numpy as np
+import pytest
+
+from studies import cli
+from symheli import LinearModel, LPVStateSpace, Scheduling
+from symheli.errors import InputError, SymheliError
+from synthesis import decay_rate, h2_gain, l2_gain, lft_gain, stability
+from synthesis.analysis import energy_to_peak
+from synthesis.certify.statement.statement_file import read
+from synthesis.forms import Spline
+from synthesis.sets import invariant_set, low_complexity_set
+from synthesis.switching import dwell_time
+
+pytestmark = pytest.mark.guard
+
+
+@cache
+def lag(dt=None):
+    p = Scheduling("p", "1", 0.0, 1.0, rate=0.5)
+    A = [[[-1.0]], [[-1.0]]] if dt is None else [[[0.5]], [[-0.2]]]
+    return LPVStateSpace.polynomial(A, [[[1.0]]], [[[1.0]]], [[[0.0]]], p, dt=dt)
+
+
+def rotated():
+    nothing = np.zeros((2, 0))
+    A, names = [[0.5, 0.2], [0.0, 0.7]], ["x_m", "y_m"]
+    return LinearModel(A, nothing, np.eye(2), nothing, ["x", "y"], [], names, dt=0.1)
+
+
+def pushed():
+    return LinearModel([[1.0]], [[2.0]], [[1.0]], [[0.0]], ["x"], ["u"], ["x_m"])
+
+
+QUICK = {"form": Spline(degree=1, segments=1), "search": None}
+TRIPLED = {(0, 1): [[3.0]], (1, 0): [[3.0]]}
+SLOW = [[[-1.0]], [[-1.0]]]
+MADE = {
+    "l2 gain": lambda: l2_gain(lag(), **QUICK),
+    "sampled l2 gain": lambda: l2_gain(lag(0.1), **QUICK),
+    "stability": lambda: stability(lag(), **QUICK),
+    "decay rate": lambda: decay_rate(lag(), **QUICK),
+    "energy-to-peak gain": lambda: energy_to_peak(lag(), **QUICK),
+    "h2 gain": lambda: h2_gain(lag(), **QUICK),
+    "LFT gain": lambda: lft_gain(lag().to_lft(), "DG", search=None),
+    "ellipsoid": lambda: invariant_set(pushed(), input_bounds={"u": 1.0}),
+    "parallelepiped": lambda: low_complexity_set(rotated(), state_bounds={"x": 1.0, "y": 2.0}),
+    "dwell time": lambda: dwell_time(SLOW, TRIPLED, within=1.2, parts=4),
+    "average dwell time": lambda: dwell_time(SLOW, TRIPLED, average=True),
+    "sampled dwell time": lambda: dwell_time([[[0.9]], [[0.8]]], TRIPLED, dt=0.1),
+}
+BETTER = {
+    **dict.fromkeys(("l2 gain", "sampled l2 gain", "energy-to-peak gain", "h2 gain"), "gamma"),
+    "LFT gain": "gamma",
+    "decay rate": "alpha",
+    **dict.fromkeys(("dwell time", "average dwell time", "sampled dwell time"), "seconds"),
+}
+
+
+@cache
+def made(kind):
+    return MADE[kind]()
+
+
+@pytest.fixture(params=MADE)
+def saved(request, tmp_path):
+    """(kind, the statement, its file)."""
+    found = made(request.param)
+    return request.param, found, found.save(tmp_path / "proof.json")
+
+
+def test_it_is_read_without_knowing_what_it_is(saved):
+    _, found, file = saved
+    again = read(file)
+    assert type(again) is type(found)
+    assert again.verify(rigorous=True)
+    assert (again.claim, again.conditions) == (found.claim, found.conditions)
+    assert again.facts == found.facts
+    assert again.bound == found.bound or np.isnan(found.bound)
+    assert (again.verified, again.why) == (True, "")
+
+
+def test_symheli_verify_prints_claim_and_conditions(saved, capsys):
+    _, found, file = saved
+    assert cli.main(["verify", str(file)]) == 0
+    told = capsys.readouterr().out
+    assert told.startswith(f"proven in exact arithmetic: {found.claim}\n")
+    assert all(f"- {line}" in told for line in found.conditions)
+    assert cli.main(["verify", str(file), "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert data["exact"]
+    assert data["claim"] == found.claim
+    assert "nan" not in found.claim
+
+
+def with_text_changed(value):
+    if isinstance(value, dict):
+        return {name: with_text_changed(part) for name, part in value.items()}
+    if isinstance(value, list):
+        return [with_text_changed(part) for part in value]
+    return "for every model of the world" if isinstance(value, str) and " " in value else value
+
+
+def test_sentences_of_the_file_are_not_repeated_as_the_claim(saved):
+    _, found, file = saved
+    content = json.loads(file.read_text())
+    kept = {name: content[name] for name in ("schema", "statement", "kind") if name in content}
+    file.write_text(json.dumps({**with_text_changed(content), **kept}))
+    try:
+        again = read(file)
+    except SymheliError:
+        return
+    assert (again.claim, again.conditions) == (found.claim, found.conditions)
+
+
+@pytest.mark.parametrize("kind", BETTER)
+def test_a_better_number_is_not_proven(kind, tmp_path):
+    found = made(kind)
+    file = found.save(tmp_path / "proof.json")
+    content = json.loads(file.read_text())
+    name = BETTER[kind]
+    content[name] *= 1.2 if name == "alpha" else 0.8
+    for other in {"lower", "upper", "frozen"} & content.keys():
+        content[other] = {"float": "nan"}
+    file.write_text(json.dumps(content))
+    assert not proven(file)
+
+
+def proven(file):
+    """The statement of a file where its exact check passes; None where it is refused."""
+    try:
+        found = read(file)
+        return found if found.verify(rigorous=True) else None
+    except SymheliError:
+        return None
+
+
+def numbers(value, path=()):
+    if isinstance(value, dict):
+        value = {k: v for k, v in value.items() if k not in ("attempts", "seconds", "worst")}
+        for name, part in value.items():
+            yield from numbers(part, (*path, name))
+    elif isinstance(value, list):
+        for i, part in enumerate(value):
+            yield from numbers(part, (*path, i))
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        yield path
+
+
+def test_a_number_changed_is_refused_or_says_what_it_now_proves(saved, tmp_path):
+    """No change ends in a traceback; what passes holds for the numbers in the file, about another
+    model or with more room.
+    """
+    kind, found, file = saved
+    content = json.loads(file.read_text())
+    places = sorted(numbers(content), key=str)
+    random.seed(0)
+    for path in random.sample(places, min(12, len(places))):
+        for change in (lambda v: 1.5 * v, lambda v: -v, lambda v: 0.5 * v):
+            forged = json.loads(file.read_text())
+            at = forged
+            for step in path[:-1]:
+                at = at[step]
+            at[path[-1]] = change(at[path[-1]])
+            (tmp_path / "forged.json").write_text(json.dumps(forged))
+            again = proven(tmp_path / "forged.json")
+            if again is not None and kind in BETTER and BETTER[kind] == path[0]:
+                better = again.bound > found.bound * (1 + 1e-2)
+                assert better == (BETTER[kind] != "alpha") or again.bound == found.bound
+
+
+def test_a_dwell_time_is_bound_to_its_segments():
+    found = made("dwell time")
+    assert sum(found.lengths) <= found.seconds
+    assert log(3) < found.seconds
+
+
+def test_a_claim_is_about_one_model(tmp_path):
+    found = made("l2 gain")
+    assert found.proven_of(lag())
+    assert found.proven_of(lag().with_rate(3.0))  # the rate is a condition, not the model
+    assert not found.proven_of(lag(0.1))
+    other = LPVStateSpace.polynomial(
+        [[[-1.0]], [[-1.0 - 1e-15]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], lag().parameters
+    )
+    assert not found.proven_of(other)
+    with pytest.raises(InputError, match="the proof is about an LPVStateSpace"):
+        found.proven_of(lag().to_lft())
+    with pytest.raises(InputError, match="not about one model"):
+        made("dwell time").proven_of(lag())
+    assert made("LFT gain").proven_of(lag().with_rate(inf).to_lft())
+
+
+def test_an_unknown_statement_is_named(tmp_path):
+    file = tmp_path / "proof.json"
+    for name in ("passivity of the moon", None, ["set"]):
+        head = {"schema": "symheli statement", "version": 2, "statement": name}
+        file.write_text(json.dumps(head))
+        with pytest.raises(InputError, match=r"unknown statement .*certificate, dwell-time"):
+            read(file)
