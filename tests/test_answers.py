@@ -948,7 +948,7 @@ PYTHON = {
         lambda s: synthesis.Certificate.load(s.family_file),
         InputError,
         "family.json: expected the schema 'symheli statement'",
-        "this file was not written by Certificate.save",
+        "this file was not written by the .save of a certificate",
     ),
     "no objectives": (
         lambda s: synthesis.multiobjective(s.plant, []),
