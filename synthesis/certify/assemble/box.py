@@ -6,7 +6,7 @@ the proof; `pointwise` does not.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import reduce
 from math import prod
 from typing import Any, NamedTuple
@@ -68,8 +68,8 @@ class Affine(NamedTuple):
     """F = sum_v x_v linear[., v] + constant + g `level`, which must stay below -`back_off`; svec'd
     matrices (N, N).
 
-    `linear` (K, V, L) and `constant` (K, L) are the Bernstein coefficients of `degrees`; `columns`
-    (V,) of P.
+    `linear` (K, V, L), `constant` and `level` (K, L) are the Bernstein coefficients of `degrees`;
+    `columns` (V,) of P.
     """
 
     degrees: tuple[int, ...]
@@ -88,7 +88,7 @@ def affine_inequalities(
     changed by `weight`.
     """
     nx, nu, ny = model.sizes
-    eye, gains = np.eye(nx), demand.kind.endswith("gain")
+    eye, gains = np.eye(nx), demand.kind.driven
     nothing = svec(np.zeros((nx, nx)))
     out = []
     # every P on its own segments
@@ -103,25 +103,17 @@ def affine_inequalities(
             out.append(_affine(P, columns, nothing, nothing, -eye))
     if gains:
         inputs = np.diag(np.r_[np.zeros(nx), np.ones(nu)])
-        level, fixed = (
-            (-svec(inputs), 0 * inputs) if demand.kind == "l2 gain" else (0 * svec(inputs), -inputs)
-        )
+        level, fixed = 0 * svec(inputs), -inputs if demand.of_gramian else 0 * inputs
         back_off = margin * svec(np.diag(np.r_[np.ones(nx), np.zeros(nu)]))
     else:
         level, fixed, back_off = svec(eye), 0 * eye, nothing
     for region in regions(model, shape.knots, demand.motion, demand.moving(shape.degrees)):
         columns, pair = _pair(shape, region, nx)
-        for F in decrease(model, region, pair, demand, float):
+        for F, G in _with_rise(model, region, pair, demand):
             W = extended(weight, F.shape[0] - nx)
-            out.append(
-                _affine(
-                    PolynomialMatrix(F.box, W.T @ F.coefficients @ W),
-                    columns,
-                    level,
-                    back_off,
-                    fixed,
-                )
-            )
+            F = PolynomialMatrix(F.box, W.T @ F.coefficients @ W)
+            rise = level if G is None else PolynomialMatrix(G.box, W.T @ G.coefficients @ W)
+            out.append(_affine(F, columns, rise, back_off, fixed))
         if demand.of_gramian and region.next_segment == region.segment:
             columns, P = _unknown(
                 shape, region.segment, np.unique(coefficients_of(shape, region.segment)), nx
@@ -131,6 +123,22 @@ def affine_inequalities(
             level_y = -svec(np.diag(np.r_[np.zeros(size - seen), np.ones(seen)]))
             out.append(_affine(F, columns, level_y, 0 * level_y, np.zeros((size, size))))
     return out
+
+
+def _with_rise(
+    model: Pieces, region: Region, pair: Pair, demand: Demand
+) -> Iterator[tuple[PolynomialMatrix, PolynomialMatrix | None]]:
+    """Yield each dissipation inequality at level 0, and what a level of 1 adds; None of a kind
+    whose supply rate has no level.
+    """
+    every = decrease(model, region, pair, demand, float)
+    if demand.kind.facets.supply is None:
+        yield from ((F, None) for F in every)
+        return
+    for F, higher in zip(every, decrease(model, region, pair, demand, float, 1.0), strict=True):
+        degrees = tuple(map(max, F.degrees, higher.degrees))
+        F = F.elevate(degrees)
+        yield F, higher.elevate(degrees) - F
 
 
 def assemble(
@@ -154,7 +162,7 @@ def assemble(
         if isinstance(impose, SumOfSquares):
             F, P = _raised(F, impose.elevation, tensor)
             terms = list(sums_of_squares(F.degrees, F.N))
-            level = np.tile(F.level, len(F.constant))
+            level = F.level.ravel()
             zero.append(
                 (
                     P,
@@ -173,7 +181,7 @@ def assemble(
         cone.append(
             (
                 lift @ P,
-                np.tile(F.level, rows),
+                (conditions.negative @ F.level).ravel(),
                 (-conditions.negative @ F.constant - F.back_off).ravel(),
             )
         )
@@ -221,22 +229,32 @@ def _raised(F: Affine, elevation: int, tensor: int) -> tuple[Affine, sparse.csr_
         T = coefficient_conditions(F.degrees, elevation, 0).negative
         degrees = tuple(d + elevation if d else 0 for d in F.degrees)
         F = F._replace(
-            degrees=degrees, linear=np.tensordot(T, F.linear, axes=1), constant=T @ F.constant
+            degrees=degrees,
+            linear=np.tensordot(T, F.linear, axes=1),
+            constant=T @ F.constant,
+            level=T @ F.level,
         )
     return F, _columns(F, tensor)
 
 
 def _affine(
-    F: PolynomialMatrix, columns: Array, level: Array, back_off: Array, fixed: Array
+    F: PolynomialMatrix,
+    columns: Array,
+    level: Array | PolynomialMatrix,
+    back_off: Array,
+    fixed: Array,
 ) -> Affine:
     """Return the affine map of the polynomials of a stack of unit P and, last in the stack, P = 0;
-    `fixed` is a constant to add.
+    `level` multiplies g, a constant (L,) or the same stack of one polynomial; `fixed` is a constant
+    to add.
     """
     m, N = len(F.box), F.shape[0]
     c = svec(F.coefficients).reshape(-1, F.coefficients.shape[m], length(N))
-    return Affine(
-        F.degrees, columns, c[:, :-1] - c[:, -1:], c[:, -1] + svec(fixed), level, back_off, N
-    )
+    if isinstance(level, PolynomialMatrix):
+        g = svec(level.coefficients).reshape(len(c), -1, length(N))[:, -1]
+    else:
+        g = np.tile(level, (len(c), 1))
+    return Affine(F.degrees, columns, c[:, :-1] - c[:, -1:], c[:, -1] + svec(fixed), g, back_off, N)
 
 
 def coefficients_of(shape: Shape, index: Sequence[int]) -> Array:

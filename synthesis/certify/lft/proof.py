@@ -18,6 +18,7 @@ from symheli.lpv.lpv_matrices import Matrices
 from symheli.lpv.scheduling import Scheduling
 from synthesis.certify.lft.multipliers import Multiplier
 from synthesis.certify.proof import pointwise
+from synthesis.certify.statement.kind import L2_GAIN, STABILITY
 from synthesis.certify.statement.units import Scaling
 from synthesis.numerics.polynomial import structure
 from synthesis.numerics.polynomial.exact import Number, exact, positive_definite, rational
@@ -67,7 +68,7 @@ class LFTEvidence(NamedTuple):
         """
         if not isinstance(proof, QuadraticStorage) or not isinstance(proof.multiplier, Multiplier):
             return "expected P and a Multiplier"
-        if kind != ("l2 gain" if self.lft.inputs else "stability"):
+        if kind != (L2_GAIN if self.lft.inputs else STABILITY):
             return f"the LFT of the proof is not one of the kind {kind!r}"
         if rates != (math.inf,) * len(self.lft.parameters):
             return f"the proof is for parameters that jump, the certificate for rates {rates}"

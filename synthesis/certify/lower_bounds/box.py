@@ -19,9 +19,10 @@ from synthesis.certify.lower_bounds.lines import Line, alone, directions, growin
 from synthesis.certify.lower_bounds.lower_bound import LowerBoundSearch, lower_bound
 from synthesis.certify.lower_bounds.paths import Budget, WaveFamily, samples, steps
 from synthesis.certify.lower_bounds.periodic import multiplier
+from synthesis.certify.lower_bounds.supplied import frozen_level, supplied
 from synthesis.certify.lower_bounds.tied import tied_lower_bound
 from synthesis.certify.statement.demand import Demand
-from synthesis.certify.statement.kind import Kind
+from synthesis.certify.statement.kind import L2_GAIN, STABILITY, Kind
 from synthesis.certify.statement.trajectory import SchedulingTrajectory
 from synthesis.numerics.linear.balance import balance
 from synthesis.numerics.linear.norm import (
@@ -55,8 +56,10 @@ def measure(demand: Demand, dt: float | None) -> Measure:
     """Return the measure of a frozen model, larger is worse: its gain, or minus its decay rate
     (1/s), also for stability.
     """
-    if demand.kind == "l2 gain":
+    if demand.kind == L2_GAIN:
         return lambda A, B, C, D: norm(A, B, C, D, dt)[0]
+    if demand.kind.indexed:
+        return lambda A, B, C, D: frozen_level(A, B, C, D, dt, demand.kind)
     if demand.of_gramian:
         return lambda A, B, C, D: of_gramian(A, B, C, D, dt, demand.kind)
     return lambda A, B, C, D: -frozen_decay(A, dt)
@@ -74,7 +77,7 @@ def frozen_decay(A: Array, dt: float | None) -> float:
 
 def of_gramian(A: Array, B: Array, C: Array, D: Array, dt: float | None, kind: Kind) -> float:
     """Return max |y(t)| over inputs of unit energy: sqrt of the largest eigenvalue of C X C' (+ D
-    D'), X the controllability Gramian; of the "h2 gain" the root of its trace.
+    D'), X the controllability Gramian; of a kind of `rows` the root of its trace.
 
     inf where the model is not stable. Source: Rotea (1993); discrete time by the same argument.
     """
@@ -90,15 +93,15 @@ def of_gramian(A: Array, B: Array, C: Array, D: Array, dt: float | None, kind: K
 
 
 def _size(covariance: Array, kind: Kind) -> float:
-    """Return the largest variance in any direction, or of the "h2 gain" that of all outputs."""
-    if kind == "h2 gain":
+    """Return the largest variance in any direction, or of a kind of `rows` that of all outputs."""
+    if kind.facets.rows:
         return max(float(np.trace(covariance)), 0.0)
     return max(float(np.linalg.eigvalsh(0.5 * (covariance + covariance.T)).max(initial=0.0)), 0.0)
 
 
 def worst_by(demand: Demand, model: Pieces) -> Worst:
     """Return the worst frozen model by the measure of the inequality."""
-    rough = partial(gain_at_poles, dt=model.dt) if demand.kind == "l2 gain" else None
+    rough = partial(gain_at_poles, dt=model.dt) if demand.kind == L2_GAIN else None
     return worst_frozen(model, measure(demand, model.dt), rough)
 
 
@@ -164,10 +167,12 @@ def worst_moving(
     lines = [line for line in _lines(model, demand.rates) if line.rate > 0]
     near = frozen.p[0] if len(model.parameters) == 1 and frozen.p else 0.0
     for line, share in shared(lines, search):
-        if demand.kind == "l2 gain":
+        if demand.kind == L2_GAIN:
             known = FrozenGain(frozen.value, near, math.nan)
             found = lower_bound(line.model, line.rate, frozen=known, search=share)
             value, trajectory = found.gain, found.trajectory
+        elif demand.kind.indexed:
+            value, trajectory = supplied(line.model, line.rate, share, demand.kind)
         elif demand.of_gramian:
             value, trajectory = _peaks(line.model, line.rate, share, demand.kind)
         else:
@@ -194,12 +199,12 @@ def worst_tied(
     """Return the worst found along cycles within rate and jerk limits; for gains and growth
     only.
     """
-    if search is None or demand.kind not in ("l2 gain", "stability"):
+    if search is None or demand.kind not in (L2_GAIN, STABILITY):
         return frozen
     found = tied_lower_bound(model, demand.motion, search)
     if found is None or not found.gain > frozen.value:
         return frozen
-    if demand.kind == "stability" and not math.isinf(found.gain):
+    if demand.kind == STABILITY and not math.isinf(found.gain):
         return frozen
     return Worst(found.gain, None, found.trajectory)
 

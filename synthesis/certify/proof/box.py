@@ -50,6 +50,9 @@ INDEPENDENT_POINTS = 40
 model's own matrices.
 """
 
+DOUBLINGS = 40
+"""Largest number of times a level is raised fourfold in the search for one that holds."""
+
 MIN_LEVEL = 1e-8
 """Least g in scaled units: no strict inequality proves zero."""
 
@@ -91,6 +94,8 @@ class BoxEvidence(NamedTuple):
             return "the parameters of the model do not move as those of the proof"
         if not self.model.original:
             return "the pieces are not those of the model"
+        if self.demand.channel != 1.0:
+            return "the outputs of the model are not in the units of the proof"
         if self.demand.of_gramian and self.model.passes_peaks:
             return f"the {kind} of a continuous model needs D = 0"
         return structure.first(
@@ -106,13 +111,14 @@ class BoxEvidence(NamedTuple):
         u, root = self.units, math.sqrt(self.units.time)
         outputs = u.channel if self.demand.of_gramian else u.channel / root
         model = self.model.scaled(u.left, u.right, 1 / root, outputs, u.time)
-        return model, self.demand._replace(time=u.time if model.dt is None else 1.0)
+        time = u.time if model.dt is None else 1.0
+        return model, self.demand._replace(time=time, channel=u.channel)
 
     def in_units(self, value: float) -> float:
         """Return a physical gain (decay rate, 1/s) in the scaled units."""
-        if self.demand.kind == "decay rate":
+        if self.demand.kind.facets.decays:
             return value * self.units.time if self.model.dt is None else value
-        return value / self.units.channel
+        return value / self.units.channel ** self.demand.kind.facets.powers[1]
 
     def to_physical(self, P: Array) -> Array:
         """Return Lyapunov matrices of V in physical units, squared outputs times seconds or, where
@@ -129,7 +135,7 @@ class BoxEvidence(NamedTuple):
 
     @property
     def _input_energy(self) -> float:
-        return self.units.channel**2 if self.demand.of_gramian else 1.0
+        return self.units.channel ** (2.0 - self.demand.kind.facets.powers[0])
 
     def sampled(self, P: BoxLyapunov, points: int) -> tuple[BoxLyapunov, float]:
         """Return (P, the bound it admits at `points` values of each parameter in every region); inf
@@ -139,19 +145,24 @@ class BoxEvidence(NamedTuple):
         for stability.
         """
         kind = self.demand.kind
+        facets = kind.facets
         model, demand = self.scaled
         if not demand.meaningful(model.dt, P.degrees):
-            return P, -math.inf if kind == "decay rate" else math.inf
+            return P, -math.inf if facets.sense < 0 else math.inf
         back = self._back(P)
-        if kind == "stability":
+        if not facets.sense:
             return P, math.nan
         samples = _samples(model, back, demand, points)
-        if kind == "decay rate":
+        if facets.decays:
             alpha = samples.decay(model.dt)
             return P, alpha / self.in_units(1.0)
+        if kind.indexed:
+            g = samples.level()
+            bound = facets.bound(g) if math.isfinite(g) else facets.sense * math.inf
+            return P, bound / self.in_units(1.0)
         g = samples.gain()
-        if kind == "l2 gain" or not 0 < g < math.inf:
-            return P, math.sqrt(g) / self.in_units(1.0)
+        if facets.supply is not None or not 0 < g < math.inf:
+            return P, facets.bound(g) / self.in_units(1.0)
         factor = 1.0 / (g * (1 + LOOSENINGS[0]))
         P = replace(P, coefficients=P.coefficients * factor)
         back = self._back(P)
@@ -165,20 +176,13 @@ class BoxEvidence(NamedTuple):
         kind = self.demand.kind
         if math.isinf(value):
             return None
-        nothing = kind.endswith("gain") and value * self.in_units(1.0) <= math.sqrt(
-            MIN_LEVEL * (1 + LOOSENINGS[0])
+        nothing = (
+            kind.gains
+            and not kind.indexed
+            and value * self.in_units(1.0) <= math.sqrt(MIN_LEVEL * (1 + LOOSENINGS[0]))
         )
         for fraction in (*LOOSENINGS, *LARGE_LOOSENINGS) if nothing else LOOSENINGS:
-            # gains: of gamma^2
-            bound = (
-                value
-                if kind == "stability"
-                else (
-                    value - fraction * abs(value)
-                    if kind == "decay rate"
-                    else value * math.sqrt(1 + fraction)
-                )
-            )
+            bound = self._looser(value, fraction)
             if self.demand.of_gramian:
                 trial = replace(P, coefficients=P.coefficients / (1 + fraction))
                 bound *= math.sqrt(1 + fraction)
@@ -186,9 +190,23 @@ class BoxEvidence(NamedTuple):
                 trial = P
             if self.floating(trial, bound):
                 return trial, bound
-            if kind == "stability":
+            if not kind.facets.sense:
                 break
         return None
+
+    def _looser(self, value: float, fraction: float) -> float:
+        """Return a bound that is looser by a fraction: gains of gamma^2, decay rates of themselves,
+        other levels of one in scaled units.
+        """
+        kind = self.demand.kind
+        if not kind.facets.sense:
+            return value
+        if kind.indexed:
+            unit = 1.0 / self.in_units(1.0)
+            return value + kind.facets.sense * fraction * (abs(value) + unit)
+        if kind.facets.decays:
+            return value - fraction * abs(value)
+        return value * math.sqrt(1 + fraction)
 
     def conditioning(self, P: BoxLyapunov) -> float:
         """Return the largest condition number of P in scaled coordinates, at its knots and a few
@@ -298,17 +316,17 @@ def polynomials(
     for index in np.ndindex(*P.segments):
         yield positivity(convert(P.segment(index), number))
     nx, nu, ny = model.sizes
-    g = number(bound) * number(bound) if demand.kind.endswith("gain") else None
-    if demand.kind == "decay rate":
+    kind = demand.kind
+    g = kind.facets.level(number(bound)) if kind.driven else None
+    if kind.facets.decays:
         demand = demand._replace(shift=bound)
+    level = 0 if kind.facets.supply is None else g
     for region in regions(model, P.knots, demand.motion, demand.moving(P.degrees)):
         pair = Pair(
             *(convert(P.segment(index), number) for index in (region.segment, region.next_segment))
         )
-        for F in decrease(model, region, pair, demand, number):
-            if demand.kind == "l2 gain":
-                F = _less(F, np.r_[np.zeros(nx), np.ones(nu)], g, number)
-            elif demand.of_gramian:
+        for F in decrease(model, region, pair, demand, number, level):
+            if demand.of_gramian:
                 F = _less(F, np.r_[np.zeros(nx), np.ones(nu)], number(1.0), number)
             yield F
         if demand.of_gramian and region.next_segment == region.segment:
@@ -328,6 +346,7 @@ class _Samples(NamedTuple):
     moves: list[Array]
     here: list[Array]
     outputs: list[Array]
+    rises: list[Array]
     nx: int
     seen: int
 
@@ -336,6 +355,14 @@ class _Samples(NamedTuple):
         if any(np.linalg.eigvalsh(P).min() <= 0 for P in self.here):
             return math.inf
         return max([MIN_LEVEL, *(_least_level(F, self.nx) for F in self.moves)])
+
+    def level(self) -> float:
+        """Return the least g at which every inequality holds, for a level of any sign: F - g R < 0,
+        R >= 0.
+        """
+        if any(np.linalg.eigvalsh(P).min() <= 0 for P in self.here):
+            return math.inf
+        return max(map(_least_multiple, self.moves, self.rises), default=math.inf)
 
     def output(self) -> float:
         """Return the least g of the second inequality."""
@@ -366,19 +393,41 @@ def _least_level(F: Array, n: int) -> float:
     return float(np.linalg.eigvalsh(schur_complement(F, n)).max())
 
 
+def _least_multiple(F: Array, R: Array) -> float:
+    """Return the least g with F - g R < 0 for all matrices (K, N, N), R >= 0; inf for none."""
+    size = max(float(np.abs(F).max()), 1e-300)
+    high = size / max(float(np.abs(R).max()), 1e-300)
+    low = -high
+    for _ in range(DOUBLINGS):
+        if np.linalg.eigvalsh(F - high * R).max() < 0:
+            break
+        low, high = high, abs(high) * 4
+    else:
+        return math.inf
+    while np.linalg.eigvalsh(F - low * R).max() < 0 and abs(low) < 1e12 * size:
+        low *= 4
+    for _ in range(DOUBLINGS + 20):
+        middle = 0.5 * (low + high)
+        negative = np.linalg.eigvalsh(F - middle * R).max() < 0
+        low, high = (low, middle) if negative else (middle, high)
+    return high
+
+
 def _samples(model: Pieces, P: BoxLyapunov, demand: Demand, points: int) -> _Samples:
     nx, _, ny = model.sizes
-    moves, here, outputs = [], [], []
+    moves, here, outputs, rises = [], [], [], []
     for region in regions(model, P.knots, demand.motion, demand.moving(P.degrees)):
         pair = Pair(P.segment(region.segment), P.segment(region.next_segment))
-        for F in decrease(model, region, pair, demand, float):
+        higher = decrease(model, region, pair, demand, float, 1.0)
+        for F, G in zip(decrease(model, region, pair, demand, float), higher, strict=True):
             local = _grid(F, points)
             moves.append(F(local))
+            rises.append(moves[-1] - G(local))
             here.append(pair.here(local[:, : len(region.box)]))
         if demand.of_gramian:
             F = output_form(model, region, pair.here, demand, float)
             outputs.append(F(_grid(F, points)))
-    return _Samples(moves, here, outputs, nx, demand.seen(ny))
+    return _Samples(moves, here, outputs, rises, nx, demand.seen(ny))
 
 
 def _grid(F: PolynomialMatrix, points: int) -> Array:

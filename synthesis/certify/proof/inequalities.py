@@ -4,6 +4,7 @@ Continuous time, V = x' P(p) x, at every corner nu of the box of rates, Pdot = s
 nu_i = p_j where the rate of p_i is p_j:
 
     L2 gain          [A'P + PA + Pdot + C'C   PB + C'D; .   D'D - g I] < 0
+    supply rate      [A'P + PA + Pdot   PB; .   0] - [C D; 0 I]'[q I  s I; s I  r I][C D; 0 I] < 0
     energy to peak   [A'P + PA + Pdot   PB; .   -I] < 0  and  [P   C'; .   g I] > 0, D = 0
     H2               the first of these  and  [diag(P, .., P)   (c_1, .., c_ny)'; .   g] > 0, D = 0
     decay rate       A'P + PA + Pdot + 2 alpha P < 0
@@ -15,9 +16,10 @@ discrete time, P+ = P(p(k+1)):
     H2               the first of these  and  the second of H2 for diag(P, I) and rows (c_i, d_i)
     decay rate       A'P+A exp(2 alpha dt) - P < 0
 
-and P > 0; gain^2 = g; c_i is row i of C. P^-1 bounds the variance of the state in white noise, and
-g is then at least the trace of C P^-1 C'. Sources: Wu, Yang, Packard and Becker, Int. J. Robust
-and Nonlinear Control 6 (1996), theorem 3.1; Rotea, "The generalized H2 control problem", Automatica
+and P > 0; gain^2 = g; q, s, r are affine in g, see `statement.kind`, in discrete time too; c_i is
+row i of C. P^-1 bounds the variance of the state in white noise, and g is then at least the trace
+of C P^-1 C'. Sources: Wu, Yang, Packard and Becker, Int. J. Robust and Nonlinear Control 6 (1996),
+theorem 3.1; Rotea, "The generalized H2 control problem", Automatica
 29 (1993); Boyd, El Ghaoui, Feron and Balakrishnan, "Linear Matrix Inequalities in System and
 Control Theory" (1994), sections 5.1 and 6.
 """
@@ -27,12 +29,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from synthesis.certify.statement.demand import Demand
-from synthesis.certify.statement.kind import Kind
+from synthesis.certify.statement.kind import L2_GAIN, Supply
 from synthesis.certify.statement.norm_bounded import NormBounded
 from synthesis.certify.statement.spline import Lyapunov, MemoryLyapunov, SplineLyapunov
 from synthesis.numerics.polynomial.exact import Number, exact, growth_of
@@ -58,11 +60,12 @@ def positivity(P: PolynomialMatrix) -> PolynomialMatrix:
 
 
 def decrease(
-    model: Pieces, region: Region, P: Pair, demand: Demand, number: Number
+    model: Pieces, region: Region, P: Pair, demand: Demand, number: Number, level: Any = 0
 ) -> Iterator[PolynomialMatrix]:
-    """Yield the dissipation inequalities on a region, without the term in g; one a corner of the
-    box of rates.
+    """Yield the dissipation inequalities on a region at a level g of the supply rate; one a corner
+    of the box of rates.
     """
+    supply = demand.supply(level, number)
     m = len(model.parameters)
     system, here = model_on(model, region, number), now(P.here, region, number)
     moving = demand.moving(here.degrees)
@@ -70,7 +73,7 @@ def decrease(
         there = successor(P.there, region, number, moving)
         system, here = [M.extend(there.box[m:]) for M in system], here.extend(there.box[m:])
         growth = number(growth_of(demand.shift, model.dt))
-        yield from dissipation(system, here, demand.kind, after=there * growth)
+        yield from dissipation(system, here, supply, demand.kind.driven, after=there * growth)
         return
     drifts = [
         slope_along(here, drift, demand.time, number) for drift in demand.motion.drifts(moving)
@@ -78,18 +81,20 @@ def decrease(
     if demand.shift:
         rising = here * (2 * number(demand.shift))
         drifts = [rising if drift is None else rising + drift for drift in drifts]
-    yield from dissipation(system, here, demand.kind, drifts)
+    yield from dissipation(system, here, supply, demand.kind.driven, drifts)
 
 
 def dissipation(
     system: Sequence[PolynomialMatrix],
     P: PolynomialMatrix,
-    kind: Kind,
+    supply: Supply | None,
+    driven: bool,
     drifts: Sequence[PolynomialMatrix | None] = (None,),
     after: PolynomialMatrix | None = None,
 ) -> Iterator[PolynomialMatrix]:
-    """Yield the blocks of the table above without the term in g for the `system` A, B, C, D; one
-    for each of the `drifts` dP/dt (None: 0), or in discrete time for P+ = `after`.
+    """Yield the blocks of the table above for the `system` A, B, C, D, of the states alone where it
+    is not `driven`; one for each of the `drifts` dP/dt (None: 0), or in discrete time for P+ =
+    `after`.
     """
     A, B, C, D = system
     if after is not None:
@@ -97,11 +102,16 @@ def dissipation(
     else:
         PA = P @ A
         top, side, corner = PA + PA.T, P @ B, B.T @ B * 0
-    if kind == "l2 gain":
-        top, side, corner = top + C.T @ C, side + C.T @ D, corner + D.T @ D
+    q, s, r = supply or (0, 0, 0)
+    if q:
+        top, side, corner = top - C.T @ C * q, side - C.T @ D * q, corner - D.T @ D * q
+    if s:
+        side, corner = side - C.T * s, corner - (D + D.T) * s
+    if r:
+        corner = corner - PolynomialMatrix.constant(np.eye(B.shape[1], dtype=int) * r, B.box)
     for drift in drifts:
         whole = top if drift is None else top + drift
-        yield block([[whole, side], [side.T, corner]]) if kind.endswith("gain") else whole
+        yield block([[whole, side], [side.T, corner]]) if driven else whole
 
 
 def output_form(
@@ -117,7 +127,7 @@ def output_form(
         eye = PolynomialMatrix.constant(exact(np.eye(nu), number), here.box)
         zero = PolynomialMatrix.constant(exact(np.zeros((nx, nu)), number), here.box)
         here, C = block([[here, zero], [zero.T, eye]]), block([[C, D]])
-    if demand.kind != "h2 gain":
+    if not demand.kind.facets.rows:
         return -block([[here, C.T], [C, C @ C.T * 0]])
     rows = [PolynomialMatrix(C.box, C.coefficients[..., i : i + 1, :]) for i in range(ny)]
     none = here * 0
@@ -198,7 +208,7 @@ def _polynomials(
     model, P, rate, _, channel = statement
     assert statement.meaningful  # noqa: S101 - checked by the callers
     ends = ((model.breaks[0][0], model.breaks[0][-1]),)
-    demand = Demand("l2 gain", Motion(ends, (rate,), (None,)))
+    demand = Demand(L2_GAIN, Motion(ends, (rate,), (None,)))
     one, own = np.array([[number(1.0)]]), _observed(model, P.order, channel)
     for region in regions(model, [P.knots], demand.motion, demand.moving([P.degree])):
         if isinstance(P, MemoryLyapunov):
@@ -294,9 +304,9 @@ def _remembering(
         low, height = lower.extend((share,)), (upper - lower).extend((share,))
         s = PolynomialMatrix(here.box, np.array(share)[None, :, None, None])
         slopes = [nu * here.derivative(0) for nu in (-number(rate), number(rate))]
-        for nu, F in zip(
-            (-number(rate), number(rate)), dissipation(model, here, "l2 gain", slopes), strict=True
-        ):
+        gain = Demand(L2_GAIN, Motion((), (), ())).supply(0, number)
+        blocks = dissipation(model, here, gain, True, slopes)
+        for nu, F in zip((-number(rate), number(rate)), blocks, strict=True):
             # height ds/dt = de/dt - dp/dt (lower' + s height')
             lead = (low + height @ s) * (number(1.0) / number(lag.time))
             steeper = low.derivative(0) + height.derivative(0) @ s

@@ -17,6 +17,7 @@ from symheli.values.tracking import tracked
 from synthesis.certify.proof import pointwise
 from synthesis.certify.proof.inequalities import Statement, lmi_polynomials
 from synthesis.certify.statement.demand import Demand
+from synthesis.certify.statement.kind import L2_GAIN, STABILITY
 from synthesis.certify.statement.norm_bounded import NormBounded
 from synthesis.certify.statement.spline import Lyapunov, MemoryLyapunov, SplineLyapunov
 from synthesis.certify.statement.units import Scaling
@@ -148,7 +149,7 @@ class IntervalEvidence(NamedTuple):
         if fault := self._fault_of_block(P):
             return fault
         own = 0 if self.block is None else self.block.inputs
-        if kind != ("l2 gain" if len(self.lpv.inputs) > own else "stability"):
+        if kind != (L2_GAIN if len(self.lpv.inputs) > own else STABILITY):
             return f"the model of the proof is not one of the kind {kind!r}"
         if not self.rate >= 0 or rates != (self.rate,):
             return f"the proof is for rates {(self.rate,)}, the certificate for {rates}"
@@ -246,7 +247,7 @@ class IntervalEvidence(NamedTuple):
 
     def _demand(self, rate: float, gamma: float) -> Demand:
         s = self.lpv.scheduling
-        kind = "stability" if math.isnan(gamma) else "l2 gain"
+        kind = STABILITY if math.isnan(gamma) else L2_GAIN
         return Demand(kind, Motion(((s.low, s.high),), (rate,), (None,)))
 
     def _ends(self, P: Lyapunov | None = None) -> list[float]:

@@ -25,6 +25,7 @@ from synthesis.numerics.polynomial.symmetric import extended, symmetrized
 
 if TYPE_CHECKING:
     from synthesis.certify.statement.demand import Demand
+from synthesis.certify.statement.kind import Supply
 
 Array = np.ndarray
 
@@ -160,10 +161,11 @@ def dissipation(
     after: Array | None,
     g: Any,
     block: PointSupply | None = None,
+    supply: Supply | None = None,
 ) -> Array:
     """Return the bounded real inequality at one p as a quadratic form in x, d and u: dV/dt + |y|^2
     - g |u|^2 + multiplier (bound^2 |v|^2 - |d|^2), the last term around each part of a `block` d =
-    Delta v.
+    Delta v. With a `supply` dV/dt - (q |y|^2 + 2 s y'u + r |u|^2) instead.
 
     `drift` is dP/dt, `after` P(p(k+1)) in discrete time. g None: dV/dt and the last term alone, in
     x and d.
@@ -186,6 +188,10 @@ def dissipation(
             change = change + factor * (block.bound * block.bound * (v.T @ v) - d.T @ d)
     if g is None:
         return change[: n + inputs, : n + inputs]
+    if supply is not None:
+        q, s, r = supply
+        across = out.T @ u
+        return change - q * (out.T @ out) - s * (across + across.T) - r * (u.T @ u)
     return change + out[:y].T @ out[:y] - g * (u.T @ u)
 
 
@@ -270,10 +276,12 @@ def inequalities(
     states = _states_of(P, number)
     here, slopes = states(here), [*map(states, slopes)]
     yield -here
-    g = number(bound) * number(bound) if demand.kind.endswith("gain") else None
+    facets = demand.kind.facets
+    g = facets.level(number(bound)) if demand.kind.driven else None
+    supply = demand.supply(g, number) if demand.kind.indexed else None
     if demand.of_gramian:
         # V grows by at most the energy of the input, and the outputs are seen by it
-        yield -_output_form(here, model, demand.kind, dt, g)
+        yield -_output_form(here, model, facets.rows, dt, g)
         model, g = model._replace(C=model.C * 0, D=model.D * 0), number(1.0)
     supplied = None
     if channel is not None and isinstance(P, SplineLyapunov) and P.multiplier is not None:
@@ -282,18 +290,18 @@ def inequalities(
         for multiplier in multipliers:
             yield -np.array([[multiplier]])
         supplied = PointSupply(channel, number(channel.bound), multipliers)
-    decay, motion = demand.kind == "decay rate", demand.motion
+    decay, motion = facets.decays, demand.motion
     if dt is None:
         for pace in paces(p, demand.rates, motion.ties, degrees, number):
             drift = here * (2 * number(bound)) if decay else here * 0
             for nu, slope in zip(pace, slopes, strict=True):
                 drift = drift + number(demand.time) * nu * slope
-            yield dissipation(model, here, drift, None, g, supplied)
+            yield dissipation(model, here, drift, None, g, supplied, supply)
         return
     growth = number(growth_of(bound, dt)) if decay else number(1.0)
     for q in reached(p, spans(p, demand.rates, motion.ties, degrees, motion.box, dt), motion.box):
         after = states(tensor_spline(knots, degrees, P.coefficients, q, number)[0]) * growth
-        yield dissipation(model, here, None, after, g, supplied)
+        yield dissipation(model, here, None, after, g, supplied, supply)
 
 
 def _states_of(P: SplineLyapunov | BoxLyapunov, number: Number) -> Callable[[Array], Array]:
@@ -304,7 +312,7 @@ def _states_of(P: SplineLyapunov | BoxLyapunov, number: Number) -> Callable[[Arr
     return lambda form: T.T @ form @ T
 
 
-def _output_form(P: Array, model: Matrices, kind: str, dt: float | None, g: Any) -> Array:
+def _output_form(P: Array, model: Matrices, rows: bool, dt: float | None, g: Any) -> Array:
     """Return the matrix that must be positive definite for |y|^2 < g V, or < g (V + |u|^2) in
     discrete time; for a variance below g, that of the rows of C one after the other beside as many
     copies of V.
@@ -313,7 +321,7 @@ def _output_form(P: Array, model: Matrices, kind: str, dt: float | None, g: Any)
     if dt is not None:
         one = np.eye(B.shape[1], dtype=int) + D[:0].T @ D[:0]
         P, C = np.block([[P, B * 0], [B.T * 0, one]]), np.hstack([C, D])
-    if kind == "h2 gain":
+    if rows:
         P, C = np.kron(np.eye(len(C), dtype=int), P), C.reshape(1, -1)
     return np.block([[P, C.T], [C, np.eye(len(C), dtype=int) * g]])
 

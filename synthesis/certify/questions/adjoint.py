@@ -6,6 +6,7 @@ from typing import Any
 
 from synthesis.certify.questions.problem import BoundProblem, pose
 from synthesis.certify.statement.forms import Spline
+from synthesis.certify.statement.kind import L2_GAIN
 from synthesis.numerics.program.cone_program import LYAPUNOV
 
 ADJOINT = (
@@ -30,7 +31,7 @@ def backwards(problem: BoundProblem) -> BoundProblem | None:
     """
     demand, source = problem.demand, problem.model.source
     moving = any(0 < rate < float("inf") for rate in demand.rates)
-    apt = problem.usual and demand.kind == "l2 gain" and moving and problem.uncertain is None
+    apt = problem.usual and demand.kind == L2_GAIN and moving and problem.uncertain is None
     if not apt or demand.motion.tied:
         return None
     options = adjoint_options(len(source.parameters))

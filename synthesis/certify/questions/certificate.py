@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from html import escape
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol, Self, get_args
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol, Self
 
 import numpy as np
 
@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Array = np.ndarray
+
+BOUNDS = ("gamma", "lower", "alpha", "upper", "index", "index_limit")
+"""Fields that hold the bounds of some kind."""
 
 
 class Evidence(Protocol):
@@ -94,7 +97,8 @@ class Certificate(ProvenStatement):
     Attributes
     ----------
     kind : str
-        "l2 gain", "energy-to-peak gain", "h2 gain", "decay rate" or "stability".
+        "l2 gain", "energy-to-peak gain", "h2 gain", "decay rate", "stability", or another name that
+        `synthesis.certify.statement.kind` knows.
     gamma : float
         Proven upper bound of a gain; inf where nothing was proven, NaN for the other kinds.
     lower : float
@@ -105,6 +109,9 @@ class Certificate(ProvenStatement):
         the best bound found is one of growth; -inf where there is none, NaN for the other kinds.
     upper : float
         No larger decay rate can be proven, 1/s; NaN for the other kinds.
+    index, index_limit : float
+        Proven index of passivity or another supply rate, and the one that no proof exceeds; NaN for
+        the other kinds.
     frozen : float
         The same from p constant alone; NaN for stability.
     status : Status
@@ -162,6 +169,8 @@ class Certificate(ProvenStatement):
     lower: float = math.nan
     alpha: float = math.nan
     upper: float = math.nan
+    index: float = math.nan
+    index_limit: float = math.nan
     frozen: float = math.nan
     status: Status
     verified: bool
@@ -185,8 +194,9 @@ class Certificate(ProvenStatement):
         Raises `InputError` for an invalid statement, `CertificateError` for contradictory numbers.
         """
         self._check_form()
-        sign, moving = (-1.0, "upper bound") if self.kind == "decay rate" else (1.0, "lower bound")
-        what = self.kind.split()[-1] if self.kind.endswith("gain") else self.kind
+        sense = self.kind.facets.sense
+        sign, moving = (-1.0, "upper bound") if sense < 0 else (1.0, "lower bound")
+        what = "gain" if self.kind.endswith("gain") else self.kind
         # frozen and limit are computed to 1e-8, what is proven is loosened by 5e-7 at least
         slack = 1e-6 * abs(self.bound) if math.isfinite(self.bound) else 0.0
         for name, bound in ((f"frozen {what}", self.frozen), (moving, self.limit)):
@@ -204,21 +214,19 @@ class Certificate(ProvenStatement):
             raise CertificateError(f"a verified certificate cannot have the status {self.status}")
         if self.verified and self.proof is None:
             raise CertificateError("a verified certificate needs its proof, which is missing")
-        if self.verified and self.kind == "decay rate" and not self.alpha >= 0:
+        if self.verified and self.kind.facets.decays and not self.alpha >= 0:
             raise CertificateError(
                 f"a decay rate of {self.alpha:.6g} is growth, and proves nothing"
             )
 
     def _check_form(self) -> None:
-        if not isinstance(self.kind, str) or self.kind not in get_args(Kind):
-            raise InputError(
-                f"expected one of the kinds {', '.join(get_args(Kind))}, got {self.kind!r:.60}"
-            )
+        object.__setattr__(self, "kind", Kind.named(self.kind))
         if not isinstance(self.rates, tuple):
             raise InputError(
                 f"expected a tuple of rates, one each parameter, got {self.rates!r:.60}"
             )
-        for bound in (self.gamma, self.lower, self.alpha, self.upper, self.frozen, *self.rates):
+        bounds = (getattr(self, name) for name in BOUNDS)
+        for bound in (*bounds, self.frozen, *self.rates):
             if not isinstance(bound, float):
                 raise InputError(
                     f"bounds and rates must be floats (NaN where there is none), got {bound!r:.60}"
@@ -231,26 +239,30 @@ class Certificate(ProvenStatement):
 
     @property
     def bound(self) -> float:
-        """`gamma` of a gain, `alpha` of a decay rate, NaN for stability."""
-        return self.alpha if self.kind == "decay rate" else self.gamma
+        """The proven bound: `gamma` of a gain, `alpha` of a decay rate, `index` of an index, NaN
+        for stability.
+        """
+        fields = self.kind.facets.fields
+        return getattr(self, fields[0]) if fields else math.nan
 
     proven = former_attribute("proven", "bound")
 
     @property
     def limit(self) -> float:
-        """The bound no proof can improve on: `lower` of a gain, `upper` of a decay rate, NaN for
-        stability.
+        """The bound no proof can improve on: `lower` of a gain, `upper` of a decay rate or index,
+        NaN for stability.
         """
-        return self.upper if self.kind == "decay rate" else self.lower
+        fields = self.kind.facets.fields
+        return getattr(self, fields[1]) if fields else math.nan
 
     @property
     def gap(self) -> float:
         """Ratio gamma / lower, or upper / alpha: 1 means exact, inf that nothing is proven; NaN for
         stability.
         """
-        above, below = (
-            (self.upper, self.alpha) if self.kind == "decay rate" else (self.gamma, self.lower)
-        )
+        above, below = self.bound, self.limit
+        if self.kind.facets.sense < 0:
+            above, below = below, above
         return above / below if below > 0 else math.nan if math.isnan(below) else math.inf
 
     @property
@@ -301,8 +313,9 @@ class Certificate(ProvenStatement):
     @property
     def facts(self) -> Mapping[str, Any]:
         """Kind, bounds and conditions as data that JSON holds."""
-        names = ("kind", "rates", "gamma", "alpha")
-        return {name: getattr(self, name) for name in names} | {"status": self.status.name}
+        own = {name: getattr(self, name) for name in ("rates", "gamma", "alpha")}
+        more = {"bound": self.bound, "unit": self.kind.facets.unit, "status": self.status.name}
+        return {"kind": str(self.kind), **own, **more}
 
     @property
     def stored(self) -> dict[str, Any]:
@@ -353,11 +366,12 @@ class Certificate(ProvenStatement):
         """
         if self.proof is None:
             return None
-        if self.kind != "decay rate" and not math.isnan(self.alpha):
-            return f"a proof of the {self.kind} has no decay rate"
-        if not self.kind.endswith("gain") and not math.isnan(self.gamma):
-            return f"a proof of the {self.kind} has no gain"
-        if self.kind != "stability" and not 0 <= self.bound < math.inf:
+        facets = self.kind.facets
+        for name in BOUNDS:
+            if name not in facets.fields and not math.isnan(getattr(self, name)):
+                return f"a proof of the {self.kind} has no {name}"
+        signed = facets.sense < 0 and not facets.decays
+        if facets.sense and not (math.isfinite(self.bound) and (signed or self.bound >= 0)):
             return f"the bound of a {self.kind} must be a finite number >= 0, got {self.bound}"
         try:
             return self.proof.fault(self.kind, self.rates)
@@ -383,14 +397,16 @@ class Certificate(ProvenStatement):
     def _summary(self) -> list[str]:
         """Return the first lines: kind, status and numbers."""
         lines = [f"{self.kind}, {self.method}: {self.status.value}"]
-        if self.kind.endswith("gain"):
+        sense, what = self.kind.facets.sense, "gain" if self.kind.endswith("gain") else self.kind
+        if sense > 0:
             lines.append(
-                f"  frozen {self.frozen:.6g} <= lower {self.lower:.6g} <= gain <= {self.gamma:.6g}"
+                f"  frozen {self.frozen:.6g} <= lower {self.limit:.6g} <= {what} <="
+                f" {self.bound:.6g}"
             )
-        elif self.kind == "decay rate":
+        elif sense < 0:
             lines.append(
-                f"  {self.alpha:.6g} <= decay rate <= {self.upper:.6g} <= frozen"
-                f" {self.frozen:.6g}, 1/s"
+                f"  {self.bound:.6g} <= {what} <= {self.limit:.6g} <= frozen"
+                f" {self.frozen:.6g}, {self.kind.facets.unit}"
             )
         if not math.isnan(self.indicative):
             lines.append(f"  at the points of the grid {self.indicative:.6g}, which proves nothing")

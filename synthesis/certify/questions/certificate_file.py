@@ -28,6 +28,7 @@ from synthesis.certify.proof import box, one_parameter
 from synthesis.certify.questions.certificate import Certificate, Proof
 from synthesis.certify.statement.box import BoxLyapunov
 from synthesis.certify.statement.demand import Demand
+from synthesis.certify.statement.kind import Kind
 from synthesis.certify.statement.lag import LagRegion
 from synthesis.certify.statement.norm_bounded import NormBounded
 from synthesis.certify.statement.outcome import Attempt, Seconds, Status
@@ -49,16 +50,22 @@ def _former_units(
     return Scaling(left, right, outputs if storage == 1.0 else math.sqrt(storage), time, weight)
 
 
+def _demand(kind: Any, **own: Any) -> Demand:
+    """Return the demand of a file, its kind by name."""
+    return Demand(Kind.named(kind), **own)
+
+
 TYPES: dict[str, Any] = {
     kind.__name__: kind
     for kind in (
         *(Attempt, Seconds, Scheduling, Block),
-        *(PolynomialMatrix, Motion, Scaling, Demand, lft_proof.Coordinates, NormBounded),
+        *(PolynomialMatrix, Motion, Scaling, lft_proof.Coordinates, NormBounded),
         *(SplineLyapunov, MemoryLyapunov, LagRegion, BoxLyapunov),
         Multiplier,
         *(Polynomial, BSpline, PiecewiseLinear, Product, Patches),
     )
 } | {
+    "Demand": _demand,
     "LFT": LFTMatrices,
     "LPVStateSpace": LPVMatrices,
     "Quadratic": lft_proof.QuadraticStorage,
@@ -69,10 +76,11 @@ TYPES: dict[str, Any] = {
 """Types that a file may contain, by their name in the file, which does not change with the name of
 the class.
 """
-WORDS = {kind: word for word, kind in TYPES.items()}
+WORDS = {kind: word for word, kind in TYPES.items()} | {Demand: "Demand"}
 
 HEAD = {"schema", "version", "statement"}
-LATER = ("perturbation",)
+NONE = {"float": "nan"}
+LATER = {"perturbation": None, "index": NONE, "index_limit": NONE}
 """Fields that files of this version may lack: they were written before the field existed."""
 
 ROUTES = {
@@ -103,7 +111,7 @@ def read(content: Mapping[str, Any]) -> Certificate:
 
 def _certificate(content: Mapping[str, Any]) -> Certificate:
     names = {f.name for f in fields(Certificate)}
-    content = {**dict.fromkeys(LATER), **content}
+    content = {**LATER, **content}
     missing, foreign = names - content.keys(), content.keys() - names - HEAD
     if missing or foreign:
         raise InputError(

@@ -16,8 +16,9 @@ if TYPE_CHECKING:
 
 def plot_certificate(certificate: Certificate, ax: Axes | None) -> Axes:
     """See `Certificate.plot`."""
-    if certificate.kind == "stability":
-        raise InputError("a stability certificate has no bounds to draw: print it")
+    facets = certificate.kind.facets
+    if not facets.sense:
+        raise InputError(f"a {certificate.kind} certificate has no bounds to draw: print it")
     ax = axes_of(ax, 5.5, 3.5)
     bounds = {
         "frozen": (certificate.frozen, GREY),
@@ -40,10 +41,8 @@ def plot_certificate(certificate: Certificate, ax: Axes | None) -> Axes:
     ax.set_xticks(range(len(bounds)), list(bounds))
     ax.set_xlim(-0.5, len(bounds) - 0.5)
     ax.margins(y=0.2)
-    if certificate.kind.endswith("gain"):
+    if certificate.kind.gains:
         ax.set_ylim(bottom=0.0)  # differences of a few per mille look like that
-    ax.set_ylabel(
-        "decay rate (1/s)" if certificate.kind == "decay rate" else f"{certificate.kind} (y per u)"
-    )
+    ax.set_ylabel(f"{certificate.kind} ({facets.unit})")
     ax.set_title(f"{certificate.kind}, |dp/dt| ≤ {rates} per second", fontsize=9, loc="left")
     return plain(ax)

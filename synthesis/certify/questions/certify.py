@@ -27,6 +27,7 @@ from synthesis.certify.questions.ladder import CLOSE_TO_LOWER, Found, Ladder
 from synthesis.certify.questions.one_parameter_search import OneParameter
 from synthesis.certify.questions.problem import BoundProblem
 from synthesis.certify.statement.impose import Grid
+from synthesis.certify.statement.kind import STABILITY
 from synthesis.certify.statement.outcome import Seconds, Status
 from synthesis.certify.statement.trajectory import SchedulingTrajectory
 from synthesis.numerics.polynomial.pieces import Pieces, pieces
@@ -52,7 +53,7 @@ class Beaten(NamedTuple):
 def certify(problem: BoundProblem) -> Certificate:
     """Search a lower bound and a proof, and write the certificate."""
     demand, search = problem.demand, problem.search
-    sign = 1.0 if problem.gains else -1.0
+    sign = 1.0 if demand.kind.gains else -1.0
     start = time.perf_counter()
     model, frozen, delta, unstable = _worst_member(problem)
     report = Report(problem)
@@ -70,7 +71,7 @@ def certify(problem: BoundProblem) -> Certificate:
             return report.nothing(Status.UNSTABLE, beaten)
         # stable or not to rounding: nothing is known from below
         frozen, search = Worst(0.0 if problem.gains else -MARGINAL_DECAY, frozen.p), None
-    stability = demand.kind == "stability"
+    stability = demand.kind == STABILITY
     limit = frozen if stability else worst_moving(model.source, demand, frozen, search)
     beaten = Beaten(
         sign * frozen.value,
@@ -81,7 +82,8 @@ def certify(problem: BoundProblem) -> Certificate:
     )
     if math.isinf(limit.value) if problem.gains else limit.value >= 0:
         return report.nothing(Status.GROWING, beaten)
-    ladder, level = route(problem), math.inf if stability else abs(frozen.value)
+    level = math.inf if stability else frozen.value if demand.kind.indexed else abs(frozen.value)
+    ladder = route(problem)
     best = ladder.search(level)
     for other in (over_jumps, by_coefficients) if stability else (by_coefficients,):
         again = None if best.proof is not None else other(problem)
@@ -97,7 +99,7 @@ def certify(problem: BoundProblem) -> Certificate:
         if worst is not None:
             return report.nothing(Status.GROWING, beaten._replace(worst=worst), ladder)
     cert = report.found(best, beaten, ladder)
-    if stability:
+    if stability or demand.kind.indexed:
         return cert
     second = (
         (1 + CLOSE_TO_LOWER, over_jumps, ()),
@@ -174,8 +176,9 @@ class Report:
 
     def found(self, best: Found, beaten: Beaten, ladder: Ladder) -> Certificate:
         """Write the certificate of the best proof found."""
+        kind = self.problem.demand.kind
         if best.proof is None:
-            growth = self.problem.demand.kind == "decay rate" and math.isfinite(best.bound)
+            growth = kind.facets.decays and math.isfinite(best.bound)
             status = Status.GROWTH if growth else Status.without_proof(best.answer)
         else:
             status = Status.UNPROVEN if isinstance(self.problem.impose, Grid) else Status.PROVEN
@@ -185,10 +188,8 @@ class Report:
         self, best: Found, beaten: Beaten, ladder: Ladder | None, status: Status
     ) -> Certificate:
         problem, kind, proven = self.problem, self.problem.demand.kind, status is Status.PROVEN
-        nothing = -math.inf if kind == "decay rate" else math.inf
-        names = {"stability": (), "decay rate": ("alpha", "upper", "frozen")}.get(
-            kind, ("gamma", "lower", "frozen")
-        )
+        nothing = -math.inf if kind.facets.sense < 0 else math.inf
+        names = (*kind.facets.fields, "frozen") if kind.facets.fields else ()
         told = proven or status is Status.GROWTH
         values = (best.bound if told else nothing, beaten.limit, beaten.frozen)
         bounds = dict(zip(names, values, strict=False))

@@ -23,7 +23,7 @@ from synthesis.certify.questions.problem import BoundProblem
 from synthesis.certify.statement.box import BoxLyapunov
 from synthesis.certify.statement.forms import Spline
 from synthesis.certify.statement.impose import Grid
-from synthesis.certify.statement.kind import Kind
+from synthesis.certify.statement.kind import L2_GAIN, Kind
 from synthesis.certify.statement.outcome import Attempt
 from synthesis.certify.statement.scaling import dissipative, gramian_units, model_scaling
 from synthesis.certify.statement.spline import graded_knots
@@ -113,7 +113,7 @@ class General(Ladder):
         frozen, scale = _scaling(model, kind, bound)
         of_gramian = self.problem.demand.of_gramian
         self.choices = [gramian_units(scale, frozen) if of_gramian else scale]
-        other = dissipative(scale, frozen, bound) if kind == "l2 gain" else None
+        other = dissipative(scale, frozen, bound) if kind == L2_GAIN else None
         if other is not None:
             self.choices.insert(0, other)
         self.rounding = math.nan
@@ -123,7 +123,7 @@ class General(Ladder):
         """Choose the first units in which the gain of the model frozen at mid-range is found
         accurately; return the unit of gains.
         """
-        if self.problem.demand.kind != "l2 gain" or len(self.choices) == 1:
+        if self.problem.demand.kind != L2_GAIN or len(self.choices) == 1:
             return self.unit
         start, found = time.perf_counter(), []
         gain = norm(*_frozen(self.problem.model), self.problem.model.dt)[0]
@@ -141,7 +141,7 @@ class General(Ladder):
         self.evidence = BoxEvidence(self.problem.model, units, self.problem.demand)
         searched = self.evidence._replace(model=rounded_pieces(self.problem.model))
         self.scaled, self.scaled_demand = searched.scaled
-        return 1.0 / self.evidence.in_units(1.0)
+        return abs(1.0 / self.evidence.in_units(1.0))
 
     def _frozen_gain(self) -> float:
         """Return the gain of the model frozen at mid-range as a program in these units finds it."""
@@ -389,7 +389,7 @@ class General(Ladder):
             if least is None:
                 return nothing
             P, bound = least
-            if gains:
+            if gains and not self.problem.demand.kind.indexed:
                 bound *= math.sqrt(1 + self.sampling_error)
             if not self.believed(Proof(self.evidence, P), bound):
                 return nothing
@@ -412,4 +412,7 @@ def _scaling(model: Pieces, kind: Kind, expected: float) -> tuple[LinearModel, S
     low, high = np.array([(s.low, s.high) for s in model.parameters]).T
     every = model.at(low + np.linspace(0.0, 1.0, 9)[:, None] * (high - low))
     frozen = LinearModel(*_frozen(model), *names, dt=model.dt)  # type: ignore[arg-type]
-    return frozen, model_scaling(frozen, expected if kind.endswith("gain") else 1.0, every)
+    if kind.indexed:  # no level says how large the outputs are
+        size = norm(frozen.A, frozen.B, frozen.C, frozen.D, model.dt)[0]
+        expected = size if 0 < size < math.inf else 1.0
+    return frozen, model_scaling(frozen, expected if kind.driven else 1.0, every)

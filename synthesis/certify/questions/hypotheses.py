@@ -29,23 +29,6 @@ VERIFIED = (
 )
 
 
-MEANING: dict[Kind, str] = {
-    "l2 gain": (
-        "the gain is from zero initial state, |y|_2 < gamma |u|_2, all inputs to all outputs"
-        " together"
-    ),
-    "energy-to-peak gain": (
-        "the gain is from zero initial state, max_t |y(t)| < gamma |u|_2, the Euclidean norm of"
-        " all outputs"
-    ),
-    "h2 gain": (
-        "the variance of all outputs together, E|y(t)|^2 at every t from zero initial state, is"
-        " below gamma^2 for white noise of unit intensity at all inputs"
-    ),
-    "decay rate": "|x(t)| <= c exp(-alpha t) |x(0)| for some c, along every admissible p(t)",
-}
-
-
 def hypotheses(
     kind: Kind,
     parameters: Sequence[Scheduling],
@@ -57,7 +40,7 @@ def hypotheses(
     the meaning of the bound.
     """
     moving = tuple(motion(s, rate) for s, rate in zip(parameters, rates, strict=True))
-    meaning = (MEANING[kind],) if kind in MEANING else ()
+    meaning = (kind.facets.meaning,) if kind.facets.sense else ()
     return (*moving, *perturbed(model), *fitted(model), *drifting(model), *found, *meaning)
 
 

@@ -17,6 +17,7 @@ from symheli.progress import task
 from synthesis.certify.questions.certificate import Proof
 from synthesis.certify.questions.own_scale import in_its_own_scale
 from synthesis.certify.questions.problem import BoundProblem
+from synthesis.certify.statement.kind import STABILITY
 from synthesis.certify.statement.outcome import Attempt
 from synthesis.numerics.program.answer import Answer
 
@@ -163,8 +164,10 @@ class Ladder(ABC):
             return self._searched(limit)
 
     def _searched(self, limit: float) -> Found:
-        if self.problem.demand.kind == "decay rate":
+        if self.problem.demand.kind.facets.decays:
             return self._decay(limit)
+        if self.problem.demand.kind.indexed:
+            return self._index(limit)
         if not self.problem.gains:
             return self._least(limit)
 
@@ -186,7 +189,7 @@ class Ladder(ABC):
         problem = self.problem
         if problem.by_points:
             return answer
-        other = type(self)(problem._replace(demand=problem.demand._replace(kind="stability")))
+        other = type(self)(problem._replace(demand=problem.demand._replace(kind=STABILITY)))
         stable = other.search(math.inf)
         self.attempts += other.attempts
         self.spent += other.spent
@@ -235,6 +238,20 @@ class Ladder(ABC):
         found = self.attempt(shape, margin, alpha)
         self._searching.step(str(self.attempts[-1]) if self.attempts else "")
         return found
+
+    def _index(self, limit: float) -> Found:
+        """Return the best level found of a supply rate, of any sign; `limit`, the worst frozen one,
+        ends the search where it is met.
+        """
+        sense = float(self.problem.demand.kind.facets.sense)
+        best, nothing = Found(sense * math.inf), Found(sense * math.inf)
+        for shape in (self.constant(), *self.shapes()):
+            found = self._margins(shape, nothing)
+            best = best.or_better(found, sense)
+            near = abs(best.bound - sense * limit) <= CLOSE_TO_LOWER * max(abs(limit), self.unit)
+            if best.proof is not None and near:
+                break
+        return best
 
     def _decay(self, limit: float) -> Found:
         """Return the largest decay rate found, between 0 and `limit` (1/s); each P counts for the

@@ -36,7 +36,7 @@ from synthesis.certify.questions.ladder import NO_MARGIN, Found, Ladder, inflate
 from synthesis.certify.statement.demand import Demand
 from synthesis.certify.statement.forms import Spline
 from synthesis.certify.statement.impose import Bernstein
-from synthesis.certify.statement.kind import Kind
+from synthesis.certify.statement.kind import L2_GAIN, STABILITY, Kind
 from synthesis.certify.statement.outcome import Attempt, Status
 from synthesis.certify.statement.trajectory import SchedulingTrajectory
 from synthesis.numerics.linear.norm import surely_unstable
@@ -107,7 +107,7 @@ def lft_gain(
     >>> print(f"{cert.gamma:.3f}")
     1.000
     """
-    return _certified(_checked(lft, scaling, "l2 gain", solver, search))
+    return _certified(_checked(lft, scaling, L2_GAIN, solver, search))
 
 
 def lft_stability(
@@ -158,7 +158,7 @@ def lft_stability(
     >>> lft_stability(lag.to_lft().reduce()).verified
     True
     """
-    return _certified(_checked(lft, scaling, "stability", solver, search))
+    return _certified(_checked(lft, scaling, STABILITY, solver, search))
 
 
 class LFTProblem(NamedTuple):
@@ -175,7 +175,7 @@ class LFTProblem(NamedTuple):
     @property
     def gains(self) -> bool:
         """Whether the bound is a gain."""
-        return self.demand.kind == "l2 gain"
+        return self.demand.kind == L2_GAIN
 
 
 def _checked(
@@ -192,7 +192,7 @@ def _checked(
             "the LFT has no states; its gain is the largest norm of its matrix over the box"
         )
     solver = general_solver(solver)
-    if kind == "stability":
+    if kind == STABILITY:
         lft = lft.select(inputs=(), outputs=())
     elif not (lft.inputs and lft.outputs):
         raise InputError(

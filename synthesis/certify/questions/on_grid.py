@@ -21,6 +21,7 @@ from synthesis.certify.questions.certificate import Certificate
 from synthesis.certify.questions.hypotheses import hypotheses
 from synthesis.certify.questions.problem import Model
 from synthesis.certify.statement.impose import Grid, Imposed
+from synthesis.certify.statement.kind import L2_GAIN
 from synthesis.certify.statement.outcome import Attempt, Seconds, Status
 from synthesis.certify.statement.rates import Rate, limits
 from synthesis.certify.statement.scaling import dissipative, model_scaling
@@ -74,14 +75,14 @@ def gain_on_grid(
     rates = tuple(math.nan if isinstance(s.rate, str) else s.rate for s in moving)
     hypothesis = f"the inequalities hold at {impose.points} values of each parameter: no guarantee"
     return Certificate(
-        kind="l2 gain",
+        kind=L2_GAIN,
         gamma=math.inf,
         lower=frozen,
         frozen=frozen,
         status=status,
         verified=False,
         rates=rates,
-        hypotheses=hypotheses("l2 gain", moving, rates, model, (hypothesis,)),
+        hypotheses=hypotheses(L2_GAIN, moving, rates, model, (hypothesis,)),
         method=f"{type(form).__name__}, {impose.found_by}",
         solver=SOLVER.name,
         seconds=Seconds(solve=time.perf_counter() - start),

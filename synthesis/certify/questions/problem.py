@@ -12,7 +12,7 @@ from synthesis.certify.lower_bounds.lower_bound import LowerBoundSearch
 from synthesis.certify.statement.demand import Demand
 from synthesis.certify.statement.forms import HigherOrder, LaggedParameter, LyapunovForm, Spline
 from synthesis.certify.statement.impose import Bernstein, Grid, Imposed, SumOfSquares, Vertices
-from synthesis.certify.statement.kind import Kind
+from synthesis.certify.statement.kind import L2_GAIN, STABILITY, Kind
 from synthesis.certify.statement.rates import Rate, limits
 from synthesis.numerics.polynomial.motion import Motion
 from synthesis.numerics.polynomial.pieces import Pieces, pieces
@@ -45,7 +45,7 @@ class BoundProblem(NamedTuple):
         """
         return (
             len(self.model.parameters) == 1
-            and self.demand.kind in ("l2 gain", "stability")
+            and self.demand.kind in (L2_GAIN, STABILITY)
             and isinstance(self.impose, Bernstein)
             and self.impose.subdivision == 0
             and not (isinstance(self.form, Spline) and self.form.total_degree is not None)
@@ -77,7 +77,7 @@ class BoundProblem(NamedTuple):
         """Whether such a program is possible."""
         return (
             len(self.model.parameters) > 1
-            and self.demand.kind == "l2 gain"
+            and self.demand.kind == L2_GAIN
             and self.model.dt is None
             and isinstance(self.impose, Bernstein)
             and self.impose.elevation == self.impose.subdivision == 0
@@ -87,14 +87,14 @@ class BoundProblem(NamedTuple):
 
     @property
     def gains(self) -> bool:
-        """Whether the bound is a gain."""
-        return self.demand.kind.endswith("gain")
+        """Whether the bound is a gain or another level of a supply rate, minimised with margins."""
+        return self.demand.kind.driven
 
 
 def pose(
     model: Model,
     rate: Rate,
-    kind: Kind,
+    kind: str,
     form: LyapunovForm | None,
     impose: Imposed | None,
     solver: Solver | str | None,
@@ -125,7 +125,7 @@ def pose(
         model = model.with_scheduling(moving)
     if uncertain is not None:
         uncertain = uncertain.with_scheduling(model.parameters)
-    demand = Demand(kind, motion)
+    demand = Demand(Kind.named(kind), motion)
     problem = BoundProblem(pieces(model), demand, form, impose, Solver("CLARABEL"), search)
     problem = problem._replace(uncertain=uncertain, usual=usual)
     _check_channels(problem)
@@ -185,6 +185,11 @@ def _check_channels(problem: BoundProblem) -> None:
         raise InputError(
             f"a gain needs inputs and outputs, got {nu} and {ny}; use stability() without channels"
         )
+    if problem.demand.kind.indexed and nu != ny:
+        raise InputError(
+            f"{problem.demand.kind}: expected as many outputs as inputs, y'u must have a meaning;"
+            f" got {ny} and {nu}; model.select(inputs=[...], outputs=[...]) takes pairs"
+        )
     if problem.demand.of_gramian and problem.model.passes_peaks:
         raise InputError(
             f"the {problem.demand.kind} of a continuous model needs D = 0: feedthrough passes peaks"
@@ -207,7 +212,7 @@ def _check_options(problem: BoundProblem) -> None:
     form, kind, dt = problem.form, problem.demand.kind, problem.model.dt
     if not isinstance(form, Spline):
         name = type(form).__name__
-        if kind not in ("l2 gain", "stability") or not problem.one_parameter:
+        if kind not in (L2_GAIN, STABILITY) or not problem.one_parameter:
             raise InputError(
                 f"{name} is a form for l2_gain and stability of an LPVStateSpace in one parameter"
                 " by plain Bernstein coefficients; take form=Spline(...) here"
@@ -222,7 +227,7 @@ def _check_options(problem: BoundProblem) -> None:
                 "HigherOrder proves stability only: a V of that degree does not balance energies;"
                 " for a gain use LaggedParameter"
             )
-    if kind == "stability" and form.accept is not None:
+    if kind == STABILITY and form.accept is not None:
         raise InputError("accept compares bounds, and stability has none: leave it out")
     if not problem.gains and (problem.impose.margins, problem.impose.floor) != (None, None):
         raise InputError(

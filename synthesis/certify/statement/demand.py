@@ -4,33 +4,42 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from synthesis.certify.statement.kind import Kind
+from synthesis.certify.statement.kind import Kind, Supply
 from synthesis.numerics.polynomial.motion import Motion
 
 
 class Demand(NamedTuple):
     """The property to be proven: `kind`; how p moves; `shift`: alpha of a decay rate, 1/s, else 0.
 
-    `time`: seconds in the unit of time of the model in continuous time.
+    `time`: seconds in the unit of time of the model in continuous time; `channel`: the unit of its
+    outputs.
     """
 
     kind: Kind
     motion: Motion
     shift: float = 0.0
     time: float = 1.0
+    channel: float = 1.0
+
+    def supply(self, level: Any, number: Any) -> Supply | None:
+        """Return the supply rate at a level, in an arithmetic; None of a kind without one."""
+        facets = self.kind.facets
+        if facets.supply is None:
+            return None
+        return facets.supply(number, self.channel).plus(level, facets.rise)
 
     @property
     def of_gramian(self) -> bool:
         """Whether P bounds the inverse Gramian of the inputs, and a second inequality the
         outputs.
         """
-        return self.kind in ("energy-to-peak gain", "h2 gain")
+        return self.kind.facets.gramian
 
     def seen(self, outputs: int) -> int:
         """Return the number of rows of that second inequality in which g stands."""
-        return 1 if self.kind == "h2 gain" else outputs
+        return 1 if self.kind.facets.rows else outputs
 
     @property
     def rates(self) -> tuple[float, ...]:

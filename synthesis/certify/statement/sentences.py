@@ -7,25 +7,14 @@ from collections.abc import Sequence
 from typing import Any
 
 from symheli import Scheduling
-from symheli.errors import InputError
 from synthesis.certify.statement.kind import Kind
-
-MEANING: dict[Kind, str] = {
-    "l2 gain": "|y|_2 < gamma |u|_2 from rest, all inputs to all outputs together",
-    "energy-to-peak gain": "max_t |y(t)| < gamma |u|_2 from rest, |y| of all outputs together",
-    "h2 gain": "from rest E|y(t)|^2 < gamma^2 at every t, in white noise of unit intensity",
-    "decay rate": "|x(t)| <= c exp(-alpha t) |x(0)| for some c",
-    "stability": "the free state decays exponentially",
-}
 
 
 def claim(kind: Kind, bound: float) -> str:
-    """The claim of a kind with this bound; raises `InputError` for a kind without words."""
-    if kind not in MEANING:
-        raise InputError(f"no claim is known of the kind {kind!r}")
+    """The claim of a kind with this bound."""
     number = "" if math.isnan(bound) else f" {bound:.9g}"
-    unit = " 1/s" if kind == "decay rate" else ""
-    return f"{kind}{number}{unit}: {MEANING[kind]}, for every p(t) within its range and rate"
+    unit = f" {kind.facets.unit}" if kind.facets.unit == "1/s" else ""
+    return f"{kind}{number}{unit}: {kind.facets.meaning}, for every p(t) within its range and rate"
 
 
 def conditions(evidence: Any, rates: Sequence[float]) -> tuple[str, ...]:

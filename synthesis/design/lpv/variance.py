@@ -32,6 +32,7 @@ import numpy as np
 from symheli.lpv.bases import FunctionSpace
 from symheli.progress import tracked
 from synthesis.certify.lower_bounds.box import of_gramian
+from synthesis.certify.statement.kind import H2_GAIN
 from synthesis.certify.statement.outcome import Attempt
 from synthesis.design.loops.controller import Controller
 from synthesis.design.lpv.elimination import Half, controlled, observed
@@ -280,7 +281,7 @@ class _Search:
         for fit in fits(gains, self.scaled.parameters):
             A, B, C, D = closed(self.scaled, fit, self.points)
             if fit.misfit <= ACCURACY and all(
-                of_gramian(A[k], B[k], C[k], D[k], None, "h2 gain") <= limit for k in range(len(A))
+                of_gramian(A[k], B[k], C[k], D[k], None, H2_GAIN) <= limit for k in range(len(A))
             ):
                 return fit
         return None

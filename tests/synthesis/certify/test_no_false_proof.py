@@ -18,6 +18,7 @@ from synthesis.certify.assemble.unknowns import scaled_problem
 from synthesis.certify.proof import box, one_parameter
 from synthesis.certify.statement.box import BoxLyapunov
 from synthesis.certify.statement.demand import Demand
+from synthesis.certify.statement.kind import DECAY_RATE, STABILITY
 from synthesis.certify.statement.spline import SplineLyapunov
 from synthesis.certify.statement.units import Scaling
 from synthesis.forms import Spline
@@ -177,7 +178,7 @@ def test_a_slope_in_the_last_places_counts_among_several_parameters():
     P = BoxLyapunov((np.array([0.0, 1.0]),) * 2, (0, 0), energy()[None, None])
     for least, holds in ((-last, False), (last, True)):
         model = nearly_cancelling([80 * last, least, 80 * last, least], basis)
-        demand = Demand("stability", Motion.of(model.parameters))
+        demand = Demand(STABILITY, Motion.of(model.parameters))
         units = Scaling(np.eye(2), np.eye(2), 1.0, 1.0, np.eye(2))
         evidence = box.BoxEvidence(pieces(model), units, demand)
         assert evidence.fault(P, "stability", (0.0, 0.0)) is None
@@ -192,7 +193,7 @@ def test_a_decay_rate_in_the_last_places_is_not_rounded_up():
     slow = LPVStateSpace.polynomial([[[pole]]], *nothing, p, dt=1.0)
     P = BoxLyapunov((np.array([0.0, 1.0]),), (0,), np.ones((1, 1, 1)))
     units = Scaling(np.eye(1), np.eye(1), 1.0, 1.0, np.eye(1))
-    demand = Demand("decay rate", Motion.of(slow.parameters))
+    demand = Demand(DECAY_RATE, Motion.of(slow.parameters))
     evidence = box.BoxEvidence(pieces(slow), units, demand)
     assert evidence.exact(P, 0.0)
     assert not evidence.exact(P, 1.6e-16)

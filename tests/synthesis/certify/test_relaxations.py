@@ -15,6 +15,7 @@ from symheli.errors import CertificateError, InputError, UnknownNameError
 from synthesis import Solver, decay_rate, l2_gain, stability
 from synthesis.analysis import Status, energy_to_peak, installed_solvers
 from synthesis.certify.statement.demand import Demand
+from synthesis.certify.statement.kind import STABILITY
 from synthesis.forms import LaggedParameter, Spline
 from synthesis.impose import Bernstein, Grid, SumOfSquares, Vertices
 from synthesis.numerics.polynomial.pieces import pieces
@@ -328,7 +329,7 @@ def test_a_next_value_that_may_be_anywhere_costs_no_degree_in_p():
     degrees = {}
     for rate in (math.inf, 1.0):
         motion = Motion.of(model.parameters)._replace(rates=(rate, rate))
-        demand = Demand("stability", motion)
+        demand = Demand(STABILITY, motion)
         region = next(regions(model, shape.knots, motion, demand.moving(shape.degrees)))
         degrees[rate] = [
             F.degrees for F in decrease(model, region, _pair(shape, region, 2)[1], demand, float)
