@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -41,6 +41,8 @@ class NamedVector(Mapping[str, float]):
 
     signals: tuple[Signal, ...]
     array: Array
+    short: ClassVar[bool] = True
+    """A summary shows it as it is."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "signals", signals(self.signals))

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from symheli.values.named_vector import NamedVector
 from symheli.values.signal import Signal
 
 LINE, WIDE = 88, 160
@@ -62,6 +61,8 @@ def _empty(field: Any) -> bool:
 
 
 def _words(value: Any) -> str:
+    if getattr(type(value), "short", False):
+        return _clipped(repr(value))
     match value:
         case Signal():
             return _named(value)
@@ -71,8 +72,6 @@ def _words(value: Any) -> str:
             return value.name
         case np.ndarray():
             return _array(value)
-        case NamedVector():
-            return _clipped(repr(value))
         case Mapping():
             return _clipped("{" + ", ".join(map(str, value)) + "}")
     if is_dataclass(value) or hasattr(value, "_fields"):

@@ -16,6 +16,7 @@ from synthesis.certify.assemble.box import Shape, affine_inequalities, assemble
 from synthesis.certify.assemble.points import at_points, points_of
 from synthesis.certify.assemble.rounded import rounded_pieces
 from synthesis.certify.proof.box import BoxEvidence
+from synthesis.certify.questions import admitted_bound
 from synthesis.certify.questions.certificate import Proof
 from synthesis.certify.questions.frozen_storage import central_dissipation
 from synthesis.certify.questions.ladder import CLOSE_TO_LOWER, NO_MARGIN, Found, Ladder
@@ -158,7 +159,7 @@ class General(Ladder):
         shape, margin = self.constant(), self.problem.impose.tried[0]
         candidate = self._solve(shape, margin)
         P = candidate.x is not None and self._lyapunov(candidate.x, shape)
-        bound = self.evidence.sampled(P, 2)[1] if P else math.inf
+        bound = admitted_bound.sampled(self.evidence, P, 2)[1] if P else math.inf
         self.evidence, self.scaled = whole, scaled
         return bound
 
@@ -381,11 +382,13 @@ class General(Ladder):
         nothing = Found(math.inf, None, Answer.INFEASIBLE if none else Answer.FAILED)
         P = self._lyapunov(candidate.x, shape)
         if isinstance(self.problem.impose, Grid):
-            P, bound = self.evidence.sampled(P, self.problem.impose.points)
+            P, bound = admitted_bound.sampled(self.evidence, P, self.problem.impose.points)
             if math.isinf(bound):
                 return nothing
         else:
-            least = self.evidence.least(P, SAMPLES_PER_REGION.get(len(shape.knots), 3))
+            least = admitted_bound.least(
+                self.evidence, P, SAMPLES_PER_REGION.get(len(shape.knots), 3)
+            )
             if least is None:
                 return nothing
             P, bound = least
@@ -394,7 +397,7 @@ class General(Ladder):
             if not self.believed(Proof(self.evidence, P), bound):
                 return nothing
         proof = Proof(self.evidence, P)
-        return Found(bound, proof, candidate.answer, self.evidence.conditioning(P))
+        return Found(bound, proof, candidate.answer, admitted_bound.conditioning(self.evidence, P))
 
 
 def _frozen(model: Pieces) -> Matrices:

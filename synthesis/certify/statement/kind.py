@@ -7,6 +7,7 @@ A kind with a supply rate bounds dV/dt < s0(y, u) + g s1(y, u), each of the form
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -100,8 +101,9 @@ class Kind(str):
         if isinstance(name, str) and name not in cls.known:
             first, _, rest = name.partition(" about ")
             points = {point.name: point for point in entry_points(group=GROUP)}
-            if (point := points.get(first.replace(" ", "-"))) is not None:
-                point.load()(*([float(rest)] if rest else []))
+            with contextlib.suppress(ValueError, TypeError):
+                if (point := points.get(first.replace(" ", "-"))) is not None:
+                    point.load()(*([float(rest)] if rest else []))
         if not isinstance(name, str) or name not in cls.known:
             raise InputError(f"expected one of the kinds {', '.join(cls.known)}, got {name!r:.60}")
         return cls.known[name]

@@ -77,7 +77,7 @@ def test_its_proof_is_exact_and_saved(tmp_path):
     again = Certificate.load(tmp_path / "proof.json")
     assert again.kind == "h2 gain"
     assert again.verify(rigorous=True)
-    assert "variance of all outputs" in str(again.hypotheses)
+    assert "white noise of unit intensity" in str(again.hypotheses)
 
 
 def test_feedthrough_is_refused():

@@ -18,6 +18,7 @@ from synthesis.certify.assemble import unknowns as forms
 from synthesis.certify.proof import box as proof
 from synthesis.certify.proof import inequalities
 from synthesis.certify.proof import one_parameter as verify
+from synthesis.certify.questions import admitted_bound
 from synthesis.forms import HigherOrder, LaggedParameter, Spline
 from synthesis.impose import SumOfSquares
 from synthesis.numerics.polynomial import pieces, regions
@@ -57,11 +58,11 @@ def forget_the_rate(monkeypatch):
         lambda cells, knots, degree, rate, *rest: blocks(cells, knots, degree, 0.0, *rest),
     )
 
-    def still(model, region, P, demand, number):
+    def still(model, region, P, demand, number, level=0):
         resting = demand.motion._replace(rates=tuple(0.0 for _ in demand.rates))
-        return decrease(model, region, P, demand._replace(motion=resting), number)
+        return decrease(model, region, P, demand._replace(motion=resting), number, level)
 
-    everywhere(monkeypatch, "decrease", still, inequalities, program, proof)
+    everywhere(monkeypatch, "decrease", still, inequalities, program, proof, admitted_bound)
 
 
 def flip_a_sign(monkeypatch):
@@ -72,7 +73,7 @@ def flip_a_sign(monkeypatch):
         monkeypatch,
         "decrease",
         lambda *args: list(decrease(*args))[:1],
-        *(inequalities, program, proof),
+        *(inequalities, program, proof, admitted_bound),
     )
 
 
