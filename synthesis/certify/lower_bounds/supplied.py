@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from scipy import linalg, optimize
+from scipy import linalg
 
 from symheli import LPVStateSpace
 from symheli.progress import tracked
@@ -25,8 +25,10 @@ from synthesis.numerics.linear.norm import stable
 
 Array = np.ndarray
 
-FREQUENCIES = 200
+FREQUENCIES = 60
 """Frequencies at which a frozen model is first looked at; the worst is then refined."""
+ZOOMS = 12
+"""Times that the interval about the worst frequency is cut to a quarter."""
 WAVES = 12
 """Waves that are examined, those of the fastest growth first."""
 PHASES = (1.0, -1.0, 1j)
@@ -42,22 +44,26 @@ def frozen_level(A: Array, B: Array, C: Array, D: Array, dt: float | None, kind:
         return math.inf
     one = np.eye(len(A))
 
-    def at(omega: float) -> float:
+    def at(omega: Array) -> Array:
         s = 1j * omega if dt is None else np.exp(1j * omega * dt)
-        return _worse(C @ np.linalg.solve(s * one - A, B) + D, kind, None)
+        right = np.broadcast_to(B, (len(s), *B.shape))
+        T = C @ np.linalg.solve(s[:, None, None] * one - A, right) + D
+        return np.array([_worse(each, kind, None) for each in T])
 
     pace = np.abs(poles) if dt is None else np.abs(np.log(poles.astype(complex) + 1e-300)) / dt
     pace = pace[pace > 0] if np.any(pace > 0) else np.ones(1)
     top = 1e3 * pace.max() if dt is None else math.pi / dt
     every = np.unique(np.r_[0.0, pace, np.geomspace(1e-3 * pace.min(), top, FREQUENCIES)])
     every = every[every <= top]
-    values = np.array([at(omega) for omega in every])
+    values = at(every)
     k = int(values.argmax())
     low, high = every[max(k - 1, 0)], every[min(k + 1, len(every) - 1)]
-    found = optimize.minimize_scalar(
-        lambda omega: -at(omega), bounds=(low, high), method="bounded", options={"xatol": 1e-9}
-    )
-    return max(float(values[k]), -float(found.fun))
+    for _ in range(ZOOMS):
+        finer = np.linspace(low, high, 9)
+        values = at(finer)
+        k = int(values.argmax())
+        low, high = finer[max(k - 1, 0)], finer[min(k + 1, 8)]
+    return float(values.max())
 
 
 def supplied(
@@ -110,6 +116,9 @@ def _worse(T: Array, kind: Kind, paired: Callable[[Array], Array] | None) -> flo
     at_zero = q * energy + s * cross + r * one
     rise = facets.rise.outputs * energy + facets.rise.cross * cross + facets.rise.inputs * one
     try:
+        if len(one) == 1:
+            ratio = -at_zero[0, 0].real / rise[0, 0].real if rise[0, 0].real > 0 else -math.inf
+            return facets.sense * facets.bound(float(ratio)) if math.isfinite(ratio) else -math.inf
         g = float(linalg.eigh(-at_zero, rise, eigvals_only=True)[-1])
     except np.linalg.LinAlgError:
         return -math.inf
