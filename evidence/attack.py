@@ -21,10 +21,12 @@ from scipy import linalg
 from symheli import LPVStateSpace, Scheduling, UncertainStateSpace
 from symheli.errors import SymheliError
 from synthesis import decay_rate, h2_gain, l2_gain, lft_gain, stability
-from synthesis.analysis import energy_to_peak
-from synthesis.certify.questions.output_strictness import output_strictness
-from synthesis.certify.questions.passivity import passivity_index
-from synthesis.certify.questions.sector import sector_radius
+from synthesis.analysis import (
+    energy_to_peak,
+    output_strictness,
+    passivity_index,
+    sector_radius,
+)
 from synthesis.forms import Spline
 from synthesis.robust import DynamicBlock, robust_margin, slope_margin, worst_case_gain
 from synthesis.sets import invariant_set, low_complexity_set

@@ -3,7 +3,10 @@ from synthesis.certify.lower_bounds.lines import frozen_box_gain as frozen_box_g
 from synthesis.certify.lower_bounds.lower_bound import LowerBoundSearch as LowerBoundSearch
 from synthesis.certify.questions.gain_against_rate import gain_against_rate as gain_against_rate
 from synthesis.certify.questions.lft_gain import lft_stability as lft_stability
+from synthesis.certify.questions.output_strictness import output_strictness as output_strictness
+from synthesis.certify.questions.passivity import passivity_index as passivity_index
 from synthesis.certify.questions.questions import energy_to_peak as energy_to_peak
+from synthesis.certify.questions.sector import sector_radius as sector_radius
 from synthesis.certify.statement.outcome import Status as Status
 from synthesis.design.loops.frozen_reading import proven_around as proven_around
 from synthesis.design.loops.handling_qualities import attitude_bandwidth as attitude_bandwidth

@@ -12,10 +12,12 @@ from studies import cli
 from symheli import LinearModel, LPVStateSpace, Scheduling
 from symheli.errors import InputError, SymheliError
 from synthesis import decay_rate, h2_gain, l2_gain, lft_gain, stability
-from synthesis.analysis import energy_to_peak
-from synthesis.certify.questions.output_strictness import output_strictness
-from synthesis.certify.questions.passivity import passivity_index
-from synthesis.certify.questions.sector import sector_radius
+from synthesis.analysis import (
+    energy_to_peak,
+    output_strictness,
+    passivity_index,
+    sector_radius,
+)
 from synthesis.certify.statement.statement_file import read
 from synthesis.forms import Spline
 from synthesis.sets import invariant_set, low_complexity_set

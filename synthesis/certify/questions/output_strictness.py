@@ -65,6 +65,10 @@ def output_strictness(
     InputError, SolverError
         As of `l2_gain`; for another number of outputs than inputs, and without feedthrough.
 
+    See Also
+    --------
+    synthesis.analysis.passivity_index : what is left after nu |u|^2
+
     References
     ----------
     Willems, "Dissipative dynamical systems", Archive for Rational Mechanics and Analysis 45 (1972).
@@ -72,7 +76,7 @@ def output_strictness(
     Examples
     --------
     >>> from symheli import LPVStateSpace, Scheduling
-    >>> from synthesis.certify.questions.output_strictness import output_strictness
+    >>> from synthesis.analysis import output_strictness
     >>> p = Scheduling("p", "1", 0.0, 1.0, rate=0.5)
     >>> lag = LPVStateSpace.polynomial([[[-1.0]], [[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.25]]], p)
     >>> cert = output_strictness(lag, search=None)  # the worst is 1/G(0) = 0.8, at p = 0

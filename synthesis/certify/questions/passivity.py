@@ -61,6 +61,10 @@ def passivity_index(
     InputError, SolverError
         As of `l2_gain`; for another number of outputs than inputs.
 
+    See Also
+    --------
+    synthesis.analysis.output_strictness : what is left after rho |y|^2
+
     References
     ----------
     Willems, "Dissipative dynamical systems", Archive for Rational Mechanics and Analysis 45 (1972).
@@ -68,7 +72,7 @@ def passivity_index(
     Examples
     --------
     >>> from symheli import LPVStateSpace, Scheduling
-    >>> from synthesis.certify.questions.passivity import passivity_index
+    >>> from synthesis.analysis import passivity_index
     >>> p = Scheduling("p", "1", 0.0, 1.0, rate=0.5)
     >>> lag = LPVStateSpace.polynomial([[[-1.0]], [[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.3]]], p)
     >>> cert = passivity_index(lag, search=None)

@@ -69,6 +69,10 @@ def sector_radius(
     InputError, SolverError
         As of `l2_gain`; for another number of outputs than inputs, a centre that is no number.
 
+    See Also
+    --------
+    synthesis.l2_gain : the radius about zero
+
     References
     ----------
     Zames, "On the input-output stability of time-varying nonlinear feedback systems", IEEE Trans.
@@ -77,7 +81,7 @@ def sector_radius(
     Examples
     --------
     >>> from symheli import LPVStateSpace, Scheduling
-    >>> from synthesis.certify.questions.sector import sector_radius
+    >>> from synthesis.analysis import sector_radius
     >>> p = Scheduling("p", "1", 0.0, 1.0, rate=0.5)
     >>> lag = LPVStateSpace.polynomial([[[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], p)
     >>> cert = sector_radius(lag, 0.5, search=None)  # the circle of 1/(s + 1)
