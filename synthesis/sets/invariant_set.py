@@ -295,11 +295,15 @@ class _Climb:
                 break
             if found is None:
                 return before
-            log = 0.5 * np.linalg.slogdet(self._middle(found))[1]
+            middle = self._middle(found)
+            if not np.linalg.eigvalsh(0.5 * (middle + middle.T))[0] > 0:
+                self.why = "what the solver returned is no ellipsoid"
+                return before
+            log = 0.5 * np.linalg.slogdet(middle)[1]
             if before is not None and abs(log - self._log) < SETTLED:
                 return found
             before, self._log = found, log
-            self.T = np.linalg.cholesky(self._middle(found))
+            self.T = np.linalg.cholesky(middle)
         self.why = UNBOUNDED
         return None
 
