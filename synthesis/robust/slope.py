@@ -45,7 +45,7 @@ ROUNDS = 25
 """Largest number of programs with one slope."""
 GROWTH = 1.001
 """Ratio of a slope without a multiplier to one with it at which the search ends."""
-LARGEST = 1e6
+LARGEST = 1e9
 """Largest slope, in units of the inverse of the norm of G, that is looked for."""
 NORM = 1 - 1e-6
 """Largest integral of |h|."""
@@ -388,7 +388,7 @@ class _ScalarLoop(NamedTuple):
         for sign, part in zip(
             (1.0, -1.0), np.split(found.x[:n], 2 if self.odd else 1), strict=False
         ):
-            c[: len(part)] += sign * part
+            c[: len(part)] += sign * np.maximum(part, 0.0)
         c = np.trunc(np.ldexp(c, BITS[1])) * 2.0 ** -BITS[1]
         causal, ahead = c.reshape(2, *at.causal.shape)
         q = float(found.x[n] / pace)
