@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from fractions import Fraction
 from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from symheli import LFT, LinearModel, LPVStateSpace, UncertainStateSpace
+from symheli import LFT, LinearModel, LPVStateSpace, Scheduling, UncertainStateSpace
 from symheli.errors import InputError
 from symheli.lpv.lft.reduction import reduce_without_loss
 from symheli.lpv.lft_matrices import parts as slices
@@ -19,6 +20,7 @@ from synthesis.design.lti.weights import as_weight
 from synthesis.design.plant import parts
 from synthesis.numerics.linear.balance import balance
 from synthesis.numerics.linear.norm import stable, to_continuous
+from synthesis.numerics.polynomial.transfer import Transfer, rationals
 from synthesis.robust import covers
 
 Array = np.ndarray
@@ -130,11 +132,29 @@ class Part(NamedTuple):
     real: bool
 
 
+class ExactLoop(NamedTuple):
+    """A, B, C, D of a loop in rationals, as it follows from model and blocks without rounding;
+    `sampled`: of the model from sample to sample itself.
+    """
+
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+    sampled: bool
+
+    @property
+    def transfer(self) -> Transfer:
+        """The transfer matrix from w to z, of a sampled loop over s = (z - 1)/(z + 1)."""
+        return Transfer.of(*self)
+
+
 class BlockLoop(NamedTuple):
     """x' = A x + B w, z = C x + D w, w = Delta z with one block of norm <= 1 a part; the last part
     may be the performance. Sampled models stand as continuous ones of the same norms. `sizes` (nz,)
     of the outputs of full blocks in units of the model, `weights` of the blocks; `middles` and
-    `radii` of the parameters, 0 of those that the model does not depend on.
+    `radii` of the parameters, 0 of those that the model does not depend on. `exact` is the loop
+    that is proven, of which the doubles are the nearest; None: nothing is proven of this one.
     """
 
     A: Array
@@ -147,6 +167,7 @@ class BlockLoop(NamedTuple):
     middles: Array
     radii: Array
     weights: tuple[LinearModel | None, ...] = ()
+    exact: ExactLoop | None = None
 
     @property
     def reals(self) -> int:
@@ -212,12 +233,13 @@ class BlockLoop(NamedTuple):
             C[n:] + D[n:, :n] @ gain @ C[:n],
             D[n:, n:] + D[n:, :n] @ gain @ D[:n, n:],
             rest,
-            *self[5:],
+            *self[5:-1],
         )
 
-    def in_units(self, level: float, performance: bool) -> BlockLoop:
-        """Return the loop with z in units of the level, of the last part alone where that is the
-        performance, balanced between its parts at the middle of its frequencies.
+    def units(self, level: float, performance: bool) -> tuple[Array, Array]:
+        """Return units (nz,) of z and (nw,) of w, powers of two, in which the level is about one,
+        that of the last part alone where that is the performance, and the parts are balanced at the
+        middle of the frequencies.
         """
         rows, columns = np.ones(len(self.C)), np.ones(self.B.shape[1])
         for part in self.parts[-1:] if performance else self.parts:
@@ -229,11 +251,10 @@ class BlockLoop(NamedTuple):
             [[np.linalg.norm(M[a.rows, b.columns]) for b in self.parts] for a in self.parts]
         )
         d = balance(size, np.zeros((len(size), 1)), np.zeros((1, len(size))))
-        for part, own in zip(self.parts, d, strict=True):
+        for part, own in zip(self.parts, np.exp2(np.round(np.log2(d))), strict=True):
             rows[part.rows] /= own
             columns[part.columns] *= own
-        B, C = self.B * columns, rows[:, None] * self.C
-        return self._replace(B=B, C=C, D=rows[:, None] * self.D * columns)
+        return rows, columns
 
     @property
     def stable(self) -> bool:
@@ -279,29 +300,36 @@ def loop_of(
             raise InputError("a gain needs an input and an output that belong to no block")
     if not (model.order or blocks):
         raise InputError("nothing is uncertain: the model has no parameter and there is no block")
-    n, x, units = model.order, len(model.states), np.array(sizes).reshape(-1, 1)
-    B = np.hstack([model.M21[:x], model.M22[:x, x:][:, into]])
-    C = np.vstack([model.M12[:, :x], units * model.M22[x:, :x][out]])
+    n, x = model.order, len(model.states)
+    units = rationals(sizes).reshape(-1, 1)
+    reach = np.array([_reach(s) for s, size in model.blocks for _ in range(size)], dtype=object)
+    M11, M12, M21, M22 = map(rationals, (model.M11, model.M12, model.M21, model.M22))
+    M11, M12 = reach.reshape(n, 1) * M11, reach.reshape(n, 1) * M12
+    B = np.hstack([M21[:x], M22[:x, x:][:, into]])
+    C = np.vstack([M12[:, :x], units * M22[x:, :x][out]])
     D = np.block(
-        [
-            [model.M11, model.M12[:, x:][:, into]],
-            [units * model.M21[x:][out], units * model.M22[x:, x:][np.ix_(out, into)]],
-        ]
+        [[M11, M12[:, x:][:, into]], [units * M21[x:][out], units * M22[x:, x:][np.ix_(out, into)]]]
     )
     real = [Part(part, part, True) for part in slices(model.sizes) if part.stop > part.start]
     full = [
         Part(slice(n + a.start, n + a.stop), slice(n + b.start, n + b.stop), False)
         for a, b in zip(slices([*map(len, rows)]), slices([*map(len, columns)]), strict=True)
     ]
-    A = model.M22[:x, :x]
     every = [*([None] * n), *(w for w, own in zip(weights, rows, strict=False) for _ in own)]
-    A, B, C, D = behind(A, B, C, D, every, model.dt)
+    exact = ExactLoop(*behind(M22[:x, :x], B, C, D, every, model.dt), sampled=model.dt is not None)
+    A, B, C, D = (M.astype(float) for M in exact[:4])
     if model.dt is not None:
         A, B, C, D = to_continuous(A, B, C, D)
     middles = np.array([s.middle for s, _ in model.blocks])
     radii = np.array([s.radius * (size > 0) for s, size in model.blocks])
-    whole = (*real, *full)
-    return BlockLoop(A, B, C, D, whole, model.dt, units[:, 0], middles, radii, weights)
+    whole, own = (*real, *full), units[:, 0].astype(float)
+    return BlockLoop(A, B, C, D, whole, model.dt, own, middles, radii, weights, exact)
+
+
+def _reach(s: Scheduling) -> Fraction:
+    """Return the largest distance of the range from its middle as rounded, in radii as rounded."""
+    low, high, middle = Fraction(s.low), Fraction(s.high), Fraction(s.middle)
+    return max(high - middle, middle - low) / Fraction(s.radius)
 
 
 def _check_copies(model: LFT) -> None:
@@ -370,14 +398,18 @@ def stable_weight(block: DynamicBlock, dt: float | None) -> LinearModel | None:
 def behind(
     A: Array, B: Array, C: Array, D: Array, weights: Sequence[LinearModel | None], dt: float | None
 ) -> tuple[Array, Array, Array, Array]:
-    """Return a model whose first outputs pass these weights."""
+    """Return a model whose first outputs pass these weights; of rationals without rounding."""
     every = [1.0 if w is None else w for w in [*weights, *[None] * (len(C) - len(weights))]]
     W = as_weight(every, "weight", [Signal(f"v{i}") for i in range(len(C))], dt)
+    own = W.A, W.B, W.C, W.D
+    if C.dtype == object:
+        own = tuple(map(rationals, own))
+    a, b, c, d = own
     return (
-        np.block([[A, np.zeros((len(A), len(W.A)))], [W.B @ C, W.A]]),
-        np.vstack([B, W.B @ D]),
-        np.hstack([W.D @ C, W.C]),
-        W.D @ D,
+        np.block([[A, np.zeros((len(A), len(a)), dtype=C.dtype)], [b @ C, a]]),
+        np.vstack([B, b @ D]),
+        np.hstack([d @ C, c]),
+        d @ D,
     )
 
 
