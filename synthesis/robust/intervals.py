@@ -81,17 +81,38 @@ class LevelProof(NamedTuple):
         """Whether the loop is stable without its blocks, the scalings fit its blocks, hold on their
         intervals, and these leave no frequency out.
         """
-        if not (np.all(self.rows > 0) and np.all(self.columns > 0) and self._fits(loop)):
+        if self.bound is None or not self._fits(loop):
             return False
         check = Check.of(
             loop.transfer.scaled(self.rows, self.columns), self.parts, self.performance
         )
+        if not check.transfer.stable:
+            return False
         reached = 0.0
         for low, high, by in sorted(self.intervals, key=lambda each: each.low):
             if low > reached or not check.holds(by, low, high, self.level):
                 return False
             reached = max(reached, high)
-        return bool(self.intervals) and math.isinf(reached) and check.transfer.stable
+        return bool(self.intervals) and math.isinf(reached)
+
+    @property
+    def bound(self) -> Fraction | None:
+        """The level in the units of the loop; None where `rows` and `columns` are no units of its
+        blocks, the same number along each.
+        """
+        found = set()
+        for k, part in enumerate(self.parts):
+            own, other = (
+                {*map(Fraction, v)} for v in (self.rows[part.rows], self.columns[part.columns])
+            )
+            if not (len(own) == len(other) == 1 and min(*own, *other) > 0):
+                return None
+            unit = own.pop() * other.pop()
+            if not self.performance or k == len(self.parts) - 1:
+                found.add(unit)
+            elif unit != 1:
+                return None
+        return Fraction(self.level) / found.pop() if len(found) == 1 else None
 
     def _fits(self, loop: ExactLoop) -> bool:
         """Whether the parts are blocks side by side that take every row and column once."""
