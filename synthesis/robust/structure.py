@@ -20,7 +20,7 @@ from synthesis.design.lti.weights import as_weight
 from synthesis.design.plant import parts
 from synthesis.numerics.linear.balance import balance
 from synthesis.numerics.linear.norm import stable, to_continuous
-from synthesis.numerics.polynomial.transfer import Transfer, rationals
+from synthesis.numerics.polynomial.transfer import Transfer, inverse, rationals
 from synthesis.robust import covers
 
 Array = np.ndarray
@@ -147,6 +147,34 @@ class ExactLoop(NamedTuple):
     def transfer(self) -> Transfer:
         """The transfer matrix from w to z, of a sampled loop over s = (z - 1)/(z + 1)."""
         return Transfer.of(*self)
+
+    def select(self, into: Array, out: Array) -> ExactLoop:
+        """Return the loop from these columns of w to these rows of z."""
+        return self._replace(B=self.B[:, into], C=self.C[out], D=self.D[np.ix_(out, into)])
+
+    def behind(self, K: LinearModel) -> ExactLoop:
+        """Return the loop whose last inputs are K times its last outputs.
+
+        Raises `InputError` where I - K D is singular at infinite frequency.
+        """
+        a, b, c, d = map(rationals, (K.A, K.B, K.C, K.D))
+        nu, ny, n = len(c), b.shape[1], len(a)
+        B1, B2, C1, C2 = self.B[:, :-nu], self.B[:, -nu:], self.C[:-ny], self.C[-ny:]
+        D11, D12, D21, D22 = (
+            M for rows in (self.D[:-ny], self.D[-ny:]) for M in (rows[:, :-nu], rows[:, -nu:])
+        )
+        loop = inverse(rationals(np.eye(nu)) - d @ D22)
+        u = loop @ np.hstack([d @ C2, c, d @ D21])  # of (x, x of K, w)
+        y = np.hstack([C2, np.zeros((ny, n), dtype=object), D21]) + D22 @ u
+        whole = np.vstack(
+            [
+                np.hstack([self.A, np.zeros((len(self.A), n), dtype=object), B1]) + B2 @ u,
+                np.hstack([np.zeros((n, len(self.A)), dtype=object), a, 0 * b @ D21]) + b @ y,
+                np.hstack([C1, np.zeros((len(C1), n), dtype=object), D11]) + D12 @ u,
+            ]
+        )
+        m = len(self.A) + n
+        return ExactLoop(whole[:m, :m], whole[:m, m:], whole[m:, :m], whole[m:, m:], self.sampled)
 
 
 class BlockLoop(NamedTuple):

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import linalg
 
+from symheli.errors import InputError
 from synthesis.numerics.polynomial.positive import hurwitz, product
 
 Array = np.ndarray
@@ -119,6 +120,22 @@ def rationals(M: Any) -> Array:
     out = np.empty(M.shape, dtype=object)
     out.ravel()[:] = [Fraction(v) for v in M.ravel().tolist()]
     return out
+
+
+def inverse(M: Array) -> Array:
+    """Return the inverse of a matrix of rationals; raise `InputError` where it is singular."""
+    n = len(M)
+    whole = np.hstack([M, rationals(np.eye(n))])
+    for k in range(n):
+        pivot = next((i for i in range(k, n) if whole[i, k] != 0), None)
+        if pivot is None:
+            raise InputError("the loop is not well posed: I - K D is singular")
+        whole[[k, pivot]] = whole[[pivot, k]]
+        whole[k] = whole[k] / whole[k, k]
+        for i in range(n):
+            if i != k:
+                whole[i] = whole[i] - whole[i, k] * whole[k]
+    return whole[:, n:]
 
 
 def _whole(M: Array) -> tuple[Array, int]:
