@@ -31,6 +31,8 @@ SHARE, APART = 0.9995, 1.002
 """Part of the upper bound for which a proof is tried first; ratio of a factor that is not proven to
 one that is at which the search between them ends.
 """
+NEARLY = 1 - 1e-6
+"""Level, by that of the largest factor looked for, at which the proof of it begins."""
 MIN_SCALE = 1e-6
 """A model that does not bear this part of its uncertainty counts as unstable without any."""
 STEPS = 3
@@ -274,7 +276,8 @@ def _of_blocks(
     _, d = best_reals(lambda d: _lost(loop, d, largest), loop.reals)
     upper = _lost(loop, d, largest, refine=True)
     borne = upper >= largest
-    proof = proven_level(loop, 1 / upper, performance=False).proof
+    start = (NEARLY if borne else 1.0) / upper
+    proof = proven_level(loop, start, performance=False).proof
     closed = loop.closed(min(upper, largest) * d)
     found = worst_closing(closed, refine=True) if closed.stable and closed.parts else None
     return RobustMargin(

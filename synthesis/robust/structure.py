@@ -9,10 +9,11 @@ from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy import linalg
 
 from symheli import LFT, LinearModel, LPVStateSpace, Scheduling, UncertainStateSpace
 from symheli.errors import InputError
-from symheli.lpv.lft.reduction import reduce_without_loss
+from symheli.lpv.lft.reduction import reduce_exactly
 from symheli.lpv.lft_matrices import parts as slices
 from symheli.values.sample_period import same_period
 from symheli.values.signal import Signal, indices
@@ -132,6 +133,10 @@ class Part(NamedTuple):
     real: bool
 
 
+PARALLEL = 1e6
+"""Condition number of modes from which on they are not taken as coordinates."""
+
+
 class ExactLoop(NamedTuple):
     """A, B, C, D of a loop in rationals, as it follows from model and blocks without rounding;
     `sampled`: of the model from sample to sample itself.
@@ -147,6 +152,22 @@ class ExactLoop(NamedTuple):
     def transfer(self) -> Transfer:
         """The transfer matrix from w to z, of a sampled loop over s = (z - 1)/(z + 1)."""
         return Transfer.of(*self)
+
+    def rounded(self) -> tuple[Array, Array, Array, Array]:
+        """Return the loop in doubles, in coordinates of its modes, or of Schur's where these are
+        nearly parallel: there entries do not cancel.
+        """
+        A, n = self.A.astype(float), len(self.A)
+        balanced, (units, _) = linalg.matrix_balance(A, permute=False, separate=True)
+        values, V = np.linalg.eig(balanced)
+        T = np.where(values.imag >= 0, V.real, V.imag)
+        if not np.linalg.cond(T) < PARALLEL:
+            T = linalg.schur(balanced)[1]
+        T = units[:, None] * T
+        exact, near = rationals(T), rationals(np.linalg.inv(T))
+        back = (rationals(2 * np.eye(n)) - near @ exact) @ near  # a step of Newton's method
+        A, B, C = back @ self.A @ exact, back @ self.B, self.C @ exact
+        return A.astype(float), B.astype(float), C.astype(float), self.D.astype(float)
 
     def select(self, into: Array, out: Array) -> ExactLoop:
         """Return the loop from these columns of w to these rows of z."""
@@ -307,7 +328,7 @@ def loop_of(
     signal that the model does not have.
     """
     if isinstance(model, LPVStateSpace):
-        model = reduce_without_loss(model.to_lft())
+        model = model.to_lft()
     elif isinstance(model, LFT):
         _check_copies(model)
     if not isinstance(model, LFT):
@@ -326,30 +347,31 @@ def loop_of(
         sizes += [1.0] * len(rows[-1])
         if not (columns[-1] and rows[-1]):
             raise InputError("a gain needs an input and an output that belong to no block")
-    if not (model.order or blocks):
+    copies = reduce_exactly(model)
+    n, x = sum(copies.sizes), len(model.states)
+    if not (n or blocks):
         raise InputError("nothing is uncertain: the model has no parameter and there is no block")
-    n, x = model.order, len(model.states)
     units = rationals(sizes).reshape(-1, 1)
-    reach = np.array([_reach(s) for s, size in model.blocks for _ in range(size)], dtype=object)
-    M11, M12, M21, M22 = map(rationals, (model.M11, model.M12, model.M21, model.M22))
-    M11, M12 = reach.reshape(n, 1) * M11, reach.reshape(n, 1) * M12
+    number = dict(zip(model.parameters, copies.sizes, strict=True))
+    reach = rationals([_reach(s) for s, size in number.items() for _ in range(size)]).reshape(n, 1)
+    M11, M12, M21, M22 = reach * copies.M11, reach * copies.M12, copies.M21, rationals(model.M22)
     B = np.hstack([M21[:x], M22[:x, x:][:, into]])
     C = np.vstack([M12[:, :x], units * M22[x:, :x][out]])
     D = np.block(
         [[M11, M12[:, x:][:, into]], [units * M21[x:][out], units * M22[x:, x:][np.ix_(out, into)]]]
     )
-    real = [Part(part, part, True) for part in slices(model.sizes) if part.stop > part.start]
+    real = [Part(part, part, True) for part in slices(copies.sizes) if part.stop > part.start]
     full = [
         Part(slice(n + a.start, n + a.stop), slice(n + b.start, n + b.stop), False)
         for a, b in zip(slices([*map(len, rows)]), slices([*map(len, columns)]), strict=True)
     ]
     every = [*([None] * n), *(w for w, own in zip(weights, rows, strict=False) for _ in own)]
     exact = ExactLoop(*behind(M22[:x, :x], B, C, D, every, model.dt), sampled=model.dt is not None)
-    A, B, C, D = (M.astype(float) for M in exact[:4])
+    A, B, C, D = exact.rounded()
     if model.dt is not None:
         A, B, C, D = to_continuous(A, B, C, D)
     middles = np.array([s.middle for s, _ in model.blocks])
-    radii = np.array([s.radius * (size > 0) for s, size in model.blocks])
+    radii = np.array([s.radius * (size > 0) for s, size in number.items()])
     whole, own = (*real, *full), units[:, 0].astype(float)
     return BlockLoop(A, B, C, D, whole, model.dt, own, middles, radii, weights, exact)
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
@@ -47,6 +49,76 @@ def reduce_without_loss(lft: LFT) -> LFT:
         if np.all(change <= bar) and not (dropped and np.any(change > ROUNDING * np.abs(values))):
             return smaller
     return whole
+
+
+class ExactCopies(NamedTuple):
+    """M11, M12, M21 of an LFT in rationals, and the numbers of copies of its parameters."""
+
+    M11: Array
+    M12: Array
+    M21: Array
+    sizes: tuple[int, ...]
+
+
+def reduce_exactly(lft: LFT) -> ExactCopies:
+    """Return the copies that the inputs reach and the outputs show, by ranks in rational
+    arithmetic: the same function of the parameters, to the last digit.
+    """
+    lft = _without_idle_copies(lft)
+    copies = _units(lft).copies if lft.order else np.ones(0)
+    M11 = _rational(copies[:, None] * lft.M11 / copies)
+    found = ExactCopies(
+        M11, _rational(copies[:, None] * lft.M12), _rational(lft.M21 / copies), lft.sizes
+    )
+    while True:
+        seen = _reached_exactly(ExactCopies(found.M11.T, found.M21.T, found.M12.T, found.sizes))
+        back = ExactCopies(seen.M11.T, seen.M21.T, seen.M12.T, seen.sizes)
+        smaller = _reached_exactly(back)
+        if smaller.sizes == found.sizes:
+            return found
+        found = smaller
+
+
+def _reached_exactly(own: ExactCopies) -> ExactCopies:
+    """Return what the inputs reach alone, in coordinates that are some of the copies."""
+    here = parts(own.sizes)
+    spans = [_span(own.M12[rows]) for rows in here]
+    while True:
+        grown = [
+            _span(
+                np.hstack([V, *(own.M11[a, b] @ W for b, (W, _) in zip(here, spans, strict=True))])
+            )
+            for a, (V, _) in zip(here, spans, strict=True)
+        ]
+        if [len(k) for _, k in grown] == [len(k) for _, k in spans]:
+            break
+        spans = grown
+    chosen = [a.start + k for a, (_, own_rows) in zip(here, spans, strict=True) for k in own_rows]
+    V = _diagonal([basis for basis, _ in spans], object)
+    sizes = tuple(len(rows) for _, rows in spans)
+    return ExactCopies((own.M11 @ V)[chosen], own.M12[chosen], own.M21 @ V, sizes)
+
+
+def _span(columns: Array) -> tuple[Array, list[int]]:
+    """Return a basis (n, r) of the columns and r rows in which it is the identity."""
+    rest = [column for column in columns.T if any(column)]
+    basis: list[Array] = []
+    rows: list[int] = []
+    for column in rest:
+        for v, k in zip(basis, rows, strict=True):
+            column = column - column[k] * v
+        k = max(range(len(column)), key=lambda i: abs(column[i]))
+        if column[k] != 0:
+            column = column / column[k]
+            basis = [v - v[k] * column for v in basis]
+            basis, rows = [*basis, column], [*rows, k]
+    return np.array(basis, dtype=object).reshape(len(basis), len(columns)).T, rows
+
+
+def _rational(M: Array) -> Array:
+    out = np.empty(M.shape, dtype=object)
+    out.ravel()[:] = [Fraction(v) for v in M.ravel().tolist()]
+    return out
 
 
 def _rounding(lft: LFT, delta: Array) -> Array:
@@ -269,8 +341,8 @@ def _projected(lft: LFT, left: list[Array], right: list[Array]) -> LFT:
     return replace(lft, M11=L.T @ lft.M11 @ R, M12=L.T @ lft.M12, M21=lft.M21 @ R, blocks=blocks)
 
 
-def _diagonal(parts: list[Array]) -> Array:
-    out = np.zeros((sum(p.shape[0] for p in parts), sum(p.shape[1] for p in parts)))
+def _diagonal(parts: Sequence[Array], kind: type = float) -> Array:
+    out = np.zeros((sum(p.shape[0] for p in parts), sum(p.shape[1] for p in parts)), dtype=kind)
     i = j = 0
     for p in parts:
         out[i : i + p.shape[0], j : j + p.shape[1]] = p
