@@ -19,36 +19,40 @@ SAMPLES = 12
 """Number of points of the box at which the parameter-dependent part is evaluated."""
 TOLERANCES = (1e-12, 1e-14)
 """Tolerances of the reductions that are tried where nothing may be lost."""
-ROUNDING = 4 * np.finfo(float).eps
-"""Relative change of an entry below which it is the same number."""
 LOSS = 64 * np.finfo(float).eps
-"""Largest change of an entry, in units of the size that row and column give it or of its own terms,
-that is rounding of the reduction itself.
+"""Largest change of what an entry has of the parameters, in units of the size that row and column
+give that part or of its own terms, that is rounding of the reduction itself.
 """
 
 
-def reduce(lft: LFT, tolerance: float) -> LFT:
+def reduce(lft: LFT, tolerance: float | None) -> LFT:
     """See `LFT.reduce`."""
+    if tolerance is None:
+        return reduce_without_loss(lft)
     return _one_parameter(lft, tolerance) if len(lft.blocks) == 1 else _structured(lft, tolerance)
 
 
 def reduce_without_loss(lft: LFT) -> LFT:
-    """Return the same model with the fewest copies found by reductions that change no entry by more
-    than `LOSS` and drop no parameter; without copies that zeros cut off, where all of them do.
+    """Return the same model with the copies that exact ranks leave, or with fewer where these
+    change nothing that depends on a parameter by more than `LOSS` of its own size, and no parameter
+    goes.
 
-    `LFT.reduce` takes dependence below its tolerance for rounding. In coordinates of entries that
-    nearly cancel such a dependence may decide stability.
+    The constant part has no say: in coordinates of entries that nearly cancel a dependence that is
+    small beside it may decide stability.
     """
-    whole = _without_idle_copies(lft)
+    found = reduce_exactly(lft)
+    M11, M12, M21 = (M.astype(float) for M in found[:3])
+    blocks = tuple(Block(b.scheduling, n) for b, n in zip(lft.blocks, found.sizes, strict=True))
+    whole = replace(lft, M11=M11, M12=M12, M21=M21, M22=0 * lft.M22, blocks=blocks)
     delta = _samples(whole)
     values, bar = whole.matrix(delta), _rounding(whole, delta)
-    for tolerance in TOLERANCES:
+    for tolerance in TOLERANCES if whole.order else ():
         smaller = reduce(whole, tolerance)
         change = np.abs(smaller.matrix(delta) - values)
         dropped = any(a and not b for a, b in zip(whole.sizes, smaller.sizes, strict=True))
-        if np.all(change <= bar) and not (dropped and np.any(change > ROUNDING * np.abs(values))):
-            return smaller
-    return whole
+        if np.all(change <= bar) and not dropped:
+            return replace(smaller, M22=lft.M22)
+    return replace(whole, M22=lft.M22)
 
 
 class ExactCopies(NamedTuple):
@@ -125,11 +129,11 @@ def _rounding(lft: LFT, delta: Array) -> Array:
     """Changes of the entries (SAMPLES, nx + ny, nx + nu) that count as rounding at these points."""
     own = np.repeat(delta, lft.sizes, axis=-1)
     inverse = np.abs(np.linalg.inv(np.eye(lft.order) - lft.M11 * own[:, None, :]))
-    terms = np.abs(lft.M22) + (np.abs(lft.M21) * np.abs(own)[:, None, :]) @ inverse @ np.abs(
-        lft.M12
-    )
-    rows, columns = equilibrate(np.abs(lft.matrix(delta)).max(axis=0, initial=0.0))
-    return LOSS * np.maximum(terms, 1 / (rows[:, None] * columns))
+    terms = (np.abs(lft.M21) * np.abs(own)[:, None, :]) @ inverse @ np.abs(lft.M12)
+    size = np.abs(lft.matrix(delta) - lft.M22).max(axis=0, initial=0.0)
+    rows, columns = equilibrate(size)
+    depends = np.any(size, axis=1)[:, None] & np.any(size, axis=0)
+    return LOSS * np.maximum(terms, np.where(depends, 1 / (rows[:, None] * columns), 0.0))
 
 
 def _without_idle_copies(lft: LFT) -> LFT:
