@@ -19,6 +19,8 @@ SAMPLES = 12
 """Number of points of the box at which the parameter-dependent part is evaluated."""
 TOLERANCES = (1e-12, 1e-14)
 """Tolerances of the reductions that are tried where nothing may be lost."""
+NEARLY = 1e-6
+"""Largest error of an inverse of coordinates that one step of Newton's method mends."""
 LOSS = 64 * np.finfo(float).eps
 """Largest change of what an entry has of the parameters, in units of the size that row and column
 give that part or of its own terms, that is rounding of the reduction itself.
@@ -52,7 +54,22 @@ def reduce_without_loss(lft: LFT) -> LFT:
         dropped = any(a and not b for a, b in zip(whole.sizes, smaller.sizes, strict=True))
         if np.all(change <= bar) and not dropped:
             return replace(smaller, M22=lft.M22)
-    return replace(whole, M22=lft.M22)
+    return replace(_in_balanced_coordinates(whole, found), M22=lft.M22)
+
+
+def _in_balanced_coordinates(lft: LFT, exact: ExactCopies) -> LFT:
+    """Return the copies of one parameter in balanced coordinates, formed in rationals: only entries
+    are rounded. The LFT itself where it has several parameters or is nearly not minimal.
+    """
+    if len(lft.blocks) != 1 or not lft.order:
+        return lft
+    into, out = _balancing(lft)
+    if not np.abs(into @ out - np.eye(lft.order)).max() < NEARLY:
+        return lft
+    T, near = _rational(out), _rational(into)
+    back = (2 * _rational(np.eye(lft.order)) - near @ T) @ near  # a step of Newton's method
+    M11, M12, M21 = back @ exact.M11 @ T, back @ exact.M12, exact.M21 @ T
+    return replace(lft, M11=M11.astype(float), M12=M12.astype(float), M21=M21.astype(float))
 
 
 class ExactCopies(NamedTuple):
@@ -209,6 +226,12 @@ def _balanced(lft: LFT) -> LFT:
     """
     if not lft.order:
         return lft
+    into, out = _balancing(lft)
+    return replace(lft, M11=into @ lft.M11 @ out, M12=into @ lft.M12, M21=lft.M21 @ out)
+
+
+def _balancing(lft: LFT) -> tuple[Array, Array]:
+    """Return (into, out), inverse to one another: balanced copies are `into` times the given."""
     power, size = lft.M12, np.zeros(lft.M22.shape)
     for _ in range(2 * lft.order):
         size, power = np.maximum(size, np.abs(lft.M21 @ power)), lft.M11 @ power
@@ -220,9 +243,8 @@ def _balanced(lft: LFT) -> LFT:
         sight.append(sight[-1] @ lft.M11)
     R, S = np.hstack(reach), np.vstack(sight)
     U, s, Vt = np.linalg.svd(S @ R, full_matrices=False)
-    root = np.sqrt(s[: lft.order])
-    into, out = (U[:, : lft.order] / root).T @ S, R @ (Vt[: lft.order].T / root)
-    return replace(lft, M11=into @ lft.M11 @ out, M12=into @ lft.M12, M21=lft.M21 @ out)
+    root = np.sqrt(np.maximum(s[: lft.order], np.finfo(float).tiny))
+    return (U[:, : lft.order] / root).T @ S, R @ (Vt[: lft.order].T / root)
 
 
 def _structured(lft: LFT, tolerance: float) -> LFT:
