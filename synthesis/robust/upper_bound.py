@@ -68,16 +68,18 @@ def proven_level(loop: BlockLoop, start: float, *, performance: bool) -> Upper:
     rows, columns = loop.units(unit, performance)
     transfer = loop.exact.transfer.scaled(rows, columns)
     check = Check.of(transfer, loop.parts, performance)
-    level, decides = _short(start / unit), math.nan
+    level, decides, step = _short(start / unit), math.nan, GROWTH
     known: list[tuple[float, Scalings]] = []
-    while transfer.stable and math.isfinite(level):
+    while transfer.stable and level < MAX_LEVEL:
         failed, covered = _uncovered(loop, check, level, known)
         if failed is None:
             proof = LevelProof(level, rows, columns, loop.parts, performance, tuple(covered))
             return Upper(unit * level, decides, proof)
+        # where the frequency that decided decides again, scalings that are found do not hold
+        step = step**2 if failed == decides else GROWTH
         decides = failed
         least = level_at(transfer.response(failed), loop, level, performance)
-        level = _short(max(least, level) * GROWTH) if math.isfinite(least) else math.inf
+        level = _short(max(least, level) * step) if math.isfinite(least) else math.inf
     return Upper(math.inf, decides, None)
 
 
