@@ -254,14 +254,30 @@ def covers_servo(W: LinearModel, bandwidth: PositiveRange, damping: PositiveRang
             at = i + m, j, l
             more = value * math.comb(top - i, m) * (-1) ** m
             whole[at] = whole.get(at, Fraction(0)) + more
-    ranges = (
+    box = (
+        (Fraction(0), Fraction(1)),
         (Fraction(bandwidth.low) / w0, Fraction(bandwidth.high) / w0),
         (Fraction(damping.low), Fraction(damping.high)),
     )
-    left = {at: np.array([[-value]], dtype=object) for at, value in whole.items()}
-    exact = PolynomialMatrix.from_monomials(left, ((Fraction(0), Fraction(1)), *ranges))
+    coefficients = np.zeros((top + 1, 5, 3), dtype=object)
+    for at, value in whole.items():
+        coefficients[at] = -value
+    for axis, (low, high) in enumerate(box):
+        change = _power_to_bernstein(coefficients.shape[axis] - 1, low, high)
+        coefficients = np.moveaxis(np.tensordot(change, coefficients, (1, axis)), 0, axis)
+    exact = PolynomialMatrix(box, coefficients[..., None, None])
     rough = PolynomialMatrix(exact.box, exact.coefficients.astype(float))
     return negative_definite(rough, CELLS) and negative_definite_exactly(exact, CELLS)
+
+
+def _power_to_bernstein(degree: int, low: Fraction, high: Fraction) -> Array:
+    """Return the Bernstein coefficients over [low, high] of p^e in column e, in rationals."""
+    out = np.zeros((degree + 1, degree + 1), dtype=object)
+    for i, e, k in itertools.product(range(degree + 1), repeat=3):
+        if k <= e:
+            share = Fraction(math.comb(i, k) * math.comb(degree - i, e - k), math.comb(degree, e))
+            out[i, e] += share * low ** (e - k) * high**k
+    return out
 
 
 def rational(numerator: Sequence[float] | Array, denominator: Array, pace: float) -> LinearModel:

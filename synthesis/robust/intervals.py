@@ -287,7 +287,8 @@ def _integers(by: Scalings) -> list[tuple[Array, Array]]:
     """Return real and imaginary parts of all, times one power of two that makes them integers."""
     parts = [rationals(f(M)) for M in by for f in (np.real, np.imag)]
     common = max((v.denominator for M in parts for v in M.ravel().tolist()), default=1)
-    whole = [np.frompyfunc(lambda v: int(v * common), 1, 1)(M) for M in parts]
+    turn = np.frompyfunc(lambda v: int(v * common), 1, 1)
+    whole = [np.asarray(turn(M), dtype=object) for M in parts]
     return [(whole[2 * k], whole[2 * k + 1]) for k in range(3)]
 
 

@@ -106,7 +106,10 @@ class MuDesign:
         """
         if self.proof is None or self.asked is None or self.controller is None:
             return False
-        loop, level = _Plant.of(*self.asked).loop.exact.behind(self.controller), self.proof.bound
+        loop, level = (
+            _Plant.of(*self.asked).loop.in_rationals.behind(self.controller),
+            self.proof.bound,
+        )
         if level is None or self.proof.performance or level > self.mu:
             return False
         return self.proof.verified(loop) and (
@@ -248,7 +251,7 @@ class _Plant(NamedTuple):
             np.r_[tuple(np.r_[getattr(p, side)] for p in (*parts, loop.parts[k]))]
             for side in ("columns", "rows")
         )
-        own = loop.exact.select(into, out)
+        own = loop.in_rationals.select(into, out)
         moved = loop._replace(
             B=loop.B[:, into], C=loop.C[out], D=loop.D[np.ix_(out, into)], exact=own
         )
@@ -303,7 +306,7 @@ class _Plant(NamedTuple):
         """Return what is proven, from a level on, of the loop behind a controller; `named` is that
         of the model itself.
         """
-        loop = self.closed(K)._replace(exact=self.loop.exact.behind(named))
+        loop = self.closed(K)._replace(exact=self.loop.in_rationals.behind(named))
         return proven_level(loop, level, performance=False)
 
     def named(self, K: LinearModel) -> LinearModel | None:

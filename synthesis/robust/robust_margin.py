@@ -74,8 +74,8 @@ class RobustMargin(NamedTuple):
             return self.proof.verify(rigorous=True)
         if self.proof is None or self.asked is None:
             return False
-        loop, level = loop_of(*self.asked).exact, self.proof.bound
-        if loop is None or level is None or Fraction(self.lower) * level > 1:
+        loop, level = loop_of(*self.asked).in_rationals, self.proof.bound
+        if level is None or Fraction(self.lower) * level > 1:
             return False
         return self.proof.verified(loop) and (
             not rigorous or witness.level_is_kept(self.proof, loop)

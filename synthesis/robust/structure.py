@@ -160,7 +160,7 @@ class ExactLoop(NamedTuple):
         A, n = self.A.astype(float), len(self.A)
         balanced, (units, _) = linalg.matrix_balance(A, permute=False, separate=True)
         values, V = np.linalg.eig(balanced)
-        T = np.where(values.imag >= 0, V.real, V.imag)
+        T = np.where(np.imag(values) >= 0, np.real(V), np.imag(V))
         if not np.linalg.cond(T) < PARALLEL:
             T = linalg.schur(balanced)[1]
         T = units[:, None] * T
@@ -217,6 +217,12 @@ class BlockLoop(NamedTuple):
     radii: Array
     weights: tuple[LinearModel | None, ...] = ()
     exact: ExactLoop | None = None
+
+    @property
+    def in_rationals(self) -> ExactLoop:
+        """The loop that is proven."""
+        assert self.exact is not None  # noqa: S101 - `loop_of` makes it
+        return self.exact
 
     @property
     def reals(self) -> int:

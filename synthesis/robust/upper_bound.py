@@ -66,7 +66,7 @@ def proven_level(loop: BlockLoop, start: float, *, performance: bool) -> Upper:
     """
     unit = 2.0 ** round(math.log2(start))
     rows, columns = loop.units(unit, performance)
-    transfer = loop.exact.transfer.scaled(rows, columns)
+    transfer = loop.in_rationals.transfer.scaled(rows, columns)
     check = Check.of(transfer, loop.parts, performance)
     level, decides, step = _short(start / unit), math.nan, GROWTH
     known: list[tuple[float, Scalings]] = []

@@ -60,8 +60,8 @@ class WorstCaseGain(NamedTuple):
         """
         if self.proof is None or self.asked is None:
             return False
-        loop, level = loop_of(*self.asked, performance=True).exact, self.proof.bound
-        if loop is None or level is None or not (self.proof.performance and level <= self.upper):
+        loop, level = loop_of(*self.asked, performance=True).in_rationals, self.proof.bound
+        if level is None or not (self.proof.performance and level <= self.upper):
             return False
         return self.proof.verified(loop) and (
             not rigorous or witness.level_is_kept(self.proof, loop)

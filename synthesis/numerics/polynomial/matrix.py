@@ -6,10 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from functools import reduce
 from math import comb, prod
-from numbers import Rational
 from typing import Any
 
 import numpy as np
@@ -85,7 +83,7 @@ class PolynomialMatrix:
     @classmethod
     def from_monomials(cls, terms: Mapping[tuple[int, ...], Any], box: Box) -> PolynomialMatrix:
         """Return the sum of p_1^e1 p_2^e2 ... M over {(e1, e2, ...): M}, p in the units of
-        the box; of rationals in object arrays, and a box of them, without rounding.
+        the box.
         """
         if not terms:
             raise InputError("expected at least one term {exponents: matrix}")
@@ -96,13 +94,11 @@ class PolynomialMatrix:
         degrees = [max(int(e[i]) for e in terms) for i in range(m)]
         power = [_power_to_bernstein(d, *bounds) for d, bounds in zip(degrees, box, strict=True)]
         out: Any = 0
-        one = np.ones((), dtype=power[0].dtype if m else float)
         for exponents, M in terms.items():
             weights = reduce(
-                np.multiply.outer, [power[i][:, e] for i, e in enumerate(exponents)], one
+                np.multiply.outer, [power[i][:, e] for i, e in enumerate(exponents)], np.ones(())
             )
-            M = np.asarray(M)
-            out = out + np.multiply.outer(weights, M if M.dtype == object else M.astype(float))
+            out = out + np.multiply.outer(weights, np.asarray(M, dtype=float))
         return cls(box, out)
 
     @property
@@ -307,23 +303,9 @@ def _power_to_bernstein(degree: int, low: float, high: float) -> Array:
     """Return the matrix (d + 1, d + 1) with the Bernstein coefficients over [low, high] of p^e in
     column e (the blossom of p^e).
     """
-    if isinstance(low, Rational):
-        return _exact_power_to_bernstein(degree, low, high)
     out = np.zeros((degree + 1, degree + 1))
     for e in range(degree + 1):
         # p^e = (low + width t)^e; the blossom at e arguments, (degree of) which k are `high`
         own = np.array([low ** (e - k) * high**k for k in range(e + 1)])
         out[:, e] = elevation_matrix(e, degree) @ own
-    return out
-
-
-def _exact_power_to_bernstein(degree: int, low: Rational, high: Rational) -> Array:
-    out = np.zeros((degree + 1, degree + 1), dtype=object)
-    for i in range(degree + 1):
-        for e in range(degree + 1):
-            out[i, e] = sum(
-                Fraction(comb(i, k) * comb(degree - i, e - k), comb(degree, e))
-                * (low ** (e - k) * high**k)
-                for k in range(e + 1)
-            )
     return out

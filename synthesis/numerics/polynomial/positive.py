@@ -15,6 +15,8 @@ import numpy as np
 Array = np.ndarray
 Number = Any
 """An integer or a rational."""
+Coefficients = Sequence[Any] | Array
+"""Coefficients of a polynomial, ascending."""
 
 BITS = 600
 """Bits that Bernstein coefficients keep as an interval is halved; what is cut off is rounded down.
@@ -25,12 +27,12 @@ CELLS = 4000
 """Largest number of intervals examined; beyond it nothing more is shown."""
 
 
-def product(*factors: Sequence[Any]) -> Array:
+def product(*factors: Coefficients) -> Array:
     """Return the coefficients of a product, ascending."""
     return reduce(np.convolve, (np.array([*f], dtype=object) for f in factors))
 
 
-def bernstein(c: Sequence[int], low: Number, high: Number | None, pace: Number = 1) -> Array:
+def bernstein(c: Coefficients, low: Number, high: Number | None, pace: Number = 1) -> Array:
     """Return the Bernstein coefficients on [low, high], times a positive number, of the polynomial
     with the coefficients c, ascending.
 
@@ -78,7 +80,7 @@ def positive_until(b: Array, depth: int = DEPTH) -> Fraction:
     return reached
 
 
-def positive(c: Sequence[int], low: Number, high: Number | None, pace: Number = 1) -> bool:
+def positive(c: Coefficients, low: Number, high: Number | None, pace: Number = 1) -> bool:
     """Whether the polynomial is shown to be positive on [low, high]; to infinity (`high` None) the
     coefficient of its degree counts too.
     """
@@ -103,7 +105,7 @@ def _cut(b: Array) -> Array:
     return b >> spare if spare > 0 else b
 
 
-def hurwitz(c: Sequence[int]) -> bool:
+def hurwitz(c: Coefficients) -> bool:
     """Whether all roots of the polynomial with these coefficients, ascending, of degree len(c) - 1,
     have negative real parts: Routh's scheme without fractions.
     """

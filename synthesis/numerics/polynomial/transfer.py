@@ -41,7 +41,7 @@ class Transfer(NamedTuple):
         n = len(A)
         units, pace = _units(A, sampled)
         grow = np.array([Fraction(float(u)) for u in units], dtype=object)
-        rate = Fraction(2) ** (0 if sampled else -pace)
+        rate: Any = Fraction(2) ** (0 if sampled else -pace)
         A, B, C = A * grow / grow[:, None] * rate, B / grow[:, None] * rate, C * grow
         (A, alpha), (B, beta), (C, gamma), (D, delta) = map(_whole, (A, B, C, D))
         p = characteristic(A)
@@ -92,7 +92,8 @@ class Transfer(NamedTuple):
                     (real + term, imaginary) if k % 2 == 0 else (real, imaginary + term)
                 )
             parts.append([real, imaginary])
-        return Gaussian(*parts[0], (parts[1][0], parts[1][1]))
+        (real, imaginary), (a, b) = parts
+        return Gaussian(real, imaginary, (a, b))
 
     def at_infinity(self) -> Gaussian:
         """Return the response at infinite frequency."""
@@ -111,7 +112,7 @@ class Transfer(NamedTuple):
         imaginary = found.imaginary * a - found.real * b
         part: Callable[[Any], float] = lambda v: float(Fraction(int(v), int(size)))  # noqa: E731
         turn = np.frompyfunc(part, 1, 1)
-        return (turn(real) + 1j * turn(imaginary)).astype(complex)
+        return np.asarray(turn(real) + 1j * turn(imaginary), dtype=complex)
 
 
 def rationals(M: Any) -> Array:
