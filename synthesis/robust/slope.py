@@ -45,7 +45,7 @@ ROUNDS = 25
 """Largest number of programs with one slope."""
 GROWTH = 1.001
 """Ratio of a slope without a multiplier to one with it at which the search ends."""
-LARGEST = 1e9
+LARGEST = 1e12
 """Largest slope, in units of the inverse of the norm of G, that is looked for."""
 NORM = 1 - 1e-6
 """Largest integral of |h|."""
