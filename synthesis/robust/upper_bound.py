@@ -34,7 +34,9 @@ Array = np.ndarray
 
 LEAST_MARGIN = 1e-7
 """The left side counts as positive where its least eigenvalue is above this, for scalings <= 1."""
-MAX_FREQUENCIES = 400
+SAME = 1e-4
+"""Relative distance of frequencies below which one that decides again is the same."""
+MAX_FREQUENCIES = 60
 """Largest number of frequencies; beyond it nothing is proven."""
 NARROW = 1e-9
 """Relative width of an interval of frequencies below which its level is raised."""
@@ -75,8 +77,8 @@ def proven_level(loop: BlockLoop, start: float, *, performance: bool) -> Upper:
         if failed is None:
             proof = LevelProof(level, rows, columns, loop.parts, performance, tuple(covered))
             return Upper(unit * level, decides, proof)
-        # where the frequency that decided decides again, scalings that are found do not hold
-        step = step**2 if failed == decides else GROWTH
+        # where a frequency decides again, scalings that are found do not hold far enough
+        step = step**2 if abs(failed - decides) <= SAME * failed else GROWTH
         decides = failed
         least = level_at(transfer.response(failed), loop, level, performance)
         level = _short(max(least, level) * step) if math.isfinite(least) else math.inf
@@ -180,7 +182,12 @@ def scalings_at(M: Array, loop: BlockLoop, level: float, performance: bool) -> S
     """Return scalings <= 1 that show the level at one frequency; None where there are none."""
     nz, nw = M.shape
     basis = _basis(loop, nz, nw)
-    F = [_left(M, Scalings(Z, _levelled(W, loop, level, performance), G)) for Z, W, G in basis]
+    # each column in units of its own, in which a response at a peak is no larger than another
+    unit = 1 / np.hypot(1.0, np.linalg.norm(M, axis=0))
+    F = [
+        unit[:, None] * _left(M, Scalings(Z, _levelled(W, loop, level, performance), G)) * unit
+        for Z, W, G in basis
+    ]
     positive = [W for _, W, _ in basis]
     rows, sizes, right = [], [], []
     for each, limit in ((F, None), (positive, None), (positive, 1.0)):
