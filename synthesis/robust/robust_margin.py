@@ -305,7 +305,10 @@ def _lost(loop: BlockLoop, d: np.ndarray, largest: float, refine: bool = False) 
     """
 
     def excess(r: float) -> float:
-        closed = loop.closed(r * d)
+        try:
+            closed = loop.closed(r * d)
+        except np.linalg.LinAlgError:  # not well posed there
+            return -1.0
         if not closed.stable:
             return -1.0
         if not closed.parts:
