@@ -16,7 +16,7 @@ from symheli.lpv.bases.user_functions import UserFunctions
 from symheli.lpv.interconnection import append, feedback, parallel, series
 from symheli.lpv.lft.algebra import close
 from symheli.lpv.lft.model import LFT
-from symheli.lpv.lft.reduction import reduce_without_loss
+from symheli.lpv.lft.reduction import reduce as reduce_lft
 from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.lpv.scheduling import Scheduling, parameters
 from symheli.values.signal import Signal, signals
@@ -109,7 +109,7 @@ def lft_of(
     K = np.zeros((len(moving), len(moving)))
     static = close(together, K, E, F, columns, rows, constant)
     blocks = (static.M11, static.M12, static.M21, static.M22, static.blocks)
-    return reduce_without_loss(LFT(*blocks, x, u, y, dt))
+    return reduce_lft(LFT(*blocks, x, u, y, dt), None)
 
 
 def _matrices(given: Sequence[Given], known: Sequence[Scheduling]) -> list[Expression]:

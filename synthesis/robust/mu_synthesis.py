@@ -26,9 +26,11 @@ from synthesis.design.lti.hinf import hinf
 from synthesis.design.lti.point_design import PointDesign, named_loop
 from synthesis.design.plant.generalized import Channels, Generalized, sampled_controller
 from synthesis.numerics.linear.model import as_model
+from synthesis.robust import witness
 from synthesis.robust.covers import rational
+from synthesis.robust.intervals import LevelProof
 from synthesis.robust.structure import BlockLoop, DynamicBlock, Part, behind, channels_of, loop_of
-from synthesis.robust.upper_bound import proven_level
+from synthesis.robust.upper_bound import Upper, proven_level
 
 Array = np.ndarray
 
@@ -76,6 +78,10 @@ class MuDesign:
         D of each part for which the controller was designed: parameters, blocks, performance.
     reasons : tuple of str
         Why there is no controller.
+    proof : LevelProof, optional
+        The numbers that `mu` rests on; None where it is inf.
+    asked : tuple, optional
+        Model, controls, measurements and blocks.
     """
 
     controller: LinearModel | None
@@ -84,8 +90,31 @@ class MuDesign:
     levels: tuple[float, ...]
     scalings: tuple[LinearModel, ...]
     reasons: tuple[str, ...] = ()
+    proof: LevelProof | None = None
+    asked: tuple[LFT, Sequence[str], Sequence[str], Sequence[DynamicBlock]] | None = None
 
     __repr__ = summarized
+
+    @property
+    def verified(self) -> bool:
+        """Whether there is a proof, which was checked in exact arithmetic as it was found."""
+        return self.proof is not None
+
+    def verify(self, rigorous: bool = False) -> bool:
+        """Check the proof of `mu` again in exact arithmetic, from the plant, its blocks and the
+        controller; `rigorous`: and the inequality at single frequencies, by a second writing of it.
+        """
+        if self.proof is None or self.asked is None or self.controller is None:
+            return False
+        loop, level = (
+            _Plant.of(*self.asked).loop.in_rationals.behind(self.controller),
+            self.proof.bound,
+        )
+        if level is None or self.proof.performance or level > self.mu:
+            return False
+        return self.proof.verified(loop) and (
+            not rigorous or witness.level_is_kept(self.proof, loop)
+        )
 
 
 @with_one_thread
@@ -183,12 +212,15 @@ def mu_synthesis(
     level, K, D = best
     if K is None:
         return MuDesign(None, math.inf, math.nan, tuple(levels), (), tuple(reasons))
-    proven = proven_level(plant.closed(K), level, performance=False)
     found = plant.named(K)
     if found is None:
         return MuDesign(None, math.inf, math.nan, tuple(levels), (), (NOT_SAMPLED,))
-    omega = plant.loop.frequency(proven.omega)
-    return MuDesign(found, proven.level, omega, tuple(levels), tuple(d.model() for d in D))
+    proven = plant.proven(K, found, level)
+    omega, filters = plant.loop.frequency(proven.omega), tuple(d.model() for d in D)
+    asked = model, controls, measurements, blocks
+    return MuDesign(
+        found, proven.level, omega, tuple(levels), filters, proof=proven.proof, asked=asked
+    )
 
 
 class _Plant(NamedTuple):
@@ -219,7 +251,10 @@ class _Plant(NamedTuple):
             np.r_[tuple(np.r_[getattr(p, side)] for p in (*parts, loop.parts[k]))]
             for side in ("columns", "rows")
         )
-        moved = loop._replace(B=loop.B[:, into], C=loop.C[out], D=loop.D[np.ix_(out, into)])
+        own = loop.in_rationals.select(into, out)
+        moved = loop._replace(
+            B=loop.B[:, into], C=loop.C[out], D=loop.D[np.ix_(out, into)], exact=own
+        )
         ends = np.cumsum([(0, 0), *((_size(p.rows), _size(p.columns)) for p in parts)], axis=0)
         own = tuple(
             Part(slice(a, b), slice(c, d), part.real)
@@ -266,6 +301,13 @@ class _Plant(NamedTuple):
         names = Channels.of(model, self.controls, self.measurements, None, None)
         one = named_loop(Generalized.between(model, names), K, names)
         return self.loop._replace(A=one.A, B=one.B, C=one.C, D=one.D, parts=self.parts)
+
+    def proven(self, K: LinearModel, named: LinearModel, level: float) -> Upper:
+        """Return what is proven, from a level on, of the loop behind a controller; `named` is that
+        of the model itself.
+        """
+        loop = self.closed(K)._replace(exact=self.loop.in_rationals.behind(named))
+        return proven_level(loop, level, performance=False)
 
     def named(self, K: LinearModel) -> LinearModel | None:
         """Return the controller of the model itself; None where that has none of this kind."""

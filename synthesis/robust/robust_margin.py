@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
@@ -16,8 +17,11 @@ from symheli.lpv import Polynomial
 from symheli.threads import with_one_thread
 from symheli.values.summary import summarized
 from synthesis.certify.lower_bounds.frozen import frozen_gain, worst_over
+from synthesis.certify.questions.certificate import Certificate
 from synthesis.certify.questions.questions import stability
 from synthesis.certify.statement.rates import Rate
+from synthesis.robust import witness
+from synthesis.robust.intervals import LevelProof
 from synthesis.robust.lower_bound import ACCURACY, ROUGH, best_reals, worst_closing
 from synthesis.robust.structure import BlockLoop, DynamicBlock, loop_at, loop_of
 from synthesis.robust.uncertain import uncertain
@@ -27,6 +31,8 @@ SHARE, APART = 0.9995, 1.002
 """Part of the upper bound for which a proof is tried first; ratio of a factor that is not proven to
 one that is at which the search between them ends.
 """
+NEARLY = 1 - 1e-6
+"""Level, by that of the largest factor looked for, at which the proof of it begins."""
 MIN_SCALE = 1e-6
 """A model that does not bear this part of its uncertainty counts as unstable without any."""
 STEPS = 3
@@ -41,7 +47,8 @@ class RobustMargin(NamedTuple):
     oscillate at `omega` (rad/s; NaN where the model at p is unstable without any).
 
     `perturbation`: of several blocks, their response at `omega` from all their outputs to all their
-    inputs, in the order of the blocks.
+    inputs, in the order of the blocks. `proof` has the numbers that `lower` rests on, None where it
+    is 0; `asked` the model and its blocks.
     """
 
     lower: float
@@ -49,8 +56,30 @@ class RobustMargin(NamedTuple):
     p: float | tuple[float, ...]
     omega: float
     perturbation: np.ndarray | None = None
+    proof: LevelProof | Certificate | None = None
+    asked: tuple[LFT | LPVStateSpace, Sequence[DynamicBlock]] | None = None
 
     __repr__ = summarized
+
+    @property
+    def verified(self) -> bool:
+        """Whether there is a proof, which was checked in exact arithmetic as it was found."""
+        return self.proof is not None
+
+    def verify(self, rigorous: bool = False) -> bool:
+        """Check the proof of `lower` again in exact arithmetic, from the model and its blocks;
+        `rigorous`: and the inequality at single frequencies, by a second writing of it.
+        """
+        if isinstance(self.proof, Certificate):
+            return self.proof.verify(rigorous=True)
+        if self.proof is None or self.asked is None:
+            return False
+        loop, level = loop_of(*self.asked).in_rationals, self.proof.bound
+        if level is None or Fraction(self.lower) * level > 1:
+            return False
+        return self.proof.verified(loop) and (
+            not rigorous or witness.level_is_kept(self.proof, loop)
+        )
 
 
 @with_one_thread
@@ -68,8 +97,8 @@ def robust_margin(
     The upper bound is attained by the parameters and the perturbation returned, p constant. The
     lower one, of an `UncertainStateSpace` and where p moves, is proven by `stability` for that set,
     with P(p) and a scaling for each block, and dynamics of any kind; of several blocks beside
-    constant parameters by D and G scalings over intervals of frequency that leave none out, in
-    floating point.
+    constant parameters by D and G scalings over intervals of frequency that leave none out. All of
+    it is checked in exact arithmetic.
 
     Parameters
     ----------
@@ -139,9 +168,9 @@ def robust_margin(
         return RobustMargin(0.0, MIN_SCALE, p, omega, delta)
     borne = excess(largest) >= 0
     upper = largest if borne else float(brentq(excess, MIN_SCALE, largest, rtol=ACCURACY))  # type: ignore[arg-type]
-    lower = _proven(lambda r: stability(grown(r), 0.0, search=None).verified, upper, borne)
+    lower, proof = _proven(lambda r: stability(grown(r), 0.0, search=None), upper, borne)
     _, omega, p, delta = _worst_closing(grown(upper))
-    return RobustMargin(lower, math.inf if borne else upper, p, omega, delta)
+    return RobustMargin(lower, math.inf if borne else upper, p, omega, delta, proof)
 
 
 def _set_of(
@@ -161,29 +190,38 @@ def _while_moving(unc: UncertainStateSpace, rate: Rate, largest: float) -> Robus
     borne = level * largest <= 1
     upper = largest if borne else 1 / level
 
-    def proven(r: float) -> bool:
-        return stability(unc.with_bound(r * unc.bound), rate, search=None).verified
+    def proven(r: float) -> Certificate:
+        return stability(unc.with_bound(r * unc.bound), rate, search=None)
 
-    lower = _proven(proven, upper, borne)
-    return RobustMargin(lower, math.inf if borne else upper, p, omega, delta)
+    lower, proof = _proven(proven, upper, borne)
+    return RobustMargin(lower, math.inf if borne else upper, p, omega, delta, proof)
 
 
-def _proven(stable: Callable[[float], bool], upper: float, borne: bool) -> float:
+def _proven(
+    asked: Callable[[float], Certificate], upper: float, borne: bool
+) -> tuple[float, Certificate | None]:
     """Return a factor up to `upper` for which stability is proven, to `APART` of the largest one
-    that was tried; 0 where there is none.
+    that was tried, and its proof; 0 and None where there is none.
     """
+
+    def stable(r: float) -> Certificate | None:
+        found = asked(r)
+        return found if found.verified and found.verify(rigorous=True) else None
+
     high = upper if borne else SHARE * upper
-    if stable(high):
-        return high
+    if found := stable(high):
+        return high, found
     low = 0.5 * high
-    while not stable(low):
+    while not (found := stable(low)):
         low, high = 0.5 * low, low
         if low < MIN_SCALE * upper:
-            return 0.0
+            return 0.0, None
     while high / low > APART:
         middle = math.sqrt(low * high)
-        low, high = (middle, high) if stable(middle) else (low, middle)
-    return low
+        better = stable(middle)
+        low, high = (middle, high) if better else (low, middle)
+        found = better or found
+    return low, found
 
 
 def _worst_closing(unc: UncertainStateSpace) -> tuple[float, float, float, np.ndarray | None]:
@@ -238,16 +276,27 @@ def _of_blocks(
     _, d = best_reals(lambda d: _lost(loop, d, largest), loop.reals)
     upper = _lost(loop, d, largest, refine=True)
     borne = upper >= largest
-    level = proven_level(loop, 1 / upper, performance=False).level
+    start = (NEARLY if borne else 1.0) / upper
+    proof = proven_level(loop, start, performance=False).proof
     closed = loop.closed(min(upper, largest) * d)
     found = worst_closing(closed, refine=True) if closed.stable and closed.parts else None
     return RobustMargin(
-        min(1 / level, largest),
+        0.0 if proof is None else min(_inverse(proof.bound), largest),
         float("inf") if borne else upper,
         loop.physical(upper * d),
         float("nan") if found is None else loop.frequency(found.omega),
         None if found is None else loop.unscaled(found.delta, found.omega),
+        proof,
+        (model, blocks),
     )
+
+
+def _inverse(level: Fraction | None) -> float:
+    """Return 1/level, rounded down; 0 without a level."""
+    if level is None:
+        return 0.0
+    found = float(1 / level)
+    return math.nextafter(found, 0.0) if Fraction(found) * level > 1 else found
 
 
 def _lost(loop: BlockLoop, d: np.ndarray, largest: float, refine: bool = False) -> float:
@@ -256,7 +305,10 @@ def _lost(loop: BlockLoop, d: np.ndarray, largest: float, refine: bool = False) 
     """
 
     def excess(r: float) -> float:
-        closed = loop.closed(r * d)
+        try:
+            closed = loop.closed(r * d)
+        except np.linalg.LinAlgError:  # not well posed there
+            return -1.0
         if not closed.stable:
             return -1.0
         if not closed.parts:

@@ -7,22 +7,19 @@ stable if for some multiplier M
 
 M = 1 is the circle criterion and q that of Popov; h, the impulse response of H on both sides of
 time zero, has an integral of |h| below 1, and h >= 0 unless phi is odd. Here H is a sum of powers
-of a/(s + a), found by a linear program over frequencies. Between them the eigenvalues of a
-Hamiltonian matrix say where the inequality is lost, and these frequencies join the program.
-
-Which of these eigenvalues are imaginary is decided by a tolerance. With lightly damped or slow
-poles in mixed coordinates a crossing moves off the axis by more than the tolerance and is missed.
-So a slope found here is computed, not verified.
+of a/(s + a), found by a linear program over frequencies. The inequality is that of a polynomial in
+w^2 with integer coefficients, which is decided exactly: where it is lost, that frequency joins the
+program.
 """
 
 from __future__ import annotations
 
 import math
+from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
 from scipy import optimize
-from scipy.linalg import block_diag
 
 from symheli import LinearModel
 from symheli.errors import InputError, UnknownNameError
@@ -30,12 +27,11 @@ from symheli.threads import with_one_thread
 from symheli.values.signal import indices
 from symheli.values.summary import summarized
 from synthesis.numerics.linear.model import as_model
+from synthesis.numerics.polynomial.positive import bernstein, positive_until, product
+from synthesis.numerics.polynomial.transfer import Transfer
+from synthesis.robust import witness
 
 Array = np.ndarray
-
-UNVERIFIED = "computed, not verified"
-REASON = "frequencies are decided by eigenvalues in floating point and a tolerance"
-"""Why no slope found here is a proof."""
 
 CRITERIA = ("circle", "Popov", "Zames-Falb")
 """The classes of multipliers, each with those before it."""
@@ -49,28 +45,118 @@ ROUNDS = 25
 """Largest number of programs with one slope."""
 GROWTH = 1.001
 """Ratio of a slope without a multiplier to one with it at which the search ends."""
-LARGEST = 1e6
+LARGEST = 1e12
 """Largest slope, in units of the inverse of the norm of G, that is looked for."""
 NORM = 1 - 1e-6
 """Largest integral of |h|."""
-CROSSING = 1e-7
-"""A real part of an eigenvalue below this share of its modulus counts as zero: the frequency then
-joins the program.
-"""
 LEAST = 1e-9
-"""The left side, by its largest size, counts as positive above this."""
+"""The left side, by its largest size, is asked to be above this at the frequencies of a program."""
+NEAR = 1e-12
+"""A frequency nearer than this to one of the program, relative, is the same: the program cannot
+help.
+"""
+AROUND = 1e-6, 1e-3
+"""Relative distances of the frequencies that join the program with one at which it is lost."""
+BITS = 12, 40
+"""Bits of a pole a, and binary places of a coefficient c: integers of the proof stay short."""
+
+
+class SlopeProof(NamedTuple):
+    """The numbers of the proof that functions of slopes from 0 to `slope` leave the loop of G = c
+    (s - A)^-1 b + d stable: the multiplier, as of `SlopeMargin`, and whether phi must be odd.
+    """
+
+    A: Array
+    b: Array
+    c: Array
+    d: float
+    slope: float
+    poles: Array
+    causal: Array
+    ahead: Array
+    popov: float
+    criterion: str
+    odd: bool
+
+    def multiplier(self, omega: Array) -> Array:
+        """Return M (K,) at frequencies omega (K,), rad/s."""
+        s = 1j * np.asarray(omega, float)
+        E = _kernels(s, self.poles)
+        both = np.hstack([E, E.conj()]) @ np.r_[self.causal.ravel(), self.ahead.ravel()]
+        return 1 - both + self.popov * s
+
+    @property
+    def admissible(self) -> bool:
+        """Whether the multiplier is one of its class; exact."""
+        numbers = [*self.poles, *self.causal.ravel(), *self.ahead.ravel(), self.popov, self.d]
+        if not (np.all(np.isfinite(numbers)) and np.all(self.poles > 0) and self.slope > 0):
+            return False
+        weights = [Fraction(v) for v in (*self.causal.ravel(), *self.ahead.ravel())]
+        kinds = {
+            "circle": not (any(weights) or self.popov),
+            "Popov": not any(weights) and self.d == 0,
+            "Zames-Falb": sum(map(abs, weights)) < 1 and self.d == 0,
+        }
+        return kinds.get(self.criterion, False) and (self.odd or min(weights, default=0) >= 0)
+
+    def verified(self) -> bool:
+        """Whether G is stable, the multiplier one of its class, and the inequality true at every
+        frequency and in the limit; all in integers.
+        """
+        G = Transfer.of(self.A, self.b[:, None], self.c[None], np.array([[self.d]]))
+        return G.stable and self.lost(G) is None
+
+    def lost(self, G: Transfer) -> float | None:
+        """Return a frequency (rad/s) at or near which the inequality is not shown; None where it is
+        shown at all.
+        """
+        if not self.admissible:
+            return 0.0
+        if math.isinf(self.slope):
+            return 0.0 if np.any(G.above) else None
+        p = self._polynomial(G)
+        u = positive_until(bernstein(p, 0, None))
+        if u == 1:
+            return None
+        return math.ldexp(math.sqrt(max(u, Fraction(0)) / (1 - u)), G.pace)
+
+    def _polynomial(self, G: Transfer) -> Array:
+        """Return the coefficients of Re M (1/k - G) |d e|^2 in w^2, times a positive number, w in
+        the units of G; e the product of the (s + a)^r that are needed.
+        """
+        unit, k = Fraction(2) ** G.pace, Fraction(self.slope)
+        used = {}  # powers of each pole
+        for r, j in zip(*np.nonzero(np.abs(self.causal) + np.abs(self.ahead)), strict=True):
+            used[j] = int(r) + 1
+        a = {j: Fraction(float(self.poles[j])) / unit for j in used}
+        # (a - s)(a + s) to the powers needed, without the factors that a term has
+        whole = product([1], *[[a[j] ** 2, 0, -1] for j, r in used.items() for _ in range(r)])
+        M = product(whole, [1, Fraction(self.popov) * unit])
+        for sign, weights in ((1, self.causal), (-1, self.ahead)):
+            for r, j in zip(*np.nonzero(weights), strict=True):
+                rest = [
+                    [a[i] ** 2, 0, -1]
+                    for i, most in used.items()
+                    for _ in range(most - (i == j) * (int(r) + 1))
+                ]
+                number = Fraction(float(weights[r, j])) * a[j] ** (int(r) + 1)
+                term = product([number], *rest, *[[a[j], -sign]] * (int(r) + 1))
+                M[: len(term)] -= term
+        F = G.gain * G.below - k * G.above[:, 0, 0]
+        back = [v * (-1) ** i for i, v in enumerate(G.below)]
+        even = product(M, F, back)[0::2]
+        real = [v * (-1) ** i for i, v in enumerate(even)]
+        common = math.lcm(*(Fraction(v).denominator for v in real))
+        return np.array([int(v * common) for v in real], dtype=object)
 
 
 class SlopeMargin(NamedTuple):
-    """Functions of slopes from 0 to `slope` leave the loop stable, as computed; with the straight
+    """Functions of slopes from 0 to `slope` are proven to leave the loop stable; with the straight
     line of slope `limit` it is not stable (inf: no such line was found).
 
-    `status` is always "computed, not verified": the inequality of the multiplier is held at the
-    frequencies that eigenvalues in floating point and a tolerance point out. Where poles are
-    lightly damped and coordinates badly mixed, `slope` may be too large by orders of magnitude.
-
     The multiplier is 1 - sum c (a/(s + a))^r + q s, with a/(a - s) for those that act ahead of
-    time: `poles` a (rad/s), `causal` and `ahead` their c (powers, poles), `popov` q (s).
+    time: `poles` a (rad/s), `causal` and `ahead` their c (powers, poles), `popov` q (s). `proof`
+    has all numbers that the statement rests on; None: nothing is proven, and `slope` is 0.
     """
 
     slope: float
@@ -79,27 +165,37 @@ class SlopeMargin(NamedTuple):
     causal: Array
     ahead: Array
     popov: float
-    status: str = UNVERIFIED
+    proof: SlopeProof | None = None
 
     __repr__ = summarized
 
     @property
     def verified(self) -> bool:
-        """False: a slope is computed, not proven."""
-        return False
+        """Whether there is a proof, which was checked as it was found."""
+        return self.proof is not None
+
+    def verify(self, rigorous: bool = False) -> bool:
+        """Check the proof again from its numbers, in integers; `rigorous`: and that the inequality
+        holds at single frequencies, by a second writing of it.
+        """
+        own = self.proof
+        if own is None or own.slope != self.slope or not own.verified():
+            return False
+        return not rigorous or witness.slope_is_borne(own)
 
     def __str__(self) -> str:
+        if self.proof is None:
+            return f"no slope is proven; a line of slope {self.limit:.6g} is not stable"
         return (
-            f"slopes from 0 to {self.slope:.6g}: stable ({self.status}: {REASON}); a line of slope"
-            f" {self.limit:.6g} is not"
+            f"slopes from 0 to {self.slope:.6g}: proven stable, in exact arithmetic at every"
+            f" frequency; a line of slope {self.limit:.6g} is not"
         )
 
     def multiplier(self, omega: Array) -> Array:
         """Return M (K,) at frequencies omega (K,), rad/s."""
-        s = 1j * np.asarray(omega, float)
-        E = _kernels(s, self.poles)
-        both = np.hstack([E, E.conj()]) @ np.r_[self.causal.ravel(), self.ahead.ravel()]
-        return 1 - both + self.popov * s
+        if self.proof is None:
+            raise InputError("no slope is proven: there is no multiplier")
+        return self.proof.multiplier(omega)
 
 
 def _kernels(s: Array, poles: Array) -> Array:
@@ -117,8 +213,8 @@ def slope_margin(
     *,
     odd: bool = False,
 ) -> SlopeMargin:
-    """Compute the largest slope of a static function d = phi(v) for which the loop is stable
-    whatever the function: a saturation, a dead zone, a soft stop. Computed, not verified.
+    """Prove the largest slope of a static function d = phi(v) for which the loop is stable
+    whatever the function: a saturation, a dead zone, a soft stop.
 
     Parameters
     ----------
@@ -135,9 +231,8 @@ def slope_margin(
     Returns
     -------
     SlopeMargin
-        `slope` computed, not verified: frequencies are decided by eigenvalues and a tolerance. Plot
-        Re M(j w) (1/k - G(j w)) about lightly damped poles before it is relied on. `limit` is where
-        no proof can be.
+        `slope` is proven in exact arithmetic at every frequency; its `proof` checks itself again.
+        `limit` is where no proof can be.
 
     Raises
     ------
@@ -166,12 +261,17 @@ def slope_margin(
     if criterion not in CRITERIA:
         raise UnknownNameError("criterion", criterion, CRITERIA)
     (i,), (j,) = indices([input], model.inputs, "input"), indices([output], model.outputs, "output")
-    if model.dt is not None or not model.is_stable():
+    G = (
+        None
+        if model.dt is not None
+        else Transfer.of(model.A, model.B[:, [i]], model.C[[j]], model.D[[j], [i]][:, None])
+    )
+    if G is None or not G.stable:
         raise InputError("model: expected a stable continuous one; close its loops first")
     if model.D[j, i] != 0 and criterion != "circle":
         raise InputError(f"expected no feedthrough from {input} to {output}: put a filter between")
-    loop = _ScalarLoop(model.A, model.B[:, i], model.C[j], float(model.D[j, i]), criterion, odd)
-    return loop.margin()
+    own = model.A, model.B[:, i], model.C[j], float(model.D[j, i])
+    return _ScalarLoop(*own, criterion, odd, G).margin()
 
 
 class _ScalarLoop(NamedTuple):
@@ -183,33 +283,41 @@ class _ScalarLoop(NamedTuple):
     d: float
     criterion: str
     odd: bool
+    exact: Transfer
 
     def response(self, omega: Array) -> Array:
         """Return G (K,) at frequencies (K,)."""
-        pencil = 1j * omega[:, None, None] * np.eye(len(self.A)) - self.A
-        into = np.broadcast_to(self.b[:, None], (len(omega), len(self.b), 1))
-        return np.linalg.solve(pencil, into)[..., 0] @ self.c + self.d
+        return np.array([self.exact.response(float(w)).item() for w in omega])
 
     def margin(self) -> SlopeMargin:
         """Search the largest slope between that of the small gain theorem and the limit."""
-        paces = np.abs(np.linalg.eigvals(self.A))
+        modes = np.linalg.eigvals(self.A)
+        paces = np.abs(modes)
+        paces = paces[paces > 0] if np.any(paces) else np.ones(1)
         line = np.geomspace(paces.min() / 100, 100 * paces.max(), FREQUENCIES)
+        line = np.unique(np.r_[line, paces, np.abs(modes.imag)])
         size = np.abs(self.response(line)).max()
-        poles = np.geomspace(paces.min() / 10, 10 * paces.max(), POLES)
+        poles = _shortened(np.geomspace(paces.min() / 10, 10 * paces.max(), POLES))
         none = np.zeros((ORDER, POLES))
-        found = SlopeMargin(math.inf, math.inf, poles, none, none, 0.0)
-        if size == 0.0:
-            return found
-        found = found._replace(slope=0.0, limit=self._limit(0.5 / size, LARGEST / size))
-        low, high = 0.5 / size, min(found.limit, LARGEST / size)
+        found = SlopeProof(*self[:4], math.inf, poles, none, none, 0.0, self.criterion, self.odd)
+        if size == 0.0 and found.lost(self.exact) is None:
+            return SlopeMargin(math.inf, math.inf, poles, none, none, 0.0, found)
+        size = size or 1.0
+        limit = self._limit(0.5 / size, LARGEST / size)
+        low, high = 0.5 / size, min(limit, LARGEST / size)
+        points = _Points(line, self.response(line))
+        best, points = self._found(low, found, points)
+        while best is None and low > LEAST / size:  # a peak between the frequencies
+            low, high = 0.5 * low, low
+            best, points = self._found(low, found, points)
+        if best is None:
+            return SlopeMargin(0.0, limit, poles, none, none, 0.0)
         k = high / math.sqrt(GROWTH)
         while high > GROWTH * low:
-            made, line = self._found(k, found, line)
+            made, points = self._found(k, found, points)
             low, high = (low, k) if made is None else (k, high)
-            found, k = made or found, math.sqrt(low * high)
-        if not found.slope:
-            found = self._found(low, found, line)[0] or found
-        return found
+            best, k = made or best, math.sqrt(low * high)
+        return SlopeMargin(best.slope, limit, *best[5:9], best)
 
     def _limit(self, low: float, high: float) -> float:
         """Return the least slope of a line with which the loop is not stable; inf where none is
@@ -230,25 +338,29 @@ class _ScalarLoop(NamedTuple):
             before = float(k)
         return math.inf
 
-    def _found(self, k: float, at: SlopeMargin, line: Array) -> tuple[SlopeMargin | None, Array]:
-        """Return a multiplier for the slope k, None where none is found, and the frequencies."""
+    def _found(
+        self, k: float, at: SlopeProof, points: _Points
+    ) -> tuple[SlopeProof | None, _Points]:
+        """Return a proof of the slope k, None where none is found, and the frequencies."""
         for _ in range(ROUNDS):
-            trial = self._least(k, at, line)
+            trial = self._least(k, at, points)
             if trial is None:
-                return None, line
-            crossings = self._crossings(trial)
-            if crossings is None:
-                return None, line
-            if not len(crossings):
-                return trial, line
-            between = np.sqrt(crossings[1:] * crossings[:-1])
-            line = np.unique(np.r_[line, crossings, between])
-        return None, line
+                return None, points
+            lost = trial.lost(self.exact)
+            if lost is None:
+                return trial, points
+            if np.any(np.abs(points.omega - lost) <= NEAR * lost):
+                return None, points
+            around = np.array(
+                [lost, *(lost * (1 + sign * step) for step in AROUND for sign in (-1, 1))]
+            )
+            points = points.joined(around, self.response(around))
+        return None, points
 
-    def _least(self, k: float, at: SlopeMargin, line: Array) -> SlopeMargin | None:
+    def _least(self, k: float, at: SlopeProof, points: _Points) -> SlopeProof | None:
         """Return the multiplier with the largest least real part, relative to |1/k - G|."""
-        F = 1 / k - self.response(line)
-        size, s = np.abs(F), 1j * line
+        F = 1 / k - points.response
+        size, s = np.abs(F), 1j * points.omega
         pace = math.exp(np.log(at.poles).mean())
         E = _kernels(s, at.poles)
         both = np.hstack([E, E.conj()])
@@ -263,7 +375,7 @@ class _ScalarLoop(NamedTuple):
             np.r_[np.zeros(n + 1), -1.0],
             np.vstack(
                 [
-                    np.column_stack([-terms, -popov, np.ones(len(line))]),
+                    np.column_stack([-terms, -popov, np.ones(len(s))]),
                     np.r_[np.ones(n), 0.0, 0.0],
                 ]
             ),
@@ -276,36 +388,26 @@ class _ScalarLoop(NamedTuple):
         for sign, part in zip(
             (1.0, -1.0), np.split(found.x[:n], 2 if self.odd else 1), strict=False
         ):
-            c[: len(part)] += sign * part
+            c[: len(part)] += sign * np.maximum(part, 0.0)
+        c = np.trunc(np.ldexp(c, BITS[1])) * 2.0 ** -BITS[1]
         causal, ahead = c.reshape(2, *at.causal.shape)
-        return at._replace(slope=k, causal=causal, ahead=ahead, popov=float(found.x[n] / pace))
+        q = float(found.x[n] / pace)
+        return at._replace(slope=k, causal=causal, ahead=ahead, popov=q)
 
-    def _crossings(self, trial: SlopeMargin) -> Array | None:
-        """Return the frequencies at which the left side is zero; None where it is not positive at
-        the highest.
-        """
-        a = np.tile(trial.poles, ORDER)
-        n, m, q = len(self.A), len(a), len(trial.poles)
-        chain = np.diag(a[q:], -q) - np.diag(a)
-        A = np.array(block_diag(self.A, chain, chain))
-        A[n : n + q, :n] = np.array(-np.outer(a[:q], self.c))  # filters of F, then of the input
-        top = 1 / trial.slope - self.d
-        first = np.r_[a[:q], np.zeros(m - q)]
-        B = np.r_[self.b, first * top, first]
-        u = np.r_[np.zeros(n + 2 * m), 1.0]
-        F = np.r_[-self.c, np.zeros(2 * m), top]
-        P = F - np.r_[np.zeros(n), trial.causal.ravel(), np.zeros(m), 0.0]
-        if trial.popov:
-            P = P - trial.popov * np.r_[self.c @ self.A, np.zeros(2 * m), self.c @ self.b]
-        Q = np.r_[np.zeros(n + m), trial.ahead.ravel(), 0.0]
-        W = 0.5 * (np.outer(u, P) + np.outer(P, u) - np.outer(Q, F) - np.outer(F, Q))
-        R = W[-1, -1]
-        if R <= LEAST * abs(top):
-            return None
-        S = W[:-1, -1:]
-        flow = A - B[:, None] @ S.T / R
-        values = np.linalg.eigvals(
-            np.block([[flow, -np.outer(B, B) / R], [S @ S.T / R - W[:-1, :-1], -flow.T]])
-        )
-        near = np.abs(values.real) <= CROSSING * np.maximum(np.abs(values), 1e-6 * a.max())
-        return np.unique(np.abs(values.imag[near]))
+
+class _Points(NamedTuple):
+    """Frequencies (K,), rad/s, and the response there."""
+
+    omega: Array
+    response: Array
+
+    def joined(self, omega: Array, response: Array) -> _Points:
+        """Return these and more, each frequency once."""
+        both, first = np.unique(np.r_[self.omega, omega], return_index=True)
+        return _Points(both, np.r_[self.response, response][first])
+
+
+def _shortened(poles: Array) -> Array:
+    """Return numbers with fewer bits."""
+    m, e = np.frexp(poles)
+    return np.ldexp(np.rint(np.ldexp(m, BITS[0])), e - BITS[0])

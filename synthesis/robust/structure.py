@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from fractions import Fraction
 from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy import linalg
 
-from symheli import LFT, LinearModel, LPVStateSpace, UncertainStateSpace
+from symheli import LFT, LinearModel, LPVStateSpace, Scheduling, UncertainStateSpace
 from symheli.errors import InputError
-from symheli.lpv.lft.reduction import reduce_without_loss
+from symheli.lpv.lft.reduction import reduce_exactly
 from symheli.lpv.lft_matrices import parts as slices
 from symheli.values.sample_period import same_period
 from symheli.values.signal import Signal, indices
@@ -19,6 +21,7 @@ from synthesis.design.lti.weights import as_weight
 from synthesis.design.plant import parts
 from synthesis.numerics.linear.balance import balance
 from synthesis.numerics.linear.norm import stable, to_continuous
+from synthesis.numerics.polynomial.transfer import Transfer, inverse, rationals
 from synthesis.robust import covers
 
 Array = np.ndarray
@@ -130,11 +133,77 @@ class Part(NamedTuple):
     real: bool
 
 
+PARALLEL = 1e6
+"""Condition number of modes from which on they are not taken as coordinates."""
+
+
+class ExactLoop(NamedTuple):
+    """A, B, C, D of a loop in rationals, as it follows from model and blocks without rounding;
+    `sampled`: of the model from sample to sample itself.
+    """
+
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+    sampled: bool
+
+    @property
+    def transfer(self) -> Transfer:
+        """The transfer matrix from w to z, of a sampled loop over s = (z - 1)/(z + 1)."""
+        return Transfer.of(*self)
+
+    def rounded(self) -> tuple[Array, Array, Array, Array]:
+        """Return the loop in doubles, in coordinates of its modes, or of Schur's where these are
+        nearly parallel: there entries do not cancel.
+        """
+        A, n = self.A.astype(float), len(self.A)
+        balanced, (units, _) = linalg.matrix_balance(A, permute=False, separate=True)
+        values, V = np.linalg.eig(balanced)
+        T = np.where(np.imag(values) >= 0, np.real(V), np.imag(V))
+        if not np.linalg.cond(T) < PARALLEL:
+            T = linalg.schur(balanced)[1]
+        T = units[:, None] * T
+        exact, near = rationals(T), rationals(np.linalg.inv(T))
+        back = (rationals(2 * np.eye(n)) - near @ exact) @ near  # a step of Newton's method
+        A, B, C = back @ self.A @ exact, back @ self.B, self.C @ exact
+        return A.astype(float), B.astype(float), C.astype(float), self.D.astype(float)
+
+    def select(self, into: Array, out: Array) -> ExactLoop:
+        """Return the loop from these columns of w to these rows of z."""
+        return self._replace(B=self.B[:, into], C=self.C[out], D=self.D[np.ix_(out, into)])
+
+    def behind(self, K: LinearModel) -> ExactLoop:
+        """Return the loop whose last inputs are K times its last outputs.
+
+        Raises `InputError` where I - K D is singular at infinite frequency.
+        """
+        a, b, c, d = map(rationals, (K.A, K.B, K.C, K.D))
+        nu, ny, n = len(c), b.shape[1], len(a)
+        B1, B2, C1, C2 = self.B[:, :-nu], self.B[:, -nu:], self.C[:-ny], self.C[-ny:]
+        D11, D12, D21, D22 = (
+            M for rows in (self.D[:-ny], self.D[-ny:]) for M in (rows[:, :-nu], rows[:, -nu:])
+        )
+        loop = inverse(rationals(np.eye(nu)) - d @ D22)
+        u = loop @ np.hstack([d @ C2, c, d @ D21])  # of (x, x of K, w)
+        y = np.hstack([C2, np.zeros((ny, n), dtype=object), D21]) + D22 @ u
+        whole = np.vstack(
+            [
+                np.hstack([self.A, np.zeros((len(self.A), n), dtype=object), B1]) + B2 @ u,
+                np.hstack([np.zeros((n, len(self.A)), dtype=object), a, 0 * b @ D21]) + b @ y,
+                np.hstack([C1, np.zeros((len(C1), n), dtype=object), D11]) + D12 @ u,
+            ]
+        )
+        m = len(self.A) + n
+        return ExactLoop(whole[:m, :m], whole[:m, m:], whole[m:, :m], whole[m:, m:], self.sampled)
+
+
 class BlockLoop(NamedTuple):
     """x' = A x + B w, z = C x + D w, w = Delta z with one block of norm <= 1 a part; the last part
     may be the performance. Sampled models stand as continuous ones of the same norms. `sizes` (nz,)
     of the outputs of full blocks in units of the model, `weights` of the blocks; `middles` and
-    `radii` of the parameters, 0 of those that the model does not depend on.
+    `radii` of the parameters, 0 of those that the model does not depend on. `exact` is the loop
+    that is proven, of which the doubles are the nearest; None: nothing is proven of this one.
     """
 
     A: Array
@@ -147,6 +216,13 @@ class BlockLoop(NamedTuple):
     middles: Array
     radii: Array
     weights: tuple[LinearModel | None, ...] = ()
+    exact: ExactLoop | None = None
+
+    @property
+    def in_rationals(self) -> ExactLoop:
+        """The loop that is proven."""
+        assert self.exact is not None  # noqa: S101 - `loop_of` makes it
+        return self.exact
 
     @property
     def reals(self) -> int:
@@ -212,12 +288,13 @@ class BlockLoop(NamedTuple):
             C[n:] + D[n:, :n] @ gain @ C[:n],
             D[n:, n:] + D[n:, :n] @ gain @ D[:n, n:],
             rest,
-            *self[5:],
+            *self[5:-1],
         )
 
-    def in_units(self, level: float, performance: bool) -> BlockLoop:
-        """Return the loop with z in units of the level, of the last part alone where that is the
-        performance, balanced between its parts at the middle of its frequencies.
+    def units(self, level: float, performance: bool) -> tuple[Array, Array]:
+        """Return units (nz,) of z and (nw,) of w, powers of two, in which the level is about one,
+        that of the last part alone where that is the performance, and the parts are balanced at the
+        middle of the frequencies.
         """
         rows, columns = np.ones(len(self.C)), np.ones(self.B.shape[1])
         for part in self.parts[-1:] if performance else self.parts:
@@ -229,11 +306,10 @@ class BlockLoop(NamedTuple):
             [[np.linalg.norm(M[a.rows, b.columns]) for b in self.parts] for a in self.parts]
         )
         d = balance(size, np.zeros((len(size), 1)), np.zeros((1, len(size))))
-        for part, own in zip(self.parts, d, strict=True):
+        for part, own in zip(self.parts, np.exp2(np.round(np.log2(d))), strict=True):
             rows[part.rows] /= own
             columns[part.columns] *= own
-        B, C = self.B * columns, rows[:, None] * self.C
-        return self._replace(B=B, C=C, D=rows[:, None] * self.D * columns)
+        return rows, columns
 
     @property
     def stable(self) -> bool:
@@ -258,7 +334,7 @@ def loop_of(
     signal that the model does not have.
     """
     if isinstance(model, LPVStateSpace):
-        model = reduce_without_loss(model.to_lft())
+        model = model.to_lft()
     elif isinstance(model, LFT):
         _check_copies(model)
     if not isinstance(model, LFT):
@@ -277,31 +353,39 @@ def loop_of(
         sizes += [1.0] * len(rows[-1])
         if not (columns[-1] and rows[-1]):
             raise InputError("a gain needs an input and an output that belong to no block")
-    if not (model.order or blocks):
+    copies = reduce_exactly(model)
+    n, x = sum(copies.sizes), len(model.states)
+    if not (n or blocks):
         raise InputError("nothing is uncertain: the model has no parameter and there is no block")
-    n, x, units = model.order, len(model.states), np.array(sizes).reshape(-1, 1)
-    B = np.hstack([model.M21[:x], model.M22[:x, x:][:, into]])
-    C = np.vstack([model.M12[:, :x], units * model.M22[x:, :x][out]])
+    units = rationals(sizes).reshape(-1, 1)
+    number = dict(zip(model.parameters, copies.sizes, strict=True))
+    reach = rationals([_reach(s) for s, size in number.items() for _ in range(size)]).reshape(n, 1)
+    M11, M12, M21, M22 = reach * copies.M11, reach * copies.M12, copies.M21, rationals(model.M22)
+    B = np.hstack([M21[:x], M22[:x, x:][:, into]])
+    C = np.vstack([M12[:, :x], units * M22[x:, :x][out]])
     D = np.block(
-        [
-            [model.M11, model.M12[:, x:][:, into]],
-            [units * model.M21[x:][out], units * model.M22[x:, x:][np.ix_(out, into)]],
-        ]
+        [[M11, M12[:, x:][:, into]], [units * M21[x:][out], units * M22[x:, x:][np.ix_(out, into)]]]
     )
-    real = [Part(part, part, True) for part in slices(model.sizes) if part.stop > part.start]
+    real = [Part(part, part, True) for part in slices(copies.sizes) if part.stop > part.start]
     full = [
         Part(slice(n + a.start, n + a.stop), slice(n + b.start, n + b.stop), False)
         for a, b in zip(slices([*map(len, rows)]), slices([*map(len, columns)]), strict=True)
     ]
-    A = model.M22[:x, :x]
     every = [*([None] * n), *(w for w, own in zip(weights, rows, strict=False) for _ in own)]
-    A, B, C, D = behind(A, B, C, D, every, model.dt)
+    exact = ExactLoop(*behind(M22[:x, :x], B, C, D, every, model.dt), sampled=model.dt is not None)
+    A, B, C, D = exact.rounded()
     if model.dt is not None:
         A, B, C, D = to_continuous(A, B, C, D)
     middles = np.array([s.middle for s, _ in model.blocks])
-    radii = np.array([s.radius * (size > 0) for s, size in model.blocks])
-    whole = (*real, *full)
-    return BlockLoop(A, B, C, D, whole, model.dt, units[:, 0], middles, radii, weights)
+    radii = np.array([s.radius * (size > 0) for s, size in number.items()])
+    whole, own = (*real, *full), units[:, 0].astype(float)
+    return BlockLoop(A, B, C, D, whole, model.dt, own, middles, radii, weights, exact)
+
+
+def _reach(s: Scheduling) -> Fraction:
+    """Return the largest distance of the range from its middle as rounded, in radii as rounded."""
+    low, high, middle = Fraction(s.low), Fraction(s.high), Fraction(s.middle)
+    return max(high - middle, middle - low) / Fraction(s.radius)
 
 
 def _check_copies(model: LFT) -> None:
@@ -370,14 +454,18 @@ def stable_weight(block: DynamicBlock, dt: float | None) -> LinearModel | None:
 def behind(
     A: Array, B: Array, C: Array, D: Array, weights: Sequence[LinearModel | None], dt: float | None
 ) -> tuple[Array, Array, Array, Array]:
-    """Return a model whose first outputs pass these weights."""
+    """Return a model whose first outputs pass these weights; of rationals without rounding."""
     every = [1.0 if w is None else w for w in [*weights, *[None] * (len(C) - len(weights))]]
     W = as_weight(every, "weight", [Signal(f"v{i}") for i in range(len(C))], dt)
+    own = W.A, W.B, W.C, W.D
+    if C.dtype == object:
+        own = tuple(map(rationals, own))
+    a, b, c, d = own
     return (
-        np.block([[A, np.zeros((len(A), len(W.A)))], [W.B @ C, W.A]]),
-        np.vstack([B, W.B @ D]),
-        np.hstack([W.D @ C, W.C]),
-        W.D @ D,
+        np.block([[A, np.zeros((len(A), len(a)), dtype=C.dtype)], [b @ C, a]]),
+        np.vstack([B, b @ D]),
+        np.hstack([d @ C, c]),
+        d @ D,
     )
 
 

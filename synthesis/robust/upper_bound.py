@@ -5,8 +5,8 @@ At a frequency, M the response from w to z, blocks of norm at most 1/level canno
     W - M* Z M - i (G M - M* G*) > 0,   Z = diag(d_k I or D_k), W = level^2 Z (of the sizes of w)
 
 with D_k > 0 and G_k Hermitian for a real number at several places, d_k > 0 for full dynamics. The
-scalings found at one frequency hold as far as the left side stays positive definite: up to the next
-imaginary eigenvalue of a Hamiltonian matrix. Frequencies are taken until nothing is left between.
+scalings found at one frequency hold as far as the left side stays positive definite, which is
+decided in integers. Frequencies are taken until nothing is left between.
 
 References
 ----------
@@ -27,63 +27,71 @@ from scipy import sparse
 from synthesis.numerics.polynomial.symmetric import svec
 from synthesis.numerics.program.answer import Answer
 from synthesis.numerics.program.cone_program import ConeProgram, Solver, solve
+from synthesis.robust.intervals import Check, Interval, LevelProof, Scalings
 from synthesis.robust.structure import BlockLoop
 
 Array = np.ndarray
 
 LEAST_MARGIN = 1e-7
 """The left side counts as positive where its least eigenvalue is above this, for scalings <= 1."""
-CROSSING = 1e-7
-"""A real part of an eigenvalue below this share of its modulus counts as zero: more frequencies are
-then taken.
-"""
-MAX_FREQUENCIES = 400
+SAME = 1e-4
+"""Relative distance of frequencies below which one that decides again is the same."""
+MAX_FREQUENCIES = 60
 """Largest number of frequencies; beyond it nothing is proven."""
 NARROW = 1e-9
 """Relative width of an interval of frequencies below which its level is raised."""
 BISECTIONS = 14
 """Bisections of the level at one frequency."""
+LEVEL_BITS, SCALING_BITS = 24, 40
+"""Binary places of a level, and of the entries of scalings <= 1."""
+FAR = 2.0**20
+"""Frequency, in units of the fastest pole, at which scalings for all higher ones are checked."""
 GROWTH = 1.001
 """Factor by which a level is raised above the least at the frequency that decides."""
 MAX_LEVEL = 1e4
 """Largest level, in units of the start, that is looked for."""
 
 
-class Scalings(NamedTuple):
-    """Z (nz, nz), W (nw, nw) without the level, and G (nw, nz)."""
-
-    Z: Array
-    W: Array
-    G: Array
-
-
 class Upper(NamedTuple):
-    """The level, proven for all frequencies where `covered`, and the frequency that decides."""
+    """The level, the frequency that decides it, and its proof; inf and None where there is none."""
 
     level: float
     omega: float
-    covered: bool
+    proof: LevelProof | None
 
 
 def proven_level(loop: BlockLoop, start: float, *, performance: bool) -> Upper:
     """Return the least level, from `start` on in steps of `GROWTH`, that no block exceeds at any
     frequency: of all blocks, or of the performance alone beside blocks of norm 1.
+
+    Proven of `loop.exact`, in integers.
     """
-    loop = loop.in_units(start, performance)
-    level, decides = 1.0, math.nan
+    unit = 2.0 ** round(math.log2(start))
+    rows, columns = loop.units(unit, performance)
+    transfer = loop.in_rationals.transfer.scaled(rows, columns)
+    check = Check.of(transfer, loop.parts, performance)
+    level, decides, step = _short(start / unit), math.nan, GROWTH
     known: list[tuple[float, Scalings]] = []
-    while math.isfinite(level):
-        failed = _uncovered(loop, level, performance, known)
+    while transfer.stable and level < MAX_LEVEL:
+        failed, covered = _uncovered(loop, check, level, known)
         if failed is None:
-            return Upper(start * level, decides, True)
+            proof = LevelProof(level, rows, columns, loop.parts, performance, tuple(covered))
+            return Upper(unit * level, decides, proof)
+        # where a frequency decides again, scalings that are found do not hold far enough
+        step = step**2 if abs(failed - decides) <= SAME * failed else GROWTH
         decides = failed
-        level = max(level_at(loop, failed, level, performance), level) * GROWTH
-    return Upper(math.inf, decides, False)
+        least = level_at(transfer.response(failed), loop, level, performance)
+        level = _short(max(least, level) * step) if math.isfinite(least) else math.inf
+    return Upper(math.inf, decides, None)
 
 
-def level_at(loop: BlockLoop, omega: float, low: float, performance: bool) -> float:
-    """Return the least level above `low` at a frequency, from above; inf beyond `MAX_LEVEL`."""
-    M = loop.response(omega)
+def _short(level: float) -> float:
+    """Return a level rounded up to fewer bits: the integers of the check stay short."""
+    return math.ldexp(math.ceil(math.ldexp(level, LEVEL_BITS)), -LEVEL_BITS)
+
+
+def level_at(M: Array, loop: BlockLoop, low: float, performance: bool) -> float:
+    """Return the least level above `low` of a response, from above; inf beyond `MAX_LEVEL`."""
     high = 1.01 * low
     while scalings_at(M, loop, high, performance) is None:
         low, high = high, 2 * high
@@ -101,28 +109,42 @@ def level_at(loop: BlockLoop, omega: float, low: float, performance: bool) -> fl
 
 
 def _uncovered(
-    loop: BlockLoop, level: float, performance: bool, known: list[tuple[float, Scalings]]
-) -> float | None:
-    """Return a frequency at which the level has no scalings; None where every one is covered."""
+    loop: BlockLoop, check: Check, level: float, known: list[tuple[float, Scalings]]
+) -> tuple[float | None, list[Interval]]:
+    """Return a frequency at which the level has no scalings, None where every one is covered, and
+    the intervals that are.
+    """
     paces = loop.paces
     slow, fast = (float(paces[0]), float(paces[-1])) if len(paces) else (1.0, 1.0)
-    waiting = [(0.0, math.inf)]
+    waiting, covered, omega = [(0.0, math.inf)], [], 0.0
+
+    def joined(omega: float, by: Scalings) -> tuple[float, float] | None:
+        held = check.reach(by, min(omega, FAR * fast), level)
+        if held is not None:
+            covered.append(Interval(*held, by))
+        return held
+
     for omega, found in known:
-        waiting = _without(waiting, _held(loop, found, omega, level, performance))
+        if _touches(waiting, omega):
+            waiting = _without(waiting, joined(omega, found))
     for _ in range(MAX_FREQUENCIES):
         if not waiting:
-            return None
+            return None, covered
         low, high = waiting.pop()
         omega = _inside(low, high, slow, fast)
-        found = scalings_at(loop.response(omega), loop, level, performance)
+        found = scalings_at(check.transfer.response(omega), loop, level, check.performance)
         if found is None:
-            return omega
-        held = _held(loop, found, omega, level, performance)
+            return omega, covered
+        held = joined(omega, found)
         if held is None or held[1] - held[0] < NARROW * omega:
-            return omega
+            return omega, covered
         known.append((omega, found))
         waiting = _without([*waiting, (low, high)], held)
-    return omega
+    return omega, covered
+
+
+def _touches(intervals: Sequence[tuple[float, float]], omega: float) -> bool:
+    return any(low <= omega <= high for low, high in intervals)
 
 
 def _inside(low: float, high: float, slow: float, fast: float) -> float:
@@ -148,43 +170,6 @@ def _without(
     return out
 
 
-def _held(
-    loop: BlockLoop, found: Scalings, omega: float, level: float, performance: bool
-) -> tuple[float, float] | None:
-    """Return the interval about omega in which the scalings hold; its upper end inf where they hold
-    for all above. None where they do not hold at omega.
-    """
-    if not _positive(found):
-        return None
-    by = found._replace(W=_levelled(found.W, loop, level, performance))
-    if np.linalg.eigvalsh(_left(loop.response(omega), by))[0] <= 0.1 * LEAST_MARGIN:
-        return None
-    A, B, C, D = loop.A, loop.B, loop.C, loop.D
-    middle, R = -D.T @ found.Z - 1j * found.G, _left(D, by)
-    least = np.linalg.eigvalsh(R)[0]
-    if abs(least) < 1e-12:
-        return None
-    S, Q = (middle @ C).conj().T, -C.T @ found.Z @ C
-    inner = np.linalg.solve(R, np.hstack([S.conj().T, B.T]))
-    side, back = inner[:, : len(A)], inner[:, len(A) :]
-    flow = A - B @ side
-    values = np.linalg.eigvals(np.block([[flow, -B @ back], [S @ side - Q, -flow.conj().T]]))
-    near = np.abs(values.real) <= CROSSING * np.maximum(
-        np.abs(values), loop.paces.max(initial=1.0) * 1e-6
-    )
-    cross = values.imag[near]
-    below, above = cross[cross < omega], cross[cross > omega]
-    if least <= 0 and not len(above):
-        return None
-    low = max(float(below.max()), 0.0) if len(below) else 0.0
-    return low, float(above.min()) if len(above) else math.inf
-
-
-def _positive(found: Scalings) -> bool:
-    """Whether the scalings are positive definite: without that the left side says nothing."""
-    return all(np.linalg.eigvalsh(M)[0] > 0 for M in (found.Z, found.W) if len(M))
-
-
 def _levelled(W: Array, loop: BlockLoop, level: float, performance: bool) -> Array:
     out = W.copy()
     for k, part in enumerate(loop.parts):
@@ -197,7 +182,12 @@ def scalings_at(M: Array, loop: BlockLoop, level: float, performance: bool) -> S
     """Return scalings <= 1 that show the level at one frequency; None where there are none."""
     nz, nw = M.shape
     basis = _basis(loop, nz, nw)
-    F = [_left(M, Scalings(Z, _levelled(W, loop, level, performance), G)) for Z, W, G in basis]
+    # each column in units of its own, in which a response at a peak is no larger than another
+    unit = 1 / np.hypot(1.0, np.linalg.norm(M, axis=0))
+    F = [
+        unit[:, None] * _left(M, Scalings(Z, _levelled(W, loop, level, performance), G)) * unit
+        for Z, W, G in basis
+    ]
     positive = [W for _, W, _ in basis]
     rows, sizes, right = [], [], []
     for each, limit in ((F, None), (positive, None), (positive, 1.0)):
@@ -215,9 +205,9 @@ def scalings_at(M: Array, loop: BlockLoop, level: float, performance: bool) -> S
     found = solve(program, Solver("CLARABEL"))
     if found.x is None or found.answer is not Answer.SOLVED or found.x[-1] <= LEAST_MARGIN:
         return None
-    return Scalings(
-        *(np.tensordot(found.x[:-1], np.stack([each[i] for each in basis]), 1) for i in range(3))
-    )
+    x = found.x[:-1]
+    x = np.ldexp(np.rint(np.ldexp(x, SCALING_BITS)), -SCALING_BITS)
+    return Scalings(*(np.tensordot(x, np.stack([each[i] for each in basis]), 1) for i in range(3)))
 
 
 def _left(M: Array, by: Scalings) -> Array:

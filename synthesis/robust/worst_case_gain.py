@@ -13,6 +13,8 @@ from symheli import LFT, LPVStateSpace
 from symheli.threads import with_one_thread
 from symheli.values.summary import summarized
 from synthesis.numerics.linear.norm import norm
+from synthesis.robust import witness
+from synthesis.robust.intervals import LevelProof
 from synthesis.robust.lower_bound import ACCURACY, ROUGH, best_reals, worst_closing
 from synthesis.robust.structure import BlockLoop, DynamicBlock, loop_of
 from synthesis.robust.upper_bound import proven_level
@@ -24,13 +26,17 @@ LEAST_SHARE = 1e-6
 (nearly) zero.
 """
 
+LEAST_GAIN = 2.0**-40
+"""Gain that is proven where none is found, in units of the outputs per unit of the inputs."""
+
 
 class WorstCaseGain(NamedTuple):
     """The gain of every model of the set is below `upper`; that of the model with the parameters at
     `p` (of several a tuple) and a `perturbation` of this response at `omega` (rad/s) is `lower`.
 
     `perturbation` (inputs, outputs of the blocks in their order); without a block None. Both gains
-    are inf where a model of the set is unstable.
+    are inf where a model of the set is unstable. `proof` has the numbers that `upper` rests on,
+    None where it is inf; `asked` the model and its blocks.
     """
 
     lower: float
@@ -38,8 +44,28 @@ class WorstCaseGain(NamedTuple):
     p: float | tuple[float, ...]
     omega: float
     perturbation: np.ndarray | None = None
+    proof: LevelProof | None = None
+    asked: tuple[LFT | LPVStateSpace, Sequence[DynamicBlock]] | None = None
 
     __repr__ = summarized
+
+    @property
+    def verified(self) -> bool:
+        """Whether there is a proof, which was checked in exact arithmetic as it was found."""
+        return self.proof is not None
+
+    def verify(self, rigorous: bool = False) -> bool:
+        """Check the proof of `upper` again in exact arithmetic, from the model and its blocks;
+        `rigorous`: and the inequality at single frequencies, by a second writing of it.
+        """
+        if self.proof is None or self.asked is None:
+            return False
+        loop, level = loop_of(*self.asked, performance=True).in_rationals, self.proof.bound
+        if level is None or not (self.proof.performance and level <= self.upper):
+            return False
+        return self.proof.verified(loop) and (
+            not rigorous or witness.level_is_kept(self.proof, loop)
+        )
 
 
 @with_one_thread
@@ -50,7 +76,7 @@ def worst_case_gain(
     dynamics, from the channels that belong to no block.
 
     The lower bound is attained by what is returned; the upper one is proven by D and G scalings
-    over intervals of frequency that leave none out, in floating point. For parameters that move,
+    over intervals of frequency that leave none out, in exact arithmetic. For parameters that move,
     and one block, `l2_gain` of an `UncertainStateSpace`.
 
     Parameters
@@ -95,16 +121,16 @@ def worst_case_gain(
     lower, omega, delta = _gain(loop.closed(d), refine=True)
     if math.isinf(negative) or math.isinf(lower):
         return WorstCaseGain(math.inf, math.inf, loop.physical(d), math.nan)
-    start = lower or LEAST_SHARE * _through(loop)
-    if start == 0.0:
-        return WorstCaseGain(0.0, 0.0, nowhere, math.nan)
-    proven = proven_level(loop, start, performance=True)
+    proven = proven_level(
+        loop, lower or LEAST_SHARE * _through(loop) or LEAST_GAIN, performance=True
+    )
     inner = None
     if delta is not None:  # without the last block, the performance
         last = loop.parts[-1]
         columns, rows = last.columns.stop - last.columns.start, last.rows.stop - last.rows.start
         inner = loop.unscaled(delta, omega)[: len(delta) - columns, : len(loop.sizes) - rows]
-    return WorstCaseGain(lower, proven.level, loop.physical(d), loop.frequency(omega), inner)
+    worst = loop.physical(d), loop.frequency(omega), inner
+    return WorstCaseGain(lower, proven.level, *worst, proven.proof, (model, blocks))
 
 
 def _gain(closed: BlockLoop, refine: bool = False) -> tuple[float, float, np.ndarray | None]:

@@ -259,12 +259,13 @@ class LFT(Operators, LFTMatrices):
             outputs=tuple(self.outputs[i - nx] for i in rows[nx:]),
         )
 
-    def reduce(self, tolerance: float = 1e-12) -> LFT:
+    def reduce(self, tolerance: float | None = None) -> LFT:
         """Return the same model with fewer copies of the parameters: minimal for one parameter,
-        structured Kalman for several.
+        structured Kalman for several. No entry changes by more than the rounding of what depends
+        on the parameters, and no parameter goes.
 
-        What is below `tolerance` of the size that its row and column give an entry counts as
-        rounding.
+        With a `tolerance`, 1e-12 say, another model of fewer copies: what is below it, of the size
+        that its row and column give an entry, counts as rounding and is lost.
         """
         from symheli.lpv.lft.reduction import reduce
 

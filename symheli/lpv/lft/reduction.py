@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
@@ -17,47 +19,138 @@ SAMPLES = 12
 """Number of points of the box at which the parameter-dependent part is evaluated."""
 TOLERANCES = (1e-12, 1e-14)
 """Tolerances of the reductions that are tried where nothing may be lost."""
-ROUNDING = 4 * np.finfo(float).eps
-"""Relative change of an entry below which it is the same number."""
+NEARLY = 1e-6
+"""Largest error of an inverse of coordinates that one step of Newton's method mends."""
 LOSS = 64 * np.finfo(float).eps
-"""Largest change of an entry, in units of the size that row and column give it or of its own terms,
-that is rounding of the reduction itself.
+"""Largest change of what an entry has of the parameters, in units of the size that row and column
+give that part or of its own terms, that is rounding of the reduction itself.
 """
 
 
-def reduce(lft: LFT, tolerance: float) -> LFT:
+def reduce(lft: LFT, tolerance: float | None) -> LFT:
     """See `LFT.reduce`."""
+    if tolerance is None:
+        return reduce_without_loss(lft)
     return _one_parameter(lft, tolerance) if len(lft.blocks) == 1 else _structured(lft, tolerance)
 
 
 def reduce_without_loss(lft: LFT) -> LFT:
-    """Return the same model with the fewest copies found by reductions that change no entry by more
-    than `LOSS` and drop no parameter; without copies that zeros cut off, where all of them do.
+    """Return the same model with the copies that exact ranks leave, or with fewer where these
+    change nothing that depends on a parameter by more than `LOSS` of its own size, and no parameter
+    goes.
 
-    `LFT.reduce` takes dependence below its tolerance for rounding. In coordinates of entries that
-    nearly cancel such a dependence may decide stability.
+    The constant part has no say: in coordinates of entries that nearly cancel a dependence that is
+    small beside it may decide stability.
     """
-    whole = _without_idle_copies(lft)
+    found = reduce_exactly(lft)
+    M11, M12, M21 = (M.astype(float) for M in found[:3])
+    blocks = tuple(Block(b.scheduling, n) for b, n in zip(lft.blocks, found.sizes, strict=True))
+    whole = replace(lft, M11=M11, M12=M12, M21=M21, M22=0 * lft.M22, blocks=blocks)
     delta = _samples(whole)
     values, bar = whole.matrix(delta), _rounding(whole, delta)
-    for tolerance in TOLERANCES:
+    for tolerance in TOLERANCES if whole.order else ():
         smaller = reduce(whole, tolerance)
         change = np.abs(smaller.matrix(delta) - values)
         dropped = any(a and not b for a, b in zip(whole.sizes, smaller.sizes, strict=True))
-        if np.all(change <= bar) and not (dropped and np.any(change > ROUNDING * np.abs(values))):
-            return smaller
-    return whole
+        if np.all(change <= bar) and not dropped:
+            return replace(smaller, M22=lft.M22)
+    return replace(_in_balanced_coordinates(whole, found), M22=lft.M22)
+
+
+def _in_balanced_coordinates(lft: LFT, exact: ExactCopies) -> LFT:
+    """Return the copies of one parameter in balanced coordinates, formed in rationals: only entries
+    are rounded. The LFT itself where it has several parameters or is nearly not minimal.
+    """
+    if len(lft.blocks) != 1 or not lft.order:
+        return lft
+    into, out = _balancing(lft)
+    if not np.abs(into @ out - np.eye(lft.order)).max() < NEARLY:
+        return lft
+    T, near = _rational(out), _rational(into)
+    back = (2 * _rational(np.eye(lft.order)) - near @ T) @ near  # a step of Newton's method
+    M11, M12, M21 = back @ exact.M11 @ T, back @ exact.M12, exact.M21 @ T
+    return replace(lft, M11=M11.astype(float), M12=M12.astype(float), M21=M21.astype(float))
+
+
+class ExactCopies(NamedTuple):
+    """M11, M12, M21 of an LFT in rationals, and the numbers of copies of its parameters."""
+
+    M11: Array
+    M12: Array
+    M21: Array
+    sizes: tuple[int, ...]
+
+
+def reduce_exactly(lft: LFT) -> ExactCopies:
+    """Return the copies that the inputs reach and the outputs show, by ranks in rational
+    arithmetic: the same function of the parameters, to the last digit.
+    """
+    lft = _without_idle_copies(lft)
+    copies = _units(lft).copies if lft.order else np.ones(0)
+    M11 = _rational(copies[:, None] * lft.M11 / copies)
+    found = ExactCopies(
+        M11, _rational(copies[:, None] * lft.M12), _rational(lft.M21 / copies), lft.sizes
+    )
+    while True:
+        seen = _reached_exactly(ExactCopies(found.M11.T, found.M21.T, found.M12.T, found.sizes))
+        back = ExactCopies(seen.M11.T, seen.M21.T, seen.M12.T, seen.sizes)
+        smaller = _reached_exactly(back)
+        if smaller.sizes == found.sizes:
+            return found
+        found = smaller
+
+
+def _reached_exactly(own: ExactCopies) -> ExactCopies:
+    """Return what the inputs reach alone, in coordinates that are some of the copies."""
+    here = parts(own.sizes)
+    spans = [_span(own.M12[rows]) for rows in here]
+    while True:
+        grown = [
+            _span(
+                np.hstack([V, *(own.M11[a, b] @ W for b, (W, _) in zip(here, spans, strict=True))])
+            )
+            for a, (V, _) in zip(here, spans, strict=True)
+        ]
+        if [len(k) for _, k in grown] == [len(k) for _, k in spans]:
+            break
+        spans = grown
+    chosen = [a.start + k for a, (_, own_rows) in zip(here, spans, strict=True) for k in own_rows]
+    V = _diagonal([basis for basis, _ in spans], object)
+    sizes = tuple(len(rows) for _, rows in spans)
+    return ExactCopies((own.M11 @ V)[chosen], own.M12[chosen], own.M21 @ V, sizes)
+
+
+def _span(columns: Array) -> tuple[Array, list[int]]:
+    """Return a basis (n, r) of the columns and r rows in which it is the identity."""
+    rest = [column for column in columns.T if any(column)]
+    basis: list[Array] = []
+    rows: list[int] = []
+    for column in rest:
+        for v, k in zip(basis, rows, strict=True):
+            column = column - column[k] * v
+        k = max(range(len(column)), key=lambda i: abs(column[i]))
+        if column[k] != 0:
+            column = column / column[k]
+            basis = [v - v[k] * column for v in basis]
+            basis, rows = [*basis, column], [*rows, k]
+    return np.array(basis, dtype=object).reshape(len(basis), len(columns)).T, rows
+
+
+def _rational(M: Array) -> Array:
+    out = np.empty(M.shape, dtype=object)
+    out.ravel()[:] = [Fraction(v) for v in M.ravel().tolist()]
+    return out
 
 
 def _rounding(lft: LFT, delta: Array) -> Array:
     """Changes of the entries (SAMPLES, nx + ny, nx + nu) that count as rounding at these points."""
     own = np.repeat(delta, lft.sizes, axis=-1)
     inverse = np.abs(np.linalg.inv(np.eye(lft.order) - lft.M11 * own[:, None, :]))
-    terms = np.abs(lft.M22) + (np.abs(lft.M21) * np.abs(own)[:, None, :]) @ inverse @ np.abs(
-        lft.M12
-    )
-    rows, columns = equilibrate(np.abs(lft.matrix(delta)).max(axis=0, initial=0.0))
-    return LOSS * np.maximum(terms, 1 / (rows[:, None] * columns))
+    terms = (np.abs(lft.M21) * np.abs(own)[:, None, :]) @ inverse @ np.abs(lft.M12)
+    size = np.abs(lft.matrix(delta) - lft.M22).max(axis=0, initial=0.0)
+    rows, columns = equilibrate(size)
+    depends = np.any(size, axis=1)[:, None] & np.any(size, axis=0)
+    return LOSS * np.maximum(terms, np.where(depends, 1 / (rows[:, None] * columns), 0.0))
 
 
 def _without_idle_copies(lft: LFT) -> LFT:
@@ -133,6 +226,12 @@ def _balanced(lft: LFT) -> LFT:
     """
     if not lft.order:
         return lft
+    into, out = _balancing(lft)
+    return replace(lft, M11=into @ lft.M11 @ out, M12=into @ lft.M12, M21=lft.M21 @ out)
+
+
+def _balancing(lft: LFT) -> tuple[Array, Array]:
+    """Return (into, out), inverse to one another: balanced copies are `into` times the given."""
     power, size = lft.M12, np.zeros(lft.M22.shape)
     for _ in range(2 * lft.order):
         size, power = np.maximum(size, np.abs(lft.M21 @ power)), lft.M11 @ power
@@ -144,9 +243,8 @@ def _balanced(lft: LFT) -> LFT:
         sight.append(sight[-1] @ lft.M11)
     R, S = np.hstack(reach), np.vstack(sight)
     U, s, Vt = np.linalg.svd(S @ R, full_matrices=False)
-    root = np.sqrt(s[: lft.order])
-    into, out = (U[:, : lft.order] / root).T @ S, R @ (Vt[: lft.order].T / root)
-    return replace(lft, M11=into @ lft.M11 @ out, M12=into @ lft.M12, M21=lft.M21 @ out)
+    root = np.sqrt(np.maximum(s[: lft.order], np.finfo(float).tiny))
+    return (U[:, : lft.order] / root).T @ S, R @ (Vt[: lft.order].T / root)
 
 
 def _structured(lft: LFT, tolerance: float) -> LFT:
@@ -269,8 +367,8 @@ def _projected(lft: LFT, left: list[Array], right: list[Array]) -> LFT:
     return replace(lft, M11=L.T @ lft.M11 @ R, M12=L.T @ lft.M12, M21=lft.M21 @ R, blocks=blocks)
 
 
-def _diagonal(parts: list[Array]) -> Array:
-    out = np.zeros((sum(p.shape[0] for p in parts), sum(p.shape[1] for p in parts)))
+def _diagonal(parts: Sequence[Array], kind: type = float) -> Array:
+    out = np.zeros((sum(p.shape[0] for p in parts), sum(p.shape[1] for p in parts)), dtype=kind)
     i = j = 0
     for p in parts:
         out[i : i + p.shape[0], j : j + p.shape[1]] = p
