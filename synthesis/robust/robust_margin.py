@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import NamedTuple
+from typing import ClassVar
 
 import numpy as np
 from scipy.optimize import brentq
@@ -22,6 +22,7 @@ from synthesis.certify.questions.questions import stability
 from synthesis.certify.statement.rates import Rate
 from synthesis.robust import witness
 from synthesis.robust.intervals import LevelProof
+from synthesis.robust.level_statement import Asked, LevelStatement
 from synthesis.robust.lower_bound import ACCURACY, ROUGH, best_reals, worst_closing
 from synthesis.robust.structure import BlockLoop, DynamicBlock, loop_at, loop_of
 from synthesis.robust.uncertain import uncertain
@@ -41,7 +42,8 @@ POINTS = 21
 """Values of the parameter whose highest peaks are climbed."""
 
 
-class RobustMargin(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class RobustMargin(LevelStatement):
     """`lower` times the stated uncertainty is proven to be borne, `upper` times it is not: there a
     stable perturbation of that norm makes the model with the parameter at `p` (of several a tuple)
     oscillate at `omega` (rad/s; NaN where the model at p is unstable without any).
@@ -58,15 +60,25 @@ class RobustMargin(NamedTuple):
     perturbation: np.ndarray | None = None
     proof: LevelProof | Certificate | None = None
     asked: tuple[LFT | LPVStateSpace, Sequence[DynamicBlock]] | None = None
+    reader: ClassVar[str] = "robust-margin"
+    number: ClassVar[str] = "lower"
 
     __repr__ = summarized
 
-    @property
-    def verified(self) -> bool:
-        """Whether there is a proof, which was checked in exact arithmetic as it was found."""
-        return self.proof is not None
+    @classmethod
+    def proposed(cls, bound: float, proof: LevelProof | None, asked: Asked) -> RobustMargin:
+        """Return the margin with this number; without a proof it is none."""
+        return cls(bound, math.nan, math.nan, math.nan, None, proof, asked)
 
-    def verify(self, rigorous: bool = False) -> bool:
+    @property
+    def claim(self) -> str:
+        """The claim in one sentence, with numbers and units."""
+        return (
+            f"robust margin {self.lower:.9g}: stable while the ranges of constant parameters about"
+            f" their middles, and the bounds of the blocks, are {self.lower:.6g} times the stated"
+        )
+
+    def verify(self, rigorous: bool = True) -> bool:
         """Check the proof of `lower` again in exact arithmetic, from the model and its blocks;
         `rigorous`: and the inequality at single frequencies, by a second writing of it.
         """

@@ -15,8 +15,10 @@ program.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass
 from fractions import Fraction
-from typing import NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from scipy import optimize
@@ -24,8 +26,11 @@ from scipy import optimize
 from symheli import LinearModel
 from symheli.errors import InputError, UnknownNameError
 from symheli.threads import with_one_thread
+from symheli.values.arrays import frozen
 from symheli.values.signal import indices
 from symheli.values.summary import summarized
+from synthesis.certify.questions.certificate_file import decoded, encoded
+from synthesis.certify.statement.proven_statement import ProvenStatement
 from synthesis.numerics.linear.model import as_model
 from synthesis.numerics.polynomial.positive import bernstein, positive_until, product
 from synthesis.numerics.polynomial.transfer import Transfer
@@ -150,7 +155,8 @@ class SlopeProof(NamedTuple):
         return np.array([int(v * common) for v in real], dtype=object)
 
 
-class SlopeMargin(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class SlopeMargin(ProvenStatement):
     """Functions of slopes from 0 to `slope` are proven to leave the loop stable; with the straight
     line of slope `limit` it is not stable (inf: no such line was found).
 
@@ -166,15 +172,70 @@ class SlopeMargin(NamedTuple):
     ahead: Array
     popov: float
     proof: SlopeProof | None = None
+    reader: ClassVar[str] = "slope-margin"
 
     __repr__ = summarized
 
     @property
-    def verified(self) -> bool:
+    def verified(self) -> bool:  # type: ignore[override]
         """Whether there is a proof, which was checked as it was found."""
         return self.proof is not None
 
-    def verify(self, rigorous: bool = False) -> bool:
+    @property
+    def why(self) -> str:  # type: ignore[override]
+        """Why nothing is proven; empty where something is."""
+        return "" if self.verified else "no multiplier was found that holds at every frequency"
+
+    @property
+    def bound(self) -> float:
+        """The largest slope that is proven."""
+        return self.slope
+
+    @property
+    def claim(self) -> str:
+        """The claim in one sentence, with numbers and units."""
+        return (
+            f"slope margin {self.slope:.9g}: the loop is stable with every function d = phi(v) of"
+            f" slopes from 0 to {self.slope:.6g}"
+        )
+
+    @property
+    def conditions(self) -> tuple[str, ...]:
+        """Conditions of the claim, each a sentence made from the numbers of the proof."""
+        own = self.proof
+        if own is None:
+            return ()
+        moving = "phi may change in time" if own.criterion == "circle" else "phi is constant"
+        shape = "phi is odd" if own.odd else "phi has any shape"
+        sizes = f"the loop in the file, {len(own.A)} states, in continuous time, positive feedback"
+        return (sizes, f"{moving}, phi(0) = 0", shape)
+
+    @property
+    def facts(self) -> Mapping[str, Any]:
+        """Kind, bounds and conditions as data that JSON holds."""
+        return {"kind": "slope margin", "bound": self.slope}
+
+    @property
+    def stored(self) -> dict[str, Any]:
+        """Values of a file: the loop and its multiplier."""
+        if self.proof is None:
+            raise InputError("only a proven slope is saved")
+        return {"kind": "slope margin", **encoded(self.proof._asdict())}
+
+    @classmethod
+    def restored(cls, content: Mapping[str, Any]) -> SlopeMargin:
+        """Return the slope of a file, proven anew."""
+        values = {name: decoded(content[name]) for name in SlopeProof._fields}
+        n = len(values["A"])
+        counts = values["causal"].shape
+        shapes = {"A": (n, n), "b": (n,), "c": (n,), "poles": counts[1:], "ahead": counts}
+        for name, shape in shapes.items():
+            values[name] = frozen(values[name], name, shape)
+        proof = SlopeProof(**values)
+        own = (proof.slope, math.nan, proof.poles, proof.causal, proof.ahead, proof.popov)
+        return cls(*own, proof if proof.verified() else None)
+
+    def verify(self, rigorous: bool = True) -> bool:
         """Check the proof again from its numbers, in integers; `rigorous`: and that the inequality
         holds at single frequencies, by a second writing of it.
         """

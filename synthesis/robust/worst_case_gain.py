@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from scipy.optimize import brentq
@@ -15,6 +16,7 @@ from symheli.values.summary import summarized
 from synthesis.numerics.linear.norm import norm
 from synthesis.robust import witness
 from synthesis.robust.intervals import LevelProof
+from synthesis.robust.level_statement import Asked, LevelStatement
 from synthesis.robust.lower_bound import ACCURACY, ROUGH, best_reals, worst_closing
 from synthesis.robust.structure import BlockLoop, DynamicBlock, loop_of
 from synthesis.robust.upper_bound import proven_level
@@ -30,7 +32,8 @@ LEAST_GAIN = 2.0**-40
 """Gain that is proven where none is found, in units of the outputs per unit of the inputs."""
 
 
-class WorstCaseGain(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class WorstCaseGain(LevelStatement):
     """The gain of every model of the set is below `upper`; that of the model with the parameters at
     `p` (of several a tuple) and a `perturbation` of this response at `omega` (rad/s) is `lower`.
 
@@ -46,15 +49,25 @@ class WorstCaseGain(NamedTuple):
     perturbation: np.ndarray | None = None
     proof: LevelProof | None = None
     asked: tuple[LFT | LPVStateSpace, Sequence[DynamicBlock]] | None = None
+    reader: ClassVar[str] = "worst-case-gain"
+    number: ClassVar[str] = "upper"
 
     __repr__ = summarized
 
-    @property
-    def verified(self) -> bool:
-        """Whether there is a proof, which was checked in exact arithmetic as it was found."""
-        return self.proof is not None
+    @classmethod
+    def proposed(cls, bound: float, proof: LevelProof | None, asked: Asked) -> WorstCaseGain:
+        """Return the gain with this number; without a proof it is none."""
+        return cls(math.nan, bound, math.nan, math.nan, None, proof, asked)
 
-    def verify(self, rigorous: bool = False) -> bool:
+    @property
+    def claim(self) -> str:
+        """The claim in one sentence, with numbers and units."""
+        return (
+            f"worst-case gain {self.upper:.9g}: |y|_2 < {self.upper:.6g} |u|_2 from rest, for every"
+            " constant parameter of its range and every block of its bound"
+        )
+
+    def verify(self, rigorous: bool = True) -> bool:
         """Check the proof of `upper` again in exact arithmetic, from the model and its blocks;
         `rigorous`: and the inequality at single frequencies, by a second writing of it.
         """

@@ -20,6 +20,7 @@ from synthesis.analysis import (
 )
 from synthesis.certify.statement.statement_file import read
 from synthesis.forms import Spline
+from synthesis.robust import DynamicBlock, robust_margin, slope_margin, worst_case_gain
 from synthesis.sets import invariant_set, low_complexity_set
 from synthesis.switching import dwell_time
 
@@ -46,6 +47,26 @@ def passing():
 def with_feedthrough():
     p = Scheduling("p", "1", 0.0, 1.0, rate=0.5)
     return LPVStateSpace.polynomial([[[-1.0]], [[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.25]]], p)
+
+
+def third_order():
+    """-1/(s + 1)^3, positive feedback: a line is stable below 8."""
+    A = [[-1.0, 0.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, -1.0]]
+    B, C = [[-1.0], [0.0], [0.0]], [[0.0, 0.0, 1.0]]
+    return LinearModel(A, B, C, [[0.0]], ["x1", "x2", "x3"], ["d"], ["v"])
+
+
+def loss(into, out):
+    return DynamicBlock([into], [out], 0.5)
+
+
+def two_by_two():
+    """A lag from u to y, and one from the block's d to its v, over one parameter."""
+    p = Scheduling("p", "1", 0.0, 1.0, rate=0.0)
+    B, D = [[1.0, 1.0]], [[0.0, 0.5], [0.0, 0.0]]
+    return LPVStateSpace.polynomial(
+        [[[-1.0]], [[-1.0]]], [B], [[[1.0], [0.7]]], [D], p, inputs=["u", "d"], outputs=["y", "v"]
+    )
 
 
 def rotated():
@@ -78,6 +99,9 @@ MADE = {
     "output strictness of two": lambda: output_strictness(passing(), **QUICK),
     "sector of two": lambda: sector_radius(passing(), 0.7, **QUICK),
     "LFT gain": lambda: lft_gain(lag().to_lft(), "DG", search=None),
+    "slope margin": lambda: slope_margin(third_order(), "d", "v", "Zames-Falb", odd=True),
+    "robust margin": lambda: robust_margin(passing().with_rate(0.0), [loss("u1", "y1")]),
+    "worst-case gain": lambda: worst_case_gain(two_by_two(), [loss("d", "v")]),
     "ellipsoid": lambda: invariant_set(pushed(), input_bounds={"u": 1.0}),
     "parallelepiped": lambda: low_complexity_set(rotated(), state_bounds={"x": 1.0, "y": 2.0}),
     "dwell time": lambda: dwell_time(SLOW, TRIPLED, within=1.2, parts=4),
@@ -87,6 +111,7 @@ MADE = {
 BETTER = {
     **dict.fromkeys(("l2 gain", "sampled l2 gain", "energy-to-peak gain", "h2 gain"), "gamma"),
     "LFT gain": "gamma",
+    "slope margin": "slope",
     "decay rate": "alpha",
     "l2 gain of two": "gamma",
     "decay rate of two": "alpha",
@@ -153,13 +178,26 @@ def test_sentences_of_the_file_are_not_repeated_as_the_claim(saved):
     assert (again.claim, again.conditions) == (found.claim, found.conditions)
 
 
+@pytest.mark.parametrize(("kind", "factor"), [("robust margin", 1.01), ("worst-case gain", 0.99)])
+def test_a_better_level_is_not_proven(kind, factor, tmp_path):
+    file = made(kind).save(tmp_path / "proof.json")
+    content = json.loads(file.read_text())
+    for names in (["bound"], ["bound", "level"]):
+        forged = dict(content)
+        for name in names:
+            forged[name] *= factor if name == "bound" else 1 / factor
+        file.write_text(json.dumps(forged))
+        again = proven(file)
+        assert again is None or (again.bound > made(kind).bound) == (kind == "worst-case gain")
+
+
 @pytest.mark.parametrize("kind", BETTER)
 def test_a_better_number_is_not_proven(kind, tmp_path):
     found = made(kind)
     file = found.save(tmp_path / "proof.json")
     content = json.loads(file.read_text())
     name = BETTER[kind]
-    content[name] *= 1.2 if name in ("alpha", "index") else 0.8
+    content[name] *= 1.2 if name in ("alpha", "index", "slope") else 0.8
     for other in {"lower", "upper", "frozen", "index_limit"} & content.keys():
         content[other] = {"float": "nan"}
     file.write_text(json.dumps(content))
@@ -206,7 +244,7 @@ def test_a_number_changed_is_refused_or_says_what_it_now_proves(saved, tmp_path)
             again = proven(tmp_path / "forged.json")
             if again is not None and kind in BETTER and BETTER[kind] == path[0]:
                 better = again.bound > found.bound * (1 + 1e-2)
-                looser = BETTER[kind] not in ("alpha", "index")
+                looser = BETTER[kind] not in ("alpha", "index", "slope")
                 assert better == looser or again.bound == found.bound
 
 

@@ -1,0 +1,166 @@
+"""What margins and worst-case gains have in common as proven statements: conditions and files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from symheli import LFT, LinearModel, LPVStateSpace
+from symheli.errors import InputError
+from symheli.lpv.lft_matrices import LFTMatrices
+from symheli.lpv.lpv_matrices import LPVMatrices
+from symheli.values.arrays import frozen
+from synthesis.certify.questions.certificate_file import decoded, encoded, same_model
+from synthesis.certify.statement.proven_statement import ProvenStatement
+from synthesis.certify.statement.sentences import motion
+from synthesis.numerics.linear.model import as_model
+from synthesis.robust.intervals import Interval, LevelProof, Scalings
+from synthesis.robust.structure import DynamicBlock, Part
+
+Asked = tuple[LFT | LPVStateSpace, Sequence[DynamicBlock]]
+
+
+class LevelStatement(ProvenStatement):
+    """A statement about a loop with constant parameters and blocks, proven by scalings over
+    intervals of frequency.
+    """
+
+    proof: Any
+    asked: Asked | None
+    number: ClassVar[str]
+    """Field of the proven number."""
+
+    @property
+    def verified(self) -> bool:  # type: ignore[override]
+        """Whether there is a proof, which was checked in exact arithmetic as it was found."""
+        return self.proof is not None
+
+    @property
+    def why(self) -> str:  # type: ignore[override]
+        """Why nothing is proven; empty where something is."""
+        return "" if self.verified else "no scalings were found that hold at every frequency"
+
+    @property
+    def bound(self) -> float:
+        """The number that is proven."""
+        return float(getattr(self, self.number))
+
+    @property
+    def conditions(self) -> tuple[str, ...]:
+        """Conditions of the claim, each a sentence made from the numbers of the proof."""
+        if self.asked is None:
+            return ()
+        model, blocks = self.asked
+        n = len(model.states)
+        time = "in continuous time" if model.dt is None else f"sampled every {model.dt!r} s"
+        each = (
+            f"stable linear dynamics from {', '.join(b.outputs)} to {', '.join(b.inputs)} of gain"
+            f" <= {b.bound!r}{'' if b.weight is None else ' times the weight in the file'}"
+            for b in blocks
+        )
+        moving = (motion(s, 0.0) for s in model.parameters)
+        return (f"the model in the file, {n} state{'s' * (n != 1)}, {time}", *moving, *each)
+
+    @property
+    def facts(self) -> Mapping[str, Any]:
+        """Kind, bounds and conditions as data that JSON holds."""
+        return {"kind": self.reader.replace("-", " "), "bound": self.bound}
+
+    @property
+    def stored(self) -> dict[str, Any]:
+        """Values of a file: the number, the model, its blocks and the scalings."""
+        if not isinstance(self.proof, LevelProof) or self.asked is None:
+            raise InputError(
+                "only a bound that is proven by scalings over frequency is saved so; a margin with"
+                " one block is proven by a certificate: save its .proof"
+            )
+        model, blocks = self.asked
+        proof = self.proof
+        return {
+            "kind": self.reader.replace("-", " "),
+            "bound": self.bound,
+            "model": encoded(model),
+            "blocks": [_written(block) for block in blocks],
+            "level": proof.level,
+            "rows": encoded(proof.rows),
+            "columns": encoded(proof.columns),
+            "parts": [
+                [p.rows.start, p.rows.stop, p.columns.start, p.columns.stop, p.real]
+                for p in proof.parts
+            ],
+            "performance": proof.performance,
+            "intervals": [
+                [encoded(low), encoded(high), *(_complex(M) for M in by)]
+                for low, high, by in proof.intervals
+            ],
+        }
+
+    @classmethod
+    def restored(cls, content: Mapping[str, Any]) -> Self:
+        """Return the statement of a file, proven anew."""
+        parts = tuple(
+            Part(slice(int(a), int(b)), slice(int(c), int(d)), real is True)
+            for a, b, c, d, real in content["parts"]
+        )
+        intervals = tuple(
+            Interval(float(decoded(low)), float(decoded(high)), Scalings(*map(_read_complex, by)))
+            for low, high, *by in content["intervals"]
+        )
+        proof = LevelProof(
+            float(content["level"]),
+            frozen(decoded(content["rows"]), "rows", (None,)),
+            frozen(decoded(content["columns"]), "columns", (None,)),
+            parts,
+            content["performance"] is True,
+            intervals,
+        )
+        asked = _model(decoded(content["model"])), [_block(one) for one in content["blocks"]]
+        found = cls.proposed(float(content["bound"]), proof, asked)
+        return found if found.verify(rigorous=False) else cls.proposed(found.bound, None, asked)
+
+    @classmethod
+    def proposed(cls, bound: float, proof: LevelProof | None, asked: Asked) -> Self:
+        """Return the statement with this number; without a proof it is none."""
+        raise NotImplementedError
+
+    def proven_of(self, model: Any) -> bool:
+        """Return whether the claim is about exactly this model; see `ProvenStatement.proven_of`."""
+        return self.asked is not None and same_model(self.asked[0], model)
+
+
+def _complex(M: Any) -> list[Any]:
+    return [encoded(np.array(np.real(M), float)), encoded(np.array(np.imag(M), float))]
+
+
+def _read_complex(parts: Any) -> Any:
+    real, imaginary = map(decoded, parts)
+    return np.asarray(real) + 1j * np.asarray(imaginary)
+
+
+def _written(block: DynamicBlock) -> dict[str, Any]:
+    weight = None
+    if block.weight is not None:
+        own = as_model(block.weight)
+        weight = {**{name: encoded(getattr(own, name)) for name in "ABCD"}, "dt": own.dt}
+    own_names = {"inputs": list(map(str, block.inputs)), "outputs": list(map(str, block.outputs))}
+    return {**own_names, "bound": float(block.bound), "weight": weight}
+
+
+def _block(content: Mapping[str, Any]) -> DynamicBlock:
+    weight = content["weight"]
+    if weight is not None:
+        A, B, C, D = (np.asarray(decoded(weight[name]), float) for name in "ABCD")
+        states = [f"x{i}" for i in range(len(A))]
+        weight = LinearModel(A, B, C, D, states, ["u"], ["y"], weight["dt"])
+    names = ([str(name) for name in content[group]] for group in ("inputs", "outputs"))
+    return DynamicBlock(*names, float(content["bound"]), weight)
+
+
+def _model(value: Any) -> LFT | LPVStateSpace:
+    for matrices, model in ((LPVMatrices, LPVStateSpace), (LFTMatrices, LFT)):
+        if isinstance(value, matrices):
+            return model(**{f.name: getattr(value, f.name) for f in fields(value)})
+    raise InputError(f"expected an LPVStateSpace or an LFT, got {type(value).__name__}")
