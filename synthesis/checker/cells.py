@@ -1,0 +1,198 @@
+"""Boxes of p on which model and P are polynomials, and in discrete time the values that p(k+1) may
+have from there.
+
+|dp_i/dt| <= rate_i, or dp_i/dt = p_j (`tie` j). With a period dt, p_i changes by at most rate_i dt,
+or by dt p_j within dt^2/2 times the rate of p_j. A p_j that is the rate of p_i can be no larger
+than what lets p_i stay in its range: p_j^2 <= 2 rate_j (high_i - p_i) above zero, and in the same
+way below.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from itertools import product as combinations
+from typing import NamedTuple
+
+from .polynomials import Box, Polynomial
+from .reading import Model, Parameter
+
+PARTS = 8
+"""Parts of the range of a parameter that is the rate of another, where p(k+1) depends on it."""
+
+Point = tuple[Fraction, Fraction, Fraction, Fraction]
+"""p(k+1) at (lower end, lowest), (lower end, highest), (upper end, lowest), (upper end, highest)."""
+
+
+class Strip(NamedTuple):
+    """An interval of one parameter inside one segment of P; where P moves in discrete time, those
+    of the next segment that are reached from it.
+    """
+
+    low: Fraction
+    high: Fraction
+    segment: int
+    following: int
+    reached: Point | None
+
+    @property
+    def middle(self) -> Fraction:
+        """The middle of the interval."""
+        return (self.low + self.high) / 2
+
+
+class Cell(NamedTuple):
+    """A box of p, `here`, as polynomials on a unit box whose first variables are those of p, and
+    p(k+1), `there`; segments of P at both.
+    """
+
+    strips: tuple[Strip, ...]
+    here: tuple[Polynomial, ...]
+    there: tuple[Polynomial, ...]
+    motion: tuple[Parameter, ...]
+
+    @property
+    def middle(self) -> tuple[Fraction, ...]:
+        """The middle of the box."""
+        return tuple(s.middle for s in self.strips)
+
+    @property
+    def variables(self) -> int:
+        """Number of variables of the unit box."""
+        return self.here[0].variables
+
+    @property
+    def segments(self) -> tuple[int, ...]:
+        """Segments of P at p."""
+        return tuple(s.segment for s in self.strips)
+
+    @property
+    def following(self) -> tuple[int, ...]:
+        """Segments of P at p(k+1)."""
+        return tuple(s.following for s in self.strips)
+
+    def slope(self, F: Polynomial, axis: int) -> Polynomial:
+        """Return dF/dp_axis at a p that moves alone."""
+        strip = self.strips[axis]
+        return F.derivative(axis) * (1 / (strip.high - strip.low))
+
+    def reaches(self, box: Box) -> bool:
+        """Whether p can be in this part of the unit box and stay in its ranges forever."""
+        ends = [
+            tuple(s.low + t * (s.high - s.low) for t in side)
+            for s, side in zip(self.strips, box, strict=False)
+        ]
+        for i, p in enumerate(self.motion):
+            if p.tie is None or self.motion[p.tie].rate is None:
+                continue
+            (a, b), (c, d), jerk = ends[i], ends[p.tie], self.motion[p.tie].rate
+            if d < 0 and d * d > 2 * jerk * (b - p.low):
+                return False
+            if c > 0 and c * c > 2 * jerk * (p.high - a):
+                return False
+        return True
+
+    def place(self, point: Sequence[Fraction]) -> str:
+        """Say where a point of the unit box is."""
+        said = [
+            f"p{i + 1} = {float(q.at(point)[0][0]):.9g}" for i, q in enumerate(self.here)
+        ] + [
+            f"p{i + 1} a sample later = {float(q.at(point)[0][0]):.9g}"
+            for i, (q, s) in enumerate(zip(self.there, self.strips, strict=True))
+            if s.reached is not None
+        ]
+        return ", ".join(said)
+
+
+def cells(
+    model: Model,
+    motion: tuple[Parameter, ...],
+    knots: Sequence[Sequence[Fraction]],
+    moving: Sequence[bool],
+) -> Iterator[Cell]:
+    """Yield boxes that cover all p; `moving`: whether P changes as a parameter moves."""
+    m, dt = len(motion), model.dt
+    free = [i for i in range(m) if motion[i].tie is None]
+    tied = [i for i in range(m) if motion[i].tie is not None]
+
+    def strips(i: int, others: dict[int, Strip]) -> list[Strip]:
+        p, cuts = motion[i], {*knots[i], *model.breaks(i)}
+        if dt is not None and any(motion[k].tie == i and moving[k] for k in tied):
+            cuts |= {p.low + p.width * Fraction(k, PARTS) for k in range(PARTS)}
+        span = None
+        if dt is not None and moving[i]:
+            span = _span(motion, i, others, dt)
+        inside = sorted({p.low, p.high, *(c for c in cuts if p.low < c < p.high)})
+        return list(_strips(p, inside, knots[i], span))
+
+    for choice in combinations(*(strips(i, {}) for i in free)):
+        found = dict(zip(free, choice, strict=True))
+        for rest in combinations(*(strips(i, found) for i in tied)):
+            found.update(zip(tied, rest, strict=True))
+            cell = _cell(tuple(found[i] for i in range(m)), motion)
+            if cell.reaches(((Fraction(0), Fraction(1)),) * m):
+                yield cell
+
+
+def _span(
+    motion: Sequence[Parameter], i: int, others: dict[int, Strip], dt: Fraction
+) -> tuple[Fraction, Fraction]:
+    """Return the (least, largest) change of a parameter in a sample; the width of its range where
+    it may jump.
+    """
+    p = motion[i]
+    if p.tie is None:
+        reach = p.width if p.rate is None else min(p.rate * dt, p.width)
+        return -reach, reach
+    q, strip = motion[p.tie], others[p.tie]
+    low, high = q.low * dt, q.high * dt
+    if q.rate is not None:
+        slack = q.rate * dt * dt / 2
+        low, high = max(low, strip.low * dt - slack), min(high, strip.high * dt + slack)
+    return max(low, -p.width), min(high, p.width)
+
+
+def _strips(
+    p: Parameter,
+    cuts: Sequence[Fraction],
+    knots: Sequence[Fraction],
+    span: tuple[Fraction, Fraction] | None,
+) -> Iterator[Strip]:
+    """Yield the intervals of one parameter, with each segment of P that is reached from them."""
+    inner = knots[1:-1]
+    for a, b in zip(cuts, cuts[1:], strict=False):
+        own = sum((a + b) / 2 >= k for k in inner)
+        if span is None:
+            yield Strip(a, b, own, own, None)
+            continue
+        down, up = span
+        for j, (left, right) in enumerate(zip(knots, knots[1:], strict=False)):
+            # the segment is reached from left - up to right - down; the limits of p(k+1), clipped
+            # to it, are straight lines between these values and those where the clipping begins
+            ends = sorted({a, b, *(c for k in (left, right) for c in (k - up, k - down)
+                                   if a < c < b)})  # fmt: skip
+            for c, d in zip(ends, ends[1:], strict=False):
+                if not left - up <= (c + d) / 2 <= right - down:
+                    continue
+                q = [min(max(v + s, left), right) for v in (c, d) for s in (down, up)]
+                yield Strip(c, d, own, j, (q[0], q[1], q[2], q[3]))
+
+
+def _cell(strips: tuple[Strip, ...], motion: tuple[Parameter, ...]) -> Cell:
+    m = len(strips)
+    more = [i for i, s in enumerate(strips) if s.reached is not None]
+    variables = m + len(more)
+    one = Polynomial.number(1, variables)
+    here, there = [], []
+    for i, s in enumerate(strips):
+        t = Polynomial.variable(i, variables)
+        p = one * s.low + t * (s.high - s.low)
+        here.append(p.reduced())
+        if s.reached is None:
+            there.append(here[-1])
+            continue
+        r = Polynomial.variable(m + more.index(i), variables)
+        a, b, c, d = s.reached
+        q = one * a + r * (b - a) + t * (c - a) + t @ r * (a - b - c + d)
+        there.append(q.reduced())
+    return Cell(strips, tuple(here), tuple(there), motion)

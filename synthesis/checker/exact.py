@@ -1,0 +1,163 @@
+"""Matrices of integers, and whether a symmetric one is positive definite."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from operator import mul
+
+try:
+    from flint import fmpz_mat  # type: ignore[import-not-found]
+except ImportError:
+    fmpz_mat = None
+
+Rows = list[list[int]]
+
+LARGE = 12
+"""Rows from which python-flint, where it is installed, multiplies faster."""
+ENTRY_BITS = 128
+"""Bits to which a matrix is rounded, with the rounding counted, before its congruence."""
+FACTOR_BITS = 40
+"""Bits behind the point of the congruence."""
+
+
+def product(X: Rows, Y: Rows) -> Rows:
+    """Return X Y; X has at least one column."""
+    if fmpz_mat is not None and len(X) >= LARGE and len(Y[0]) >= LARGE:
+        found = (fmpz_mat(X) * fmpz_mat(Y)).tolist()
+        return [[int(v) for v in row] for row in found]
+    columns = list(zip(*Y, strict=True))
+    return [[sum(map(mul, row, column)) for column in columns] for row in X]
+
+
+def transposed(X: Rows, columns: int) -> Rows:
+    """Return X', X of that many columns."""
+    return [list(column) for column in zip(*X, strict=True)] if X else [[] for _ in range(columns)]
+
+
+def positive_definite(M: Rows) -> bool:
+    """Whether the symmetric matrix of integers M is positive definite."""
+    return shown(M) or pivots_positive(M)
+
+
+def shown(M: Rows) -> bool:
+    """Whether M is positive definite, shown by a congruence or, where doubles cannot tell, by
+    elimination; False also where doubles say that it is not.
+    """
+    if len(M) <= 2:
+        return pivots_positive(M)
+    if any(M[i][i] <= 0 for i in range(len(M))):
+        return False
+    N, one = _rounded(M), 1 << ENTRY_BITS
+    if any(abs(v) > 2 * one for row in N for v in row):
+        return False  # a minor of two rows is negative
+    L = cholesky([[v / one for v in row] for row in N])
+    if L is None:
+        return False
+    return _dominant(N, _inverse_transposed(L)) or pivots_positive(M)
+
+
+def _rounded(M: Rows) -> Rows:
+    """Return N with M_ij = 2^(e_i + e_j - ENTRY_BITS) (N_ij + r_ij), 0 <= r_ij < 1, N_ii near
+    2^ENTRY_BITS and not above: M in units in which its diagonal is one.
+    """
+    e = [(M[i][i].bit_length() + 1) // 2 for i in range(len(M))]
+    out = []
+    for i, row in enumerate(M):
+        own = []
+        for j, value in enumerate(row):
+            down = e[i] + e[j] - ENTRY_BITS
+            own.append(value >> down if down >= 0 else value << -down)
+        out.append(own)
+    return out
+
+
+def cholesky(M: Sequence[Sequence[float]]) -> list[list[float]] | None:
+    """Return the lower factor of a matrix of doubles; None where a pivot is not positive."""
+    L: list[list[float]] = []
+    for i, row in enumerate(M):
+        own: list[float] = []
+        for j in range(i):
+            other = L[j]
+            own.append((row[j] - sum(map(mul, own, other))) / other[j])
+        pivot = row[i] - sum(v * v for v in own)
+        if not pivot > 0:
+            return None
+        own.append(math.sqrt(pivot))
+        L.append(own)
+    return L
+
+
+def _inverse_transposed(L: list[list[float]]) -> Rows:
+    """Return W = L'^-1 rounded, times 2^FACTOR_BITS, by its columns: rows of L^-1."""
+    n, size = len(L), float(1 << FACTOR_BITS)
+    inverse: list[list[float]] = []
+    for i in range(n):
+        own = [0.0] * n
+        for j in range(i + 1):
+            total = (i == j) - sum(L[i][k] * inverse[k][j] for k in range(j, i))
+            own[j] = total / L[i][i]
+        inverse.append(own)
+    if not all(math.isfinite(v) for row in inverse for v in row):
+        return []
+    return [[round(v * size) for v in row] for row in inverse]
+
+
+def _dominant(N: Rows, back: Rows) -> bool:
+    """Whether W' (N + r) W is strictly dominant in its diagonal for all symmetric r with entries
+    from 0 to 1, W' = `back`: N + r is positive definite then.
+    """
+    if not back:
+        return False
+    Q = product(product(back, N), transposed(back, len(N)))
+    reach = [sum(map(abs, row)) for row in back]
+    every = sum(reach)
+    # |(W' r W)_jk| <= reach_j reach_k
+    return all(
+        2 * row[j] > sum(map(abs, row)) + reach[j] * every
+        for j, row in enumerate(Q)
+    )
+
+
+def pivots_positive(M: Rows) -> bool:
+    """Whether all leading minors are positive, by Bareiss' elimination without fractions."""
+    own, before = [list(row) for row in M], 1
+    while own:
+        pivot, head = own[0][0], own[0][1:]
+        if pivot <= 0:
+            return False
+        own = [
+            [(pivot * v - row[0] * top) // before for v, top in zip(row[1:], head, strict=True)]
+            for row in own[1:]
+        ]
+        before = pivot
+    return True
+
+
+def shortfall(M: Rows) -> float:
+    """Return the least multiple of its own diagonal that must be added to M to make it positive
+    definite, to some digits: how far it is from being so, in no units.
+    """
+    n = len(M)
+    size = [max(M[i][i].bit_length(), 1) // 2 for i in range(n)]
+
+    def entry(i: int, j: int) -> float:
+        down = size[i] + size[j] - 64
+        value = M[i][j] >> down if down >= 0 else M[i][j] << -down
+        return max(min(value / float(1 << 64), 1e150), -1e150)
+
+    own = [[entry(i, j) for j in range(n)] for i in range(n)]
+
+    def enough(t: float) -> bool:
+        trial = [list(row) for row in own]
+        for i in range(n):
+            trial[i][i] += t * (abs(own[i][i]) or 1.0)
+        return cholesky(trial) is not None
+
+    low, high = 0.0, 1e-15
+    while not enough(high) and high < 1e100:
+        low, high = high, 4 * high
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if enough(middle) else (middle, high)
+    return high
