@@ -10,9 +10,8 @@ if not __package__:
     spec = importlib.util.spec_from_file_location(
         "checker", start, submodule_search_locations=[str(start.parent)]
     )
-    assert spec is not None and spec.loader is not None  # noqa: S101 - the file is there
+    assert spec is not None  # noqa: S101 - the file is there
     sys.modules["checker"] = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(sys.modules["checker"])
     __package__ = "checker"
 
 from .report import main

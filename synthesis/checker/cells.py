@@ -11,29 +11,28 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
+from itertools import pairwise
 from itertools import product as combinations
 from typing import NamedTuple
 
-from .polynomials import Box, Polynomial
+from .polynomials import Box, Polynomial, combined, scalar, variable
 from .reading import Model, Parameter
 
 PARTS = 8
 """Parts of the range of a parameter that is the rate of another, where p(k+1) depends on it."""
 
-Point = tuple[Fraction, Fraction, Fraction, Fraction]
-"""p(k+1) at (lower end, lowest), (lower end, highest), (upper end, lowest), (upper end, highest)."""
-
 
 class Strip(NamedTuple):
-    """An interval of one parameter inside one segment of P; where P moves in discrete time, those
-    of the next segment that are reached from it.
+    """An interval of one parameter inside one segment of P; where P moves in discrete time, what of
+    a `following` segment is reached: p(k+1) at (lower end, least), (lower end, largest), (upper
+    end, least), (upper end, largest).
     """
 
     low: Fraction
     high: Fraction
     segment: int
     following: int
-    reached: Point | None
+    reached: tuple[Fraction, ...] | None
 
     @property
     def middle(self) -> Fraction:
@@ -50,6 +49,7 @@ class Cell(NamedTuple):
     here: tuple[Polynomial, ...]
     there: tuple[Polynomial, ...]
     motion: tuple[Parameter, ...]
+    variables: int
 
     @property
     def middle(self) -> tuple[Fraction, ...]:
@@ -57,9 +57,9 @@ class Cell(NamedTuple):
         return tuple(s.middle for s in self.strips)
 
     @property
-    def variables(self) -> int:
-        """Number of variables of the unit box."""
-        return self.here[0].variables
+    def center(self) -> tuple[Fraction, ...]:
+        """The middle of the unit box."""
+        return (Fraction(1, 2),) * self.variables
 
     @property
     def segments(self) -> tuple[int, ...]:
@@ -71,10 +71,25 @@ class Cell(NamedTuple):
         """Segments of P at p(k+1)."""
         return tuple(s.following for s in self.strips)
 
-    def slope(self, F: Polynomial, axis: int) -> Polynomial:
-        """Return dF/dp_axis at a p that moves alone."""
-        strip = self.strips[axis]
-        return F.derivative(axis) * (1 / (strip.high - strip.low))
+    def drifts(self, F: Polynomial, varies: Sequence[bool]) -> list[tuple[str, Polynomial]]:
+        """Return (at which rates, dF/dt) at every corner of the box of rates of the parameters with
+        which F varies.
+        """
+        found = [("", F * 0)]
+        for i, (p, strip) in enumerate(zip(self.motion, self.strips, strict=True)):
+            if not varies[i]:
+                continue
+            slope = F.derivative(i) * (1 / (strip.high - strip.low))
+            if p.tie is not None:
+                along = combined([self.here[p.tie]], [slope])
+                found = [(said, G + along) for said, G in found]
+            elif p.rate is not None:
+                found = [
+                    (f"{said} with dp{i + 1}/dt = {float(rate):.6g}", G + slope * rate)
+                    for said, G in found
+                    for rate in (-p.rate, p.rate)
+                ]
+        return found
 
     def reaches(self, box: Box) -> bool:
         """Whether p can be in this part of the unit box and stay in its ranges forever."""
@@ -95,9 +110,9 @@ class Cell(NamedTuple):
     def place(self, point: Sequence[Fraction]) -> str:
         """Say where a point of the unit box is."""
         said = [
-            f"p{i + 1} = {float(q.at(point)[0][0]):.9g}" for i, q in enumerate(self.here)
+            f"p{i + 1} = {float(q.value(point)[0][0]):.9g}" for i, q in enumerate(self.here)
         ] + [
-            f"p{i + 1} a sample later = {float(q.at(point)[0][0]):.9g}"
+            f"p{i + 1} a sample later = {float(q.value(point)[0][0]):.9g}"
             for i, (q, s) in enumerate(zip(self.there, self.strips, strict=True))
             if s.reached is not None
         ]
@@ -160,39 +175,37 @@ def _strips(
 ) -> Iterator[Strip]:
     """Yield the intervals of one parameter, with each segment of P that is reached from them."""
     inner = knots[1:-1]
-    for a, b in zip(cuts, cuts[1:], strict=False):
+    for a, b in pairwise(cuts):
         own = sum((a + b) / 2 >= k for k in inner)
         if span is None:
             yield Strip(a, b, own, own, None)
             continue
         down, up = span
-        for j, (left, right) in enumerate(zip(knots, knots[1:], strict=False)):
+        for j, (left, right) in enumerate(pairwise(knots)):
             # the segment is reached from left - up to right - down; the limits of p(k+1), clipped
             # to it, are straight lines between these values and those where the clipping begins
             ends = sorted({a, b, *(c for k in (left, right) for c in (k - up, k - down)
                                    if a < c < b)})  # fmt: skip
-            for c, d in zip(ends, ends[1:], strict=False):
+            for c, d in pairwise(ends):
                 if not left - up <= (c + d) / 2 <= right - down:
                     continue
                 q = [min(max(v + s, left), right) for v in (c, d) for s in (down, up)]
-                yield Strip(c, d, own, j, (q[0], q[1], q[2], q[3]))
+                yield Strip(c, d, own, j, tuple(q))
 
 
 def _cell(strips: tuple[Strip, ...], motion: tuple[Parameter, ...]) -> Cell:
     m = len(strips)
     more = [i for i, s in enumerate(strips) if s.reached is not None]
-    variables = m + len(more)
-    one = Polynomial.number(1, variables)
-    here, there = [], []
+    here, there, one = [], [], scalar(1)
     for i, s in enumerate(strips):
-        t = Polynomial.variable(i, variables)
+        t = variable(i)
         p = one * s.low + t * (s.high - s.low)
         here.append(p.reduced())
         if s.reached is None:
             there.append(here[-1])
             continue
-        r = Polynomial.variable(m + more.index(i), variables)
+        r = variable(m + more.index(i))
         a, b, c, d = s.reached
         q = one * a + r * (b - a) + t * (c - a) + t @ r * (a - b - c + d)
         there.append(q.reduced())
-    return Cell(strips, tuple(here), tuple(there), motion)
+    return Cell(strips, tuple(here), tuple(there), motion, m + len(more))

@@ -113,10 +113,7 @@ def _dominant(N: Rows, back: Rows) -> bool:
     reach = [sum(map(abs, row)) for row in back]
     every = sum(reach)
     # |(W' r W)_jk| <= reach_j reach_k
-    return all(
-        2 * row[j] > sum(map(abs, row)) + reach[j] * every
-        for j, row in enumerate(Q)
-    )
+    return all(2 * row[j] > sum(map(abs, row)) + reach[j] * every for j, row in enumerate(Q))
 
 
 def pivots_positive(M: Rows) -> bool:
@@ -136,28 +133,24 @@ def pivots_positive(M: Rows) -> bool:
 
 def shortfall(M: Rows) -> float:
     """Return the least multiple of its own diagonal that must be added to M to make it positive
-    definite, to some digits: how far it is from being so, in no units.
+    definite, to three digits: how far it is from being so, in no units.
     """
-    n = len(M)
-    size = [max(M[i][i].bit_length(), 1) // 2 for i in range(n)]
+    one = 1 << 60
 
-    def entry(i: int, j: int) -> float:
-        down = size[i] + size[j] - 64
-        value = M[i][j] >> down if down >= 0 else M[i][j] << -down
-        return max(min(value / float(1 << 64), 1e150), -1e150)
+    def enough(t: int) -> bool:
+        return shown(
+            [
+                [v * one + (t * abs(v) if i == j else 0) for j, v in enumerate(row)]
+                for i, row in enumerate(M)
+            ]
+        )
 
-    own = [[entry(i, j) for j in range(n)] for i in range(n)]
-
-    def enough(t: float) -> bool:
-        trial = [list(row) for row in own]
-        for i in range(n):
-            trial[i][i] += t * (abs(own[i][i]) or 1.0)
-        return cholesky(trial) is not None
-
-    low, high = 0.0, 1e-15
-    while not enough(high) and high < 1e100:
+    low, high = 0, 1
+    while not enough(high):
         low, high = high, 4 * high
-    for _ in range(40):
-        middle = 0.5 * (low + high)
+        if high > one**3:
+            return math.inf
+    while high - low > high >> 10:
+        middle = (low + high) // 2
         low, high = (low, middle) if enough(middle) else (middle, high)
-    return high
+    return high / one

@@ -8,9 +8,10 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
+from itertools import pairwise
 from itertools import product as combinations
 
-from .polynomials import Polynomial
+from .polynomials import Polynomial, scalar, zero
 
 
 class Functions(ABC):
@@ -38,8 +39,8 @@ class Legendre(Functions):
     def on(self, middle: Fraction, p: Polynomial) -> list[Polynomial]:
         """Return the functions by their recurrence."""
         low, high = self.breaks
-        x = _affine(p, low, high) * 2 - Polynomial.number(1, p.variables)
-        found = [Polynomial.number(1, p.variables), x.reduced()]
+        x = _affine(p, low, high) * 2 - scalar(1)
+        found = [scalar(1), x.reduced()]
         for j in range(1, self.size - 1):
             following = x @ found[j] * (2 * j + 1) - found[j - 1] * j
             found.append((following * Fraction(1, j + 1)).reduced())
@@ -47,7 +48,9 @@ class Legendre(Functions):
 
 
 class BSplines(Functions):
-    """B-splines of a degree on breakpoints, those at the ends repeated (Cox and de Boor)."""
+    """B-splines of a degree on breakpoints, those at the ends repeated (Cox and de Boor); of degree
+    1 they are one at a node and zero at the others.
+    """
 
     def __init__(self, degree: int, breaks: tuple[Fraction, ...]) -> None:
         self.degree, self.breaks, self.size = degree, breaks, len(breaks) - 1 + degree
@@ -57,32 +60,16 @@ class BSplines(Functions):
     def on(self, middle: Fraction, p: Polynomial) -> list[Polynomial]:
         """Return the functions by their recurrence."""
         here, t = self.degree + self.piece(middle), self.knots
-        one, zero = Polynomial.number(1, p.variables), Polynomial.zero(1, 1, p.variables)
-        found = [one if i == here else zero for i in range(len(t) - 1)]
+        found = [scalar(1) if i == here else zero(1, 1) for i in range(len(t) - 1)]
         for d in range(1, self.degree + 1):
             rising = [
-                _affine(p, t[i], t[i + d]) if t[i] < t[i + d] else zero
+                _affine(p, t[i], t[i + d]) if t[i] < t[i + d] else zero(1, 1)
                 for i in range(len(t) - d)
             ]
             found = [
-                (rising[i] @ found[i] + (one - rising[i + 1]) @ found[i + 1]).reduced()
+                (rising[i] @ found[i] + (scalar(1) - rising[i + 1]) @ found[i + 1]).reduced()
                 for i in range(len(t) - d - 1)
             ]
-        return found
-
-
-class Hats(Functions):
-    """Piecewise linear functions, one at a node and zero at the others."""
-
-    def __init__(self, nodes: tuple[Fraction, ...]) -> None:
-        self.breaks, self.size = nodes, len(nodes)
-
-    def on(self, middle: Fraction, p: Polynomial) -> list[Polynomial]:
-        """Return the two that are not zero, and zeros."""
-        k = self.piece(middle)
-        up = _affine(p, self.breaks[k], self.breaks[k + 1])
-        found = [Polynomial.zero(1, 1, p.variables)] * self.size
-        found[k], found[k + 1] = Polynomial.number(1, p.variables) - up, up
         return found
 
 
@@ -98,11 +85,10 @@ class Cubics(Functions):
     def _second_derivatives(self) -> list[list[Fraction]]:
         """Return the second derivatives at every node (rows), of every function (columns)."""
         x, n = self.breaks, self.size
-        h = [b - a for a, b in zip(x, x[1:], strict=False)]
-        zero = Fraction(0)
+        h = [b - a for a, b in pairwise(x)]
         left, right = [], []
         for i in range(n):
-            row, values = [zero] * n, [zero] * n
+            row, values = [Fraction(0)] * n, [Fraction(0)] * n
             if 0 < i < n - 1:
                 row[i - 1 : i + 2] = [h[i - 1], 2 * (h[i - 1] + h[i]), h[i]]
                 values[i - 1 : i + 2] = [6 / h[i - 1], -6 / h[i - 1] - 6 / h[i], 6 / h[i]]
@@ -118,7 +104,7 @@ class Cubics(Functions):
         k = self.piece(middle)
         a, b = self.breaks[k], self.breaks[k + 1]
         up, sixth = _affine(p, a, b), (b - a) ** 2 / 6
-        down = Polynomial.number(1, p.variables) - up
+        down = scalar(1) - up
         bends = [((s @ s @ s) - s) * sixth for s in (down, up)]
         found = []
         for j in range(self.size):
@@ -138,8 +124,11 @@ class Powers(Functions):
         """Return the powers of the interval, and zeros."""
         k, n = self.piece(middle), self.degree + 1
         u = _affine(p, self.breaks[k], self.breaks[k + 1])
-        found = [Polynomial.zero(1, 1, p.variables)] * self.size
-        found[k * n : (k + 1) * n] = [u.power(n - 1 - i) for i in range(n)]
+        found = [zero(1, 1)] * self.size
+        own = [scalar(1)]
+        for _ in range(self.degree):
+            own.append((own[-1] @ u).reduced())
+        found[k * n : (k + 1) * n] = own[::-1]
         return found
 
 
@@ -162,7 +151,7 @@ class Basis:
         each = [f.on(m, q) for f, m, q in zip(self.factors, middle, p, strict=True)]
         found = []
         for k in self.indices:
-            own = Polynomial.number(1, p[0].variables)
+            own = scalar(1)
             for functions, i in zip(each, k, strict=True):
                 own = own @ functions[i]
             found.append(own.reduced())
@@ -171,7 +160,7 @@ class Basis:
 
 def _affine(p: Polynomial, low: Fraction, high: Fraction) -> Polynomial:
     """Return (p - low)/(high - low)."""
-    return ((p - Polynomial.number(low, p.variables)) * (1 / (high - low))).reduced()
+    return ((p - scalar(low)) * (1 / (high - low))).reduced()
 
 
 def solved(left: list[list[Fraction]], right: list[list[Fraction]]) -> list[list[Fraction]]:

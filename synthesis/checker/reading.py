@@ -10,12 +10,12 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from .exact import Rows
-from .functions import Basis, BSplines, Cubics, Functions, Hats, Legendre, Powers
-from .polynomials import Polynomial, Whole, combined
+from .functions import Basis, BSplines, Cubics, Functions, Legendre, Powers
+from .polynomials import Polynomial, combined, matrix
 
 MOST_FUNCTIONS = 100_000
 """Products of functions that a basis may have before those of too large a degree are left out."""
@@ -114,7 +114,7 @@ def ascending(values: Any, name: str, least: int = 2) -> tuple[Fraction, ...]:
         found = tuple(array(values, name, None))
     else:
         found = tuple(number(v, name) for v in items(values, name))
-    if len(found) < least or any(b <= a for a, b in zip(found, found[1:], strict=False)):
+    if len(found) < least or any(b <= a for a, b in pairwise(found)):
         raise Unreadable(f"the file is damaged: {name} do not increase, or are too few")
     return found
 
@@ -212,7 +212,7 @@ def _functions(value: Any) -> Functions:
         degree = whole(field(value, "degree"), "degree", 1)
         return BSplines(degree, ascending(field(value, "breakpoints"), "breakpoints"))
     if kind == "PiecewiseLinear":
-        return Hats(ascending(field(value, "nodes"), "nodes"))
+        return BSplines(1, ascending(field(value, "nodes"), "nodes"))
     if kind in ("Spline", "CubicSpline"):
         return Cubics(ascending(field(value, "nodes"), "nodes", 4))
     if kind == "Patches":
@@ -226,7 +226,7 @@ class Model:
     """dx/dt = A x + B u (sampled: x(k+1)), y = C x + D u, each matrix the sum of f_j(p) M_j."""
 
     basis: Basis
-    matrices: Mapping[str, tuple[Whole, ...]]
+    matrices: Mapping[str, tuple[Polynomial, ...]]
     parameters: tuple[Parameter, ...]
     states: tuple[str, ...]
     inputs: tuple[str, ...]
@@ -251,7 +251,7 @@ class Model:
         sizes = {"A": (x, x), "B": (x, u), "C": (y, x), "D": (y, u)}
         matrices = {
             name: tuple(
-                Whole.of(M)
+                matrix(M, len(columns))
                 for M in array(field(value, name), name, count, len(rows), len(columns))
             )
             for name, (rows, columns) in sizes.items()
@@ -261,12 +261,11 @@ class Model:
     def on(self, middle: Sequence[Fraction], p: Sequence[Polynomial]) -> tuple[Polynomial, ...]:
         """Return A, B, C, D on the box around `middle`, at the polynomials p."""
         functions = self.basis.on(middle, p)
-        x, u = len(self.states), len(self.inputs)
-        widths = {"A": x, "B": u, "C": x, "D": u}
-        return tuple(
-            combined(functions, [Polynomial.constant(M, widths[name], p[0].variables) for M in own])
-            for name, own in self.matrices.items()
-        )
+        return tuple(combined(functions, own) for own in self.matrices.values())
+
+    def same_range(self, other: Model) -> bool:
+        """Whether the parameters have the ranges of another model's."""
+        return [p[:2] for p in self.parameters] == [p[:2] for p in other.parameters]
 
     def breaks(self, axis: int) -> tuple[Fraction, ...]:
         """Return where the polynomials change along a parameter."""
@@ -283,12 +282,11 @@ def period(value: Any) -> Fraction | None:
     return dt
 
 
-def even(rows: Sequence[Sequence[Fraction]]) -> Whole:
-    """Return the symmetric part of a matrix, which is all that a quadratic form sees."""
-    n = range(len(rows))
-    return Whole.of([[(rows[i][j] + rows[j][i]) / 2 for j in n] for i in n])
-
-
-def plain(rows: Rows, below: int) -> list[list[Fraction]]:
-    """Return integers over a number as rationals."""
-    return [[Fraction(v, below) for v in row] for row in rows]
+def bound_of(kind: str, content: Any) -> Fraction:
+    """Return the bound that a certificate claims; 0 of stability, which has none."""
+    if kind == "stability":
+        return Fraction(0)
+    bound = number(field(content, "alpha" if kind == "decay rate" else "gamma"), "the bound")
+    if bound < 0:
+        raise Unreadable("the file is damaged: the bound is below zero")
+    return bound

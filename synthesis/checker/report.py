@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from . import storage
+from . import lft, sets, storage
 from .demands import Claim, failure
 from .reading import Unreadable, field, opened
 
@@ -19,7 +19,10 @@ DAMAGED = (TypeError, ValueError, LookupError, ArithmeticError, AttributeError, 
 def claim_of(kind: str, content: Mapping[str, Any]) -> Claim:
     """Return what a file of this kind claims; raises `Unreadable` for a kind that is not known."""
     if kind in storage.KINDS:
-        return storage.claimed(kind, content)
+        of_lft = field(field(content, "proof"), "route") == "lft"
+        return (lft if of_lft else storage).claimed(kind, content)
+    if kind in sets.KINDS:
+        return sets.claimed(kind, content)
     raise Unreadable(f"claims of the kind {kind!r:.40} are not known")
 
 

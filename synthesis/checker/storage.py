@@ -6,7 +6,7 @@ Continuous time, dP/dt at every corner of the box of rates:
     stability        -(A'P + PA + dP/dt) > 0
     decay rate a     -(A'P + PA + dP/dt + 2 a P) > 0
     energy to peak   -[A'P + PA + dP/dt   PB; .   -I] > 0  and  [P   C'; .   g^2 I] > 0,  D = 0
-    H2               the first of these  and  [diag(P, .., P)   (c_1, .., c_ny)'; .   g^2] > 0,  D = 0
+    H2               the first  and  [diag(P, .., P)   (c_1, .., c_ny)'; .   g^2] > 0,  D = 0
 
 sampled, P+ = P(p(k+1)): A'P+A - P for A'P + PA + dP/dt, A'P+B for PB, B'P+B - I for -I, and
 P - exp(2 a dt) A'P+A > 0; the outputs then see [P 0; 0 I] by [C D]. Always P > 0.
@@ -22,15 +22,21 @@ from itertools import product as combinations
 from math import comb
 from typing import Any, NamedTuple
 
+from . import words
 from .cells import Cell, cells
-from .demands import Claim, Demand, exponential_above
+from .demands import Claim, Demand, exponential
 from .polynomials import (
     Polynomial,
-    Whole,
     bernstein_functions,
     block,
     combined,
+    diagonal,
+    even,
+    matrix,
+    scalar,
     symmetric,
+    variable,
+    zero,
 )
 from .reading import (
     Model,
@@ -38,7 +44,7 @@ from .reading import (
     Unreadable,
     array,
     ascending,
-    even,
+    bound_of,
     field,
     items,
     kind_of,
@@ -48,7 +54,6 @@ from .reading import (
 )
 
 KINDS = ("l2 gain", "stability", "decay rate", "energy-to-peak gain", "h2 gain")
-SIGNS = (-1, 1)
 
 
 @dataclass(frozen=True)
@@ -59,7 +64,7 @@ class Spline:
 
     knots: tuple[tuple[Fraction, ...], ...]
     degrees: tuple[int, ...]
-    values: Mapping[tuple[int, ...], Whole]
+    values: Mapping[tuple[int, ...], Polynomial]
     size: int
 
     def on(self, segments: Sequence[int], p: Sequence[Polynomial]) -> Polynomial:
@@ -67,7 +72,7 @@ class Spline:
         each = []
         for knots, d, j, q in zip(self.knots, self.degrees, segments, p, strict=True):
             left, right = knots[j], knots[j + 1]
-            u = (q - Polynomial.number(left, q.variables)) * (1 / (right - left))
+            u = (q - scalar(left)) * (1 / (right - left))
             each.append(bernstein_functions(d, u.reduced()))
         functions, matrices = [], []
         for k in combinations(*(range(d + 1) for d in self.degrees)):
@@ -76,14 +81,8 @@ class Spline:
                 weight = weight @ own[i]
             place = tuple(j * d + i for j, d, i in zip(segments, self.degrees, k, strict=True))
             functions.append(weight)
-            matrices.append(Polynomial.constant(self.values[place], self.size, p[0].variables))
+            matrices.append(self.values[place])
         return combined(functions, matrices)
-
-    def covers(self, parameters: Sequence[Parameter]) -> bool:
-        """Whether P is known for all p."""
-        return len(self.knots) == len(parameters) and all(
-            k[0] == p.low and k[-1] == p.high for k, p in zip(self.knots, parameters, strict=True)
-        )
 
 
 def spline(knots: Sequence[Any], degrees: Sequence[int], value: Any, size: int) -> Spline:
@@ -131,9 +130,9 @@ class Proof:
     model: Model
     motion: tuple[Parameter, ...]
     P: Spline
-    coordinates: Whole | None = None
+    coordinates: Polynomial | None = None
     order: int = 1
-    slack: tuple[tuple[Fraction, ...], ...] = ()
+    slack: Sequence[Sequence[Fraction]] = ()
     block: Block | None = None
 
     @property
@@ -154,186 +153,125 @@ class Proof:
     @property
     def refused(self) -> str:
         """Say why V proves nothing, before any inequality is looked at."""
-        if not self.P.covers(self.motion):
+        covered = zip(self.P.knots, self.motion, strict=True)
+        if any(k[0] != p.low or k[-1] != p.high for k, p in covered):
             return "V is not known on the whole range of p"
         jumps = (p.tie is None and p.rate is None for p in self.motion)
         if not self.sampled and any(map(all, zip(self.moving, jumps, strict=True))):
             return "V depends on a parameter that may jump, so that V may jump too"
-        passed = any(any(map(any, M.rows)) for M in self.model.matrices["D"])
+        passed = any(M.reduced().terms for M in self.model.matrices["D"])
         if self.of_peaks and not self.sampled and passed:
             return "inputs reach the outputs directly, so that their peaks have no bound"
         return ""
 
-    def demands(self, bound: Fraction | None) -> Iterator[Demand]:
+    def level(self, bound: Fraction) -> Fraction:
+        """Return what stands in the inequalities for a bound."""
+        if self.kind != "decay rate":
+            return bound * bound
+        dt = self.model.dt
+        return 2 * bound if dt is None else exponential(2 * bound * dt)[1]
+
+    def demands(self) -> Iterator[Demand]:
         """Yield everything that must be positive definite."""
         every = list(cells(self.model, self.motion, self.P.knots, self.moving))
         slack = self._slack(every)
         for cell in every:
             P, after = self._P(cell.segments, cell.here), self._P(cell.following, cell.there)
-            yield Demand("V > 0", P, cell.place, cell.reaches)
-            yield from self._falling(cell, P, after, bound, slack)
+            yield Demand("V > 0", P, cell)
+            system = self.model.on(cell.middle, cell.here)
+            drifts = [("", P * 0)] if self.sampled else cell.drifts(P, self.moving)
+            for said, drift in drifts:
+                falling = self._falling(cell, system, P, after, drift)
+                form, paid = falling if not self.slack else (falling[0] - next(slack), None)
+                yield Demand(f"V falls{said}", form, cell, paid)
             if self.of_peaks:
-                yield _of_bound("the outputs seen by V", cell, bound, self._seen(cell, P))
+                form, paid = self._seen(P, system[2], system[3])
+                yield Demand("V bounds the outputs", form, cell, paid)
 
     def _P(self, segments: Sequence[int], p: Sequence[Polynomial]) -> Polynomial:
         P = self.P.on(segments, p)
         if self.coordinates is None:
             return P
-        T = Polynomial.constant(self.coordinates, self.P.size, P.variables)
-        return (T.T @ P @ T).reduced()
+        return (self.coordinates.T @ P @ self.coordinates).reduced()
 
     def _falling(
-        self,
-        cell: Cell,
-        P: Polynomial,
-        after: Polynomial,
-        bound: Fraction | None,
-        slack: Iterator[list[Whole]],
-    ) -> Iterator[Demand]:
-        A, B, C, D = self.model.on(cell.middle, cell.here)
-        if self.order > 1:
-            A = of_monomials(A, self.order)
-        for rates, drift in self._drifts(cell, P):
-            name = f"V falls{rates}"
-            if self.kind == "decay rate":
-                yield _of_bound(name, cell, bound, self._decaying(A, P, after, drift))
-            elif self.kind == "stability" and self.block is None:
-                left = -self._change(A, P, after, drift)
-                for own in [next(slack)] if self.slack else []:
-                    functions = bernstein_functions(len(own) - 1, Polynomial.variable(0, 1))
-                    forms = [Polynomial.constant(M, P.shape[0], 1) for M in own]
-                    left = left - combined(functions, forms)
-                yield Demand(name, left, cell.place, cell.reaches)
-            else:
-                whole_form, paid = self._dissipation(cell, (A, B, C, D), P, after, drift)
-                factor = Fraction(1) if self.of_peaks else None
-
-                def supplied(
-                    g: Fraction | None,
-                    form: Polynomial = whole_form,
-                    paid: Polynomial = paid,
-                    factor: Fraction | None = factor,
-                ) -> Polynomial:
-                    return paid * (factor or (g or Fraction(0)) ** 2) - form
-
-                yield _of_bound(name, cell, bound, supplied)
-
-    def _drifts(self, cell: Cell, P: Polynomial) -> list[tuple[str, Polynomial]]:
-        """Return (at which rates, dP/dt) at every corner of the box of rates."""
-        found = [("", P * 0)]
-        for i, (p, moves) in enumerate(zip(self.motion, self.moving, strict=True)):
-            if self.sampled or not moves:
-                continue
-            slope = cell.slope(P, i)
-            if p.tie is not None:
-                found = [(said, F + slope.times(cell.here[p.tie])) for said, F in found]
-                continue
-            assert p.rate is not None  # noqa: S101 - see `refused`
-            found = [
-                (f"{said} with dp{i + 1}/dt = {float(sign * p.rate):.6g}", F + slope * sign * p.rate)
-                for said, F in found
-                for sign in SIGNS
-            ]
-        return found
-
-    def _change(
-        self, A: Polynomial, P: Polynomial, after: Polynomial, drift: Polynomial, by: Any = 1
-    ) -> Polynomial:
-        """Return the form of dV/dt; sampled of `by` V(k+1) - V(k)."""
-        if self.sampled:
-            return A.T @ after @ A * by - P
-        PA = P @ A
-        return PA + PA.T + drift
-
-    def _decaying(
-        self, A: Polynomial, P: Polynomial, after: Polynomial, drift: Polynomial
-    ) -> Any:
-        dt = self.model.dt
-        if dt is None:
-            return lambda a: -(self._change(A, P, after, drift) + P * (2 * a))
-        return lambda a: -self._change(A, P, after, drift, exponential_above(2 * a * dt))
-
-    def _dissipation(
         self,
         cell: Cell,
         system: Sequence[Polynomial],
         P: Polynomial,
         after: Polynomial,
         drift: Polynomial,
-    ) -> tuple[Polynomial, Polynomial]:
-        """Return the form of dV/dt + |y|^2 in (x, d, u), with the supply of the block, and |u|^2;
-        |y|^2 left out where V bounds the outputs or nothing but stability is claimed.
+    ) -> tuple[Polynomial, Polynomial | None]:
+        """Return the form that is positive definite in (x, d, u), and what is paid for the bound:
+        |u|^2 of a gain. |y|^2 is left out where V bounds the outputs or there is no bound.
         """
         A, B, C, D = system
-        of_d = self.block.inputs if self.block else 0
-        if self.kind == "stability":
-            B, D = B.columns(range(of_d)), D.columns(range(of_d))
-        (n, nu), seen = B.shape, C.shape[0] - (self.block.outputs if self.block else 0)
-        top = self._change(A, P, after, drift)
+        A = of_monomials(A, self.order) if self.order > 1 else A
         if self.sampled:
-            side, corner = A.T @ after @ B, B.T @ after @ B
+            moved = A.T @ after @ A
+            top, side, corner = moved - P, A.T @ after @ B, B.T @ after @ B
         else:
-            side, corner = P @ B, Polynomial.zero(nu, nu, P.variables)
+            moved, PA = P, P @ A
+            top, side, corner = PA + PA.T + drift, P @ B, B.T @ B * 0
+        if self.kind == "decay rate":
+            return (P if self.sampled else -top), -moved
+        d, seen = (self.block.inputs, C.shape[0] - self.block.outputs) if self.block else (0, 0)
+        if self.kind == "stability" and not d:
+            return -top, None
         form = symmetric([[top], [side.T, corner]])
-        if self.kind == "l2 gain":
-            y = block([[C.rows(range(seen)), D.rows(range(seen))]])
-            form = form + y.T @ y
+        size, n = form.shape[0], A.shape[0]
+        y = block([[C, D]])
         if self.block:
-            v = block([[C, D]]).rows(range(seen, C.shape[0]))
-            form = form + self._supply(self.block, cell, v, n)
-        paid = diagonal(range(n + of_d, n + nu), n + nu)
-        return form, Polynomial.constant(paid, n + nu, P.variables)
+            form = form + self._supply(self.block, cell, y.part(range(seen, C.shape[0])), n)
+            y = y.part(range(seen))
+        energy = diagonal(range(n + d, size), size)
+        if self.of_peaks:
+            return energy - form, None
+        if self.kind == "stability":
+            return (-form).part(range(n + d), range(n + d)), None
+        return -(form + y.T @ y), energy
 
     def _supply(self, own: Block, cell: Cell, v: Polynomial, row: int) -> Polynomial:
         """Return the sum over the parts of lambda (bound^2 v'v - d'd); d begins at `row`."""
         size, first = v.shape[1], 0
-        total = Polynomial.zero(size, size, v.variables)
+        total = zero(size, size)
         for (nd, nv, _), multiplier in zip(own.parts, own.multipliers, strict=True):
-            rows = v.rows(range(first, first + nv))
-            of_d = Polynomial.constant(diagonal(range(row, row + nd), size), size, v.variables)
+            rows = v.part(range(first, first + nv))
+            of_d = diagonal(range(row, row + nd), size)
             form = rows.T @ rows * own.bound**2 - of_d
-            total = total + form.times(multiplier.on(cell.segments, cell.here))
+            factor = multiplier.on(cell.segments, cell.here)
+            total = total + combined([factor], [form])
             row, first = row + nd, first + nv
         return total
 
-    def _seen(self, cell: Cell, P: Polynomial) -> Any:
-        """Return, of a bound, the matrix by which V (sampled: and the input) bounds the outputs."""
-        _, _, C, D = self.model.on(cell.middle, cell.here)
-        ny, nu = D.shape
+    def _seen(self, P: Polynomial, C: Polynomial, D: Polynomial) -> tuple[Polynomial, Polynomial]:
+        """Return the form by which V (sampled: and the input) bounds the outputs, and what is paid
+        for the bound.
+        """
+        (ny, nu), n = D.shape, P.shape[0]
         if self.sampled:
-            eye = Polynomial.identity(nu, P.variables)
-            P = symmetric([[P], [Polynomial.zero(nu, P.shape[0], P.variables), eye]])
-            C = block([[C, D]])
-        n = P.shape[0]
-        if self.kind == "energy-to-peak gain":
-            eye = Polynomial.identity(ny, P.variables)
-            return lambda g: symmetric([[P], [C, eye * g**2]])
-        none, rows = Polynomial.zero(n, n, P.variables), [C.rows([i]) for i in range(ny)]
-        one = Polynomial.number(1, P.variables)
-        copies = [[none] * i + [P] for i in range(ny)]
-        return lambda g: symmetric([*copies, [*rows, one * g**2]])
+            eye = diagonal(range(nu), nu)
+            P = symmetric([[P], [zero(nu, n), eye]])
+            C, n = block([[C, D]]), n + nu
+        if self.kind == "h2 gain":
+            none, rows = zero(n, n), [C.part([i]) for i in range(ny)]
+            P = symmetric([[none] * i + [P] for i in range(ny)])
+            C, n, ny = block([rows]), n * ny, 1
+        size = n + ny
+        paid = diagonal(range(n, size), size)
+        return symmetric([[P], [C, zero(ny, ny)]]), paid
 
-    def _slack(self, every: Sequence[Cell]) -> Iterator[list[Whole]]:
-        """Yield the weights of each inequality in the order of the cells, as matrices."""
+    def _slack(self, every: Sequence[Cell]) -> Iterator[Polynomial]:
+        """Yield L(p) with z' L z = 0 of each inequality in the order of the cells."""
         if not self.slack:
             return
-        moves = self.moving[0]
-        each, rest = divmod(len(self.slack), len(every) * (2 if moves else 1))
+        each, rest = divmod(len(self.slack), len(every) * (2 if self.moving[0] else 1))
         if rest or not each:
             raise Unreadable("the file is damaged: rows of slack that fit no degree")
-        zero = null_forms(len(self.model.states), self.order)
-        for k in range(0, len(self.slack), each):
-            yield [zero(row) for row in self.slack[k : k + each]]
-
-
-def _of_bound(name: str, cell: Cell, bound: Fraction | None, made: Any) -> Demand:
-    """Return a demand that rests on a bound."""
-    return Demand(name, made(bound), cell.place, cell.reaches, made)
-
-
-def diagonal(ones: Sequence[int], size: int) -> Whole:
-    """Return the diagonal matrix with these ones."""
-    return Whole([[int(i == j and i in ones) for j in range(size)] for i in range(size)], 1)
+        functions = bernstein_functions(each - 1, variable(0))
+        forms = null_forms(self.slack, len(self.model.states), self.order)
+        for k in range(0, len(forms), each):
+            yield combined(functions, forms[k : k + each])
 
 
 def monomials(n: int, order: int) -> list[tuple[int, ...]]:
@@ -355,33 +293,28 @@ def of_monomials(A: Polynomial, order: int) -> Polynomial:
                     other = (*factors[:at], j, *factors[at + 1 :])
                     own[i][place[tuple(sorted(other))]] += rows[factor][j]
         terms[k] = own
-    return Polynomial((len(z), len(z)), A.variables, terms, A.below)
+    return Polynomial((len(z), len(z)), terms, A.below)
 
 
-def null_forms(n: int, order: int) -> Any:
-    """Return the function from weights to a symmetric L with z' L z = 0: each weight stands at a
-    pair of monomials, and is taken away at the first pair with the same product.
+def null_forms(weights: Sequence[Sequence[Fraction]], n: int, order: int) -> list[Polynomial]:
+    """Return symmetric L with z' L z = 0 of rows of weights: each weight stands at a pair of
+    monomials, and is taken away at the first pair with the same product.
     """
-    z = monomials(n, order)
-    first: dict[tuple[int, ...], tuple[int, int]] = {}
-    pairs = []
+    z, first, pairs = monomials(n, order), {}, []
     for b in range(len(z)):
         for a in range(b + 1):
             same = first.setdefault(tuple(sorted(z[a] + z[b])), (a, b))
             if same != (a, b):
                 pairs.append(((a, b), same))
-
-    def made(weights: Sequence[Fraction]) -> Whole:
-        if len(weights) != len(pairs):
-            raise Unreadable("the file is damaged: another number of weights of slack")
-        rows = [[Fraction(0)] * len(z) for _ in z]
-        for weight, entries in zip(weights, pairs, strict=True):
+    found = []
+    for row in weights:
+        L = [[Fraction(0)] * len(z) for _ in z]
+        for weight, entries in zip(row, pairs, strict=True):
             for sign, (a, b) in zip((1, -1), entries, strict=True):
-                rows[a][b] += sign * weight
-                rows[b][a] += sign * weight
-        return Whole.of(rows)
-
-    return made
+                L[a][b] += sign * weight
+                L[b][a] += sign * weight
+        found.append(matrix(L, len(z)))
+    return found
 
 
 def read(kind: str, content: Any) -> Proof:
@@ -407,7 +340,7 @@ def read(kind: str, content: Any) -> Proof:
     size = comb(n + order - 1, order) if n else 0
     P = spline([field(V, "knots")], [degree], field(V, "coefficients"), size)
     T, slack = field(V, "coordinates"), field(V, "slack")
-    coordinates = None if T is None else Whole.of(array(T, "coordinates", n, n))
+    coordinates = None if T is None else matrix(array(T, "coordinates", n, n), n)
     rows = () if slack is None else tuple(map(tuple, array(slack, "slack", None, None)))
     if order > 1 and (model.dt is not None or kind != "stability" or model.inputs or T is not None):
         raise Unreadable("a V of higher degree is known for stability in continuous time only")
@@ -470,59 +403,27 @@ def _block(value: Any, multiplier: Any, model: Model, knots: Any) -> Block | Non
         column = [row[k] for row in rows]
         if dynamic and len(set(column)) > 1:
             raise Unreadable("the multiplier of dynamics depends on p")
-        values = {(i,): Whole.of([[v]]) for i, v in enumerate(column)}
+        values = {(i,): scalar(v) for i, v in enumerate(column)}
         multipliers.append(Spline((ascending(knots, "knots"),), (degree,), values, 1))
     return own._replace(multipliers=tuple(multipliers))
 
 
 def claimed(kind: str, content: Any) -> Claim:
     """Return what a certificate of these kinds claims."""
-    bound = None
-    if kind != "stability":
-        bound = number(field(content, "alpha" if kind == "decay rate" else "gamma"), "the bound")
-        if bound < 0:
-            raise Unreadable("the file is damaged: the bound is below zero")
-    proof = read(kind, content)
+    bound, proof = bound_of(kind, content), read(kind, content)
+    said = words.model(proof.model, proof.motion)
+    for d, v, dynamic in proof.block.parts if proof.block else ():
+        how = "dynamics at rest at the start" if dynamic else "constant or moving in any way"
+        size = float(proof.block.bound) if proof.block else 0.0
+        said.append(
+            f"the next {d} inputs, from the first, are Delta times {v} outputs ....{size}{how}"
+        )
     return Claim(
-        sentence(kind, bound, proof.order),
-        hypotheses(proof.model, proof.motion, proof.block),
-        proof.demands(bound),
+        words.gain(kind, bound),
+        said,
+        proof.demands(),
         bound,
-        kind != "decay rate",
+        proof.level,
+        kind == "decay rate",
         proof.refused,
     )
-
-
-def sentence(kind: str, bound: Fraction | None, order: int = 1) -> str:
-    """Return the claim in words."""
-    size = "" if bound is None else repr(float(bound))
-    return {
-        "l2 gain": f"the energy gain is below {size}: |y|_2 < {size} |u|_2 from rest",
-        "stability": "the state tends to zero exponentially from every start without inputs",
-        "decay rate": f"|x(t)| <= c exp(-a t) |x(0)| for some c, without inputs, a = {size} 1/s",
-        "energy-to-peak gain": f"from rest |y(t)| < {size} |u|_2 at every t",
-        "h2 gain": f"from rest, in white noise of unit intensity, E |y(t)|^2 < {size}^2 at every t",
-    }[kind] + (f" (by a V of degree {2 * order} in x)" if order > 1 else "")
-
-
-def hypotheses(
-    model: Model, motion: Sequence[Parameter], own: Block | None = None
-) -> tuple[str, ...]:
-    """Return in words of which model a claim is, and how its parameters move."""
-    d, v = (own.inputs, own.outputs) if own else (0, 0)
-    sizes = f"{len(model.states)} states x, {len(model.inputs) - d} inputs u,"
-    time = "continuous time" if model.dt is None else f"samples of {float(model.dt)!r} s"
-    said = [f"a model of {sizes} {len(model.outputs) - v} outputs y, in {time}"]
-    for i, p in enumerate(motion):
-        how = (
-            f"dp{i + 1}/dt = p{p.tie + 1}"
-            if p.tie is not None
-            else "arbitrarily fast"
-            if p.rate is None
-            else f"|dp{i + 1}/dt| <= {float(p.rate)!r} per second"
-        )
-        said.append(f"p{i + 1} stays in [{float(p.low)!r}, {float(p.high)!r}], {how}")
-    for nd, nv, dynamic in own.parts if own else ():
-        how = "dynamics at rest at the start" if dynamic else "constant or moving in any way"
-        said.append(f"a Delta ({nd} x {nv}) of gain <= {float(own.bound)!r}, {how}, d = Delta v")
-    return tuple(said)

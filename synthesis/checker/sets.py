@@ -1,0 +1,206 @@
+"""Sets of states that no motion leaves, within limits, with u = K(p) x.
+
+x' Q(p)^-1 x <= 1, disturbances |w_i| <= 1 (W has their amplitudes), Y = K Q, at every corner of
+dQ/dt:
+
+    [dQ/dt - alpha Q - (AQ + BY) - (AQ + BY)'   -W; .   diag(tau)] > 0,  tau >= 0,  sum tau <= alpha
+
+sampled, Q constant in time:
+
+    [(1 - alpha) Q   0   (AQ + BY)'; .   diag(tau)   W'; .   .   Q] > 0
+
+so that V = x' Q^-1 x falls where V > 1. A limit |c x + d u| <= b holds in it where [Q   (cQ + dY)';
+.   b^2] > 0. Or the set |V^-1 x|_inf <= 1, sampled: every row of [V^-1 (A + BK) V   V^-1 W] has an
+absolute sum of at most 1, and |c x| <= b where that of c V is at most b.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+from . import words
+from .cells import Cell, cells
+from .demands import Claim, Demand
+from .functions import solved
+from .polynomials import (
+    Polynomial,
+    bernstein_coefficients,
+    block,
+    diagonal,
+    matrix,
+    symmetric,
+    zero,
+)
+from .reading import Model, Unreadable, array, field, items, number
+
+KINDS = ("InvariantSet", "LowComplexitySet")
+
+
+class Loop(NamedTuple):
+    """A model with its feedback (None: Y is part of the set), disturbances, controls and limits."""
+
+    model: Model
+    feedback: Model | None
+    disturbance: Mapping[str, Fraction]
+    controls: tuple[str, ...]
+    limits: Mapping[str, Fraction]
+
+    @classmethod
+    def read(cls, content: Any) -> Loop:
+        """Return the loop that a file holds."""
+        own, K = Model.read(field(content, "model")), field(content, "feedback")
+        K = None if K is None else Model.read(K)
+        controls = tuple(items(field(content, "controls"), "controls"))
+        sizes = []
+        for name in ("disturbance", "state_bounds", "input_bounds"):
+            pairs = [items(pair, name) for pair in items(field(content, name), name)]
+            sizes.append({str(key): number(value, name) for key, value in pairs})
+            if len(sizes[-1]) < len(pairs) or any(v <= 0 for v in sizes[-1].values()):
+                raise Unreadable(f"the file is damaged: {name} of one name, or not above zero")
+        if sorted([*sizes[0], *controls]) != sorted(own.inputs):
+            raise Unreadable("the file is damaged: an input is no disturbance or control, or both")
+        if not {*sizes[1]} <= {*own.states, *own.outputs} or not {*sizes[2]} <= {*controls}:
+            raise Unreadable("the file is damaged: a limit of no state, output or control")
+        if K and (K.states or K.inputs != own.states or K.outputs != controls):
+            raise Unreadable("the file is damaged: the feedback is not one of states to controls")
+        if K and not K.same_range(own):
+            raise Unreadable("the file is damaged: the feedback is on another range")
+        return cls(own, K, sizes[0], controls, sizes[1] | sizes[2])
+
+    @property
+    def refused(self) -> str:
+        """Say which limit no set of states can keep."""
+        y = [
+            i
+            for i, name in enumerate(self.model.outputs)
+            if name in self.limits and name not in self.model.states
+        ]
+        w = [self.model.inputs.index(name) for name in self.disturbance]
+        passed = any(M.part(y, w).reduced().terms for M in self.model.matrices["D"])
+        return "disturbances reach a limited output directly" if passed else ""
+
+    def on(self, cell: Cell) -> tuple[Polynomial, ...]:
+        """Return A, B of the controls, W of disturbances of size 1, C, D of the controls, and K."""
+        A, B, C, D = self.model.on(cell.middle, cell.here)
+        u, w = (
+            [self.model.inputs.index(n) for n in own] for own in (self.controls, self.disturbance)
+        )
+        x, y = range(A.shape[0]), range(C.shape[0])
+        K = self.feedback.on(cell.middle, cell.here)[3] if self.feedback else zero(len(u), len(x))
+        sizes = _diagonal([*self.disturbance.values()])
+        return A, B.part(x, u), B.part(x, w) @ sizes, C, D.part(y, u), K
+
+    def limited(
+        self, x: Polynomial, y: Polynomial, u: Polynomial
+    ) -> Iterator[tuple[str, Polynomial, Fraction]]:
+        """Yield (what is limited, its row of x, y or u, the limit)."""
+        own = self.model
+        for name, limit in self.limits.items():
+            for what, among, rows in (
+                ("u", self.controls, u), ("x", own.states, x), ("y", own.outputs, y)
+            ):  # fmt: skip
+                if name in among:
+                    i = among.index(name)
+                    yield f"{what}{i + 1}", rows.part([i]), limit
+                    break
+
+    @property
+    def said(self) -> tuple[str, ...]:
+        """The hypotheses and limits in words."""
+        sizes = [f"|w{i + 1}| <= {float(v)!r}" for i, v in enumerate(self.disturbance.values())]
+        n = zero(max(len(g) for g in (self.model.states, self.model.outputs, self.controls)), 1)
+        limits = [f"|{what}| <= {float(v)!r}" for what, _, v in self.limited(n, n, n)]
+        return (
+            *words.model(self.model, self.model.parameters),
+            f"disturbances {', '.join(sizes) or 'w = 0'} with any history",
+            f"limits {', '.join(limits)}",
+        )
+
+
+def claimed(kind: str, content: Any) -> Claim:
+    """Return what a file of a set claims."""
+    loop = Loop.read(content)
+    if kind == "InvariantSet":
+        return _ellipsoid(loop, content)
+    return _parallelepiped(loop, content)
+
+
+def _ellipsoid(loop: Loop, content: Any) -> Claim:
+    own, shape = loop.model, Model.read(field(content, "shape"))
+    alpha = number(field(content, "alpha"), "alpha")
+    tau = array(field(content, "shares"), "shares", len(loop.disturbance))
+    outputs = 0 if loop.feedback else len(loop.controls)
+    n, motion = len(own.states), own.parameters
+    if (len(shape.states), len(shape.outputs)) != (n, outputs) or not shape.same_range(own):
+        raise Unreadable("the file is damaged: the set is not one of these states and this range")
+    every = list(cells(own, motion, [(p.low, p.high) for p in motion], [False] * len(motion)))
+    refused = loop.refused
+    if any(t < 0 for t in tau) or alpha < 0 or sum(tau) > alpha:
+        refused = "the multipliers of the disturbances are below zero, or more than alpha together"
+    if any(p.low < b < p.high for i, p in enumerate(motion) for b in shape.breaks(i)):
+        refused = "Q(p) is not one polynomial"
+    Q = shape.on(every[0].middle, every[0].here)[0].reduced()
+    varies = [any(len(k) > i and k[i] for k in Q.terms) for i in range(len(motion))]
+    for p, moves in zip(motion, varies, strict=True):
+        if moves and (p.rate is None and p.tie is None if own.dt is None else p.rate != 0):
+            refused = "Q depends on a parameter that may jump, or sampled on one that moves"
+
+    def demands() -> Iterator[Demand]:
+        shares, nw = _diagonal(tau), len(tau)
+        for cell in every:
+            A, B, W, C, D, K = loop.on(cell)
+            Q, _, Y, _ = shape.on(cell.middle, cell.here)
+            Q = (Q + Q.T) * Fraction(1, 2)
+            Y = K @ Q if loop.feedback else Y
+            change = A @ Q + B @ Y
+            if own.dt is not None:
+                lower = [[Q * (1 - alpha)], [zero(nw, n), shares], [change, W, Q]]
+                yield Demand("V falls", symmetric(lower), cell)
+            for said, drift in cell.drifts(Q, varies) if own.dt is None else ():
+                top = drift - Q * alpha - change - change.T
+                yield Demand(f"V falls{said}", symmetric([[top], [-W.T, shares]]), cell)
+            for what, row, limit in loop.limited(Q, C @ Q + D @ Y, Y):
+                square = matrix([[limit * limit]], 1)
+                yield Demand(f"the limit of {what}", symmetric([[Q], [row, square]]), cell)
+
+    said = "no motion that starts in an ellipsoid x' Q(p)^-1 x <= 1 leaves it, or exceeds a limit"
+    return Claim(said, loop.said, demands(), refused=refused)
+
+
+def _parallelepiped(loop: Loop, content: Any) -> Claim:
+    own, motion, n = loop.model, loop.model.parameters, len(loop.model.states)
+    V = array(field(content, "V"), "V", n, n)
+    said = "no motion that starts in a parallelepiped |V^-1 x| <= 1 leaves it, or exceeds a limit"
+    refused = loop.refused
+    if own.dt is None or (loop.controls and loop.feedback is None):
+        raise Unreadable("a parallelepiped is known for sampled loops with a feedback only")
+    columns, eye = matrix(V, n), diagonal(range(n), n)
+    try:
+        back = matrix(solved(V, eye.value(())), n)
+    except ZeroDivisionError:
+        return Claim(said, loop.said, (), refused="the parallelepiped is flat")
+    knots = [
+        sorted({p.low, p.high, *(loop.feedback.breaks(i) if loop.feedback else ())})
+        for i, p in enumerate(motion)
+    ]
+    for cell in cells(own, motion, knots, [False] * len(motion)):
+        A, B, W, C, D, K = loop.on(cell)
+        moved, nw = [back @ (A + B @ K) @ columns, back @ W], W.shape[1]
+        rows = [[*moved, matrix([[1]] * n, 1)]] + [
+            [row @ columns, zero(1, nw), matrix([[limit]], 1)]
+            for _, row, limit in loop.limited(eye, C + D @ K, K)
+        ]
+        for values in bernstein_coefficients(block(rows), cell.variables).values():
+            for *row, most in values:
+                if sum(map(abs, row)) > most:
+                    excess = sum(map(abs, row)) / most - 1
+                    where = cell.place(cell.center)
+                    refused = f"an absolute sum is {excess:.3g} above its limit near {where}"
+    return Claim(said, loop.said, (), refused=refused)
+
+
+def _diagonal(values: list[Fraction]) -> Polynomial:
+    n = len(values)
+    return matrix([[v * (i == j) for j in range(n)] for i, v in enumerate(values)], n)
