@@ -18,14 +18,15 @@ LARGEST_FACTOR = 1e6
 
 
 class Demand(NamedTuple):
-    """`matrix` + level `paid` is positive definite on a cell (None: it has no parameters); `name`
-    is the inequality in words, the level belongs to the bound that is claimed.
+    """`matrix` + level `paid` is positive definite on a cell, or without one on a unit box of some
+    variables; `name` is the inequality in words, the level belongs to the bound that is claimed.
     """
 
     name: str
     matrix: Polynomial
     cell: Cell | None = None
     paid: Polynomial | None = None
+    variables: int = 0
 
     def at_level(self, level: Fraction) -> Polynomial:
         """Return what is positive definite."""
@@ -55,7 +56,8 @@ def failure(claim: Claim) -> str:
     level = claim.level(claim.bound)
     for demand in claim.demands:
         F, cell = demand.at_level(level), demand.cell
-        miss = first_miss(F, cell.variables, cell.reaches) if cell else first_miss(F, 0)
+        box = (cell.variables, cell.reaches) if cell else (demand.variables,)
+        miss = first_miss(F, *box)
         if miss is None:
             continue
         where = f" at {cell.place(miss.point)}" if cell else ""

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
 from itertools import pairwise
 from itertools import product as combinations
@@ -138,13 +138,9 @@ class Basis:
     """
 
     def __init__(self, factors: Sequence[Functions], total: int | None = None) -> None:
-        self.factors, self.total = tuple(factors), total
-
-    @property
-    def indices(self) -> Iterator[tuple[int, ...]]:
-        """Which function of each factor makes up each product."""
-        every = combinations(*(range(f.size) for f in self.factors))
-        return (k for k in every if self.total is None or sum(k) <= self.total)
+        self.factors = tuple(factors)
+        every = combinations(*(range(f.size) for f in factors))
+        self.indices = [k for k in every if total is None or sum(k) <= total]
 
     def on(self, middle: Sequence[Fraction], p: Sequence[Polynomial]) -> list[Polynomial]:
         """Return the products on the box around `middle`, at the polynomials p."""

@@ -12,24 +12,14 @@ or where Q_ii < 0, so that N is concave in each delta_i alone, and N > 0 at the 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import product as combinations
 from typing import Any
 
 from . import words
 from .demands import Claim, Demand
-from .polynomials import Polynomial, block, diagonal, even, matrix
-from .reading import (
-    Unreadable,
-    array,
-    bound_of,
-    field,
-    items,
-    names,
-    parameters,
-    period,
-    whole,
-)
+from .polynomials import Polynomial, block, diagonal, even, identity, matrix
+from .reading import INFINITE, Unreadable, array, bound_of, names, parameters, period, whole
 
 MOST_CORNERS = 4096
 """Corners of the box at which a multiplier is checked."""
@@ -37,80 +27,70 @@ MOST_CORNERS = 4096
 
 def claimed(kind: str, content: Any) -> Claim:
     """Return what a certificate of an LFT claims."""
-    proof = field(content, "proof")
-    lft, V = field(proof, "lft"), field(proof, "lyapunov")
-    blocks = items(field(lft, "blocks"), "blocks")
-    motion = parameters([field(each, "scheduling") for each in blocks])
-    sizes = [whole(field(each, "size"), "the size of a block", 0, 10**4) for each in blocks]
-    x, u, y = (names(field(lft, name), name) for name in ("states", "inputs", "outputs"))
-    dt, (nw, nx, nu, ny) = period(field(lft, "dt")), (sum(sizes), len(x), len(u), len(y))
-    if kind != ("l2 gain" if nu else "stability"):
-        raise Unreadable(f"an LFT of {nu} inputs has no proof of the kind {kind!r:.40}")
-    if field(content, "rates") != [{"float": "inf"}] * len(motion):
+    lft, V = content["proof"]["lft"], content["proof"]["lyapunov"]
+    motion = parameters([each["scheduling"] for each in lft["blocks"]])
+    sizes = [whole(each["size"], "the size of a block", 0, 10**4) for each in lft["blocks"]]
+    x, u, y = (len(names(lft[name])) for name in ("states", "inputs", "outputs"))
+    w, dt = sum(sizes), period(lft["dt"])
+    if kind != ("l2 gain" if u else "stability"):
+        raise Unreadable(f"an LFT of {u} inputs has no proof of the kind {kind!r:.40}")
+    if content["rates"] != [INFINITE] * len(motion):
         raise Unreadable("the proof of an LFT is for parameters that jump, the claim is not")
-    parts = {
-        name: matrix(array(field(lft, name), name, rows, columns), columns)
-        for name, rows, columns in (
-            ("M11", nw, nw), ("M12", nw, nx + nu), ("M21", nx + ny, nw), ("M22", nx + ny, nx + nu)
-        )
-    }  # fmt: skip
-    M = block([[parts["M11"], parts["M12"]], [parts["M21"], parts["M22"]]])
-    P = even(array(field(V, "P"), "P", nx, nx))
-    given = field(V, "multiplier")
-    Q, S, R = (array(field(given, name), name, nw, nw) for name in "QSR")
-    multiplier = even(Q), matrix(S, nw), even(R)
-    if field(given, "sizes") != sizes:
+    if V["multiplier"]["sizes"] != sizes:
         raise Unreadable("the multiplier is not one of the blocks of the LFT")
+    (M11, M12), (M21, M22) = (
+        [matrix(array(lft[f"M{i}{j}"], "the LFT", rows, n), n) for j, n in ((1, w), (2, x + u))]
+        for i, rows in ((1, w), (2, x + y))
+    )
+    M, P = block([[M11, M12], [M21, M22]]), even(array(V["P"], "P", x, x))
+    Q, S, R = (array(V["multiplier"][name], "a multiplier", w, w) for name in "QSR")
+    multiplier, bound = (even(Q), matrix(S, w), even(R)), bound_of(kind, content)
 
     def demands() -> Iterator[Demand]:
         yield Demand("V > 0", P)
-        yield from _nonnegative(multiplier, sizes)
-        yield _falling(M, P, multiplier, nw, nu, dt is not None)
+        yield from _nonnegative(*multiplier, sizes)
+        yield _falling(M, P, multiplier, u, dt is not None)
 
-    bound = bound_of(kind, content)
     jumping = [p._replace(rate=None, tie=None) for p in motion]
-    said = [words.sizes(nx, nu, ny, dt), *words.motion(jumping)]
+    said = [words.sizes(x, u, y, dt), *words.motion(jumping)]
     return Claim(words.gain(kind, bound), said, demands(), bound, lambda g: g * g)
 
 
 def _falling(
-    M: Polynomial, P: Polynomial, multiplier: Any, nw: int, nu: int, sampled: bool
+    M: Polynomial, P: Polynomial, multiplier: Sequence[Polynomial], inputs: int, sampled: bool
 ) -> Demand:
-    """Return the inequality of dV/dt in (w, x, u); of stability in (w, x)."""
-    nx, size = P.shape[0], M.shape[1]
-    Q, S, R = multiplier
+    """Return the inequality of dV/dt in (w, x, u); without y where there is no u."""
+    nx, size, (Q, S, R) = P.shape[0], M.shape[1], multiplier
+    nw = Q.shape[0]
     z, move, y = (M.part(range(a, b)) for a, b in ((0, nw), (nw, nw + nx), (nw + nx, M.shape[0])))
-    everything = diagonal(range(size), size)
-    w, x = everything.part(range(nw)), everything.part(range(nw, nw + nx))
+    w, x = identity(size).part(range(nw)), identity(size).part(range(nw, nw + nx))
     cross = w.T @ S @ z
     form = z.T @ R @ z + w.T @ Q @ w + cross + cross.T
-    if sampled:
-        form = form + move.T @ P @ move - x.T @ P @ x
-    else:
-        slope = x.T @ P @ move
-        form = form + slope + slope.T
-    if nu:
-        form = form + y.T @ y
-    return Demand("V falls", -form, None, diagonal(range(nw + nx, size), size) if nu else None)
+    slope = x.T @ P @ move
+    change = move.T @ P @ move - x.T @ P @ x if sampled else slope + slope.T
+    if not inputs:
+        return Demand("V falls", -(form + change))
+    energy = diagonal([int(i >= nw + nx) for i in range(size)])
+    return Demand("V falls", -(form + change + y.T @ y), None, energy)
 
 
-def _nonnegative(multiplier: Any, sizes: list[int]) -> Iterator[Demand]:
+def _nonnegative(
+    Q: Polynomial, S: Polynomial, R: Polynomial, sizes: Sequence[int]
+) -> Iterator[Demand]:
     """Yield what makes the multiplier nonnegative for every Delta of the box."""
-    Q, S, R = multiplier
     owner = [i for i, size in enumerate(sizes) for _ in range(size)]
     n = range(len(owner))
-    apart = [(a, b) for a in n for b in n if owner[a] != owner[b]]
-    coupled = any(M.part([a], [b]).reduced().terms for M in (S, R) for a, b in apart)
-    scalings = not (coupled or (Q + R).reduced().terms or (S + S.T).reduced().terms)
-    places = [[k for k in n if owner[k] == i] for i in range(len(sizes))]
-    for own in places:
+    for i in range(len(sizes)):
+        own = [k for k in n if owner[k] == i]
         yield Demand("the multiplier is concave in each parameter", -Q.part(own, own))
-    if scalings:
+    apart = [(a, b) for a in n for b in n if owner[a] != owner[b]]
+    zeros = [M.part([a], [b]) for M in (S, R) for a, b in apart] + [Q + R, S + S.T]
+    if not any(M.reduced().terms for M in zeros):
         return
     if 2 ** len(sizes) > MOST_CORNERS:
         raise Unreadable("the multiplier has more corners than this checker looks at")
     for signs in combinations((-1, 1), repeat=len(sizes)):
-        Delta = matrix([[signs[owner[i]] * (i == j) for j in n] for i in n], len(n))
+        Delta = diagonal([signs[i] for i in owner])
         turned = Delta @ S
         at_corner = Delta @ Q @ Delta + turned + turned.T + R
         yield Demand(f"the multiplier is positive at delta = {signs}", at_corner)

@@ -128,9 +128,15 @@ def zero(rows: int, columns: int) -> Polynomial:
     return Polynomial((rows, columns), {})
 
 
-def diagonal(ones: Sequence[int], size: int) -> Polynomial:
-    """Return the diagonal matrix that is one at these places and zero elsewhere."""
-    return matrix([[int(i == j and i in ones) for j in range(size)] for i in range(size)], size)
+def diagonal(values: Sequence[Fraction | int]) -> Polynomial:
+    """Return the diagonal matrix of these values."""
+    n = range(len(values))
+    return matrix([[values[i] if i == j else 0 for j in n] for i in n], len(n))
+
+
+def identity(n: int) -> Polynomial:
+    """Return the identity."""
+    return diagonal([1] * n)
 
 
 def even(rows: Sequence[Sequence[Fraction]]) -> Polynomial:

@@ -6,23 +6,32 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from . import lft, sets, storage
+from . import dwell, lagged, lft, sets, storage
 from .demands import Claim, failure
-from .reading import Unreadable, field, opened
+from .reading import DAMAGED, TUBE, Unreadable, opened
 
 PROVEN, NOT_PROVEN, UNKNOWN = 0, 1, 2
-
-DAMAGED = (TypeError, ValueError, LookupError, ArithmeticError, AttributeError, RecursionError)
-"""Errors that values of a damaged file may raise beyond those that are looked for."""
 
 
 def claim_of(kind: str, content: Mapping[str, Any]) -> Claim:
     """Return what a file of this kind claims; raises `Unreadable` for a kind that is not known."""
     if kind in storage.KINDS:
-        of_lft = field(field(content, "proof"), "route") == "lft"
-        return (lft if of_lft else storage).claimed(kind, content)
+        proof = content["proof"]
+        if proof is None:
+            raise Unreadable("the file holds no proof")
+        if proof["route"] == "lft":
+            return lft.claimed(kind, content)
+        of_lag = proof["lyapunov"]["type"] == "MemoryLyapunov"
+        return (lagged if of_lag else storage).claimed(kind, content)
     if kind in sets.KINDS:
         return sets.claimed(kind, content)
+    if kind == dwell.KIND:
+        return dwell.claimed(kind, content)
+    if kind == TUBE:
+        raise Unreadable(
+            "tubes are not decided here: their proof rests on enclosures of the nonlinear equations"
+            " and of their derivatives, for which this checker has no arithmetic of intervals"
+        )
     raise Unreadable(f"claims of the kind {kind!r:.40} are not known")
 
 

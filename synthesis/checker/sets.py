@@ -29,11 +29,13 @@ from .polynomials import (
     bernstein_coefficients,
     block,
     diagonal,
+    identity,
     matrix,
+    scalar,
     symmetric,
     zero,
 )
-from .reading import Model, Unreadable, array, field, items, number
+from .reading import Model, Unreadable, array, number
 
 KINDS = ("InvariantSet", "LowComplexitySet")
 
@@ -50,14 +52,13 @@ class Loop(NamedTuple):
     @classmethod
     def read(cls, content: Any) -> Loop:
         """Return the loop that a file holds."""
-        own, K = Model.read(field(content, "model")), field(content, "feedback")
+        own, K = Model.read(content["model"]), content["feedback"]
         K = None if K is None else Model.read(K)
-        controls = tuple(items(field(content, "controls"), "controls"))
+        controls = tuple(content["controls"])
         sizes = []
         for name in ("disturbance", "state_bounds", "input_bounds"):
-            pairs = [items(pair, name) for pair in items(field(content, name), name)]
-            sizes.append({str(key): number(value, name) for key, value in pairs})
-            if len(sizes[-1]) < len(pairs) or any(v <= 0 for v in sizes[-1].values()):
+            sizes.append({str(key): number(value, name) for key, value in content[name]})
+            if len(sizes[-1]) < len(content[name]) or any(v <= 0 for v in sizes[-1].values()):
                 raise Unreadable(f"the file is damaged: {name} of one name, or not above zero")
         if sorted([*sizes[0], *controls]) != sorted(own.inputs):
             raise Unreadable("the file is damaged: an input is no disturbance or control, or both")
@@ -89,7 +90,7 @@ class Loop(NamedTuple):
         )
         x, y = range(A.shape[0]), range(C.shape[0])
         K = self.feedback.on(cell.middle, cell.here)[3] if self.feedback else zero(len(u), len(x))
-        sizes = _diagonal([*self.disturbance.values()])
+        sizes = diagonal([*self.disturbance.values()])
         return A, B.part(x, u), B.part(x, w) @ sizes, C, D.part(y, u), K
 
     def limited(
@@ -128,9 +129,9 @@ def claimed(kind: str, content: Any) -> Claim:
 
 
 def _ellipsoid(loop: Loop, content: Any) -> Claim:
-    own, shape = loop.model, Model.read(field(content, "shape"))
-    alpha = number(field(content, "alpha"), "alpha")
-    tau = array(field(content, "shares"), "shares", len(loop.disturbance))
+    own, shape = loop.model, Model.read(content["shape"])
+    alpha = number(content["alpha"], "alpha")
+    tau = array(content["shares"], "shares", len(loop.disturbance))
     outputs = 0 if loop.feedback else len(loop.controls)
     n, motion = len(own.states), own.parameters
     if (len(shape.states), len(shape.outputs)) != (n, outputs) or not shape.same_range(own):
@@ -148,7 +149,7 @@ def _ellipsoid(loop: Loop, content: Any) -> Claim:
             refused = "Q depends on a parameter that may jump, or sampled on one that moves"
 
     def demands() -> Iterator[Demand]:
-        shares, nw = _diagonal(tau), len(tau)
+        shares, nw = diagonal(tau), len(tau)
         for cell in every:
             A, B, W, C, D, K = loop.on(cell)
             Q, _, Y, _ = shape.on(cell.middle, cell.here)
@@ -162,7 +163,7 @@ def _ellipsoid(loop: Loop, content: Any) -> Claim:
                 top = drift - Q * alpha - change - change.T
                 yield Demand(f"V falls{said}", symmetric([[top], [-W.T, shares]]), cell)
             for what, row, limit in loop.limited(Q, C @ Q + D @ Y, Y):
-                square = matrix([[limit * limit]], 1)
+                square = scalar(limit * limit)
                 yield Demand(f"the limit of {what}", symmetric([[Q], [row, square]]), cell)
 
     said = "no motion that starts in an ellipsoid x' Q(p)^-1 x <= 1 leaves it, or exceeds a limit"
@@ -171,12 +172,12 @@ def _ellipsoid(loop: Loop, content: Any) -> Claim:
 
 def _parallelepiped(loop: Loop, content: Any) -> Claim:
     own, motion, n = loop.model, loop.model.parameters, len(loop.model.states)
-    V = array(field(content, "V"), "V", n, n)
+    V = array(content["V"], "V", n, n)
     said = "no motion that starts in a parallelepiped |V^-1 x| <= 1 leaves it, or exceeds a limit"
     refused = loop.refused
     if own.dt is None or (loop.controls and loop.feedback is None):
         raise Unreadable("a parallelepiped is known for sampled loops with a feedback only")
-    columns, eye = matrix(V, n), diagonal(range(n), n)
+    columns, eye = matrix(V, n), identity(n)
     try:
         back = matrix(solved(V, eye.value(())), n)
     except ZeroDivisionError:
@@ -189,7 +190,7 @@ def _parallelepiped(loop: Loop, content: Any) -> Claim:
         A, B, W, C, D, K = loop.on(cell)
         moved, nw = [back @ (A + B @ K) @ columns, back @ W], W.shape[1]
         rows = [[*moved, matrix([[1]] * n, 1)]] + [
-            [row @ columns, zero(1, nw), matrix([[limit]], 1)]
+            [row @ columns, zero(1, nw), scalar(limit)]
             for _, row, limit in loop.limited(eye, C + D @ K, K)
         ]
         for values in bernstein_coefficients(block(rows), cell.variables).values():
@@ -199,8 +200,3 @@ def _parallelepiped(loop: Loop, content: Any) -> Claim:
                     where = cell.place(cell.center)
                     refused = f"an absolute sum is {excess:.3g} above its limit near {where}"
     return Claim(said, loop.said, (), refused=refused)
-
-
-def _diagonal(values: list[Fraction]) -> Polynomial:
-    n = len(values)
-    return matrix([[v * (i == j) for j in range(n)] for i, v in enumerate(values)], n)

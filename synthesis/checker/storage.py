@@ -10,6 +10,9 @@ Continuous time, dP/dt at every corner of the box of rates:
 
 sampled, P+ = P(p(k+1)): A'P+A - P for A'P + PA + dP/dt, A'P+B for PB, B'P+B - I for -I, and
 P - exp(2 a dt) A'P+A > 0; the outputs then see [P 0; 0 I] by [C D]. Always P > 0.
+
+Around a block d = Delta v (the first inputs, the last outputs) of parts of gain <= b each, lambda
+(b^2 v'v - d'd) of each part is added to the form of dV/dt; lambda >= 0, constant for dynamics.
 """
 
 from __future__ import annotations
@@ -17,12 +20,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import combinations_with_replacement
 from itertools import product as combinations
 from math import comb
 from typing import Any, NamedTuple
 
-from . import words
+from . import monomials, words
 from .cells import Cell, cells
 from .demands import Claim, Demand, exponential
 from .polynomials import (
@@ -32,26 +34,13 @@ from .polynomials import (
     combined,
     diagonal,
     even,
+    identity,
     matrix,
     scalar,
     symmetric,
-    variable,
     zero,
 )
-from .reading import (
-    Model,
-    Parameter,
-    Unreadable,
-    array,
-    ascending,
-    bound_of,
-    field,
-    items,
-    kind_of,
-    limit,
-    number,
-    whole,
-)
+from .reading import Model, Parameter, Unreadable, array, ascending, bound_of, limit, number, whole
 
 KINDS = ("l2 gain", "stability", "decay rate", "energy-to-peak gain", "h2 gain")
 
@@ -65,59 +54,38 @@ class Spline:
     knots: tuple[tuple[Fraction, ...], ...]
     degrees: tuple[int, ...]
     values: Mapping[tuple[int, ...], Polynomial]
-    size: int
+
+    @classmethod
+    def read(cls, knots: Sequence[Any], degrees: Sequence[int], value: Any, size: int) -> Spline:
+        """Return a spline of symmetric matrices that a file holds."""
+        own, values = tuple(ascending(each, "knots") for each in knots), {}
+        counts = [(len(k) - 1) * d + 1 for k, d in zip(own, degrees, strict=True)]
+        nested = array(value, "P", *counts, size, size)
+        for place in combinations(*map(range, counts)):
+            M = nested
+            for i in place:
+                M = M[i]
+            values[place] = even(M)
+        return cls(own, tuple(degrees), values)
 
     def on(self, segments: Sequence[int], p: Sequence[Polynomial]) -> Polynomial:
         """Return the polynomial of a segment of each parameter, at the polynomials p."""
-        each = []
+        weights: list[tuple[tuple[int, ...], Polynomial]] = [((), scalar(1))]
         for knots, d, j, q in zip(self.knots, self.degrees, segments, p, strict=True):
-            left, right = knots[j], knots[j + 1]
-            u = (q - scalar(left)) * (1 / (right - left))
-            each.append(bernstein_functions(d, u.reduced()))
-        functions, matrices = [], []
-        for k in combinations(*(range(d + 1) for d in self.degrees)):
-            weight = each[0][k[0]]
-            for own, i in zip(each[1:], k[1:], strict=True):
-                weight = weight @ own[i]
-            place = tuple(j * d + i for j, d, i in zip(segments, self.degrees, k, strict=True))
-            functions.append(weight)
-            matrices.append(self.values[place])
-        return combined(functions, matrices)
-
-
-def spline(knots: Sequence[Any], degrees: Sequence[int], value: Any, size: int) -> Spline:
-    """Return a spline of symmetric matrices that a file holds."""
-    own = tuple(ascending(each, "knots") for each in knots)
-    counts = [(len(k) - 1) * d + 1 for k, d in zip(own, degrees, strict=True)]
-    nested = array(value, "P", *counts, size, size)
-    values = {}
-    for place in combinations(*map(range, counts)):
-        M = nested
-        for i in place:
-            M = M[i]
-        values[place] = even(M)
-    return Spline(own, tuple(degrees), values, size)
+            u = (q - scalar(knots[j])) * (1 / (knots[j + 1] - knots[j]))
+            own = list(enumerate(bernstein_functions(d, u.reduced())))
+            weights = [((*k, j * d + i), f @ g) for k, f in weights for i, g in own]
+        return combined([f for _, f in weights], [self.values[k] for k, _ in weights])
 
 
 class Block(NamedTuple):
-    """d = Delta v, the first inputs and the last outputs of a model; Delta = diag of parts (d, v,
-    whether it is dynamics) of gain at most `bound`, with lambda >= 0 of each: then lambda (bound^2
-    v'v - d'd) is not negative, for dynamics over time from rest, where lambda is constant.
+    """d = Delta v: (number of d, of v, whether it is dynamics) of each part, the bound of their
+    gains, and their lambda.
     """
 
     parts: tuple[tuple[int, int, bool], ...]
     bound: Fraction
     multipliers: tuple[Spline, ...]
-
-    @property
-    def inputs(self) -> int:
-        """Number of d."""
-        return sum(d for d, _, _ in self.parts)
-
-    @property
-    def outputs(self) -> int:
-        """Number of v."""
-        return sum(v for _, v, _ in self.parts)
 
 
 @dataclass(frozen=True)
@@ -174,27 +142,25 @@ class Proof:
     def demands(self) -> Iterator[Demand]:
         """Yield everything that must be positive definite."""
         every = list(cells(self.model, self.motion, self.P.knots, self.moving))
-        slack = self._slack(every)
+        count = len(every) * (2 if self.moving[0] else 1)
+        slack = monomials.zeros(self.slack, len(self.model.states), self.order, count)
         for cell in every:
             P, after = self._P(cell.segments, cell.here), self._P(cell.following, cell.there)
             yield Demand("V > 0", P, cell)
             system = self.model.on(cell.middle, cell.here)
             drifts = [("", P * 0)] if self.sampled else cell.drifts(P, self.moving)
             for said, drift in drifts:
-                falling = self._falling(cell, system, P, after, drift)
-                form, paid = falling if not self.slack else (falling[0] - next(slack), None)
+                form, paid = self.falling(cell, system, P, after, drift)
+                form = form - next(slack) if self.slack else form
                 yield Demand(f"V falls{said}", form, cell, paid)
             if self.of_peaks:
-                form, paid = self._seen(P, system[2], system[3])
-                yield Demand("V bounds the outputs", form, cell, paid)
+                yield Demand("V bounds the outputs", *self._seen(P, cell, *system[2:]))
 
     def _P(self, segments: Sequence[int], p: Sequence[Polynomial]) -> Polynomial:
-        P = self.P.on(segments, p)
-        if self.coordinates is None:
-            return P
-        return (self.coordinates.T @ P @ self.coordinates).reduced()
+        P, T = self.P.on(segments, p), self.coordinates
+        return P if T is None else (T.T @ P @ T).reduced()
 
-    def _falling(
+    def falling(
         self,
         cell: Cell,
         system: Sequence[Polynomial],
@@ -206,29 +172,29 @@ class Proof:
         |u|^2 of a gain. |y|^2 is left out where V bounds the outputs or there is no bound.
         """
         A, B, C, D = system
-        A = of_monomials(A, self.order) if self.order > 1 else A
+        A = monomials.generator(A, self.order)
         if self.sampled:
             moved = A.T @ after @ A
             top, side, corner = moved - P, A.T @ after @ B, B.T @ after @ B
         else:
             moved, PA = P, P @ A
-            top, side, corner = PA + PA.T + drift, P @ B, B.T @ B * 0
+            top, side, corner = PA + PA.T + drift, P @ B, zero(B.shape[1], B.shape[1])
         if self.kind == "decay rate":
             return (P if self.sampled else -top), -moved
-        d, seen = (self.block.inputs, C.shape[0] - self.block.outputs) if self.block else (0, 0)
+        parts = self.block.parts if self.block else ()
+        d, v = sum(part[0] for part in parts), sum(part[1] for part in parts)
         if self.kind == "stability" and not d:
             return -top, None
-        form = symmetric([[top], [side.T, corner]])
-        size, n = form.shape[0], A.shape[0]
-        y = block([[C, D]])
+        form, y = symmetric([[top], [side.T, corner]]), block([[C, D]])
+        n, size, seen = A.shape[0], form.shape[0], C.shape[0] - v
         if self.block:
-            form = form + self._supply(self.block, cell, y.part(range(seen, C.shape[0])), n)
-            y = y.part(range(seen))
-        energy = diagonal(range(n + d, size), size)
+            form = form + self._supply(self.block, cell, y.part(range(seen, seen + v)), n)
+        if self.kind == "stability":
+            return -form.part(range(n + d), range(n + d)), None
+        energy = diagonal([int(i >= n + d) for i in range(size)])
         if self.of_peaks:
             return energy - form, None
-        if self.kind == "stability":
-            return (-form).part(range(n + d), range(n + d)), None
+        y = y.part(range(seen))
         return -(form + y.T @ y), energy
 
     def _supply(self, own: Block, cell: Cell, v: Polynomial, row: int) -> Polynomial:
@@ -237,193 +203,113 @@ class Proof:
         total = zero(size, size)
         for (nd, nv, _), multiplier in zip(own.parts, own.multipliers, strict=True):
             rows = v.part(range(first, first + nv))
-            of_d = diagonal(range(row, row + nd), size)
-            form = rows.T @ rows * own.bound**2 - of_d
+            of_d = diagonal([int(row <= i < row + nd) for i in range(size)])
             factor = multiplier.on(cell.segments, cell.here)
-            total = total + combined([factor], [form])
+            total = total + combined([factor], [rows.T @ rows * own.bound**2 - of_d])
             row, first = row + nd, first + nv
         return total
 
-    def _seen(self, P: Polynomial, C: Polynomial, D: Polynomial) -> tuple[Polynomial, Polynomial]:
+    def _seen(
+        self, P: Polynomial, cell: Cell, C: Polynomial, D: Polynomial
+    ) -> tuple[Polynomial, Cell, Polynomial]:
         """Return the form by which V (sampled: and the input) bounds the outputs, and what is paid
         for the bound.
         """
-        (ny, nu), n = D.shape, P.shape[0]
+        ny, nu = D.shape
         if self.sampled:
-            eye = diagonal(range(nu), nu)
-            P = symmetric([[P], [zero(nu, n), eye]])
-            C, n = block([[C, D]]), n + nu
+            P = symmetric([[P], [zero(nu, P.shape[0]), identity(nu)]])
+            C = block([[C, D]])
         if self.kind == "h2 gain":
-            none, rows = zero(n, n), [C.part([i]) for i in range(ny)]
+            none, rows = P * 0, [C.part([i]) for i in range(ny)]
             P = symmetric([[none] * i + [P] for i in range(ny)])
-            C, n, ny = block([rows]), n * ny, 1
-        size = n + ny
-        paid = diagonal(range(n, size), size)
-        return symmetric([[P], [C, zero(ny, ny)]]), paid
-
-    def _slack(self, every: Sequence[Cell]) -> Iterator[Polynomial]:
-        """Yield L(p) with z' L z = 0 of each inequality in the order of the cells."""
-        if not self.slack:
-            return
-        each, rest = divmod(len(self.slack), len(every) * (2 if self.moving[0] else 1))
-        if rest or not each:
-            raise Unreadable("the file is damaged: rows of slack that fit no degree")
-        functions = bernstein_functions(each - 1, variable(0))
-        forms = null_forms(self.slack, len(self.model.states), self.order)
-        for k in range(0, len(forms), each):
-            yield combined(functions, forms[k : k + each])
+            C, ny = block([rows]), 1
+        paid = diagonal([0] * P.shape[0] + [1] * ny)
+        return symmetric([[P], [C, zero(ny, ny)]]), cell, paid
 
 
-def monomials(n: int, order: int) -> list[tuple[int, ...]]:
-    """Return the monomials of a degree in n states: the numbers of their factors, ascending."""
-    return list(combinations_with_replacement(range(n), order))
-
-
-def of_monomials(A: Polynomial, order: int) -> Polynomial:
-    """Return G of dz/dt = G z, z the monomials, where dx/dt = A x."""
-    n = A.shape[0]
-    z = monomials(n, order)
-    place = {factors: i for i, factors in enumerate(z)}
-    terms = {}
-    for k, rows in A.terms.items():
-        own = [[0] * len(z) for _ in z]
-        for i, factors in enumerate(z):
-            for at, factor in enumerate(factors):
-                for j in range(n):
-                    other = (*factors[:at], j, *factors[at + 1 :])
-                    own[i][place[tuple(sorted(other))]] += rows[factor][j]
-        terms[k] = own
-    return Polynomial((len(z), len(z)), terms, A.below)
-
-
-def null_forms(weights: Sequence[Sequence[Fraction]], n: int, order: int) -> list[Polynomial]:
-    """Return symmetric L with z' L z = 0 of rows of weights: each weight stands at a pair of
-    monomials, and is taken away at the first pair with the same product.
-    """
-    z, first, pairs = monomials(n, order), {}, []
-    for b in range(len(z)):
-        for a in range(b + 1):
-            same = first.setdefault(tuple(sorted(z[a] + z[b])), (a, b))
-            if same != (a, b):
-                pairs.append(((a, b), same))
-    found = []
-    for row in weights:
-        L = [[Fraction(0)] * len(z) for _ in z]
-        for weight, entries in zip(row, pairs, strict=True):
-            for sign, (a, b) in zip((1, -1), entries, strict=True):
-                L[a][b] += sign * weight
-                L[b][a] += sign * weight
-        found.append(matrix(L, len(z)))
-    return found
-
-
-def read(kind: str, content: Any) -> Proof:
-    """Return the proof that a certificate of one or several parameters holds, by the routes "one
-    parameter" and "box".
-    """
-    proof, claimed = field(content, "proof"), items(field(content, "rates"), "rates")
-    several = field(proof, "route") == "box"
-    model = Model.read(field(proof, "source" if several else "lpv"))
-    motion = _motion(model, claimed, proof, several)
-    V, n = field(proof, "lyapunov"), len(model.states)
-    if several:
-        knots, degrees = (items(field(V, name), name) for name in ("knots", "degrees"))
-        own = [whole(d, "a degree", 0) for d in degrees]
-        if kind_of(V) != "BoxLyapunov" or not len(knots) == len(own) == len(motion):
-            raise Unreadable("the file is damaged: V is of another number of parameters")
-        return Proof(kind, model, motion, spline(knots, own, field(V, "coefficients"), n))
-    if kind_of(V) != "SplineLyapunov":
-        raise Unreadable("the file is damaged: V is of a kind that is not known")
-    order, degree = (
-        whole(field(V, name), name, least) for name, least in (("order", 1), ("degree", 0))
-    )
-    size = comb(n + order - 1, order) if n else 0
-    P = spline([field(V, "knots")], [degree], field(V, "coefficients"), size)
-    T, slack = field(V, "coordinates"), field(V, "slack")
-    coordinates = None if T is None else matrix(array(T, "coordinates", n, n), n)
-    rows = () if slack is None else tuple(map(tuple, array(slack, "slack", None, None)))
-    if order > 1 and (model.dt is not None or kind != "stability" or model.inputs or T is not None):
-        raise Unreadable("a V of higher degree is known for stability in continuous time only")
-    own_block = _block(field(proof, "block"), field(V, "multiplier"), model, field(V, "knots"))
-    if own_block and (order > 1 or kind not in ("l2 gain", "stability")):
-        raise Unreadable("a norm-bounded block is known for gains and stability only")
-    return Proof(kind, model, motion, P, coordinates, order, rows if order > 1 else (), own_block)
+def claimed(kind: str, content: Any) -> Claim:
+    """Return what a certificate of these kinds claims, by the routes "one parameter" and "box"."""
+    proof, bound = content["proof"], bound_of(kind, content)
+    several = proof["route"] == "box"
+    model = Model.read(proof["source" if several else "lpv"])
+    motion, V = _motion(model, content["rates"], proof, several), proof["lyapunov"]
+    if V["type"] == "BoxLyapunov":
+        degrees = [whole(d, "a degree", 0) for d in V["degrees"]]
+        P = Spline.read(V["knots"], degrees, V["coefficients"], len(model.states))
+        own = Proof(kind, model, motion, P)
+    elif V["type"] == "SplineLyapunov" and not several:
+        own = _of_one_parameter(kind, model, motion, proof)
+    else:
+        raise Unreadable("V is of a form that is not known")
+    said = words.model(own.model, own.motion)
+    for d, v, dynamic in own.block.parts if own.block else ():
+        how = "dynamics at rest at the start" if dynamic else "constant or moving in any way"
+        size = float(proof["block"]["bound"])
+        said.append(
+            f"{d} of the inputs = Delta times {v} of the outputs, |Delta| <= {size!r}, {how}"
+        )
+    lower, claim = kind == "decay rate", words.gain(kind, bound)
+    return Claim(claim, said, own.demands(), bound, own.level, lower, own.refused)
 
 
 def _motion(
     model: Model, claimed: Sequence[Any], proof: Any, several: bool
 ) -> tuple[Parameter, ...]:
     """Return the parameters with the rates of the claim, which must be those of the proof."""
-    motion = field(field(proof, "demand"), "motion") if several else None
-    given = [field(proof, "rate")] if motion is None else items(field(motion, "rates"), "rates")
-    if len(model.parameters) != len(claimed) or given != claimed:
+    motion = proof["demand"]["motion"] if several else None
+    if claimed != ([proof["rate"]] if motion is None else motion["rates"]):
         raise Unreadable("the rates of the claim are not those of the proof")
-    out = []
-    for own, rate in zip(model.parameters, claimed, strict=True):
-        # of a parameter whose rate is another one, the limit is what that one may be
-        out.append(own._replace(rate=limit(rate, "a rate") if own.tie is None else None))
-    if motion is not None:
-        ties = items(field(motion, "ties"), "ties")
-        box = items(field(motion, "box"), "box")
-        if ties != [p.tie for p in out] or box != [[float(p.low), float(p.high)] for p in out]:
-            raise Unreadable("the parameters of the claim do not move as those of the proof")
-    return tuple(out)
-
-
-def _block(value: Any, multiplier: Any, model: Model, knots: Any) -> Block | None:
-    """Return the norm-bounded block of a proof with its multipliers."""
-    if value is None:
-        if multiplier is not None:
-            raise Unreadable("the file is damaged: a multiplier without a block")
-        return None
-    inputs, outputs = (whole(field(value, name), name, 1, 10**6) for name in ("inputs", "outputs"))
-    parts = tuple(
-        (whole(d, "a part", 1, 10**6), whole(v, "a part", 1, 10**6), dynamic is True)
-        for d, v, dynamic in (
-            items(part, "a part") for part in items(field(value, "parts"), "parts")
-        )
-    ) or ((inputs, outputs, False),)
-    bound = number(field(value, "bound"), "the bound of the block")
-    own = Block(parts, bound, ())
-    if (own.inputs, own.outputs) != (inputs, outputs) or bound < 0:
-        raise Unreadable("the file is damaged: the parts do not make the block")
-    if inputs > len(model.inputs) or outputs > len(model.outputs):
-        raise Unreadable("the file is damaged: the block does not fit the model")
-    several = len(items(field(multiplier, "shape"), "the shape of the multiplier")) == 2
-    values = array(multiplier, "the multiplier", None, *([len(parts)] if several else []))
-    rows = values if several else [[v] for v in values]
-    segments = len(ascending(knots, "knots")) - 1
-    degree, rest = divmod(len(rows) - 1, segments)
-    if rest or not rows or len(rows[0]) != len(parts):
-        raise Unreadable("the file is damaged: the multiplier does not fit its knots")
-    if any(v < 0 for row in rows for v in row):
-        raise Unreadable("the file is damaged: a multiplier is below zero")
-    multipliers = []
-    for k, (_, _, dynamic) in enumerate(parts):
-        column = [row[k] for row in rows]
-        if dynamic and len(set(column)) > 1:
-            raise Unreadable("the multiplier of dynamics depends on p")
-        values = {(i,): scalar(v) for i, v in enumerate(column)}
-        multipliers.append(Spline((ascending(knots, "knots"),), (degree,), values, 1))
-    return own._replace(multipliers=tuple(multipliers))
-
-
-def claimed(kind: str, content: Any) -> Claim:
-    """Return what a certificate of these kinds claims."""
-    bound, proof = bound_of(kind, content), read(kind, content)
-    said = words.model(proof.model, proof.motion)
-    for d, v, dynamic in proof.block.parts if proof.block else ():
-        how = "dynamics at rest at the start" if dynamic else "constant or moving in any way"
-        size = float(proof.block.bound) if proof.block else 0.0
-        said.append(
-            f"the next {d} inputs, from the first, are Delta times {v} outputs ....{size}{how}"
-        )
-    return Claim(
-        words.gain(kind, bound),
-        said,
-        proof.demands(),
-        bound,
-        proof.level,
-        kind == "decay rate",
-        proof.refused,
+    out = tuple(
+        p._replace(rate=limit(rate, "a rate") if p.tie is None else None)
+        for p, rate in zip(model.parameters, claimed, strict=True)
     )
+    box = [[float(p.low), float(p.high)] for p in out]
+    if motion and (motion["ties"] != [p.tie for p in out] or motion["box"] != box):
+        raise Unreadable("the parameters of the claim do not move as those of the proof")
+    return out
+
+
+def _of_one_parameter(kind: str, model: Model, motion: tuple[Parameter, ...], proof: Any) -> Proof:
+    """Return the proof by P(p) of one parameter."""
+    V, n = proof["lyapunov"], len(model.states)
+    order, degree = whole(V["order"], "the order", 1), whole(V["degree"], "a degree", 0)
+    P = Spline.read([V["knots"]], [degree], V["coefficients"], comb(n + order - 1, order))
+    T, slack = V["coordinates"], V["slack"]
+    coordinates = None if T is None else matrix(array(T, "coordinates", n, n), n)
+    rows = [] if slack is None or order == 1 else array(slack, "slack", None, None)
+    own = Proof(kind, model, motion, P, coordinates, order, rows, _block(proof, V, model))
+    if kind not in ("l2 gain", "stability"):
+        raise Unreadable("V of one parameter is known for gains and stability only")
+    if order > 1 and (own.sampled or model.inputs or T is not None or own.block):
+        raise Unreadable("a V of higher degree is known for stability in continuous time only")
+    return own
+
+
+def _block(proof: Any, V: Any, model: Model) -> Block | None:
+    """Return the norm-bounded block of a proof with its multipliers."""
+    value, multiplier = proof["block"], V["multiplier"]
+    if value is None and multiplier is None:
+        return None
+    whole_block = [value["inputs"], value["outputs"], False]
+    parts, bound = value["parts"] or [whole_block], number(value["bound"], "the bound of a block")
+    for d, v, dynamic in parts:
+        whole(d, "a part", 1, len(model.inputs))
+        whole(v, "a part", 1, len(model.outputs))
+        if not isinstance(dynamic, bool):
+            raise Unreadable("the file is damaged: a part is dynamics or not")
+    if [sum(part[i] for part in parts) for i in (0, 1)] != whole_block[:2] or bound < 0:
+        raise Unreadable("the file is damaged: the parts do not make the block")
+    if whole_block[0] > len(model.inputs) or whole_block[1] > len(model.outputs):
+        raise Unreadable("the file is damaged: the block does not fit the model")
+    knots, several = ascending(V["knots"], "knots"), len(multiplier["shape"]) == 2
+    values = array(multiplier, "a multiplier", None, *([len(parts)] if several else []))
+    columns = list(zip(*values, strict=True)) if several else [values]
+    degree, rest = divmod(len(values) - 1, len(knots) - 1)
+    if rest or len(columns) != len(parts) or any(v < 0 for own in columns for v in own):
+        raise Unreadable("the file is damaged: a multiplier is below zero or fits no knots")
+    if any(part[2] and len(set(own)) > 1 for part, own in zip(parts, columns, strict=True)):
+        raise Unreadable("the multiplier of dynamics depends on p")
+    splines = (
+        Spline((knots,), (degree,), {(i,): scalar(v) for i, v in enumerate(own)}) for own in columns
+    )
+    return Block(tuple((d, v, dynamic) for d, v, dynamic in parts), bound, tuple(splines))

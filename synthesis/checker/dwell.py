@@ -1,0 +1,143 @@
+"""Functions V = x' P_i(t) x of the modes of a switched model, t since mode i was entered.
+
+P_i moves up to the dwell time T and is constant afterwards; x+ = J x as mode j follows mode i:
+
+    P_i(T) > 0,  -(A'P + PA + dP/dt) > 0 up to T,  -(A'P + PA + 2 lambda P) > 0 afterwards,
+    mu P_i(T) - J' P_j(0) J > 0
+
+sampled P(k) - A'P(k+1)A > 0 and (1 - lambda) P - A'PA > 0. With mu = 1 every signal that stays at
+least T in each mode is covered; with constant P every signal of an average dwell time above tau,
+where exp(2 lambda tau) >= mu (sampled (1 - lambda)^(tau/dt) mu <= 1). A may move with p in any way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
+from itertools import product as combinations
+from typing import Any, NamedTuple
+
+from .demands import Claim, Demand, exponential
+from .polynomials import (
+    Polynomial,
+    bernstein_functions,
+    combined,
+    even,
+    matrix,
+    scalar,
+    variable,
+)
+from .reading import Unreadable, array, number, period, whole
+
+KIND = "DwellTime"
+DEGREE = 3
+"""Degree of P on each segment of continuous time."""
+
+
+class Switched(NamedTuple):
+    """A of every mode on its pieces (polynomials of a unit box, with their numbers of variables),
+    {(from, to): J}, the period; P of every mode by coefficients, lengths of the segments of time.
+    """
+
+    modes: Sequence[Sequence[tuple[Polynomial, int]]]
+    jumps: Mapping[tuple[int, int], Polynomial]
+    dt: Fraction | None
+    P: Sequence[Sequence[Polynomial]]
+    lengths: Sequence[Fraction]
+    decay: Fraction
+    growth: Fraction
+
+    def demands(self) -> Iterator[Demand]:
+        """Yield everything that must be positive definite."""
+        for i, (pieces, P) in enumerate(zip(self.modes, self.P, strict=True)):
+            yield Demand(f"V > 0 in mode {i + 1}", P[-1])
+            for A, variables in pieces:
+                for said, form, count in self._falling(A, variables, P):
+                    yield Demand(f"V falls in mode {i + 1}{said}", form, variables=count)
+        for (i, j), J in self.jumps.items():
+            form = self.P[i][-1] * self.growth - J.T @ self.P[j][0] @ J
+            yield Demand(f"V does not rise from mode {i + 1} to {j + 1}", form)
+
+    def _falling(
+        self, A: Polynomial, m: int, P: Sequence[Polynomial]
+    ) -> Iterator[tuple[str, Polynomial, int]]:
+        last = P[-1]
+        if self.dt is not None:
+            yield " afterwards", last * (1 - self.decay) - A.T @ last @ A, m
+            for k in range(len(P) - 1):
+                yield f" after {k} samples", P[k] - A.T @ P[k + 1] @ A, m
+            return
+        PA = last @ A
+        yield " afterwards", -(PA + PA.T + last * (2 * self.decay)), m
+        functions = bernstein_functions(DEGREE, variable(m))
+        for k, length in enumerate(self.lengths):
+            own = combined(functions, P[DEGREE * k : DEGREE * (k + 1) + 1])
+            PA = own @ A
+            yield f" in segment {k + 1}", -(PA + PA.T + own.derivative(m) * (1 / length)), m + 1
+
+    def covers(self, seconds: Fraction, average: bool) -> str:
+        """Say why a dwell time is not covered; nothing where it is."""
+        segments = len(self.lengths)
+        counts = {len(P) for P in self.P}
+        if counts != {segments + 1 if self.dt else DEGREE * segments + 1}:
+            return "the functions of the modes have other lengths"
+        if any(length <= 0 for length in self.lengths) or self.decay < 0:
+            return "a segment of time is not above zero, or the decay rate is below"
+        if not average:
+            least = segments * self.dt if self.dt else sum(self.lengths)
+            if self.growth > 1:
+                return "V may rise at a switch"
+            return "" if seconds >= least else f"the functions take {float(least)!r} s"
+        x = self.decay
+        if self.dt:
+            # -ln(1 - x) is at least this part of its series
+            rate = sum((x**k / k for k in range(1, 40)), Fraction(0)) / self.dt
+        else:
+            rate = 2 * x
+        enough = not segments and x < 1 or not self.dt and not segments
+        if not enough or exponential(rate * seconds)[0] < self.growth:
+            return "V may rise more at a switch than it falls in the average dwell time"
+        return ""
+
+
+def read(content: Any) -> Switched:
+    """Return what a file of a dwell time holds."""
+    modes = [[_piece(each) for each in mode] for mode in content["modes"]["A"]]
+    n = modes[0][0][0].shape[0]
+    jumps = {
+        (whole(i, "a mode", 0), whole(j, "a mode", 0)): matrix(array(J, "a jump", n, n), n)
+        for (i, j), J in content["modes"]["jumps"]
+    }
+    P = [[even(M) for M in array(each, "P", None, n, n)] for each in content["P"]]
+    lengths = array(content["lengths"], "the lengths", None)
+    decay, growth = (number(content[name], name) for name in ("decay", "growth"))
+    return Switched(modes, jumps, period(content["modes"]["dt"]), P, lengths, decay, growth)
+
+
+def _piece(value: Any) -> tuple[Polynomial, int]:
+    """Return A(p) of a piece on the unit box, by its Bernstein coefficients, and the number of p."""
+    counts = [whole(c, "a size", 1, 10**4) for c in value["coefficients"]["shape"]]
+    *own, n, _ = counts
+    nested = array(value["coefficients"], "A", *own, n, n)
+    weights, matrices = [], []
+    for place in combinations(*map(range, own)):
+        weight, M = scalar(1), nested
+        for axis, i in enumerate(place):
+            weight = weight @ bernstein_functions(own[axis] - 1, variable(axis))[i]
+            M = M[i]
+        weights.append(weight)
+        matrices.append(matrix(M, n))
+    return combined(weights, matrices), len(own)
+
+
+def claimed(kind: str, content: Any) -> Claim:
+    """Return what a file of a dwell time claims."""
+    own, seconds = read(content), number(content["seconds"], "the dwell time")
+    average, size = content["average"] is True, repr(float(seconds))
+    if own.P and not {*(k for pair in own.jumps for k in pair)} <= {*range(len(own.modes))}:
+        raise Unreadable("the file is damaged: a switch to a mode that is not there")
+    every = f"average dwell time is above {size} s" if average else f"modes last at least {size} s"
+    said = [f"a switched model of {len(own.modes)} modes, {len(own.jumps)} switches between them"]
+    said += [f"A of mode {i + 1} moving in any way in its range" for i in range(len(own.modes))]
+    claim = f"the state tends to zero exponentially for every signal whose {every}"
+    return Claim(claim, said, own.demands(), refused=own.covers(seconds, average))
