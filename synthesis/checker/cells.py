@@ -34,15 +34,10 @@ class Strip(NamedTuple):
     following: int
     reached: tuple[Fraction, ...] | None
 
-    @property
-    def middle(self) -> Fraction:
-        """The middle of the interval."""
-        return (self.low + self.high) / 2
-
 
 class Cell(NamedTuple):
     """A box of p, `here`, as polynomials on a unit box whose first variables are those of p, and
-    p(k+1), `there`; segments of P at both.
+    p(k+1), `there`; segments of P at both, and the middle of the box.
     """
 
     strips: tuple[Strip, ...]
@@ -50,26 +45,9 @@ class Cell(NamedTuple):
     there: tuple[Polynomial, ...]
     motion: tuple[Parameter, ...]
     variables: int
-
-    @property
-    def middle(self) -> tuple[Fraction, ...]:
-        """The middle of the box."""
-        return tuple(s.middle for s in self.strips)
-
-    @property
-    def center(self) -> tuple[Fraction, ...]:
-        """The middle of the unit box."""
-        return (Fraction(1, 2),) * self.variables
-
-    @property
-    def segments(self) -> tuple[int, ...]:
-        """Segments of P at p."""
-        return tuple(s.segment for s in self.strips)
-
-    @property
-    def following(self) -> tuple[int, ...]:
-        """Segments of P at p(k+1)."""
-        return tuple(s.following for s in self.strips)
+    segments: tuple[int, ...]
+    following: tuple[int, ...]
+    middle: tuple[Fraction, ...]
 
     def drifts(self, F: Polynomial, varies: Sequence[bool]) -> list[tuple[str, Polynomial]]:
         """Return (at which rates, dF/dt) at every corner of the box of rates of the parameters with
@@ -109,13 +87,12 @@ class Cell(NamedTuple):
 
     def place(self, point: Sequence[Fraction]) -> str:
         """Say where a point of the unit box is."""
-        said = [
-            f"p{i + 1} = {float(q.value(point)[0][0]):.9g}" for i, q in enumerate(self.here)
-        ] + [
-            f"p{i + 1} a sample later = {float(q.value(point)[0][0]):.9g}"
-            for i, (q, s) in enumerate(zip(self.there, self.strips, strict=True))
-            if s.reached is not None
-        ]
+        said = []
+        for i, (strip, *both) in enumerate(zip(self.strips, self.here, self.there, strict=True)):
+            now, later = (F.value(point) for F in both)
+            said.append(f"p{i + 1} = {now[0][0][0] / now[1]:.9g}")
+            if strip.reached is not None:
+                said.append(f"p{i + 1} a sample later = {later[0][0][0] / later[1]:.9g}")
         return ", ".join(said)
 
 
@@ -131,9 +108,9 @@ def cells(
     tied = [i for i in range(m) if motion[i].tie is not None]
 
     def strips(i: int, others: dict[int, Strip]) -> list[Strip]:
-        p, cuts = motion[i], {*knots[i], *model.breaks(i)}
+        p, cuts = motion[i], {*knots[i], *model.factors[i].breaks}
         if dt is not None and any(motion[k].tie == i and moving[k] for k in tied):
-            cuts |= {p.low + p.width * Fraction(k, PARTS) for k in range(PARTS)}
+            cuts |= {p.low + (p.high - p.low) * Fraction(k, PARTS) for k in range(PARTS)}
         span = None
         if dt is not None and moving[i]:
             span = _span(motion, i, others, dt)
@@ -155,16 +132,16 @@ def _span(
     """Return the (least, largest) change of a parameter in a sample; the width of its range where
     it may jump.
     """
-    p = motion[i]
+    p, width = motion[i], motion[i].high - motion[i].low
     if p.tie is None:
-        reach = p.width if p.rate is None else min(p.rate * dt, p.width)
+        reach = width if p.rate is None else min(p.rate * dt, width)
         return -reach, reach
     q, strip = motion[p.tie], others[p.tie]
     low, high = q.low * dt, q.high * dt
     if q.rate is not None:
         slack = q.rate * dt * dt / 2
         low, high = max(low, strip.low * dt - slack), min(high, strip.high * dt + slack)
-    return max(low, -p.width), min(high, p.width)
+    return max(low, -width), min(high, width)
 
 
 def _strips(
@@ -208,4 +185,8 @@ def _cell(strips: tuple[Strip, ...], motion: tuple[Parameter, ...]) -> Cell:
         a, b, c, d = s.reached
         q = one * a + r * (b - a) + t * (c - a) + t @ r * (a - b - c + d)
         there.append(q.reduced())
-    return Cell(strips, tuple(here), tuple(there), motion, m + len(more))
+    middle = tuple((s.low + s.high) / 2 for s in strips)
+    return Cell(
+        *(strips, tuple(here), tuple(there), motion, m + len(more)),
+        *(tuple(s.segment for s in strips), tuple(s.following for s in strips), middle),
+    )

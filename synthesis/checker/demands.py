@@ -10,8 +10,8 @@ from fractions import Fraction
 from typing import NamedTuple
 
 from .cells import Cell
-from .exact import Rows, shortfall, shown
-from .polynomials import Polynomial, first_miss, matrix
+from .exact import shortfall, shown
+from .polynomials import Polynomial, first_miss
 
 LARGEST_FACTOR = 1e6
 """Largest factor on a claimed bound by which one is looked for that would do at a point."""
@@ -60,12 +60,13 @@ def failure(claim: Claim) -> str:
         miss = first_miss(F, *box)
         if miss is None:
             continue
-        where = f" at {cell.place(miss.point)}" if cell else ""
-        if not miss.false:
+        point, false = miss
+        where = f" at {cell.place(point)}" if cell else ""
+        if not false:
             return f"{demand.name}: undecided within the boxes that are looked at, as{where}"
-        short = shortfall(_at(F, miss.point))
+        short = shortfall(F.value(point)[0])
         said = f"{demand.name}: the matrix is not positive definite{where}; {short:.3g} of its own"
-        return f"{said} diagonal must be added to make it so{_needed(claim, demand, miss.point)}"
+        return f"{said} diagonal must be added to make it so{_needed(claim, demand, point)}"
     return ""
 
 
@@ -76,7 +77,7 @@ def _needed(claim: Claim, demand: Demand, point: Sequence[Fraction]) -> str:
 
     def enough(bound: float) -> bool:
         level = claim.level(Fraction(bound))
-        return shown(_at(demand.at_level(level), point))
+        return shown(demand.at_level(level).value(point)[0])
 
     low = float(claim.bound)
     high = 0.0 if claim.lower else low or 1e-12
@@ -88,11 +89,6 @@ def _needed(claim: Claim, demand: Demand, point: Sequence[Fraction]) -> str:
         middle = 0.5 * (low + high)
         low, high = (low, middle) if enough(middle) else (middle, high)
     return f"; there the bound is {'at most' if claim.lower else 'at least'} {high:.9g}"
-
-
-def _at(F: Polynomial, point: Sequence[Fraction]) -> Rows:
-    """Return the value of F at a point, times a positive number."""
-    return matrix(F.value(point), F.shape[1]).terms[()]
 
 
 def exponential(x: Fraction) -> tuple[Fraction, Fraction]:

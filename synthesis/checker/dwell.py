@@ -27,7 +27,7 @@ from .polynomials import (
     scalar,
     variable,
 )
-from .reading import Unreadable, array, number, period, whole
+from .reading import array, number, period, whole
 
 KIND = "DwellTime"
 DEGREE = 3
@@ -75,43 +75,23 @@ class Switched(NamedTuple):
             PA = own @ A
             yield f" in segment {k + 1}", -(PA + PA.T + own.derivative(m) * (1 / length)), m + 1
 
-    def covers(self, seconds: Fraction, average: bool) -> str:
+    def refused(self, seconds: Fraction, average: bool) -> str:
         """Say why a dwell time is not covered; nothing where it is."""
-        segments = len(self.lengths)
-        counts = {len(P) for P in self.P}
-        if counts != {segments + 1 if self.dt else DEGREE * segments + 1}:
-            return "the functions of the modes have other lengths"
-        if any(length <= 0 for length in self.lengths) or self.decay < 0:
-            return "a segment of time is not above zero, or the decay rate is below"
+        segments, x = len(self.lengths), self.decay
+        count = segments + 1 if self.dt else DEGREE * segments + 1
+        if any(len(P) != count for P in self.P) or any(length <= 0 for length in self.lengths):
+            return "the functions of the modes do not fit the segments of time"
         if not average:
             least = segments * self.dt if self.dt else sum(self.lengths)
-            if self.growth > 1:
-                return "V may rise at a switch"
-            return "" if seconds >= least else f"the functions take {float(least)!r} s"
-        x = self.decay
-        if self.dt:
-            # -ln(1 - x) is at least this part of its series
-            rate = sum((x**k / k for k in range(1, 40)), Fraction(0)) / self.dt
-        else:
-            rate = 2 * x
-        enough = not segments and x < 1 or not self.dt and not segments
-        if not enough or exponential(rate * seconds)[0] < self.growth:
+            fits = seconds >= least and self.growth <= 1 and x >= 0
+            return "" if fits else f"V rises at a switch, or takes {float(least)!r} s"
+        # of x < 1, -ln(1 - x) is at least this part of its series
+        series = sum((x**k / k for k in range(1, 40)), Fraction(0))
+        rate = series / self.dt if self.dt else 2 * x
+        fits = not segments and 0 <= x and (x < 1 or not self.dt)
+        if not fits or exponential(rate * seconds)[0] < self.growth:
             return "V may rise more at a switch than it falls in the average dwell time"
         return ""
-
-
-def read(content: Any) -> Switched:
-    """Return what a file of a dwell time holds."""
-    modes = [[_piece(each) for each in mode] for mode in content["modes"]["A"]]
-    n = modes[0][0][0].shape[0]
-    jumps = {
-        (whole(i, "a mode", 0), whole(j, "a mode", 0)): matrix(array(J, "a jump", n, n), n)
-        for (i, j), J in content["modes"]["jumps"]
-    }
-    P = [[even(M) for M in array(each, "P", None, n, n)] for each in content["P"]]
-    lengths = array(content["lengths"], "the lengths", None)
-    decay, growth = (number(content[name], name) for name in ("decay", "growth"))
-    return Switched(modes, jumps, period(content["modes"]["dt"]), P, lengths, decay, growth)
 
 
 def _piece(value: Any) -> tuple[Polynomial, int]:
@@ -131,13 +111,21 @@ def _piece(value: Any) -> tuple[Polynomial, int]:
 
 
 def claimed(kind: str, content: Any) -> Claim:
-    """Return what a file of a dwell time claims."""
-    own, seconds = read(content), number(content["seconds"], "the dwell time")
+    """Return what a file of a dwell time claims; the fields of the file are named here alone."""
+    modes = [[_piece(each) for each in mode] for mode in content["modes"]["A"]]
+    seconds, count, n = number(content["seconds"], "the time"), len(modes), modes[0][0][0].shape[0]
+    jumps = {
+        (whole(i, "a mode", 0, count - 1), whole(j, "a mode", 0, count - 1)): matrix(
+            array(J, "a jump", n, n), n
+        )
+        for (i, j), J in content["modes"]["jumps"]
+    }
+    P = [[even(M) for M in array(each, "P", None, n, n)] for each in content["P"]]
+    lengths = array(content["lengths"], "the lengths", None)
+    decay, growth = (number(content[name], name) for name in ("decay", "growth"))
+    own = Switched(modes, jumps, period(content["modes"]["dt"]), P, lengths, decay, growth)
     average, size = content["average"] is True, repr(float(seconds))
-    if own.P and not {*(k for pair in own.jumps for k in pair)} <= {*range(len(own.modes))}:
-        raise Unreadable("the file is damaged: a switch to a mode that is not there")
     every = f"average dwell time is above {size} s" if average else f"modes last at least {size} s"
-    said = [f"a switched model of {len(own.modes)} modes, {len(own.jumps)} switches between them"]
-    said += [f"A of mode {i + 1} moving in any way in its range" for i in range(len(own.modes))]
     claim = f"the state tends to zero exponentially for every signal whose {every}"
-    return Claim(claim, said, own.demands(), refused=own.covers(seconds, average))
+    said = [f"a switched model of {count} modes, {len(jumps)} kinds of switches between them"]
+    return Claim(claim, said, own.demands(), refused=own.refused(seconds, average))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from operator import mul
 
 try:
@@ -48,13 +47,11 @@ def shown(M: Rows) -> bool:
         return pivots_positive(M)
     if any(M[i][i] <= 0 for i in range(len(M))):
         return False
-    N, one = _rounded(M), 1 << ENTRY_BITS
-    if any(abs(v) > 2 * one for row in N for v in row):
+    N = _rounded(M)
+    if any(abs(v) > 2 << ENTRY_BITS for row in N for v in row):
         return False  # a minor of two rows is negative
-    L = cholesky([[v / one for v in row] for row in N])
-    if L is None:
-        return False
-    return _dominant(N, _inverse_transposed(L)) or pivots_positive(M)
+    back = _congruence(N)
+    return back is not None and (_dominant(N, back) or pivots_positive(M))
 
 
 def _rounded(M: Rows) -> Rows:
@@ -72,34 +69,24 @@ def _rounded(M: Rows) -> Rows:
     return out
 
 
-def cholesky(M: Sequence[Sequence[float]]) -> list[list[float]] | None:
-    """Return the lower factor of a matrix of doubles; None where a pivot is not positive."""
+def _congruence(N: Rows) -> Rows | None:
+    """Return L^-1 rounded, times 2^FACTOR_BITS, where L L' is N in doubles; None where a pivot is
+    not positive.
+    """
+    one, size = 1 << ENTRY_BITS, float(1 << FACTOR_BITS)
     L: list[list[float]] = []
-    for i, row in enumerate(M):
-        own: list[float] = []
-        for j in range(i):
-            other = L[j]
-            own.append((row[j] - sum(map(mul, own, other))) / other[j])
-        pivot = row[i] - sum(v * v for v in own)
-        if not pivot > 0:
-            return None
-        own.append(math.sqrt(pivot))
-        L.append(own)
-    return L
-
-
-def _inverse_transposed(L: list[list[float]]) -> Rows:
-    """Return W = L'^-1 rounded, times 2^FACTOR_BITS, by its columns: rows of L^-1."""
-    n, size = len(L), float(1 << FACTOR_BITS)
     inverse: list[list[float]] = []
-    for i in range(n):
-        own = [0.0] * n
-        for j in range(i + 1):
-            total = (i == j) - sum(L[i][k] * inverse[k][j] for k in range(j, i))
-            own[j] = total / L[i][i]
-        inverse.append(own)
-    if not all(math.isfinite(v) for row in inverse for v in row):
-        return []
+    for i, row in enumerate(N):
+        own: list[float] = []
+        for j, other in enumerate(L):
+            own.append((row[j] / one - sum(map(mul, own, other))) / other[j])
+        pivot = row[i] / one - sum(v * v for v in own)
+        if not 0 < pivot < math.inf:
+            return None
+        root = math.sqrt(pivot)
+        sums = [sum(map(mul, own, column)) for column in zip(*inverse, strict=True)]
+        inverse.append([-v / root for v in sums[:i]] + [1 / root] + [0.0] * (len(N) - i - 1))
+        L.append([*own, root])
     return [[round(v * size) for v in row] for row in inverse]
 
 
@@ -107,8 +94,6 @@ def _dominant(N: Rows, back: Rows) -> bool:
     """Whether W' (N + r) W is strictly dominant in its diagonal for all symmetric r with entries
     from 0 to 1, W' = `back`: N + r is positive definite then.
     """
-    if not back:
-        return False
     Q = product(product(back, N), transposed(back, len(N)))
     reach = [sum(map(abs, row)) for row in back]
     every = sum(reach)

@@ -6,10 +6,8 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from fractions import Fraction
 from itertools import pairwise
-from itertools import product as combinations
 
 from .polynomials import Polynomial, scalar, zero
 
@@ -80,12 +78,7 @@ class Cubics(Functions):
 
     def __init__(self, nodes: tuple[Fraction, ...]) -> None:
         self.breaks, self.size = nodes, len(nodes)
-        self.bends = self._second_derivatives()
-
-    def _second_derivatives(self) -> list[list[Fraction]]:
-        """Return the second derivatives at every node (rows), of every function (columns)."""
-        x, n = self.breaks, self.size
-        h = [b - a for a, b in pairwise(x)]
+        h, n = [b - a for a, b in pairwise(nodes)], self.size
         left, right = [], []
         for i in range(n):
             row, values = [Fraction(0)] * n, [Fraction(0)] * n
@@ -97,7 +90,8 @@ class Cubics(Functions):
                 row[k - 1 : k + 2] = [h[k], -h[k - 1] - h[k], h[k - 1]]
             left.append(row)
             right.append(values)
-        return solved(left, right)
+        # second derivatives at every node (rows), of every function (columns)
+        self.bends = solved(left, right)
 
     def on(self, middle: Fraction, p: Polynomial) -> list[Polynomial]:
         """Return the cubic polynomials from their values and second derivatives at the ends."""
@@ -129,28 +123,6 @@ class Powers(Functions):
         for _ in range(self.degree):
             own.append((own[-1] @ u).reduced())
         found[k * n : (k + 1) * n] = own[::-1]
-        return found
-
-
-class Basis:
-    """Products of functions of each parameter, the last one's running fastest; `total`: of
-    polynomials, just those whose degrees add up to that at most.
-    """
-
-    def __init__(self, factors: Sequence[Functions], total: int | None = None) -> None:
-        self.factors = tuple(factors)
-        every = combinations(*(range(f.size) for f in factors))
-        self.indices = [k for k in every if total is None or sum(k) <= total]
-
-    def on(self, middle: Sequence[Fraction], p: Sequence[Polynomial]) -> list[Polynomial]:
-        """Return the products on the box around `middle`, at the polynomials p."""
-        each = [f.on(m, q) for f, m, q in zip(self.factors, middle, p, strict=True)]
-        found = []
-        for k in self.indices:
-            own = scalar(1)
-            for functions, i in zip(each, k, strict=True):
-                own = own @ functions[i]
-            found.append(own.reduced())
         return found
 
 

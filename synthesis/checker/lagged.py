@@ -16,7 +16,7 @@ from typing import Any
 from . import words
 from .cells import cells
 from .demands import Claim, Demand
-from .polynomials import Polynomial, combined, scalar, symmetric, variable, zero
+from .polynomials import combined, scalar, symmetric, variable, zero
 from .reading import Model, Unreadable, array, ascending, bound_of, number, whole
 from .storage import Proof, Spline
 
@@ -33,25 +33,18 @@ def claimed(kind: str, content: Any) -> Claim:
         raise Unreadable("a lag is known for gains and stability in continuous time only")
     if content["rates"] != [proof["rate"]] or rate < 0 or T <= 0:
         raise Unreadable("the rates of the claim are not those of the proof")
-    motion, degrees = (
-        (p._replace(rate=rate),),
-        [whole(V[f"{a}degree"], "a degree", 1) for a in ("", "lead_")],
-    )
-    P = Spline.read(
-        [region["knots"], V["lead_knots"]], degrees, V["coefficients"], len(model.states)
-    )
+    motion, n = (p._replace(rate=rate),), len(model.states)
+    degrees = [whole(V[name], "a degree", 1) for name in ("degree", "lead_degree")]
+    P = Spline.read([region["knots"], V["lead_knots"]], degrees, V["coefficients"], n)
     plain, shares = Proof(kind, model, motion, P), P.knots[1]
     refused = ""
     if (knots[0], knots[-1], shares[0], shares[-1]) != (p.low, p.high, 0, 1):
         refused = "V is not known on the whole range of p and of its lag"
+    segments = range(len(knots) - 1)
     slopes = [
-        [
-            (b - a) / (right - left)
-            for (a, b), (left, right) in zip(pairwise(v), pairwise(knots), strict=True)
-        ]
-        for v in (lower, upper)
+        [(v[k + 1] - v[k]) / (knots[k + 1] - knots[k]) for k in segments] for v in (lower, upper)
     ]
-    for k in range(len(knots) - 1):
+    for k in segments:
         for i in (k, k + 1):
             low, high = -lower[i], upper[i]
             if min(low, high) < 0 or low + high <= 0:

@@ -18,7 +18,7 @@ from typing import Any
 
 from . import words
 from .demands import Claim, Demand
-from .polynomials import Polynomial, block, diagonal, even, identity, matrix
+from .polynomials import Polynomial, block, diagonal, even, matrix
 from .reading import INFINITE, Unreadable, array, bound_of, names, parameters, period, whole
 
 MOST_CORNERS = 4096
@@ -63,7 +63,8 @@ def _falling(
     nx, size, (Q, S, R) = P.shape[0], M.shape[1], multiplier
     nw = Q.shape[0]
     z, move, y = (M.part(range(a, b)) for a, b in ((0, nw), (nw, nw + nx), (nw + nx, M.shape[0])))
-    w, x = identity(size).part(range(nw)), identity(size).part(range(nw, nw + nx))
+    every = diagonal([1] * size)
+    w, x = every.part(range(nw)), every.part(range(nw, nw + nx))
     cross = w.T @ S @ z
     form = z.T @ R @ z + w.T @ Q @ w + cross + cross.T
     slope = x.T @ P @ move

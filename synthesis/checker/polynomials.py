@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from itertools import chain, zip_longest
 from itertools import product as combinations
-from typing import NamedTuple
 
 from .exact import Rows, positive_definite, product, shown, transposed
 
@@ -94,13 +93,12 @@ class Polynomial:
         matrices = [Polynomial(self.shape, own, self.below) for own in parts.values()]
         return combined([powers[e] for e in parts], matrices)
 
-    def value(self, point: Sequence[Fraction]) -> list[list[Fraction]]:
-        """Return its value at a point."""
+    def value(self, point: Sequence[Fraction]) -> tuple[Rows, int]:
+        """Return its value at a point, as integers over a number > 0."""
         F = self
         for axis, t in enumerate(point):
             F = F.at(axis, scalar(t))
-        none = [[0] * self.shape[1] for _ in range(self.shape[0])]
-        return [[Fraction(v, F.below) for v in row] for row in F.terms.get((), none)]
+        return F.terms.get((), [[0] * self.shape[1]] * self.shape[0]), F.below
 
     def _times(self, factor: int) -> dict[Exponents, Rows]:
         return {k: _scaled(rows, factor) for k, rows in self.terms.items()}
@@ -132,11 +130,6 @@ def diagonal(values: Sequence[Fraction | int]) -> Polynomial:
     """Return the diagonal matrix of these values."""
     n = range(len(values))
     return matrix([[values[i] if i == j else 0 for j in n] for i in n], len(n))
-
-
-def identity(n: int) -> Polynomial:
-    """Return the identity."""
-    return diagonal([1] * n)
 
 
 def even(rows: Sequence[Sequence[Fraction]]) -> Polynomial:
@@ -229,19 +222,12 @@ def bernstein_coefficients(F: Polynomial, variables: int) -> dict[Exponents, Row
     return values
 
 
-class Miss(NamedTuple):
-    """Where a polynomial is not shown to be positive definite: a point of the unit box, and whether
-    it is false there or only undecided.
-    """
-
-    point: Point
-    false: bool
-
-
 def first_miss(
     F: Polynomial, variables: int, reached: Callable[[Box], bool] = lambda box: True
-) -> Miss | None:
-    """Return where F is not positive definite; None where it is on all boxes that are `reached`."""
+) -> tuple[Point, bool] | None:
+    """Return (a point where F is not positive definite, whether it is known to be not); None where
+    it is positive definite on all boxes that are `reached`.
+    """
     whole = ((Fraction(0), Fraction(1)),) * variables
     waiting, looked = [(F.reduced(), whole)], 0
     while waiting:
@@ -258,13 +244,13 @@ def first_miss(
         points = [tuple(ends[e > 0] for e, ends in zip(k, box, strict=True)) for k in false]
         for point in points:
             if reached(tuple((t, t) for t in point)):
-                return Miss(point, True)
+                return point, True
         # where p is not reached it may be false: the box is made smaller; else along a curved axis
         axes = [i for i, d in enumerate(degrees) if d > 1 or false]
         if not axes:
             continue  # all coefficients are those of corners
         if looked > MOST_BOXES:
-            return Miss(tuple(a for a, _ in box), False)
+            return tuple(a for a, _ in box), False
         axis = max(axes, key=lambda i: box[i][1] - box[i][0])
         a, b = box[axis]
         for side, ends in enumerate(((a, (a + b) / 2), ((a + b) / 2, b))):

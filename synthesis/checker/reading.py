@@ -11,11 +11,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
+from itertools import product as combinations
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from .functions import Basis, BSplines, Cubics, Functions, Legendre, Powers
-from .polynomials import Polynomial, combined, matrix
+from .functions import BSplines, Cubics, Functions, Legendre, Powers
+from .polynomials import Polynomial, combined, matrix, scalar
 
 SCHEMAS = (("symheli certificate", 1), ("symheli set", 1), ("symheli statement", 2))
 TUBE = "symheli tube"
@@ -143,11 +144,6 @@ class Parameter(NamedTuple):
     rate: Fraction | None
     tie: int | None
 
-    @property
-    def width(self) -> Fraction:
-        """Length of the range."""
-        return self.high - self.low
-
 
 def parameters(value: Any) -> tuple[Parameter, ...]:
     """Return the parameters of a model, with their own rates."""
@@ -162,18 +158,6 @@ def parameters(value: Any) -> tuple[Parameter, ...]:
     if any(p.tie is not None and found[p.tie].tie is not None for p in found):
         raise Unreadable("the file is damaged: the rate of a rate is a parameter")
     return tuple(found)
-
-
-def basis(value: Any) -> Basis:
-    """Return the functions of a model."""
-    if value["type"] != "Product":
-        return Basis([_functions(value)])
-    factors, total = [_functions(each) for each in value["factors"]], value["total_degree"]
-    if total is not None and not all(isinstance(f, Legendre) for f in factors):
-        raise Unreadable("the file is damaged: a total degree is for polynomials")
-    if len(factors) < 2 or math.prod(f.size for f in factors) > MOST_FUNCTIONS:
-        raise Unreadable("the products of functions are fewer than two or too many")
-    return Basis(factors, None if total is None else whole(total, "a total degree", 0))
 
 
 def _functions(value: Any) -> Functions:
@@ -194,9 +178,12 @@ def _functions(value: Any) -> Functions:
 
 @dataclass(frozen=True)
 class Model:
-    """dx/dt = A x + B u (sampled: x(k+1)), y = C x + D u, each matrix the sum of f_j(p) M_j."""
+    """dx/dt = A x + B u (sampled: x(k+1)), y = C x + D u, each matrix the sum of f_j(p) M_j, f_j the
+    products of functions of each parameter, `indices`; the last one's run fastest.
+    """
 
-    basis: Basis
+    factors: Sequence[Functions]
+    indices: Sequence[tuple[int, ...]]
     matrices: Mapping[str, tuple[Polynomial, ...]]
     parameters: tuple[Parameter, ...]
     states: tuple[str, ...]
@@ -207,28 +194,41 @@ class Model:
     @classmethod
     def read(cls, value: Any) -> Model:
         """Return the model that a file holds."""
-        own, functions = parameters(value["parameters"]), basis(value["basis"])
-        x, u, y = (names(value[name]) for name in ("states", "inputs", "outputs"))
-        for f, p in zip(functions.factors, own, strict=True):
+        own, basis, total = parameters(value["parameters"]), value["basis"], None
+        several = basis["type"] == "Product"
+        factors = [_functions(each) for each in (basis["factors"] if several else [basis])]
+        if several and basis["total_degree"] is not None:
+            # of polynomials, just the products whose degrees add up to that at most
+            total = whole(basis["total_degree"], "a total degree", 0)
+        if total is not None and not all(isinstance(f, Legendre) for f in factors):
+            raise Unreadable("the file is damaged: a total degree is for polynomials")
+        if math.prod(f.size for f in factors) > MOST_FUNCTIONS:
+            raise Unreadable("the products of functions are too many for this checker")
+        every = combinations(*(range(f.size) for f in factors))
+        indices = [k for k in every if total is None or sum(k) <= total]
+        for f, p in zip(factors, own, strict=True):
             # the end polynomials go on where rounding takes p beyond them
-            slack = p.width / 10**9
+            slack = (p.high - p.low) / 10**9
             if f.breaks[0] > p.low + slack or f.breaks[-1] < p.high - slack:
                 raise Unreadable("the file is damaged: the functions do not cover the range")
-        count, matrices = len(functions.indices), {}
+        (x, u, y), matrices = (names(value[n]) for n in ("states", "inputs", "outputs")), {}
         for name, rows, columns in (("A", x, x), ("B", x, u), ("C", y, x), ("D", y, u)):
-            every = array(value[name], name, count, len(rows), len(columns))
-            matrices[name] = tuple(matrix(M, len(columns)) for M in every)
-        return cls(functions, matrices, own, x, u, y, period(value["dt"]))
+            each = array(value[name], name, len(indices), len(rows), len(columns))
+            matrices[name] = tuple(matrix(M, len(columns)) for M in each)
+        return cls(factors, indices, matrices, own, x, u, y, period(value["dt"]))
 
     def on(self, middle: Sequence[Fraction], p: Sequence[Polynomial]) -> tuple[Polynomial, ...]:
         """Return A, B, C, D on the box around `middle`, at the polynomials p."""
-        functions = self.basis.on(middle, p)
+        each = [f.on(m, q) for f, m, q in zip(self.factors, middle, p, strict=True)]
+        functions = []
+        for k in self.indices:
+            own = scalar(1)
+            for of_one, i in zip(each, k, strict=True):
+                own = own @ of_one[i]
+            functions.append(own.reduced())
         return tuple(combined(functions, own) for own in self.matrices.values())
 
-    def breaks(self, axis: int) -> tuple[Fraction, ...]:
-        """Return where the polynomials change along a parameter."""
-        return self.basis.factors[axis].breaks
-
-    def same_range(self, other: Model) -> bool:
-        """Whether the parameters have the ranges of another model's."""
-        return [p[:2] for p in self.parameters] == [p[:2] for p in other.parameters]
+    @property
+    def ranges(self) -> list[tuple[Fraction, Fraction]]:
+        """The range of each parameter."""
+        return [(p.low, p.high) for p in self.parameters]

@@ -16,7 +16,7 @@ absolute sum of at most 1, and |c x| <= b where that of c V is at most b.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import Any, NamedTuple
 
@@ -29,7 +29,6 @@ from .polynomials import (
     bernstein_coefficients,
     block,
     diagonal,
-    identity,
     matrix,
     scalar,
     symmetric,
@@ -41,13 +40,15 @@ KINDS = ("InvariantSet", "LowComplexitySet")
 
 
 class Loop(NamedTuple):
-    """A model with its feedback (None: Y is part of the set), disturbances, controls and limits."""
+    """A model with its feedback (None: Y is part of the set), disturbances, controls, and limits of
+    (x, y or u, which of them).
+    """
 
     model: Model
     feedback: Model | None
     disturbance: Mapping[str, Fraction]
     controls: tuple[str, ...]
-    limits: Mapping[str, Fraction]
+    limits: Sequence[tuple[str, int, Fraction]]
 
     @classmethod
     def read(cls, content: Any) -> Loop:
@@ -62,22 +63,22 @@ class Loop(NamedTuple):
                 raise Unreadable(f"the file is damaged: {name} of one name, or not above zero")
         if sorted([*sizes[0], *controls]) != sorted(own.inputs):
             raise Unreadable("the file is damaged: an input is no disturbance or control, or both")
-        if not {*sizes[1]} <= {*own.states, *own.outputs} or not {*sizes[2]} <= {*controls}:
-            raise Unreadable("the file is damaged: a limit of no state, output or control")
         if K and (K.states or K.inputs != own.states or K.outputs != controls):
             raise Unreadable("the file is damaged: the feedback is not one of states to controls")
-        if K and not K.same_range(own):
+        if K and K.ranges != own.ranges:
             raise Unreadable("the file is damaged: the feedback is on another range")
-        return cls(own, K, sizes[0], controls, sizes[1] | sizes[2])
+        limits = [
+            ("x", own.states.index(name), v)
+            if name in own.states
+            else ("y", own.outputs.index(name), v)
+            for name, v in sizes[1].items()
+        ] + [("u", controls.index(name), v) for name, v in sizes[2].items()]
+        return cls(own, K, sizes[0], controls, limits)
 
     @property
     def refused(self) -> str:
         """Say which limit no set of states can keep."""
-        y = [
-            i
-            for i, name in enumerate(self.model.outputs)
-            if name in self.limits and name not in self.model.states
-        ]
+        y = [i for what, i, _ in self.limits if what == "y"]
         w = [self.model.inputs.index(name) for name in self.disturbance]
         passed = any(M.part(y, w).reduced().terms for M in self.model.matrices["D"])
         return "disturbances reach a limited output directly" if passed else ""
@@ -93,26 +94,16 @@ class Loop(NamedTuple):
         sizes = diagonal([*self.disturbance.values()])
         return A, B.part(x, u), B.part(x, w) @ sizes, C, D.part(y, u), K
 
-    def limited(
-        self, x: Polynomial, y: Polynomial, u: Polynomial
-    ) -> Iterator[tuple[str, Polynomial, Fraction]]:
+    def limited(self, **rows: Polynomial) -> Iterator[tuple[str, Polynomial, Fraction]]:
         """Yield (what is limited, its row of x, y or u, the limit)."""
-        own = self.model
-        for name, limit in self.limits.items():
-            for what, among, rows in (
-                ("u", self.controls, u), ("x", own.states, x), ("y", own.outputs, y)
-            ):  # fmt: skip
-                if name in among:
-                    i = among.index(name)
-                    yield f"{what}{i + 1}", rows.part([i]), limit
-                    break
+        for what, i, limit in self.limits:
+            yield f"{what}{i + 1}", rows[what].part([i]), limit
 
     @property
     def said(self) -> tuple[str, ...]:
         """The hypotheses and limits in words."""
         sizes = [f"|w{i + 1}| <= {float(v)!r}" for i, v in enumerate(self.disturbance.values())]
-        n = zero(max(len(g) for g in (self.model.states, self.model.outputs, self.controls)), 1)
-        limits = [f"|{what}| <= {float(v)!r}" for what, _, v in self.limited(n, n, n)]
+        limits = [f"|{what}{i + 1}| <= {float(v)!r}" for what, i, v in self.limits]
         return (
             *words.model(self.model, self.model.parameters),
             f"disturbances {', '.join(sizes) or 'w = 0'} with any history",
@@ -134,13 +125,13 @@ def _ellipsoid(loop: Loop, content: Any) -> Claim:
     tau = array(content["shares"], "shares", len(loop.disturbance))
     outputs = 0 if loop.feedback else len(loop.controls)
     n, motion = len(own.states), own.parameters
-    if (len(shape.states), len(shape.outputs)) != (n, outputs) or not shape.same_range(own):
+    if (len(shape.states), len(shape.outputs)) != (n, outputs) or shape.ranges != own.ranges:
         raise Unreadable("the file is damaged: the set is not one of these states and this range")
-    every = list(cells(own, motion, [(p.low, p.high) for p in motion], [False] * len(motion)))
+    every = list(cells(own, motion, own.ranges, [False] * len(motion)))
     refused = loop.refused
     if any(t < 0 for t in tau) or alpha < 0 or sum(tau) > alpha:
         refused = "the multipliers of the disturbances are below zero, or more than alpha together"
-    if any(p.low < b < p.high for i, p in enumerate(motion) for b in shape.breaks(i)):
+    if any(p.low < b < p.high for i, p in enumerate(motion) for b in shape.factors[i].breaks):
         refused = "Q(p) is not one polynomial"
     Q = shape.on(every[0].middle, every[0].here)[0].reduced()
     varies = [any(len(k) > i and k[i] for k in Q.terms) for i in range(len(motion))]
@@ -162,7 +153,7 @@ def _ellipsoid(loop: Loop, content: Any) -> Claim:
             for said, drift in cell.drifts(Q, varies) if own.dt is None else ():
                 top = drift - Q * alpha - change - change.T
                 yield Demand(f"V falls{said}", symmetric([[top], [-W.T, shares]]), cell)
-            for what, row, limit in loop.limited(Q, C @ Q + D @ Y, Y):
+            for what, row, limit in loop.limited(x=Q, y=C @ Q + D @ Y, u=Y):
                 square = scalar(limit * limit)
                 yield Demand(f"the limit of {what}", symmetric([[Q], [row, square]]), cell)
 
@@ -177,13 +168,13 @@ def _parallelepiped(loop: Loop, content: Any) -> Claim:
     refused = loop.refused
     if own.dt is None or (loop.controls and loop.feedback is None):
         raise Unreadable("a parallelepiped is known for sampled loops with a feedback only")
-    columns, eye = matrix(V, n), identity(n)
+    columns, eye = matrix(V, n), diagonal([1] * n)
     try:
-        back = matrix(solved(V, eye.value(())), n)
+        back = matrix(solved(V, [[Fraction(i == j) for j in range(n)] for i in range(n)]), n)
     except ZeroDivisionError:
         return Claim(said, loop.said, (), refused="the parallelepiped is flat")
     knots = [
-        sorted({p.low, p.high, *(loop.feedback.breaks(i) if loop.feedback else ())})
+        sorted({p.low, p.high, *(loop.feedback.factors[i].breaks if loop.feedback else ())})
         for i, p in enumerate(motion)
     ]
     for cell in cells(own, motion, knots, [False] * len(motion)):
@@ -191,12 +182,12 @@ def _parallelepiped(loop: Loop, content: Any) -> Claim:
         moved, nw = [back @ (A + B @ K) @ columns, back @ W], W.shape[1]
         rows = [[*moved, matrix([[1]] * n, 1)]] + [
             [row @ columns, zero(1, nw), scalar(limit)]
-            for _, row, limit in loop.limited(eye, C + D @ K, K)
+            for _, row, limit in loop.limited(x=eye, y=C + D @ K, u=K)
         ]
         for values in bernstein_coefficients(block(rows), cell.variables).values():
             for *row, most in values:
                 if sum(map(abs, row)) > most:
                     excess = sum(map(abs, row)) / most - 1
-                    where = cell.place(cell.center)
+                    where = cell.place([Fraction(1, 2)] * cell.variables)
                     refused = f"an absolute sum is {excess:.3g} above its limit near {where}"
     return Claim(said, loop.said, (), refused=refused)

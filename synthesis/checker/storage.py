@@ -34,7 +34,6 @@ from .polynomials import (
     combined,
     diagonal,
     even,
-    identity,
     matrix,
     scalar,
     symmetric,
@@ -42,7 +41,8 @@ from .polynomials import (
 )
 from .reading import Model, Parameter, Unreadable, array, ascending, bound_of, limit, number, whole
 
-KINDS = ("l2 gain", "stability", "decay rate", "energy-to-peak gain", "h2 gain")
+PEAKS = ("energy-to-peak gain", "h2 gain")
+KINDS = ("l2 gain", "stability", "decay rate", *PEAKS)
 
 
 @dataclass(frozen=True)
@@ -104,16 +104,6 @@ class Proof:
     block: Block | None = None
 
     @property
-    def sampled(self) -> bool:
-        """Whether time is discrete."""
-        return self.model.dt is not None
-
-    @property
-    def of_peaks(self) -> bool:
-        """Whether V grows by no more than the energy of the inputs, and bounds the outputs."""
-        return self.kind in ("energy-to-peak gain", "h2 gain")
-
-    @property
     def moving(self) -> list[bool]:
         """Whether P changes as each parameter moves."""
         return [bool(d) and p.rate != 0 for d, p in zip(self.P.degrees, self.motion, strict=True)]
@@ -125,10 +115,10 @@ class Proof:
         if any(k[0] != p.low or k[-1] != p.high for k, p in covered):
             return "V is not known on the whole range of p"
         jumps = (p.tie is None and p.rate is None for p in self.motion)
-        if not self.sampled and any(map(all, zip(self.moving, jumps, strict=True))):
+        if self.model.dt is None and any(map(all, zip(self.moving, jumps, strict=True))):
             return "V depends on a parameter that may jump, so that V may jump too"
         passed = any(M.reduced().terms for M in self.model.matrices["D"])
-        if self.of_peaks and not self.sampled and passed:
+        if self.kind in PEAKS and self.model.dt is None and passed:
             return "inputs reach the outputs directly, so that their peaks have no bound"
         return ""
 
@@ -148,12 +138,12 @@ class Proof:
             P, after = self._P(cell.segments, cell.here), self._P(cell.following, cell.there)
             yield Demand("V > 0", P, cell)
             system = self.model.on(cell.middle, cell.here)
-            drifts = [("", P * 0)] if self.sampled else cell.drifts(P, self.moving)
+            drifts = [("", P * 0)] if self.model.dt else cell.drifts(P, self.moving)
             for said, drift in drifts:
                 form, paid = self.falling(cell, system, P, after, drift)
                 form = form - next(slack) if self.slack else form
                 yield Demand(f"V falls{said}", form, cell, paid)
-            if self.of_peaks:
+            if self.kind in PEAKS:
                 yield Demand("V bounds the outputs", *self._seen(P, cell, *system[2:]))
 
     def _P(self, segments: Sequence[int], p: Sequence[Polynomial]) -> Polynomial:
@@ -173,14 +163,14 @@ class Proof:
         """
         A, B, C, D = system
         A = monomials.generator(A, self.order)
-        if self.sampled:
+        if self.model.dt:
             moved = A.T @ after @ A
             top, side, corner = moved - P, A.T @ after @ B, B.T @ after @ B
         else:
             moved, PA = P, P @ A
             top, side, corner = PA + PA.T + drift, P @ B, zero(B.shape[1], B.shape[1])
         if self.kind == "decay rate":
-            return (P if self.sampled else -top), -moved
+            return (P if self.model.dt else -top), -moved
         parts = self.block.parts if self.block else ()
         d, v = sum(part[0] for part in parts), sum(part[1] for part in parts)
         if self.kind == "stability" and not d:
@@ -192,7 +182,7 @@ class Proof:
         if self.kind == "stability":
             return -form.part(range(n + d), range(n + d)), None
         energy = diagonal([int(i >= n + d) for i in range(size)])
-        if self.of_peaks:
+        if self.kind in PEAKS:
             return energy - form, None
         y = y.part(range(seen))
         return -(form + y.T @ y), energy
@@ -216,8 +206,8 @@ class Proof:
         for the bound.
         """
         ny, nu = D.shape
-        if self.sampled:
-            P = symmetric([[P], [zero(nu, P.shape[0]), identity(nu)]])
+        if self.model.dt:
+            P = symmetric([[P], [zero(nu, P.shape[0]), diagonal([1] * nu)]])
             C = block([[C, D]])
         if self.kind == "h2 gain":
             none, rows = P * 0, [C.part([i]) for i in range(ny)]
@@ -280,7 +270,7 @@ def _of_one_parameter(kind: str, model: Model, motion: tuple[Parameter, ...], pr
     own = Proof(kind, model, motion, P, coordinates, order, rows, _block(proof, V, model))
     if kind not in ("l2 gain", "stability"):
         raise Unreadable("V of one parameter is known for gains and stability only")
-    if order > 1 and (own.sampled or model.inputs or T is not None or own.block):
+    if order > 1 and (model.dt or model.inputs or T is not None or own.block):
         raise Unreadable("a V of higher degree is known for stability in continuous time only")
     return own
 
