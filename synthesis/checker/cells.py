@@ -7,8 +7,6 @@ than what lets p_i stay in its range: p_j^2 <= 2 rate_j (high_i - p_i) above zer
 way below.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from itertools import pairwise
@@ -76,9 +74,10 @@ class Cell(NamedTuple):
             for s, side in zip(self.strips, box, strict=False)
         ]
         for i, p in enumerate(self.motion):
-            if p.tie is None or self.motion[p.tie].rate is None:
+            jerk = None if p.tie is None else self.motion[p.tie].rate
+            if p.tie is None or jerk is None:
                 continue
-            (a, b), (c, d), jerk = ends[i], ends[p.tie], self.motion[p.tie].rate
+            (a, b), (c, d) = ends[i], ends[p.tie]
             if d < 0 and d * d > 2 * jerk * (b - p.low):
                 return False
             if c > 0 and c * c > 2 * jerk * (p.high - a):

@@ -2,8 +2,6 @@
 first of them is not, and by how much.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
@@ -56,8 +54,9 @@ def failure(claim: Claim) -> str:
     level = claim.level(claim.bound)
     for demand in claim.demands:
         F, cell = demand.at_level(level), demand.cell
-        box = (cell.variables, cell.reaches) if cell else (demand.variables,)
-        miss = first_miss(F, *box)
+        miss = (
+            first_miss(F, cell.variables, cell.reaches) if cell else first_miss(F, demand.variables)
+        )
         if miss is None:
             continue
         point, false = miss

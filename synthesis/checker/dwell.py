@@ -10,8 +10,6 @@ least T in each mode is covered; with constant P every signal of an average dwel
 where exp(2 lambda tau) >= mu (sampled (1 - lambda)^(tau/dt) mu <= 1). A may move with p in any way.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from itertools import product as combinations
@@ -95,9 +93,8 @@ class Switched(NamedTuple):
 
 
 def _piece(value: Any) -> tuple[Polynomial, int]:
-    """Return A(p) of a piece on the unit box, by its Bernstein coefficients, and the number of p."""
-    counts = [whole(c, "a size", 1, 10**4) for c in value["coefficients"]["shape"]]
-    *own, n, _ = counts
+    """Return A(p) of a piece on the unit box, and the number of its parameters."""
+    *own, n, _ = (whole(c, "a size", 1, 10**4) for c in value["coefficients"]["shape"])
     nested = array(value["coefficients"], "A", *own, n, n)
     weights, matrices = [], []
     for place in combinations(*map(range, own)):
@@ -110,16 +107,14 @@ def _piece(value: Any) -> tuple[Polynomial, int]:
     return combined(weights, matrices), len(own)
 
 
-def claimed(kind: str, content: Any) -> Claim:
+def claimed(content: Any) -> Claim:
     """Return what a file of a dwell time claims; the fields of the file are named here alone."""
     modes = [[_piece(each) for each in mode] for mode in content["modes"]["A"]]
     seconds, count, n = number(content["seconds"], "the time"), len(modes), modes[0][0][0].shape[0]
-    jumps = {
-        (whole(i, "a mode", 0, count - 1), whole(j, "a mode", 0, count - 1)): matrix(
-            array(J, "a jump", n, n), n
-        )
-        for (i, j), J in content["modes"]["jumps"]
-    }
+    jumps = {}
+    for pair, J in content["modes"]["jumps"]:
+        i, j = (whole(k, "a mode", 0, count - 1) for k in pair)
+        jumps[i, j] = matrix(array(J, "a jump", n, n), n)
     P = [[even(M) for M in array(each, "P", None, n, n)] for each in content["P"]]
     lengths = array(content["lengths"], "the lengths", None)
     decay, growth = (number(content[name], name) for name in ("decay", "growth"))

@@ -1,7 +1,5 @@
 """Matrices of integers, and whether a symmetric one is positive definite."""
 
-from __future__ import annotations
-
 import math
 from operator import mul
 

@@ -2,8 +2,6 @@
 interval on which they are polynomials.
 """
 
-from __future__ import annotations
-
 import math
 from abc import ABC, abstractmethod
 from fractions import Fraction

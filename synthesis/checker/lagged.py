@@ -7,8 +7,6 @@ upper - lower, of which h ds/dt = dp/dt - e / T - (lower' + s h') dp/dt. The ine
 are those of a P without lag, with dP/dt = dp/dt dP/dp + ds/dt dP/ds; here times h > 0.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any
@@ -78,5 +76,5 @@ def claimed(kind: str, content: Any) -> Claim:
                     name = f"V falls with dp1/dt = {float(speed):.6g}"
                     yield Demand(name, combined([height], [form]) - whole_drift, wide, scaled)
 
-    said = words.model(model, motion)
+    said = words.model(*model.sizes, motion)
     return Claim(words.gain(kind, bound), said, demands(), bound, lambda g: g * g, refused=refused)

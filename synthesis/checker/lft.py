@@ -10,8 +10,6 @@ It is where R = -Q = diag(D_i) > 0 and S = diag(G_i), G_i = -G_i', since then N 
 or where Q_ii < 0, so that N is concave in each delta_i alone, and N > 0 at the corners of the box.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from itertools import product as combinations
 from typing import Any
@@ -21,8 +19,8 @@ from .demands import Claim, Demand
 from .polynomials import Polynomial, block, diagonal, even, matrix
 from .reading import INFINITE, Unreadable, array, bound_of, names, parameters, period, whole
 
-MOST_CORNERS = 4096
-"""Corners of the box at which a multiplier is checked."""
+MOST_PARAMETERS = 12
+"""Parameters up to which a multiplier is checked at the corners of their box."""
 
 
 def claimed(kind: str, content: Any) -> Claim:
@@ -52,7 +50,7 @@ def claimed(kind: str, content: Any) -> Claim:
         yield _falling(M, P, multiplier, u, dt is not None)
 
     jumping = [p._replace(rate=None, tie=None) for p in motion]
-    said = [words.sizes(x, u, y, dt), *words.motion(jumping)]
+    said = words.model(x, u, y, dt, jumping)
     return Claim(words.gain(kind, bound), said, demands(), bound, lambda g: g * g)
 
 
@@ -88,7 +86,7 @@ def _nonnegative(
     zeros = [M.part([a], [b]) for M in (S, R) for a, b in apart] + [Q + R, S + S.T]
     if not any(M.reduced().terms for M in zeros):
         return
-    if 2 ** len(sizes) > MOST_CORNERS:
+    if len(sizes) > MOST_PARAMETERS:
         raise Unreadable("the multiplier has more corners than this checker looks at")
     for signs in combinations((-1, 1), repeat=len(sizes)):
         Delta = diagonal([signs[i] for i in owner])

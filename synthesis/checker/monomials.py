@@ -2,26 +2,19 @@
 and the forms in z that are zero for every x.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from itertools import combinations_with_replacement
+from itertools import combinations_with_replacement as powers
 
 from .polynomials import Polynomial, bernstein_functions, combined, matrix, variable
 from .reading import Unreadable
-
-
-def monomials(n: int, order: int) -> list[tuple[int, ...]]:
-    """Return the monomials in n states: the numbers of their factors, ascending."""
-    return list(combinations_with_replacement(range(n), order))
 
 
 def generator(A: Polynomial, order: int) -> Polynomial:
     """Return G of dz/dt = G z where dx/dt = A x."""
     if order == 1:
         return A
-    n, z, terms = A.shape[0], monomials(A.shape[0], order), {}
+    n, z, terms = A.shape[0], list(powers(range(A.shape[0]), order)), {}
     place = {factors: i for i, factors in enumerate(z)}
     for k, rows in A.terms.items():
         terms[k] = [[0] * len(z) for _ in z]
@@ -42,7 +35,7 @@ def zeros(
     """
     if not weights:
         return
-    z, first, pairs = monomials(n, order), {}, []
+    z, first, pairs = list(powers(range(n), order)), {}, []
     for b in range(len(z)):
         for a in range(b + 1):
             same = first.setdefault(tuple(sorted(z[a] + z[b])), (a, b))

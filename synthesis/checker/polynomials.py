@@ -57,7 +57,7 @@ class Polynomial:
     def T(self) -> Polynomial:
         """The transpose."""
         terms = {k: transposed(rows, self.shape[1]) for k, rows in self.terms.items()}
-        return Polynomial(self.shape[::-1], terms, self.below)
+        return Polynomial((self.shape[1], self.shape[0]), terms, self.below)
 
     def part(self, rows: Sequence[int], columns: Sequence[int] | None = None) -> Polynomial:
         """Return some rows and columns."""

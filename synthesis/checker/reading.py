@@ -21,10 +21,8 @@ from .polynomials import Polynomial, combined, matrix, scalar
 SCHEMAS = (("symheli certificate", 1), ("symheli set", 1), ("symheli statement", 2))
 TUBE = "symheli tube"
 INFINITE = {"float": "inf"}
-MOST_FUNCTIONS = 100_000
-"""Products of functions that a basis may have before those of too large a degree are left out."""
-HIGHEST_DEGREE = 60
-"""Highest degree of a polynomial that is read."""
+MOST_FUNCTIONS, HIGHEST_DEGREE = 100_000, 60
+"""Products of functions, and degree of a polynomial, beyond which nothing is read."""
 
 
 class Unreadable(Exception):
@@ -178,8 +176,8 @@ def _functions(value: Any) -> Functions:
 
 @dataclass(frozen=True)
 class Model:
-    """dx/dt = A x + B u (sampled: x(k+1)), y = C x + D u, each matrix the sum of f_j(p) M_j, f_j the
-    products of functions of each parameter, `indices`; the last one's run fastest.
+    """dx/dt = A x + B u (sampled: x(k+1)), y = C x + D u, each matrix the sum of f_j(p) M_j, f_j
+    products of functions of each parameter (`indices`), the last one's fastest.
     """
 
     factors: Sequence[Functions]
@@ -227,6 +225,11 @@ class Model:
                 own = own @ of_one[i]
             functions.append(own.reduced())
         return tuple(combined(functions, own) for own in self.matrices.values())
+
+    @property
+    def sizes(self) -> tuple[int, int, int, Fraction | None]:
+        """Numbers of states, inputs and outputs, and the sample period."""
+        return len(self.states), len(self.inputs), len(self.outputs), self.dt
 
     @property
     def ranges(self) -> list[tuple[Fraction, Fraction]]:

@@ -1,7 +1,5 @@
 """Command of the checker: reads a file, prints what its numbers claim, and decides."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -10,8 +8,6 @@ from . import dwell, lagged, lft, sets, storage
 from .demands import Claim, failure
 from .reading import DAMAGED, TUBE, Unreadable, opened
 
-PROVEN, NOT_PROVEN, UNKNOWN = 0, 1, 2
-
 
 def claim_of(kind: str, content: Mapping[str, Any]) -> Claim:
     """Return what a file of this kind claims; raises `Unreadable` for a kind that is not known."""
@@ -19,27 +15,26 @@ def claim_of(kind: str, content: Mapping[str, Any]) -> Claim:
         proof = content["proof"]
         if proof is None:
             raise Unreadable("the file holds no proof")
-        if proof["route"] == "lft":
-            return lft.claimed(kind, content)
         of_lag = proof["lyapunov"]["type"] == "MemoryLyapunov"
-        return (lagged if of_lag else storage).claimed(kind, content)
+        rest = lagged if of_lag else storage
+        return (lft if proof["route"] == "lft" else rest).claimed(kind, content)
     if kind in sets.KINDS:
         return sets.claimed(kind, content)
     if kind == dwell.KIND:
-        return dwell.claimed(kind, content)
+        return dwell.claimed(content)
     if kind == TUBE:
         raise Unreadable(
-            "tubes are not decided here: their proof rests on enclosures of the nonlinear equations"
+            "tubes are not decided here: their proof rests on enclosures of nonlinear equations"
             " and of their derivatives, for which this checker has no arithmetic of intervals"
         )
     raise Unreadable(f"claims of the kind {kind!r:.40} are not known")
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Check a file and return the exit status."""
+    """Check a file and return the exit status: 0 proven, 1 not proven, 2 not known or damaged."""
     if len(arguments) != 1 or arguments[0].startswith("-"):
         print("usage: python synthesis/checker FILE", file=sys.stderr)
-        return UNKNOWN
+        return 2
     try:
         kind, content = opened(arguments[0])
         claim = claim_of(kind, content)
@@ -50,9 +45,9 @@ def main(arguments: Sequence[str]) -> int:
         why = failure(claim)
     except Unreadable as error:
         print(f"not checked: {error}")
-        return UNKNOWN
+        return 2
     except DAMAGED as error:
         print(f"not checked: the file is damaged, a value is of no use ({error})")
-        return UNKNOWN
+        return 2
     print(f"not proven: {why}" if why else "proven in exact arithmetic")
-    return NOT_PROVEN if why else PROVEN
+    return 1 if why else 0

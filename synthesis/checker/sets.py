@@ -105,7 +105,7 @@ class Loop(NamedTuple):
         sizes = [f"|w{i + 1}| <= {float(v)!r}" for i, v in enumerate(self.disturbance.values())]
         limits = [f"|{what}{i + 1}| <= {float(v)!r}" for what, i, v in self.limits]
         return (
-            *words.model(self.model, self.model.parameters),
+            *words.model(*self.model.sizes, self.model.parameters),
             f"disturbances {', '.join(sizes) or 'w = 0'} with any history",
             f"limits {', '.join(limits)}",
         )

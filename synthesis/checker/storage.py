@@ -39,7 +39,7 @@ from .polynomials import (
     symmetric,
     zero,
 )
-from .reading import Model, Parameter, Unreadable, array, ascending, bound_of, limit, number, whole
+from .reading import Model, Parameter, Unreadable, array, ascending, bound_of, limit, whole
 
 PEAKS = ("energy-to-peak gain", "h2 gain")
 KINDS = ("l2 gain", "stability", "decay rate", *PEAKS)
@@ -151,17 +151,13 @@ class Proof:
         return P if T is None else (T.T @ P @ T).reduced()
 
     def falling(
-        self,
-        cell: Cell,
-        system: Sequence[Polynomial],
-        P: Polynomial,
-        after: Polynomial,
-        drift: Polynomial,
+        self, cell: Cell, system: Sequence[Polynomial], *V: Polynomial
     ) -> tuple[Polynomial, Polynomial | None]:
         """Return the form that is positive definite in (x, d, u), and what is paid for the bound:
-        |u|^2 of a gain. |y|^2 is left out where V bounds the outputs or there is no bound.
+        |u|^2 of a gain; V: P, P at the next sample, dP/dt. |y|^2 is left out where V bounds the
+        outputs or there is no bound.
         """
-        A, B, C, D = system
+        (A, B, C, D), (P, after, drift) = system, V
         A = monomials.generator(A, self.order)
         if self.model.dt:
             moved = A.T @ after @ A
@@ -220,18 +216,17 @@ class Proof:
 def claimed(kind: str, content: Any) -> Claim:
     """Return what a certificate of these kinds claims, by the routes "one parameter" and "box"."""
     proof, bound = content["proof"], bound_of(kind, content)
-    several = proof["route"] == "box"
-    model = Model.read(proof["source" if several else "lpv"])
-    motion, V = _motion(model, content["rates"], proof, several), proof["lyapunov"]
+    model = Model.read(proof["source" if proof["route"] == "box" else "lpv"])
+    motion, V = _motion(model, content["rates"], proof), proof["lyapunov"]
     if V["type"] == "BoxLyapunov":
         degrees = [whole(d, "a degree", 0) for d in V["degrees"]]
         P = Spline.read(V["knots"], degrees, V["coefficients"], len(model.states))
         own = Proof(kind, model, motion, P)
-    elif V["type"] == "SplineLyapunov" and not several:
+    elif V["type"] == "SplineLyapunov":
         own = _of_one_parameter(kind, model, motion, proof)
     else:
         raise Unreadable("V is of a form that is not known")
-    said = words.model(own.model, own.motion)
+    said = words.model(*model.sizes, motion)
     for d, v, dynamic in own.block.parts if own.block else ():
         how = "dynamics at rest at the start" if dynamic else "constant or moving in any way"
         size = float(proof["block"]["bound"])
@@ -242,21 +237,16 @@ def claimed(kind: str, content: Any) -> Claim:
     return Claim(claim, said, own.demands(), bound, own.level, lower, own.refused)
 
 
-def _motion(
-    model: Model, claimed: Sequence[Any], proof: Any, several: bool
-) -> tuple[Parameter, ...]:
+def _motion(model: Model, rates: Sequence[Any], proof: Any) -> tuple[Parameter, ...]:
     """Return the parameters with the rates of the claim, which must be those of the proof."""
-    motion = proof["demand"]["motion"] if several else None
-    if claimed != ([proof["rate"]] if motion is None else motion["rates"]):
-        raise Unreadable("the rates of the claim are not those of the proof")
-    out = tuple(
-        p._replace(rate=limit(rate, "a rate") if p.tie is None else None)
-        for p, rate in zip(model.parameters, claimed, strict=True)
-    )
-    box = [[float(p.low), float(p.high)] for p in out]
-    if motion and (motion["ties"] != [p.tie for p in out] or motion["box"] != box):
+    box, ties = [[float(a), float(b)] for a, b in model.ranges], [p.tie for p in model.parameters]
+    several = {"type": "Motion", "box": box, "rates": rates, "ties": ties}
+    if proof["demand"]["motion"] != several if "demand" in proof else rates != [proof["rate"]]:
         raise Unreadable("the parameters of the claim do not move as those of the proof")
-    return out
+    return tuple(
+        p._replace(rate=limit(rate, "a rate") if p.tie is None else None)
+        for p, rate in zip(model.parameters, rates, strict=True)
+    )
 
 
 def _of_one_parameter(kind: str, model: Model, motion: tuple[Parameter, ...], proof: Any) -> Proof:
@@ -277,29 +267,26 @@ def _of_one_parameter(kind: str, model: Model, motion: tuple[Parameter, ...], pr
 
 def _block(proof: Any, V: Any, model: Model) -> Block | None:
     """Return the norm-bounded block of a proof with its multipliers."""
-    value, multiplier = proof["block"], V["multiplier"]
+    value, multiplier, knots = proof["block"], V["multiplier"], ascending(V["knots"], "knots")
     if value is None and multiplier is None:
         return None
-    whole_block = [value["inputs"], value["outputs"], False]
-    parts, bound = value["parts"] or [whole_block], number(value["bound"], "the bound of a block")
-    for d, v, dynamic in parts:
-        whole(d, "a part", 1, len(model.inputs))
-        whole(v, "a part", 1, len(model.outputs))
-        if not isinstance(dynamic, bool):
-            raise Unreadable("the file is damaged: a part is dynamics or not")
-    if [sum(part[i] for part in parts) for i in (0, 1)] != whole_block[:2] or bound < 0:
-        raise Unreadable("the file is damaged: the parts do not make the block")
-    if whole_block[0] > len(model.inputs) or whole_block[1] > len(model.outputs):
-        raise Unreadable("the file is damaged: the block does not fit the model")
-    knots, several = ascending(V["knots"], "knots"), len(multiplier["shape"]) == 2
+    size = [
+        whole(value[name], f"{name} of a block", 1, len(among))
+        for name, among in (("inputs", model.inputs), ("outputs", model.outputs))
+    ]
+    parts, bound = value["parts"] or [[*size, False]], limit(value["bound"], "the bound of a block")
+    each = [(whole(d, "a part", 1), whole(v, "a part", 1), kind is True) for d, v, kind in parts]
+    several = len(multiplier["shape"]) == 2
     values = array(multiplier, "a multiplier", None, *([len(parts)] if several else []))
     columns = list(zip(*values, strict=True)) if several else [values]
     degree, rest = divmod(len(values) - 1, len(knots) - 1)
-    if rest or len(columns) != len(parts) or any(v < 0 for own in columns for v in own):
+    if bound is None or size != [sum(part[i] for part in each) for i in (0, 1)]:
+        raise Unreadable("the file is damaged: the parts do not make the block")
+    if rest or len(columns) != len(each) or any(v < 0 for own in columns for v in own):
         raise Unreadable("the file is damaged: a multiplier is below zero or fits no knots")
-    if any(part[2] and len(set(own)) > 1 for part, own in zip(parts, columns, strict=True)):
+    if any(part[2] and len(set(own)) > 1 for part, own in zip(each, columns, strict=True)):
         raise Unreadable("the multiplier of dynamics depends on p")
-    splines = (
+    splines = [
         Spline((knots,), (degree,), {(i,): scalar(v) for i, v in enumerate(own)}) for own in columns
-    )
-    return Block(tuple((d, v, dynamic) for d, v, dynamic in parts), bound, tuple(splines))
+    ]
+    return Block(tuple(each), bound, tuple(splines))

@@ -1,11 +1,9 @@
 """Claims and hypotheses in words, made from numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from fractions import Fraction
 
-from .reading import Model, Parameter
+from .reading import Parameter
 
 
 def gain(kind: str, bound: Fraction) -> str:
@@ -18,12 +16,6 @@ def gain(kind: str, bound: Fraction) -> str:
         "energy-to-peak gain": f"from rest |y(t)| < {size} |u|_2 at every t",
         "h2 gain": f"from rest, in white noise of unit intensity, E |y(t)|^2 < {size}^2 at every t",
     }[kind]
-
-
-def sizes(states: int, inputs: int, outputs: int, dt: Fraction | None) -> str:
-    """Return the sizes of a model."""
-    time = "continuous time" if dt is None else f"samples of {float(dt)!r} s"
-    return f"a model of {states} states x, {inputs} inputs u, {outputs} outputs y, in {time}"
 
 
 def motion(parameters: Sequence[Parameter]) -> list[str]:
@@ -39,7 +31,7 @@ def motion(parameters: Sequence[Parameter]) -> list[str]:
     return said
 
 
-def model(own: Model, moving: Sequence[Parameter]) -> list[str]:
-    """Return of which model a claim is, and how its parameters move."""
-    x, u, y = len(own.states), len(own.inputs), len(own.outputs)
-    return [sizes(x, u, y, own.dt), *motion(moving)]
+def model(x: int, u: int, y: int, dt: Fraction | None, moving: Sequence[Parameter]) -> list[str]:
+    """Return of a model of which sizes a claim is, and how its parameters move."""
+    time = "continuous time" if dt is None else f"samples of {float(dt)!r} s"
+    return [f"a model of {x} states x, {u} inputs u, {y} outputs y, in {time}", *motion(moving)]
