@@ -110,9 +110,7 @@ def cells(
         p, cuts = motion[i], {*knots[i], *model.factors[i].breaks}
         if dt is not None and any(motion[k].tie == i and moving[k] for k in tied):
             cuts |= {p.low + (p.high - p.low) * Fraction(k, PARTS) for k in range(PARTS)}
-        span = None
-        if dt is not None and moving[i]:
-            span = _span(motion, i, others, dt)
+        span = _span(motion, i, others, dt) if dt is not None and moving[i] else None
         inside = sorted({p.low, p.high, *(c for c in cuts if p.low < c < p.high)})
         return list(_strips(p, inside, knots[i], span))
 
@@ -150,9 +148,8 @@ def _strips(
     span: tuple[Fraction, Fraction] | None,
 ) -> Iterator[Strip]:
     """Yield the intervals of one parameter, with each segment of P that is reached from them."""
-    inner = knots[1:-1]
     for a, b in pairwise(cuts):
-        own = sum((a + b) / 2 >= k for k in inner)
+        own = sum((a + b) / 2 >= k for k in knots[1:-1])
         if span is None:
             yield Strip(a, b, own, own, None)
             continue
@@ -175,8 +172,7 @@ def _cell(strips: tuple[Strip, ...], motion: tuple[Parameter, ...]) -> Cell:
     here, there, one = [], [], scalar(1)
     for i, s in enumerate(strips):
         t = variable(i)
-        p = one * s.low + t * (s.high - s.low)
-        here.append(p.reduced())
+        here.append((one * s.low + t * (s.high - s.low)).reduced())
         if s.reached is None:
             there.append(here[-1])
             continue

@@ -11,9 +11,6 @@ from .cells import Cell
 from .exact import shortfall, shown
 from .polynomials import Polynomial, first_miss
 
-LARGEST_FACTOR = 1e6
-"""Largest factor on a claimed bound by which one is looked for that would do at a point."""
-
 
 class Demand(NamedTuple):
     """`matrix` + level `paid` is positive definite on a cell, or without one on a unit box of some
@@ -80,8 +77,8 @@ def _needed(claim: Claim, demand: Demand, point: Sequence[Fraction]) -> str:
 
     low = float(claim.bound)
     high = 0.0 if claim.lower else low or 1e-12
-    while not claim.lower and not enough(high) and high < LARGEST_FACTOR * (low or 1e-12):
-        high *= 1.5
+    for _ in range(0 if claim.lower else 40):
+        high *= 1.0 if enough(high) else 1.5
     if not enough(high):
         return "; no bound makes it so"
     for _ in range(50):

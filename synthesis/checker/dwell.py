@@ -27,7 +27,6 @@ from .polynomials import (
 )
 from .reading import array, number, period, whole
 
-KIND = "DwellTime"
 DEGREE = 3
 """Degree of P on each segment of continuous time."""
 

@@ -10,8 +10,6 @@ except ImportError:
 
 Rows = list[list[int]]
 
-LARGE = 12
-"""Rows from which python-flint, where it is installed, multiplies faster."""
 ENTRY_BITS = 128
 """Bits to which a matrix is rounded, with the rounding counted, before its congruence."""
 FACTOR_BITS = 40
@@ -20,7 +18,7 @@ FACTOR_BITS = 40
 
 def product(X: Rows, Y: Rows) -> Rows:
     """Return X Y; X has at least one column."""
-    if fmpz_mat is not None and len(X) >= LARGE and len(Y[0]) >= LARGE:
+    if fmpz_mat is not None and min(len(X), len(Y[0])) > 11:  # faster from there
         found = (fmpz_mat(X) * fmpz_mat(Y)).tolist()
         return [[int(v) for v in row] for row in found]
     columns = list(zip(*Y, strict=True))

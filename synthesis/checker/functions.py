@@ -1,6 +1,4 @@
-"""The functions f_j(p) of which a model is the sum A(p) = sum_j f_j(p) A_j: as polynomials on an
-interval on which they are polynomials.
-"""
+"""The functions of p of which a model is the sum, where they are polynomials."""
 
 import math
 from abc import ABC, abstractmethod
@@ -22,8 +20,7 @@ class Functions(ABC):
 
     def piece(self, middle: Fraction) -> int:
         """Return the interval between breaks in which `middle` lies; beyond them the last one."""
-        inside = self.breaks[1:-1]
-        return sum(middle >= b for b in inside)
+        return sum(middle >= b for b in self.breaks[1:-1])
 
 
 class Legendre(Functions):
@@ -50,8 +47,7 @@ class BSplines(Functions):
 
     def __init__(self, degree: int, breaks: tuple[Fraction, ...]) -> None:
         self.degree, self.breaks, self.size = degree, breaks, len(breaks) - 1 + degree
-        ends = (breaks[0],) * degree, (breaks[-1],) * degree
-        self.knots = (*ends[0], *breaks, *ends[1])
+        self.knots = breaks[:1] * degree + breaks + breaks[-1:] * degree
 
     def on(self, middle: Fraction, p: Polynomial) -> list[Polynomial]:
         """Return the functions by their recurrence."""

@@ -1,6 +1,4 @@
-"""Functions V = z' P z of the monomials z of one degree (`order`) in x, |z| = z(x): their motion,
-and the forms in z that are zero for every x.
-"""
+"""Functions V = z' P z of the monomials z of one degree, `order`, in x."""
 
 from collections.abc import Iterator, Sequence
 from fractions import Fraction

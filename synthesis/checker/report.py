@@ -8,6 +8,13 @@ from . import dwell, lagged, lft, sets, storage
 from .demands import Claim, failure
 from .reading import DAMAGED, TUBE, Unreadable, opened
 
+OTHERS = {
+    "InvariantSet": sets.ellipsoid,
+    "LowComplexitySet": sets.parallelepiped,
+    "DwellTime": dwell.claimed,
+}
+"""What a file of a kind claims, beside certificates."""
+
 
 def claim_of(kind: str, content: Mapping[str, Any]) -> Claim:
     """Return what a file of this kind claims; raises `Unreadable` for a kind that is not known."""
@@ -18,10 +25,8 @@ def claim_of(kind: str, content: Mapping[str, Any]) -> Claim:
         of_lag = proof["lyapunov"]["type"] == "MemoryLyapunov"
         rest = lagged if of_lag else storage
         return (lft if proof["route"] == "lft" else rest).claimed(kind, content)
-    if kind in sets.KINDS:
-        return sets.claimed(kind, content)
-    if kind == dwell.KIND:
-        return dwell.claimed(content)
+    if kind in OTHERS:
+        return OTHERS[kind](content)
     if kind == TUBE:
         raise Unreadable(
             "tubes are not decided here: their proof rests on enclosures of nonlinear equations"

@@ -36,8 +36,6 @@ from .polynomials import (
 )
 from .reading import Model, Unreadable, array, number
 
-KINDS = ("InvariantSet", "LowComplexitySet")
-
 
 class Loop(NamedTuple):
     """A model with its feedback (None: Y is part of the set), disturbances, controls, and limits of
@@ -54,34 +52,39 @@ class Loop(NamedTuple):
     def read(cls, content: Any) -> Loop:
         """Return the loop that a file holds."""
         own, K = Model.read(content["model"]), content["feedback"]
-        K = None if K is None else Model.read(K)
-        controls = tuple(content["controls"])
-        sizes = []
+        K, controls, sizes = K and Model.read(K), tuple(content["controls"]), []
         for name in ("disturbance", "state_bounds", "input_bounds"):
             sizes.append({str(key): number(value, name) for key, value in content[name]})
             if len(sizes[-1]) < len(content[name]) or any(v <= 0 for v in sizes[-1].values()):
                 raise Unreadable(f"the file is damaged: {name} of one name, or not above zero")
         if sorted([*sizes[0], *controls]) != sorted(own.inputs):
             raise Unreadable("the file is damaged: an input is no disturbance or control, or both")
-        if K and (K.states or K.inputs != own.states or K.outputs != controls):
+        if K and (K.states, K.inputs, K.outputs, K.ranges) != (
+            (),
+            own.states,
+            controls,
+            own.ranges,
+        ):
             raise Unreadable("the file is damaged: the feedback is not one of states to controls")
-        if K and K.ranges != own.ranges:
-            raise Unreadable("the file is damaged: the feedback is on another range")
-        limits = [
-            ("x", own.states.index(name), v)
-            if name in own.states
-            else ("y", own.outputs.index(name), v)
-            for name, v in sizes[1].items()
-        ] + [("u", controls.index(name), v) for name, v in sizes[2].items()]
+        limits = []
+        for name, size in sizes[1].items():
+            of_state = name in own.states
+            among = own.states if of_state else own.outputs
+            limits.append(("x" if of_state else "y", among.index(name), size))
+        limits += [("u", controls.index(name), size) for name, size in sizes[2].items()]
+        y, w = [i for what, i, _ in limits if what == "y"], [own.inputs.index(n) for n in sizes[0]]
+        if any(M.part(y, w).reduced().terms for M in own.matrices["D"]):
+            raise Unreadable("disturbances reach a limited output directly, which is not covered")
         return cls(own, K, sizes[0], controls, limits)
 
     @property
-    def refused(self) -> str:
-        """Say which limit no set of states can keep."""
-        y = [i for what, i, _ in self.limits if what == "y"]
-        w = [self.model.inputs.index(name) for name in self.disturbance]
-        passed = any(M.part(y, w).reduced().terms for M in self.model.matrices["D"])
-        return "disturbances reach a limited output directly" if passed else ""
+    def cells(self) -> list[Cell]:
+        """Boxes on which model and feedback are polynomials."""
+        knots = []
+        for i, p in enumerate(self.model.parameters):
+            breaks = self.feedback.factors[i].breaks if self.feedback else ()
+            knots.append([p.low, *(b for b in breaks if p.low < b < p.high), p.high])
+        return list(cells(self.model, self.model.parameters, knots, [False] * len(knots)))
 
     def on(self, cell: Cell) -> tuple[Polynomial, ...]:
         """Return A, B of the controls, W of disturbances of size 1, C, D of the controls, and K."""
@@ -111,24 +114,17 @@ class Loop(NamedTuple):
         )
 
 
-def claimed(kind: str, content: Any) -> Claim:
-    """Return what a file of a set claims."""
+def ellipsoid(content: Any) -> Claim:
+    """Return what a file of an ellipsoid claims."""
     loop = Loop.read(content)
-    if kind == "InvariantSet":
-        return _ellipsoid(loop, content)
-    return _parallelepiped(loop, content)
-
-
-def _ellipsoid(loop: Loop, content: Any) -> Claim:
     own, shape = loop.model, Model.read(content["shape"])
     alpha = number(content["alpha"], "alpha")
     tau = array(content["shares"], "shares", len(loop.disturbance))
     outputs = 0 if loop.feedback else len(loop.controls)
-    n, motion = len(own.states), own.parameters
+    n, motion, every = len(own.states), own.parameters, loop.cells
     if (len(shape.states), len(shape.outputs)) != (n, outputs) or shape.ranges != own.ranges:
         raise Unreadable("the file is damaged: the set is not one of these states and this range")
-    every = list(cells(own, motion, own.ranges, [False] * len(motion)))
-    refused = loop.refused
+    refused = ""
     if any(t < 0 for t in tau) or alpha < 0 or sum(tau) > alpha:
         refused = "the multipliers of the disturbances are below zero, or more than alpha together"
     if any(p.low < b < p.high for i, p in enumerate(motion) for b in shape.factors[i].breaks):
@@ -161,11 +157,13 @@ def _ellipsoid(loop: Loop, content: Any) -> Claim:
     return Claim(said, loop.said, demands(), refused=refused)
 
 
-def _parallelepiped(loop: Loop, content: Any) -> Claim:
-    own, motion, n = loop.model, loop.model.parameters, len(loop.model.states)
+def parallelepiped(content: Any) -> Claim:
+    """Return what a file of a parallelepiped claims."""
+    loop = Loop.read(content)
+    own, n = loop.model, len(loop.model.states)
     V = array(content["V"], "V", n, n)
     said = "no motion that starts in a parallelepiped |V^-1 x| <= 1 leaves it, or exceeds a limit"
-    refused = loop.refused
+    refused = ""
     if own.dt is None or (loop.controls and loop.feedback is None):
         raise Unreadable("a parallelepiped is known for sampled loops with a feedback only")
     columns, eye = matrix(V, n), diagonal([1] * n)
@@ -173,11 +171,7 @@ def _parallelepiped(loop: Loop, content: Any) -> Claim:
         back = matrix(solved(V, [[Fraction(i == j) for j in range(n)] for i in range(n)]), n)
     except ZeroDivisionError:
         return Claim(said, loop.said, (), refused="the parallelepiped is flat")
-    knots = [
-        sorted({p.low, p.high, *(loop.feedback.factors[i].breaks if loop.feedback else ())})
-        for i, p in enumerate(motion)
-    ]
-    for cell in cells(own, motion, knots, [False] * len(motion)):
+    for cell in loop.cells:
         A, B, W, C, D, K = loop.on(cell)
         moved, nw = [back @ (A + B @ K) @ columns, back @ W], W.shape[1]
         rows = [[*moved, matrix([[1]] * n, 1)]] + [

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product as combinations
 from math import comb
-from typing import Any, NamedTuple
+from typing import Any
 
 from . import monomials, words
 from .cells import Cell, cells
@@ -78,20 +78,11 @@ class Spline:
         return combined([f for _, f in weights], [self.values[k] for k, _ in weights])
 
 
-class Block(NamedTuple):
-    """d = Delta v: (number of d, of v, whether it is dynamics) of each part, the bound of their
-    gains, and their lambda.
-    """
-
-    parts: tuple[tuple[int, int, bool], ...]
-    bound: Fraction
-    multipliers: tuple[Spline, ...]
-
-
 @dataclass(frozen=True)
 class Proof:
     """A model with V, and how its parameters move; `slack`: rows of weights of forms that are zero,
-    one for each Bernstein coefficient of dV/dt of a V of higher degree.
+    one for each Bernstein coefficient of dV/dt of a V of higher degree; `parts` of a block: numbers
+    of d and v, whether it is dynamics, and lambda, with the `bound` of their gains.
     """
 
     kind: str
@@ -101,7 +92,8 @@ class Proof:
     coordinates: Polynomial | None = None
     order: int = 1
     slack: Sequence[Sequence[Fraction]] = ()
-    block: Block | None = None
+    bound: Fraction = Fraction(0)
+    parts: Sequence[tuple[int, int, bool, Spline]] = ()
 
     @property
     def moving(self) -> list[bool]:
@@ -167,14 +159,12 @@ class Proof:
             top, side, corner = PA + PA.T + drift, P @ B, zero(B.shape[1], B.shape[1])
         if self.kind == "decay rate":
             return (P if self.model.dt else -top), -moved
-        parts = self.block.parts if self.block else ()
-        d, v = sum(part[0] for part in parts), sum(part[1] for part in parts)
+        d, v = sum(part[0] for part in self.parts), sum(part[1] for part in self.parts)
         if self.kind == "stability" and not d:
             return -top, None
         form, y = symmetric([[top], [side.T, corner]]), block([[C, D]])
         n, size, seen = A.shape[0], form.shape[0], C.shape[0] - v
-        if self.block:
-            form = form + self._supply(self.block, cell, y.part(range(seen, seen + v)), n)
+        form = form + self._supply(cell, y.part(range(seen, seen + v)), n)
         if self.kind == "stability":
             return -form.part(range(n + d), range(n + d)), None
         energy = diagonal([int(i >= n + d) for i in range(size)])
@@ -183,15 +173,15 @@ class Proof:
         y = y.part(range(seen))
         return -(form + y.T @ y), energy
 
-    def _supply(self, own: Block, cell: Cell, v: Polynomial, row: int) -> Polynomial:
+    def _supply(self, cell: Cell, v: Polynomial, row: int) -> Polynomial:
         """Return the sum over the parts of lambda (bound^2 v'v - d'd); d begins at `row`."""
         size, first = v.shape[1], 0
         total = zero(size, size)
-        for (nd, nv, _), multiplier in zip(own.parts, own.multipliers, strict=True):
+        for nd, nv, _, multiplier in self.parts:
             rows = v.part(range(first, first + nv))
             of_d = diagonal([int(row <= i < row + nd) for i in range(size)])
             factor = multiplier.on(cell.segments, cell.here)
-            total = total + combined([factor], [rows.T @ rows * own.bound**2 - of_d])
+            total = total + combined([factor], [rows.T @ rows * self.bound**2 - of_d])
             row, first = row + nd, first + nv
         return total
 
@@ -227,9 +217,9 @@ def claimed(kind: str, content: Any) -> Claim:
     else:
         raise Unreadable("V is of a form that is not known")
     said = words.model(*model.sizes, motion)
-    for d, v, dynamic in own.block.parts if own.block else ():
+    for d, v, dynamic, _ in own.parts:
         how = "dynamics at rest at the start" if dynamic else "constant or moving in any way"
-        size = float(proof["block"]["bound"])
+        size = float(own.bound)
         said.append(
             f"{d} of the inputs = Delta times {v} of the outputs, |Delta| <= {size!r}, {how}"
         )
@@ -257,19 +247,23 @@ def _of_one_parameter(kind: str, model: Model, motion: tuple[Parameter, ...], pr
     T, slack = V["coordinates"], V["slack"]
     coordinates = None if T is None else matrix(array(T, "coordinates", n, n), n)
     rows = [] if slack is None or order == 1 else array(slack, "slack", None, None)
-    own = Proof(kind, model, motion, P, coordinates, order, rows, _block(proof, V, model))
+    own = Proof(kind, model, motion, P, coordinates, order, rows, *_block(proof, V, model))
     if kind not in ("l2 gain", "stability"):
         raise Unreadable("V of one parameter is known for gains and stability only")
-    if order > 1 and (model.dt or model.inputs or T is not None or own.block):
+    if order > 1 and (model.dt or model.inputs or T is not None or own.parts):
         raise Unreadable("a V of higher degree is known for stability in continuous time only")
     return own
 
 
-def _block(proof: Any, V: Any, model: Model) -> Block | None:
+def _block(
+    proof: Any, V: Any, model: Model
+) -> tuple[Fraction, Sequence[tuple[int, int, bool, Spline]]]:
     """Return the norm-bounded block of a proof with its multipliers."""
     value, multiplier, knots = proof["block"], V["multiplier"], ascending(V["knots"], "knots")
-    if value is None and multiplier is None:
-        return None
+    if value is None or multiplier is None:
+        if value is not multiplier:
+            raise Unreadable("the file is damaged: a block without multiplier, or the reverse")
+        return Fraction(0), ()
     size = [
         whole(value[name], f"{name} of a block", 1, len(among))
         for name, among in (("inputs", model.inputs), ("outputs", model.outputs))
@@ -289,4 +283,4 @@ def _block(proof: Any, V: Any, model: Model) -> Block | None:
     splines = [
         Spline((knots,), (degree,), {(i,): scalar(v) for i, v in enumerate(own)}) for own in columns
     ]
-    return Block(tuple(each), bound, tuple(splines))
+    return bound, [(*part, own) for part, own in zip(each, splines, strict=True)]
