@@ -1,6 +1,4 @@
-"""What a proof demands: symmetric matrices of polynomials that are positive definite; where the
-first of them is not, and by how much.
-"""
+"""Symmetric matrices of polynomials that a proof demands to be positive definite."""
 
 import math
 from collections.abc import Callable, Iterable, Sequence
@@ -101,9 +99,8 @@ def exponential(x: Fraction) -> tuple[Fraction, Fraction]:
         term = term * y / count
         total += term
     low, high = total, total + 2 * term
-    for _ in range(halvings + 1):
+    for k in range(halvings + 1):
+        low, high = (low * low, high * high) if k else (low, high)
         low = Fraction(math.floor(low * unit), unit)
         high = Fraction(math.ceil(high * unit), unit)
-        if _ < halvings:
-            low, high = low * low, high * high
     return low, high

@@ -16,15 +16,7 @@ from itertools import product as combinations
 from typing import Any, NamedTuple
 
 from .demands import Claim, Demand, exponential
-from .polynomials import (
-    Polynomial,
-    bernstein_functions,
-    combined,
-    even,
-    matrix,
-    scalar,
-    variable,
-)
+from .polynomials import Polynomial, bernstein_functions, combined, even, matrix, scalar, variable
 from .reading import array, number, period, whole
 
 DEGREE = 3
@@ -121,5 +113,6 @@ def claimed(content: Any) -> Claim:
     average, size = content["average"] is True, repr(float(seconds))
     every = f"average dwell time is above {size} s" if average else f"modes last at least {size} s"
     claim = f"the state tends to zero exponentially for every signal whose {every}"
-    said = [f"a switched model of {count} modes, {len(jumps)} kinds of switches between them"]
+    switches = ", ".join(f"{i + 1} to {j + 1}" for i, j in jumps)
+    said = [f"a switched model of {count} modes, switches from mode {switches}"]
     return Claim(claim, said, own.demands(), refused=own.refused(seconds, average))

@@ -25,11 +25,6 @@ def product(X: Rows, Y: Rows) -> Rows:
     return [[sum(map(mul, row, column)) for column in columns] for row in X]
 
 
-def transposed(X: Rows, columns: int) -> Rows:
-    """Return X', X of that many columns."""
-    return [list(column) for column in zip(*X, strict=True)] if X else [[] for _ in range(columns)]
-
-
 def positive_definite(M: Rows) -> bool:
     """Whether the symmetric matrix of integers M is positive definite."""
     return shown(M) or pivots_positive(M)
@@ -83,6 +78,8 @@ def _congruence(N: Rows) -> Rows | None:
         sums = [sum(map(mul, own, column)) for column in zip(*inverse, strict=True)]
         inverse.append([-v / root for v in sums[:i]] + [1 / root] + [0.0] * (len(N) - i - 1))
         L.append([*own, root])
+    if not all(math.isfinite(v) for row in inverse for v in row):
+        return None
     return [[round(v * size) for v in row] for row in inverse]
 
 
@@ -90,7 +87,7 @@ def _dominant(N: Rows, back: Rows) -> bool:
     """Whether W' (N + r) W is strictly dominant in its diagonal for all symmetric r with entries
     from 0 to 1, W' = `back`: N + r is positive definite then.
     """
-    Q = product(product(back, N), transposed(back, len(N)))
+    Q = product(product(back, N), [list(column) for column in zip(*back, strict=True)])
     reach = [sum(map(abs, row)) for row in back]
     every = sum(reach)
     # |(W' r W)_jk| <= reach_j reach_k

@@ -43,15 +43,11 @@ def claimed(kind: str, content: Any) -> Claim:
     M, P = block([[M11, M12], [M21, M22]]), even(array(V["P"], "P", x, x))
     Q, S, R = (array(V["multiplier"][name], "a multiplier", w, w) for name in "QSR")
     multiplier, bound = (even(Q), matrix(S, w), even(R)), bound_of(kind, content)
-
-    def demands() -> Iterator[Demand]:
-        yield Demand("V > 0", P)
-        yield from _nonnegative(*multiplier, sizes)
-        yield _falling(M, P, multiplier, u, dt is not None)
-
+    falling = _falling(M, P, multiplier, u, dt is not None)
+    demands = [Demand("V > 0", P), *_nonnegative(*multiplier, sizes), falling]
     jumping = [p._replace(rate=None, tie=None) for p in motion]
     said = words.model(x, u, y, dt, jumping)
-    return Claim(words.gain(kind, bound), said, demands(), bound, lambda g: g * g)
+    return Claim(words.gain(kind, bound), said, demands, bound, lambda g: g * g)
 
 
 def _falling(

@@ -10,10 +10,9 @@ from fractions import Fraction
 from itertools import chain, zip_longest
 from itertools import product as combinations
 
-from .exact import Rows, positive_definite, product, shown, transposed
+from .exact import Rows, positive_definite, product, shown
 
 Exponents = tuple[int, ...]
-Point = tuple[Fraction, ...]
 Box = tuple[tuple[Fraction, Fraction], ...]
 
 MOST_BOXES = 4000
@@ -56,8 +55,9 @@ class Polynomial:
     @property
     def T(self) -> Polynomial:
         """The transpose."""
-        terms = {k: transposed(rows, self.shape[1]) for k, rows in self.terms.items()}
-        return Polynomial((self.shape[1], self.shape[0]), terms, self.below)
+        m, n = self.shape
+        terms = {k: [[M[i][j] for i in range(m)] for j in range(n)] for k, M in self.terms.items()}
+        return Polynomial((n, m), terms, self.below)
 
     def part(self, rows: Sequence[int], columns: Sequence[int] | None = None) -> Polynomial:
         """Return some rows and columns."""
@@ -133,9 +133,10 @@ def diagonal(values: Sequence[Fraction | int]) -> Polynomial:
 
 
 def even(rows: Sequence[Sequence[Fraction]]) -> Polynomial:
-    """Return the symmetric part of a matrix, which is all that a quadratic form sees."""
-    M = matrix(rows, len(rows))
-    return ((M + M.T) * Fraction(1, 2)).reduced()
+    """Return a symmetric matrix; raises `ValueError` for one that is not."""
+    if any(rows[i][j] != rows[j][i] for i in range(len(rows)) for j in range(i)):
+        raise ValueError("a matrix of a quadratic form is not symmetric")
+    return matrix(rows, len(rows))
 
 
 def _joined(a: Exponents, b: Exponents) -> Exponents:
@@ -224,7 +225,7 @@ def bernstein_coefficients(F: Polynomial, variables: int) -> dict[Exponents, Row
 
 def first_miss(
     F: Polynomial, variables: int, reached: Callable[[Box], bool] = lambda box: True
-) -> tuple[Point, bool] | None:
+) -> tuple[tuple[Fraction, ...], bool] | None:
     """Return (a point where F is not positive definite, whether it is known to be not); None where
     it is positive definite on all boxes that are `reached`.
     """

@@ -59,12 +59,8 @@ class Loop(NamedTuple):
                 raise Unreadable(f"the file is damaged: {name} of one name, or not above zero")
         if sorted([*sizes[0], *controls]) != sorted(own.inputs):
             raise Unreadable("the file is damaged: an input is no disturbance or control, or both")
-        if K and (K.states, K.inputs, K.outputs, K.ranges) != (
-            (),
-            own.states,
-            controls,
-            own.ranges,
-        ):
+        fit = ((), own.states, controls, own.ranges)
+        if K and (K.states, K.inputs, K.outputs, K.ranges) != fit:
             raise Unreadable("the file is damaged: the feedback is not one of states to controls")
         limits = []
         for name, size in sizes[1].items():

@@ -18,10 +18,11 @@ def gain(kind: str, bound: Fraction) -> str:
     }[kind]
 
 
-def motion(parameters: Sequence[Parameter]) -> list[str]:
-    """Return how parameters move, a sentence each."""
-    said = []
-    for i, p in enumerate(parameters):
+def model(x: int, u: int, y: int, dt: Fraction | None, moving: Sequence[Parameter]) -> list[str]:
+    """Return of a model of which sizes a claim is, and how its parameters move."""
+    time = "continuous time" if dt is None else f"samples of {float(dt)!r} s"
+    said = [f"a model of {x} states x, {u} inputs u, {y} outputs y, in {time}"]
+    for i, p in enumerate(moving):
         name, how = f"p{i + 1}", "moving arbitrarily fast"
         if p.tie is not None:
             how = f"d{name}/dt = p{p.tie + 1}"
@@ -29,9 +30,3 @@ def motion(parameters: Sequence[Parameter]) -> list[str]:
             how = f"|d{name}/dt| <= {float(p.rate)!r} per second"
         said.append(f"{name} in [{float(p.low)!r}, {float(p.high)!r}], {how}")
     return said
-
-
-def model(x: int, u: int, y: int, dt: Fraction | None, moving: Sequence[Parameter]) -> list[str]:
-    """Return of a model of which sizes a claim is, and how its parameters move."""
-    time = "continuous time" if dt is None else f"samples of {float(dt)!r} s"
-    return [f"a model of {x} states x, {u} inputs u, {y} outputs y, in {time}", *motion(moving)]
