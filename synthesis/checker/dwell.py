@@ -10,13 +10,13 @@ least T in each mode is covered; with constant P every signal of an average dwel
 where exp(2 lambda tau) >= mu (sampled (1 - lambda)^(tau/dt) mu <= 1). A may move with p in any way.
 """
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
-from itertools import product as combinations
 from typing import Any, NamedTuple
 
 from .demands import Claim, Demand, exponential
-from .polynomials import Polynomial, bernstein_functions, combined, even, matrix, scalar, variable
+from .polynomials import Polynomial, bernstein_functions, combined, even, matrix, variable
 from .reading import array, number, period, whole
 
 DEGREE = 3
@@ -64,6 +64,11 @@ class Switched(NamedTuple):
             PA = own @ A
             yield f" in segment {k + 1}", -(PA + PA.T + own.derivative(m) * (1 / length)), m + 1
 
+    @property
+    def time(self) -> Fraction:
+        """The dwell time that P takes, s."""
+        return len(self.lengths) * self.dt if self.dt else sum(self.lengths, Fraction(0))
+
     def refused(self, seconds: Fraction, average: bool) -> str:
         """Say why a dwell time is not covered; nothing where it is."""
         segments, x = len(self.lengths), self.decay
@@ -71,9 +76,8 @@ class Switched(NamedTuple):
         if any(len(P) != count for P in self.P) or any(length <= 0 for length in self.lengths):
             return "the functions of the modes do not fit the segments of time"
         if not average:
-            least = segments * self.dt if self.dt else sum(self.lengths)
-            fits = seconds >= least and self.growth <= 1 and x >= 0
-            return "" if fits else f"V rises at a switch, or takes {float(least)!r} s"
+            fits = seconds >= self.time and self.growth <= 1 and x >= 0
+            return "" if fits else f"V rises at a switch, or takes {float(self.time)!r} s"
         # of x < 1, -ln(1 - x) is at least this part of its series
         series = sum((x**k / k for k in range(1, 40)), Fraction(0))
         rate = series / self.dt if self.dt else 2 * x
@@ -87,15 +91,14 @@ def _piece(value: Any) -> tuple[Polynomial, int]:
     """Return A(p) of a piece on the unit box, and the number of its parameters."""
     *own, n, _ = (whole(c, "a size", 1, 10**4) for c in value["coefficients"]["shape"])
     nested = array(value["coefficients"], "A", *own, n, n)
-    weights, matrices = [], []
-    for place in combinations(*map(range, own)):
-        weight, M = scalar(1), nested
-        for axis, i in enumerate(place):
-            weight = weight @ bernstein_functions(own[axis] - 1, variable(axis))[i]
-            M = M[i]
-        weights.append(weight)
-        matrices.append(matrix(M, n))
-    return combined(weights, matrices), len(own)
+
+    def along(values: Any, axis: int) -> Polynomial:
+        if axis == len(own):
+            return matrix(values, n)
+        functions = bernstein_functions(own[axis] - 1, variable(axis))
+        return combined(functions, [along(each, axis + 1) for each in values])
+
+    return along(nested, 0), len(own)
 
 
 def claimed(content: Any) -> Claim:
@@ -110,7 +113,9 @@ def claimed(content: Any) -> Claim:
     lengths = array(content["lengths"], "the lengths", None)
     decay, growth = (number(content[name], name) for name in ("decay", "growth"))
     own = Switched(modes, jumps, period(content["modes"]["dt"]), P, lengths, decay, growth)
-    average, size = content["average"] is True, repr(float(seconds))
+    if seconds < own.time < seconds * (1 + Fraction(1, 10**9)):
+        seconds = own.time  # lengths of time that are rounded add up to a little more
+    average, size = content["average"] is True, repr(math.nextafter(float(seconds), math.inf))
     every = f"average dwell time is above {size} s" if average else f"modes last at least {size} s"
     claim = f"the state tends to zero exponentially for every signal whose {every}"
     switches = ", ".join(f"{i + 1} to {j + 1}" for i, j in jumps)

@@ -8,12 +8,7 @@ from . import dwell, lagged, lft, sets, storage
 from .demands import Claim, failure
 from .reading import DAMAGED, TUBE, Unreadable, opened
 
-OTHERS = {
-    "InvariantSet": sets.ellipsoid,
-    "LowComplexitySet": sets.parallelepiped,
-    "DwellTime": dwell.claimed,
-}
-"""What a file of a kind claims, beside certificates."""
+SETS = {"InvariantSet": sets.ellipsoid, "LowComplexitySet": sets.parallelepiped}
 
 
 def claim_of(kind: str, content: Mapping[str, Any]) -> Claim:
@@ -22,11 +17,12 @@ def claim_of(kind: str, content: Mapping[str, Any]) -> Claim:
         proof = content["proof"]
         if proof is None:
             raise Unreadable("the file holds no proof")
-        of_lag = proof["lyapunov"]["type"] == "MemoryLyapunov"
-        rest = lagged if of_lag else storage
+        rest = lagged if proof["lyapunov"]["type"] == "MemoryLyapunov" else storage
         return (lft if proof["route"] == "lft" else rest).claimed(kind, content)
-    if kind in OTHERS:
-        return OTHERS[kind](content)
+    if kind in SETS:
+        return SETS[kind](content)
+    if kind == "DwellTime":
+        return dwell.claimed(content)
     if kind == TUBE:
         raise Unreadable(
             "tubes are not decided here: their proof rests on enclosures of nonlinear equations"

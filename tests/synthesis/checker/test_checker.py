@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy import linalg
 
 from symheli import LinearModel, LPVStateSpace, Scheduling
 from symheli.errors import SymheliError
@@ -321,7 +322,7 @@ TURNS = [[0.0, 1.0], [-10.0, -1.0]], [[0.0, 1.0], [-0.1, -0.5]]
 @pytest.mark.parametrize("average", [False, True])
 @pytest.mark.parametrize("dt", [None, 0.05])
 def test_dwell_times_are_proven_and_shorter_ones_refused(average, dt):
-    modes = TURNS if dt is None else [np.eye(2) + dt * np.array(A) for A in TURNS]
+    modes = TURNS if dt is None else [linalg.expm(dt * np.array(A)) for A in TURNS]
     within = None if average else 3.0
     found = switching.dwell_time(modes, average=average, within=within, dt=dt)
     content = switched(found)
