@@ -31,7 +31,7 @@ from synthesis.sets import InvariantSet, LowComplexitySet, invariant_set, low_co
 
 pytestmark = pytest.mark.guard
 
-ROOT = Path(__file__).resolve().parents[3]
+ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / "synthesis" / "checker"
 FILES = sorted((ROOT / "tests" / "data" / "proofs").glob("*.json"))
 DECIDED = [f for f in FILES if f.stem != "tube"]
@@ -218,9 +218,8 @@ def forgeries(file, count):
     for _ in range(count):
         place, other = rng.choice(places), json.loads(json.dumps(content))
         factor = rng.choice([0.0, -1.0, 0.5, 0.999, 1.02, 2.0])
-        exchange(other, place, lambda v, f=factor: int(f * v) if isinstance(v, int) else f * v)
-        if other != content:
-            yield place, factor, other
+        exchange(other, place, lambda v, f=factor: type(v)(f * v) if f * v != v else v + 1)
+        yield place, factor, other
 
 
 def not_believed(file, count, tmp_path, capsys):
@@ -241,7 +240,7 @@ def test_a_changed_number_is_believed_only_where_it_is_still_true(file, tmp_path
 @pytest.mark.slow
 @pytest.mark.parametrize("file", DECIDED, ids=lambda f: f.stem)
 def test_a_hundred_changed_numbers(file, tmp_path, capsys):
-    assert not_believed(file, 130, tmp_path, capsys) >= 90
+    assert not_believed(file, 100, tmp_path, capsys) == 100
 
 
 JUNK = (None, "P", -1, 1e300, 10**400, [], {}, True, {"float": "nan"}, {"type": "Certificate"})
