@@ -89,9 +89,9 @@ class Cell(NamedTuple):
         said = []
         for i, (strip, *both) in enumerate(zip(self.strips, self.here, self.there, strict=True)):
             now, later = (F.value(point) for F in both)
-            said.append(f"p{i + 1} = {now[0][0][0] / now[1]:.9g}")
+            said.append(f"p{i + 1} = {now.terms[()][0][0] / now.below:.9g}")
             if strip.reached is not None:
-                said.append(f"p{i + 1} a sample later = {later[0][0][0] / later[1]:.9g}")
+                said.append(f"p{i + 1} a sample later = {later.terms[()][0][0] / later.below:.9g}")
         return ", ".join(said)
 
 

@@ -27,7 +27,7 @@ class Demand(NamedTuple):
 
 
 class Claim(NamedTuple):
-    """What a file claims: sentences made from its numbers, and the demands that prove it.
+    """The claim of a file: sentences made from its numbers, and the demands that prove it.
 
     `level` turns the `bound`, an upper one or a `lower` one, into the level of the demands;
     `refused` says why nothing can be proven before any demand is looked at.
@@ -58,7 +58,7 @@ def failure(claim: Claim) -> str:
         where = f" at {cell.place(point)}" if cell else ""
         if not false:
             return f"{demand.name}: undecided within the boxes that are looked at, as{where}"
-        short = shortfall(F.value(point)[0])
+        short = shortfall(F.value(point).terms[()])
         said = f"{demand.name}: the matrix is not positive definite{where}; {short:.3g} of its own"
         return f"{said} diagonal must be added to make it so{_needed(claim, demand, point)}"
     return ""
@@ -68,10 +68,10 @@ def _needed(claim: Claim, demand: Demand, point: Sequence[Fraction]) -> str:
     """Return which bound would do at this point."""
     if demand.paid is None:
         return ""
+    here = demand._replace(matrix=demand.matrix.value(point), paid=demand.paid.value(point))
 
     def enough(bound: float) -> bool:
-        level = claim.level(Fraction(bound))
-        return shown(demand.at_level(level).value(point)[0])
+        return shown(here.at_level(claim.level(Fraction(bound))).terms[()])
 
     low = float(claim.bound)
     high = 0.0 if claim.lower else low or 1e-12

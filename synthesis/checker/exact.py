@@ -113,15 +113,10 @@ def shortfall(M: Rows) -> float:
     """Return the least multiple of its own diagonal that must be added to M to make it positive
     definite, to three digits: how far it is from being so, in no units.
     """
-    one = 1 << 60
+    one, n = 1 << 60, range(len(M))
 
     def enough(t: int) -> bool:
-        return shown(
-            [
-                [v * one + (t * abs(v) if i == j else 0) for j, v in enumerate(row)]
-                for i, row in enumerate(M)
-            ]
-        )
+        return shown([[M[i][j] * one + (i == j) * t * abs(M[i][j]) for j in n] for i in n])
 
     low, high = 0, 1
     while not enough(high):

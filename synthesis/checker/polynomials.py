@@ -93,12 +93,13 @@ class Polynomial:
         matrices = [Polynomial(self.shape, own, self.below) for own in parts.values()]
         return combined([powers[e] for e in parts], matrices)
 
-    def value(self, point: Sequence[Fraction]) -> tuple[Rows, int]:
-        """Return its value at a point, as integers over a number > 0."""
+    def value(self, point: Sequence[Fraction]) -> Polynomial:
+        """Return its value at a point, a constant with the one exponent ()."""
         F = self
         for axis, t in enumerate(point):
             F = F.at(axis, scalar(t))
-        return F.terms.get((), [[0] * self.shape[1]] * self.shape[0]), F.below
+        none = [[0] * self.shape[1]] * self.shape[0]
+        return Polynomial(self.shape, {(): F.terms.get((), none)}, F.below)
 
     def _times(self, factor: int) -> dict[Exponents, Rows]:
         return {k: _scaled(rows, factor) for k, rows in self.terms.items()}
@@ -241,11 +242,13 @@ def first_miss(
             continue
         degrees = max(values)
         corners = [k for k in values if all(e in (0, d) for e, d in zip(k, degrees, strict=True))]
-        false = [k for k in corners if not positive_definite(values[k])]
-        points = [tuple(ends[e > 0] for e, ends in zip(k, box, strict=True)) for k in false]
-        for point in points:
-            if reached(tuple((t, t) for t in point)):
-                return point, True
+        false = False
+        for k in corners:
+            point = tuple(ends[e > 0] for e, ends in zip(k, box, strict=True))
+            if not positive_definite(values[k]):
+                false = True
+                if reached(tuple((t, t) for t in point)):
+                    return point, True
         # where p is not reached it may be false: the box is made smaller; else along a curved axis
         axes = [i for i, d in enumerate(degrees) if d > 1 or false]
         if not axes:

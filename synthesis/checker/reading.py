@@ -1,4 +1,4 @@
-"""What a file holds, with its values checked: numbers are the rationals that its doubles are.
+"""Reading of a file, every value checked: numbers are the rationals that its doubles are.
 
 The schema and the kind are read in `opened`, and nowhere else.
 """
