@@ -12,19 +12,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from models import spring
 from scipy import linalg
 
 from symheli import LinearModel, LPVStateSpace, Scheduling
 from symheli.errors import SymheliError
 from symheli.lpv import BSpline, CubicSpline, PiecewiseLinear, Polynomial
-from synthesis import Certificate, decay_rate, h2_gain, l2_gain, stability, switching
+from synthesis import Certificate, decay_rate, h2_gain, l2_gain, lft_gain, stability, switching
 from synthesis.analysis import energy_to_peak
 from synthesis.certify.questions import certificate_file
 from synthesis.certify.statement.sentences import motion
 from synthesis.checker import dwell, report
+from synthesis.checker.cells import cells
 from synthesis.checker.demands import Claim, exponential, failure
 from synthesis.checker.exact import pivots_positive, positive_definite, shown
-from synthesis.checker.reading import DAMAGED
+from synthesis.checker.reading import DAMAGED, Model, Parameter
 from synthesis.forms import LaggedParameter, Spline
 from synthesis.numerics.polynomial.exact import rational
 from synthesis.sets import InvariantSet, LowComplexitySet, invariant_set, low_complexity_set
@@ -302,6 +304,70 @@ def test_sets_with_disturbances_are_proven_and_larger_disturbances_refused(tmp_p
         assert checked(saved(content, path), capsys)[0] == NOT_PROVEN
 
 
+@pytest.mark.parametrize("alpha", ["less than the shares", 0.99])
+def test_another_decay_of_a_set_is_refused(alpha, tmp_path, capsys):
+    """Below what the disturbances take, and above what the loop has."""
+    found = invariant_set(
+        SAMPLED, controller=[[-0.7]], input_bounds={"u": 0.7}, disturbance={"w": 1.0}
+    )
+    content = json.loads(found.save(tmp_path / "set.json").read_text())
+    shares = sum(content["shares"]["array"])
+    content["alpha"] = 0.7 * shares if isinstance(alpha, str) else alpha
+    assert checked(saved(content, tmp_path / "set.json"), capsys)[0] == NOT_PROVEN
+
+
+@pytest.mark.parametrize("scaling", ["DG", "full block"])
+def test_an_lft_with_both_kinds_of_multipliers_is_proven_and_a_smaller_gain_refused(
+    scaling, tmp_path, capsys
+):
+    found = lft_gain(spring(damping=0.4).to_lft().reduce(), scaling, search=None)
+    content = json.loads(found.save(tmp_path / "lft.json").read_text())
+    assert checked(tmp_path / "lft.json", capsys)[0] == PROVEN
+    content["gamma"] *= 0.999
+    assert checked(saved(content, tmp_path / "lft.json"), capsys)[0] == NOT_PROVEN
+
+
+def test_a_faster_sampled_decay_is_refused(tmp_path, capsys):
+    found = MADE["decay, sampled"]()
+    content = json.loads(found.save(tmp_path / "decay.json").read_text())
+    content["alpha"] *= 1.2
+    assert checked(saved(content, tmp_path / "decay.json"), capsys)[0] == NOT_PROVEN
+
+
+def of_rate(rate, tie=None):
+    return Parameter(Fraction(0), Fraction(1), rate, tie)
+
+
+def test_the_next_p_is_within_a_sample_of_p_and_both_rates_are_looked_at():
+    content = json.loads((ROOT / "tests/data/proofs/l2-gain-sampled.json").read_text())
+    model, rate = Model.read(content["proof"]["lpv"]), Fraction(1, 2)
+    knots = [(Fraction(0), Fraction(1, 3), Fraction(1))]
+    reach, steps = rate * model.dt, set()
+    for cell in cells(model, (of_rate(rate),), knots, [True]):
+        for point in ((Fraction(a), Fraction(b)) for a in (0, 1) for b in (0, 1)):
+            now, later = (
+                Fraction(F.value(point).terms[()][0][0], F.value(point).below)
+                for F in (cell.here[0], cell.there[0])
+            )
+            steps.add(later - now)
+            assert 0 <= later <= 1
+        drifts = cell.drifts(cell.here[0], [True])
+        assert {F.value(point).terms[()][0][0] > 0 for _, F in drifts} == {False, True}
+    assert (min(steps), max(steps)) == (-reach, reach)
+
+
+def test_a_rate_that_lets_p_leave_its_range_is_not_reached():
+    motion = (of_rate(None, 1), Parameter(Fraction(-1), Fraction(1), Fraction(1, 2), None))
+    content = json.loads((ROOT / "tests/data/proofs/l2-gain-two-parameters.json").read_text())
+    model = Model.read(content["proof"]["source"])
+    ends = [(p.low, p.high) for p in motion]
+    (cell,) = (c for c in cells(model, motion, ends, [True, True]) if c.middle[1] > 0)
+    # p2^2 <= 1 - p1 where p2 rises from 0 to 1 on the cell
+    for p1, p2, there in ((0.5, 0.70, True), (0.5, 0.72, False), (0.0, 1.0, True)):
+        point = (Fraction(p1), Fraction(p2))
+        assert cell.reaches(tuple((t, t) for t in point)) == there
+
+
 def switched(found):
     """What the checker is given of a dwell time: modes, P, times."""
     encoded = certificate_file.encoded
@@ -327,7 +393,9 @@ def test_dwell_times_are_proven_and_shorter_ones_refused(average, dt):
     content = switched(found)
     assert failure(dwell.claimed(content)) == ""
     assert failure(dwell.claimed(content | {"seconds": 0.9 * found.seconds}))
-    if not average:
+    if average:
+        assert failure(dwell.claimed(content | {"decay": 3 * found.decay}))
+    else:
         # the time really is shorter: V would have to fall faster than it does
         content["lengths"]["array"] = [0.8 * v for v in content["lengths"]["array"]]
         if dt is None:
