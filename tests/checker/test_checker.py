@@ -26,6 +26,7 @@ from synthesis.checker import dwell, report
 from synthesis.checker.cells import cells
 from synthesis.checker.demands import Claim, exponential, failure
 from synthesis.checker.exact import pivots_positive, positive_definite, shown
+from synthesis.checker.polynomials import bernstein_coefficients, variable
 from synthesis.checker.reading import DAMAGED, Model, Parameter
 from synthesis.forms import LaggedParameter, Spline
 from synthesis.numerics.polynomial.exact import rational
@@ -437,3 +438,11 @@ def test_nothing_is_claimed_from_the_words_of_a_file(tmp_path, capsys):
     assert "nonsense" not in checked(path, capsys)[1]
     assert isinstance(report.claim_of(content["kind"], content), Claim)
     assert ValueError in DAMAGED
+
+
+def test_the_coefficients_of_a_polynomial_are_those_of_bernstein():
+    t = variable(0)
+    found = bernstein_coefficients(t + t @ t, 1)
+    (zero,), (half,), (two,) = (found[(k,)][0] for k in range(3))
+    assert (zero, 4 * half) == (0, two)
+    assert two > 0
