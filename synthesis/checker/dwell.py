@@ -103,18 +103,16 @@ def _piece(value: Any) -> tuple[Polynomial, int]:
 
 def claimed(content: Any) -> Claim:
     """Return what a file of a dwell time claims; the fields of the file are named here alone."""
-    modes = [[_piece(each) for each in mode] for mode in content["modes"]["A"]]
+    modes = [[_piece(each) for each in mode] for mode in content["modes"]]
     seconds, count, n = number(content["seconds"], "the time"), len(modes), modes[0][0][0].shape[0]
     jumps = {}
-    for pair, J in content["modes"]["jumps"]:
+    for *pair, J in content["jumps"]:
         i, j = (whole(k, "a mode", 0, count - 1) for k in pair)
         jumps[i, j] = matrix(array(J, "a jump", n, n), n)
     P = [[even(M) for M in array(each, "P", None, n, n)] for each in content["P"]]
     lengths = array(content["lengths"], "the lengths", None)
     decay, growth = (number(content[name], name) for name in ("decay", "growth"))
-    own = Switched(modes, jumps, period(content["modes"]["dt"]), P, lengths, decay, growth)
-    if seconds < own.time < seconds * (1 + Fraction(1, 10**9)):
-        seconds = own.time  # lengths of time that are rounded add up to a little more
+    own = Switched(modes, jumps, period(content["dt"]), P, lengths, decay, growth)
     average, size = content["average"] is True, repr(math.nextafter(float(seconds), math.inf))
     every = f"average dwell time is above {size} s" if average else f"modes last at least {size} s"
     claim = f"the state tends to zero exponentially for every signal whose {every}"

@@ -21,9 +21,9 @@ def claim_of(kind: str, content: Mapping[str, Any]) -> Claim:
         return (lft if proof["route"] == "lft" else rest).claimed(kind, content)
     if kind in SETS:
         return SETS[kind](content)
-    if kind == "DwellTime":
+    if kind in ("dwell time", "average dwell time"):
         return dwell.claimed(content)
-    if kind == TUBE:
+    if kind in (TUBE, "tube"):
         raise Unreadable(
             "tubes are not decided here: their proof rests on enclosures of nonlinear equations"
             " and of their derivatives, for which this checker has no arithmetic of intervals"

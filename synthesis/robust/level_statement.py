@@ -32,6 +32,7 @@ class LevelStatement(ProvenStatement):
     asked: Asked | None
     number: ClassVar[str]
     """Field of the proven number."""
+    kind: ClassVar[str]
 
     @property
     def verified(self) -> bool:  # type: ignore[override]
@@ -67,7 +68,7 @@ class LevelStatement(ProvenStatement):
     @property
     def facts(self) -> Mapping[str, Any]:
         """Kind, bounds and conditions as data that JSON holds."""
-        return {"kind": self.reader.replace("-", " "), "bound": self.bound}
+        return {"kind": self.kind, "bound": self.bound}
 
     @property
     def stored(self) -> dict[str, Any]:
@@ -80,7 +81,7 @@ class LevelStatement(ProvenStatement):
         model, blocks = self.asked
         proof = self.proof
         return {
-            "kind": self.reader.replace("-", " "),
+            "kind": self.kind,
             "bound": self.bound,
             "model": encoded(model),
             "blocks": [_written(block) for block in blocks],

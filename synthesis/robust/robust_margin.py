@@ -62,6 +62,7 @@ class RobustMargin(LevelStatement):
     asked: tuple[LFT | LPVStateSpace, Sequence[DynamicBlock]] | None = None
     reader: ClassVar[str] = "robust-margin"
     number: ClassVar[str] = "lower"
+    kind: ClassVar[str] = "robust margin"
 
     __repr__ = summarized
 

@@ -51,6 +51,7 @@ class WorstCaseGain(LevelStatement):
     asked: tuple[LFT | LPVStateSpace, Sequence[DynamicBlock]] | None = None
     reader: ClassVar[str] = "worst-case-gain"
     number: ClassVar[str] = "upper"
+    kind: ClassVar[str] = "worst-case gain"
 
     __repr__ = summarized
 

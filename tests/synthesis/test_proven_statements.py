@@ -19,6 +19,7 @@ from synthesis.analysis import (
     sector_radius,
 )
 from synthesis.certify.statement.statement_file import read
+from synthesis.checker.report import main as checker
 from synthesis.forms import Spline
 from synthesis.robust import DynamicBlock, robust_margin, slope_margin, worst_case_gain
 from synthesis.sets import invariant_set, low_complexity_set
@@ -158,12 +159,33 @@ def test_symheli_verify_prints_claim_and_conditions(saved, capsys):
     assert "nan" not in found.claim
 
 
+def checked(file):
+    """The exit status of the checker, which shares no code with the package."""
+    return checker([str(file)])
+
+
 def with_text_changed(value):
     if isinstance(value, dict):
         return {name: with_text_changed(part) for name, part in value.items()}
     if isinstance(value, list):
         return [with_text_changed(part) for part in value]
     return "for every model of the world" if isinstance(value, str) and " " in value else value
+
+
+UNKNOWN = ("passivity", "output", "sector", "slope", "robust", "worst-case")
+"""First words of kinds that the checker does not decide."""
+
+
+def test_the_checker_that_stands_alone_agrees(saved):
+    """With the file as it is, and with a better number where there is one."""
+    kind, _, file = saved
+    expected = 2 if kind.startswith(UNKNOWN) else 0
+    assert checked(file) == expected
+    if kind in BETTER and not expected:
+        content, name = json.loads(file.read_text()), BETTER[kind]
+        content[name] *= 1.2 if name == "alpha" else 0.8
+        file.write_text(json.dumps(content))
+        assert checked(file) == 1
 
 
 def test_sentences_of_the_file_are_not_repeated_as_the_claim(saved):
