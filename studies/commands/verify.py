@@ -70,7 +70,7 @@ def _verified(file: str, model: Any) -> tuple[ProvenStatement, str, dict[str, An
 
 
 def _told(found: ProvenStatement) -> str:
-    """What a proof supposes, from its numbers; then what the file says, which nothing checks."""
+    """Conditions of a proof, from its numbers; then what the file says, which nothing checks."""
     lines = ["It holds where", *(f"- {line}" for line in found.conditions)]
     details = getattr(found, "details", "")
     if details:

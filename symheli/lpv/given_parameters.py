@@ -1,4 +1,4 @@
-"""What a user gives for the parameters of a model: rate limits, and ranges in other units."""
+"""Rate limits and ranges that a user gives for the parameters of a model."""
 
 from __future__ import annotations
 

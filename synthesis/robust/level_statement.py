@@ -1,4 +1,4 @@
-"""What margins and worst-case gains have in common as proven statements: conditions and files."""
+"""Margins and worst-case gains as proven statements: their conditions and files."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ BY_INPUTS = Supply(0, 0, 1)
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Facets:
-    """What decides about a kind.
+    """The properties that decide about a kind.
 
     Attributes
     ----------
