@@ -265,10 +265,10 @@ def _uncertain(rng: np.random.Generator) -> Trial:
 
 def _dwell(rng: np.random.Generator) -> Trial:
     dt = rng.choice([None, 0.1])
-    n, pace = int(rng.integers(1, 4)), 1.0
+    n, pace = int(rng.integers(1, 3)), 1.0
     modes = [lightly_damped(rng, n, pace, dt) for _ in range(2)]
     jumps = {key: np.eye(n) + 0.3 * rng.standard_normal((n, n)) for key in ((0, 1), (1, 0))}
-    found = dwell_time(modes, jumps, dt=dt, parts=8, average=bool(rng.random() < 0.3))
+    found = dwell_time(modes, jumps, dt=dt, parts=4, average=bool(rng.random() < 0.5))
     if not (found.verified and found.verify()):
         return NOTHING
     worst = 0.0

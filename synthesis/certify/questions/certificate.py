@@ -296,7 +296,8 @@ class Certificate(ProvenStatement):
         """Why nothing is proven; empty where something is."""
         if self.verified:
             return ""
-        return self.fault or self.status.value
+        witness = next((each for each in self.hypotheses if each.startswith("no constant P")), "")
+        return self.fault or "; ".join(filter(None, (self.status.value, witness)))
 
     @property
     def claim(self) -> str:

@@ -15,6 +15,7 @@ import numpy as np
 from symheli import LFT, LPVStateSpace, Scheduling, UncertainStateSpace
 from symheli.errors import InputError
 from synthesis.certify.lower_bounds.box import Worst, growing, unstable_at, worst_by, worst_moving
+from synthesis.certify.lower_bounds.no_common import no_common
 from synthesis.certify.lower_bounds.paths import search_hypothesis
 from synthesis.certify.lower_bounds.perturbation import worst_perturbation
 from synthesis.certify.questions.adjoint import ADJOINT, FAR_ABOVE, backwards
@@ -26,6 +27,7 @@ from synthesis.certify.questions.hypotheses import VERIFIED, hypotheses
 from synthesis.certify.questions.ladder import CLOSE_TO_LOWER, Found, Ladder
 from synthesis.certify.questions.one_parameter_search import OneParameter
 from synthesis.certify.questions.problem import BoundProblem
+from synthesis.certify.statement.forms import Spline
 from synthesis.certify.statement.impose import Grid
 from synthesis.certify.statement.kind import STABILITY
 from synthesis.certify.statement.outcome import Seconds, Status
@@ -99,6 +101,9 @@ def certify(problem: BoundProblem) -> Certificate:
         if worst is not None:
             return report.nothing(Status.GROWING, beaten._replace(worst=worst), ladder)
     cert = report.found(best, beaten, ladder)
+    if cert.status is Status.INFEASIBLE and all(map(math.isinf, demand.rates)):
+        witness = no_common(model) if isinstance(problem.form, Spline) else ""
+        cert = cert.resting_on((witness,) if witness else ())
     if stability or demand.kind.indexed:
         return cert
     second = (

@@ -62,6 +62,22 @@ def test_stability_over_jumps_has_the_functions_of_the_decay_rate():
     assert "meets the inequalities imposed" in refused.why
 
 
+def test_a_refusal_over_jumps_names_two_frozen_models():
+    """x'' + 2 p x' + p^2 x = 0 is stable at every p in [1, 10], and jumps have no common P."""
+    rho = Scheduling("rho", "1", 1.0, 10.0)
+    p = rho.symbol
+    A = [[0, 1], [-(p**2), -2 * p]]
+    model = LPVStateSpace.from_expressions(A, [[0], [1]], [[1, 0]], [[0]], rho)
+    refused = stability(model, math.inf, search=None)
+    assert refused.status is Status.INFEASIBLE
+    assert "no constant P exists: of the frozen models at rho = 1 and rho = " in refused.why
+    first, second = (np.array([[0, 1], [-(q**2), -2 * q]]) for q in (1.0, 10.0))
+    product = np.linalg.eigvals(first @ second)
+    assert np.any((np.abs(product.imag) < 1e-9) & (product.real < 0))
+    proven = stability(model, 1.0, search=None)
+    assert "no constant P" not in proven.why
+
+
 def test_a_decay_rate_below_zero_is_named():
     rho = Scheduling("rho", "1", 1.0, 10.0, rate=100.0)
     p = rho.symbol
