@@ -64,7 +64,7 @@ def lightly_damped(rng: np.random.Generator, n: int, pace: float, dt: float | No
         z = s if dt is None else np.exp(s * dt)
         blocks.append(np.array([[z.real, z.imag], [-z.imag, z.real]]) if pair else [[z.real]])
         left -= 1 + pair
-    mixed = linalg.qr(rng.standard_normal((n, n)))[0] * 10 ** rng.uniform(-1.5, 1.5, n)
+    mixed: Any = linalg.qr(rng.standard_normal((n, n)))[0] * 10 ** rng.uniform(-1.5, 1.5, n)
     return mixed @ linalg.block_diag(*blocks) @ np.linalg.inv(mixed)
 
 
@@ -115,8 +115,8 @@ def responses(A: Array, B: Array, C: Array, D: Array, dt: float | None) -> Itera
     """Yield responses of a frozen model about its poles and over frequency, the limit first."""
     if dt is None:
         yield D
-    poles = np.linalg.eigvals(A).astype(complex)
-    s = poles if dt is None else np.log(poles + 1e-300)
+    poles: Any = np.linalg.eigvals(A).astype(complex)
+    s: Any = poles if dt is None else np.log(poles + 1e-300)
     near = np.abs(s.imag) + np.multiply.outer(np.linspace(-2, 2, 9), np.abs(s.real)).ravel().max(
         initial=0.0
     )
@@ -174,16 +174,21 @@ def growth_by_products(A: list[Array], dt: float | None, rng: np.random.Generato
     return worst
 
 
+def _period(rng: np.random.Generator) -> float | None:
+    """Return no sample period, or 0.1 s."""
+    return None if rng.random() < 0.5 else 0.1
+
+
 # one function a kind: a random plant, a proof, the truth
 
 
 def _gain(rng: np.random.Generator) -> Trial:
-    model = plant(rng, 2, 2, rng.choice([0.0, 0.3]), rng.choice([None, 0.1]))
+    model = plant(rng, 2, 2, rng.choice([0.0, 0.3]), _period(rng))
     return proven_gain(l2_gain(model, **QUICK), largest(model, gain))
 
 
 def _stability(rng: np.random.Generator) -> Trial:
-    model = plant(rng, dt=rng.choice([None, 0.1])).with_rate(math.inf)
+    model = plant(rng, dt=_period(rng)).with_rate(math.inf)
     cert = stability(model, **QUICK)
     if not (cert.verified and cert.verify(True)):
         return NOTHING
@@ -193,7 +198,7 @@ def _stability(rng: np.random.Generator) -> Trial:
 
 
 def _decay(rng: np.random.Generator) -> Trial:
-    model = plant(rng, dt=rng.choice([None, 0.1])).with_rate(rng.choice([0.0, math.inf]))
+    model = plant(rng, dt=_period(rng)).with_rate(rng.choice([0.0, math.inf]))
     cert = decay_rate(model, **QUICK)
     slowest = -max(slow(A, model.dt) for A, *_ in frozen(model)) / (model.dt or 1.0)
     if not (cert.verified and cert.verify(True)):
@@ -201,7 +206,7 @@ def _decay(rng: np.random.Generator) -> Trial:
     if math.isinf(model.scheduling.limit):
         found = growth_by_products([A for A, *_ in frozen(model)], model.dt, rng)
         slowest = min(slowest, -found / (model.dt or 1.0))
-    return Trial(cert.alpha / slowest)
+    return Trial(float(cert.alpha / slowest))
 
 
 def _variance(model: LPVStateSpace) -> Iterator[Array]:
@@ -213,37 +218,37 @@ def _variance(model: LPVStateSpace) -> Iterator[Array]:
 
 
 def _peak(rng: np.random.Generator) -> Trial:
-    model = plant(rng, 1, 2, dt=rng.choice([None, 0.1]))
+    model = plant(rng, 1, 2, dt=_period(rng))
     attained = math.sqrt(max(float(np.linalg.eigvalsh(V)[-1]) for V in _variance(model)))
     return proven_gain(energy_to_peak(model, **QUICK), attained)
 
 
 def _h2(rng: np.random.Generator) -> Trial:
-    model = plant(rng, 1, 2, dt=rng.choice([None, 0.1]))
+    model = plant(rng, 1, 2, dt=_period(rng))
     attained = math.sqrt(max(float(np.trace(V)) for V in _variance(model)))
     return proven_gain(h2_gain(model, **QUICK), attained)
 
 
 def _passivity(rng: np.random.Generator) -> Trial:
-    model = plant(rng, 2, 2, 0.5, rng.choice([None, 0.1]))
+    model = plant(rng, 2, 2, 0.5, _period(rng))
     attained = -largest(model, lambda G: -least_real(G))
     return proven_index(passivity_index(model, **QUICK), attained, largest(model, gain))
 
 
 def _strictness(rng: np.random.Generator) -> Trial:
-    model = plant(rng, 1, 1, 0.5, rng.choice([None, 0.1]))
+    model = plant(rng, 1, 1, 0.5, _period(rng))
     attained = -largest(model, lambda G: -float((1 / G[0, 0]).real))
     return proven_index(output_strictness(model, **QUICK), attained, abs(attained) + 1e-300)
 
 
 def _sector(rng: np.random.Generator) -> Trial:
-    model = plant(rng, 1, 1, 0.3, rng.choice([None, 0.1]))
+    model = plant(rng, 1, 1, 0.3, _period(rng))
     c = float(rng.uniform(-1, 1) * largest(model, gain))
     return proven_gain(sector_radius(model, c, **QUICK), largest(model, lambda G: abs(G[0, 0] - c)))
 
 
 def _lft(rng: np.random.Generator) -> Trial:
-    model = plant(rng, 1, 1, dt=rng.choice([None, 0.1]))
+    model = plant(rng, 1, 1, dt=_period(rng))
     cert = lft_gain(model.to_lft(), str(rng.choice(["D", "DG", "full block"])), search=None)
     return proven_gain(cert, largest(model, gain))
 
@@ -264,7 +269,7 @@ def _uncertain(rng: np.random.Generator) -> Trial:
 
 
 def _dwell(rng: np.random.Generator) -> Trial:
-    dt = rng.choice([None, 0.1])
+    dt = _period(rng)
     n, pace = int(rng.integers(1, 3)), 1.0
     modes = [lightly_damped(rng, n, pace, dt) for _ in range(2)]
     jumps = {key: np.eye(n) + 0.3 * rng.standard_normal((n, n)) for key in ((0, 1), (1, 0))}
@@ -282,11 +287,11 @@ def _dwell(rng: np.random.Generator) -> Trial:
             flows = [np.linalg.matrix_power(A, max(int(k), 1)) for A, k in pairs]
         cycle = jumps[1, 0] @ flows[1] @ jumps[0, 1] @ flows[0]
         worst = max(worst, float(np.abs(np.linalg.eigvals(cycle)).max()))
-    return Trial(worst)
+    return Trial(float(worst))
 
 
 def _ellipsoid(rng: np.random.Generator) -> Trial:
-    model = plant(rng, 1, 1, dt=rng.choice([None, 0.1])).with_rate(0.0)
+    model = plant(rng, 1, 1, dt=_period(rng)).with_rate(0.0)
     found = invariant_set(
         model, disturbance={str(model.inputs[0]): 1.0}, state_bounds=_wide(model), degree=1
     )
@@ -306,7 +311,7 @@ def _ellipsoid(rng: np.random.Generator) -> Trial:
             for sign in (-1.0, 1.0):
                 after = x @ A.T + sign * B[:, 0]
                 worst = max(worst, float(np.einsum("ki,ij,kj->k", after, inner, after).max()))
-    return Trial(worst)
+    return Trial(float(worst))
 
 
 def _wide(model: LPVStateSpace) -> dict[str, float]:
@@ -357,8 +362,10 @@ def _slope(rng: np.random.Generator) -> Trial:
     A, B, C, _ = next(frozen(model))
     from symheli import LinearModel
 
-    names = [f"x{i}" for i in range(len(A))]
-    loop = LinearModel(A, B, C, [[0.0]], names, ["d"], ["v"])
+    names: Any = [f"x{i}" for i in range(len(A))]
+    into: Any = ["d"]
+    out: Any = ["v"]
+    loop = LinearModel(A, B, C, np.zeros((1, 1)), names, into, out)
     kind = str(rng.choice(["circle", "Popov", "Zames-Falb"]))
     found = slope_margin(loop, "d", "v", kind, odd=bool(rng.random() < 0.5))
     if not 0 < found.slope < math.inf:

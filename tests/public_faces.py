@@ -23,8 +23,11 @@ def lower(package):
 
 
 def names(face):
-    """Public names of a package, or of a module below it those that stood at the top."""
-    if face in (*TOP, "symheli.lpv"):
+    """Public names of a package, or of a module that only names again what rooms hold; of another
+    module below a package those that stood at the top.
+    """
+    house = tomllib.loads((ROOT / "evidence" / "house.toml").read_text(encoding="utf-8"))
+    if face in (*TOP, "symheli.lpv", *house["faces"]):
         return list(module(face).__all__)
     packages = [package for package in (*TOP, "symheli.lpv") if face.startswith(f"{package}.")]
     return sorted({name for p in packages for m, name in moved(p) if m == face})

@@ -13,6 +13,7 @@ from symheli.errors import InputError
 from symheli.lpv.lft_matrices import LFTMatrices
 from symheli.lpv.lpv_matrices import LPVMatrices
 from symheli.values.arrays import frozen
+from symheli.values.signal import signals
 from synthesis.certify.questions.certificate_file import decoded, encoded, same_model
 from synthesis.certify.statement.proven_statement import ProvenStatement
 from synthesis.certify.statement.sentences import motion
@@ -154,10 +155,10 @@ def _block(content: Mapping[str, Any]) -> DynamicBlock:
     weight = content["weight"]
     if weight is not None:
         A, B, C, D = (np.asarray(decoded(weight[name]), float) for name in "ABCD")
-        states = [f"x{i}" for i in range(len(A))]
-        weight = LinearModel(A, B, C, D, states, ["u"], ["y"], weight["dt"])
-    names = ([str(name) for name in content[group]] for group in ("inputs", "outputs"))
-    return DynamicBlock(*names, float(content["bound"]), weight)
+        states = signals(f"x{i}" for i in range(len(A)))
+        weight = LinearModel(A, B, C, D, states, signals(["u"]), signals(["y"]), weight["dt"])
+    into, out = ([str(name) for name in content[group]] for group in ("inputs", "outputs"))
+    return DynamicBlock(into, out, float(content["bound"]), weight)
 
 
 def _model(value: Any) -> LFT | LPVStateSpace:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -53,7 +54,7 @@ def _products(first: Array, second: Array) -> Iterator[tuple[str, Array]]:
         yield "A1 A2^-1", first @ np.linalg.inv(second)
 
 
-def _negative(values: Array) -> float | None:
+def _negative(values: Any) -> float | None:
     """Return the most negative real eigenvalue; None where there is none."""
     real = values[np.abs(values.imag) <= REAL * np.abs(values)].real
     real = real[real < -REAL * np.abs(values).max(initial=0.0)]

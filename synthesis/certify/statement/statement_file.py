@@ -84,7 +84,8 @@ def content_of(path: str | os.PathLike[str]) -> dict[str, Any]:
             " write it again with its .save"
         ) from None
     schemas = {schema for schema, _ in FORMER} | {SCHEMA}
-    if not isinstance(content, dict) or content.get("schema") not in schemas:
+    schema = content.get("schema") if isinstance(content, dict) else None
+    if not isinstance(schema, str) or schema not in schemas:
         raise InputError(
             f"{path}: expected the schema {SCHEMA!r}; this file was not written by the .save of a"
             " certificate, set, tube, dwell time or margin"
