@@ -132,7 +132,7 @@ def gridded(loop: LPVStateSpace, degree: int) -> tuple[float, float]:
 
 
 def d_scaled(loop: LPVStateSpace) -> Certificate:
-    return lft_gain(loop.to_lft().reduce(), "D", search=None)
+    return lft_gain(loop.to_lft().reduce(1e-12), "D", search=None)
 
 
 def alternating(

@@ -89,7 +89,7 @@ def judge(seed: int) -> tuple[str, bool, str]:
         proven = searching(asked).search(math.inf).proof is not None
     else:
         if route.endswith("LFT"):
-            cert = lft_gain(lpv.to_lft().reduce(), search=None)
+            cert = lft_gain(lpv.to_lft().reduce(1e-12), search=None)
         else:
             analysis = stability if route.startswith("stability") else l2_gain
             cert = analysis(lpv, **(SPLINES if "splines" in route else BOX), search=None)

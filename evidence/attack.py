@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple
 
+import casadi
 import numpy as np
 from scipy import linalg
 
@@ -31,6 +32,7 @@ from synthesis.forms import Spline
 from synthesis.robust import DynamicBlock, robust_margin, slope_margin, worst_case_gain
 from synthesis.sets import invariant_set, low_complexity_set
 from synthesis.switching import dwell_time
+from synthesis.tubes import Motions, tube
 
 Array = np.ndarray
 QUICK = {"form": Spline(degree=1, segments=1), "search": None}
@@ -416,6 +418,31 @@ def _worst_case(rng: np.random.Generator) -> Trial:
     return Trial(max(float(np.abs(each).max()) for each in closed) / found.upper)
 
 
+def _tube(rng: np.random.Generator) -> Trial:
+    """A random oscillator with a sine, a cubic and a saturation, about rest in gusts: dV/dt on the
+    border by the function alone.
+    """
+    x, u, w, c = (casadi.SX.sym(n, k) for n, k in (("x", 2), ("u", 1), ("w", 1), ("c", 0)))
+    a, b, d, s = rng.uniform(-1, 1, 4)
+    own = a * casadi.sin(x[0]) + b * x[0] ** 3 + d * casadi.fabs(x[1]) * x[1]
+    force = own + 0.1 * s * casadi.fmin(x[0], 0.1)
+    model = casadi.Function("drawn", [x, u, w], [casadi.vertcat(x[1], force + u + w)])
+    rest = casadi.Function("rest", [c], [casadi.SX.zeros(2), casadi.SX.zeros(1)])
+    K = -np.array([[rng.uniform(1, 5), rng.uniform(1, 4)]])
+    gust = float(10 ** rng.uniform(-2, -0.3))
+    found = tube(model, Motions(rest, K), gust=gust, sizes=[0.5 * gust, 0.7 * gust])
+    if not (found.verified and found.verify()):
+        return NOTHING
+    P = found.P[0]
+    z = rng.standard_normal((2000, 2))
+    e = np.linalg.solve(np.linalg.cholesky(P).T, (z / np.linalg.norm(z, axis=1)[:, None]).T)
+    worst, size = -math.inf, 0.0
+    for sign in (-gust, gust):
+        rise = 2 * np.einsum("ik,ij,jk->k", e, P, np.array(model(e, K @ e, sign)))
+        worst, size = max(worst, float(rise.max())), max(size, float(np.abs(rise).max()))
+    return Trial(1.0 + worst / size)
+
+
 KINDS: dict[str, Callable[[np.random.Generator], Trial]] = {
     "l2 gain": _gain,
     "stability": _stability,
@@ -430,6 +457,7 @@ KINDS: dict[str, Callable[[np.random.Generator], Trial]] = {
     "dwell time": _dwell,
     "ellipsoid": _ellipsoid,
     "parallelepiped": _parallelepiped,
+    "tube": _tube,
     "slope margin": _slope,
     "robust margin": _robust,
     "worst-case gain": _worst_case,

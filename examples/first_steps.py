@@ -12,7 +12,7 @@ family = symheli.sweep(heli, [0.0, 2.0, 4.0, 6.0, 8.0])
 lateral = family.select(states=["v", "p", "r", "phi", "b1"], inputs=["d_lat", "d_ped"]).interpolate(
     "polynomial", degree=3
 )
-print("order of the LFT:", lateral.to_lft().order, "reduced:", lateral.to_lft().reduce().order)
+print("order of the LFT:", lateral.to_lft().order, "reduced:", lateral.to_lft().reduce(1e-12).order)
 
 excitation = symheli.Excitation(
     {"d_lon": 0.012, "d_lat": 0.012, "d_col": 0.01, "d_ped": 0.02}, seed=1

@@ -142,7 +142,7 @@ def measure(
     jump = synthesis.l2_gain(loop, math.inf)
     tests = {"constant P": jump.gamma}
     if isinstance(loop.basis, Polynomial):
-        lft = loop.to_lft().reduce()
+        lft = loop.to_lft().reduce(1e-12)
         tests |= {
             f"LFT {name}": synthesis.lft_gain(lft, name, search=None).gamma
             for name in synthesis.analysis.SCALINGS

@@ -54,7 +54,7 @@ def on(loop: LPVStateSpace, low: float, high: float) -> LPVStateSpace:
 
 def proven(loop: LPVStateSpace, test: str) -> bool:
     """Whether this LFT test proves stability of the loop on its whole range."""
-    return synthesis.analysis.lft_stability(loop.to_lft().reduce(), test, search=None).verified
+    return synthesis.analysis.lft_stability(loop.to_lft().reduce(1e-12), test, search=None).verified
 
 
 def grows(loop: LPVStateSpace, search: LowerBoundSearch | None = None) -> bool:
@@ -126,7 +126,7 @@ def gains(loop: LPVStateSpace, low: float, high: float) -> dict[str, Any]:
     the largest frozen one.
     """
     narrow = on(loop, low, high)
-    lft = narrow.to_lft().reduce()
+    lft = narrow.to_lft().reduce(1e-12)
     varying = synthesis.l2_gain(narrow, RATE, search=LowerBoundSearch(seconds=math.inf))
     certificates: dict[str, Any] = {
         test: synthesis.lft_gain(lft, test, search=None) for test in synthesis.analysis.SCALINGS
@@ -143,7 +143,7 @@ def measure(
 ) -> Iterator[tuple[str, Any]]:
     """(name, result) of everything the page shows for one loop, as it is found."""
     s = loop.scheduling
-    yield "order", {"LFT": loop.to_lft().order, "reduced": loop.to_lft().reduce().order}
+    yield "order", {"LFT": loop.to_lft().order, "reduced": loop.to_lft().reduce(1e-12).order}
     for low, high in (*narrow, (s.low, s.high)):
         yield f"gains on [{low:g}, {high:g}] m/s", gains(loop, low, high)
     yield "whole range, jumping airspeed", {"grows": grows(loop)}

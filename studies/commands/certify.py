@@ -92,7 +92,10 @@ def run(arguments: argparse.Namespace) -> Output:
         _refuse_form(arguments)
         progress(f"LFT test with {arguments.lft} for a parameter that may jump")
         test = synthesis.analysis.lft_stability if arguments.stability else synthesis.lft_gain
-        cert, rate = test(loop.to_lft().reduce(), arguments.lft), math.inf
+        from studies.setup.bounds import COPIES, LEFT_OUT
+
+        cert, rate = test(loop.to_lft().reduce(COPIES), arguments.lft), math.inf
+        cert = cert.resting_on((LEFT_OUT,))
     else:
         progress(f"searching a Lyapunov function for |dp/dt| <= {arguments.rate:g} per second")
         certify = synthesis.stability if arguments.stability else synthesis.l2_gain

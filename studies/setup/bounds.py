@@ -25,6 +25,14 @@ LFT_TESTS = {
 }
 
 
+COPIES = 1e-12
+"""Share of an entry below which a dependence on p gets no copy of its own in an LFT test."""
+LEFT_OUT = (
+    "of the LFT: dependence on a parameter below 1e-12 of the size that its row and column give an"
+    " entry is left out; .to_lft().reduce() leaves none out"
+)
+
+
 FORMS = (MEMORY, PLAIN, CONSTANT, *LFT_TESTS)
 """Forms of a proof, the least conservative first; from `CONSTANT` on they let the airspeed jump."""
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import symheli
+from studies.setup.bounds import COPIES
 from studies.setup.flights import TOP
 from studies.transition.first_look import FirstLook, first_look
 from symheli import LFT, Helicopter, LinearFamily, LPVStateSpace
@@ -27,12 +28,6 @@ def derivative_name(row: str, column: str) -> str:
     state'_column.
     """
     return f"{_FORCE.get(row, row + chr(39))}_{column.replace('d_', 'd')}"
-
-
-COPIES = 1e-12
-"""Share of an entry below which a dependence is no copy of its own in the order that is reported;
-no proof uses that model.
-"""
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,9 @@ from studies.loops.exact_lateral import ExactLateral
 from studies.loops.lateral import ATTITUDE_HOLD, STATES, close
 from studies.setup.bounds import (
     CONSTANT,
+    COPIES,
     FORMS,
+    LEFT_OUT,
     LFT_TESTS,
     MEMORY,
     PERIOD,
@@ -199,8 +201,8 @@ def lft_bounds(name: str, channel: str, lpv: LPVStateSpace) -> list[Proof]:
 
 
 def _lft_bound(name: str, channel: str, lpv: LPVStateSpace, form: str) -> list[Bound]:
-    gain = synthesis.lft_gain(lpv.to_lft().reduce(), LFT_TESTS[form], search=None)
-    return [Bound(name, channel, math.inf, form, gain)]
+    gain = synthesis.lft_gain(lpv.to_lft().reduce(COPIES), LFT_TESTS[form], search=None)
+    return [Bound(name, channel, math.inf, form, gain.resting_on((LEFT_OUT,)))]
 
 
 def allowed_bounds(
