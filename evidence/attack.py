@@ -19,7 +19,7 @@ import casadi
 import numpy as np
 from scipy import linalg
 
-from symheli import LPVStateSpace, Scheduling, UncertainStateSpace
+from symheli import LPVStateSpace, Scheduling
 from symheli.errors import SymheliError
 from synthesis import decay_rate, h2_gain, l2_gain, lft_gain, stability
 from synthesis.analysis import (
@@ -29,7 +29,13 @@ from synthesis.analysis import (
     sector_radius,
 )
 from synthesis.forms import Spline
-from synthesis.robust import DynamicBlock, robust_margin, slope_margin, worst_case_gain
+from synthesis.robust import (
+    DynamicBlock,
+    robust_margin,
+    slope_margin,
+    uncertain,
+    worst_case_gain,
+)
 from synthesis.sets import invariant_set, low_complexity_set
 from synthesis.switching import dwell_time
 from synthesis.tubes import Motions, tube
@@ -260,7 +266,7 @@ def _uncertain(rng: np.random.Generator) -> Trial:
     largest_block = largest(model, lambda G: abs(G[1, 1]))
     bound = float(rng.uniform(0.3, 0.95) / largest_block)
     d, v = [str(model.inputs[1])], [str(model.outputs[1])]
-    whole = UncertainStateSpace.of_blocks(model, [DynamicBlock(d, v, bound)])
+    whole = uncertain(model, [DynamicBlock(d, v, bound)])
     cert = l2_gain(whole, **QUICK)
 
     def perturbed(G: Array) -> float:

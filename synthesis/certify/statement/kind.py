@@ -81,15 +81,18 @@ class Kind(str):
     """The name of a property, and its `facets`: a kind is equal to its name."""
 
     known: ClassVar[dict[str, Kind]] = {}
-    facets: Facets
+    _facets: ClassVar[dict[str, Facets]] = {}
 
     def __new__(cls, name: str, **facets: Any) -> Kind:
         """Make a kind and register it; of one that is known already, that."""
         if name not in cls.known:
-            made = super().__new__(cls, name)
-            made.facets = Facets(**facets)
-            cls.known[name] = made
+            cls.known[name], cls._facets[name] = super().__new__(cls, name), Facets(**facets)
         return cls.known[name]
+
+    @property
+    def facets(self) -> Facets:
+        """The properties that decide about the kind."""
+        return self._facets[Kind.named(str.__str__(self))]
 
     @classmethod
     def named(cls, name: Any) -> Kind:

@@ -25,7 +25,7 @@ CLOSE = 1e-5
 
 
 def reduced(lpv):
-    return lpv.to_lft().reduce()
+    return lpv.to_lft().reduce(1e-12)
 
 
 def gains(lft, scalings=SCALINGS, **options):
