@@ -103,7 +103,8 @@ def affine_inequalities(
             out.append(_affine(P, columns, nothing, nothing, -eye))
     if gains:
         inputs = np.diag(np.r_[np.zeros(nx), np.ones(nu)])
-        level, fixed = 0 * svec(inputs), -inputs if demand.of_gramian else 0 * inputs
+        paid = 0 if demand.of_gramian else demand.kind.facets.rise.inputs
+        level, fixed = -paid * svec(inputs), -inputs if demand.of_gramian else 0 * inputs
         back_off = margin * svec(np.diag(np.r_[np.ones(nx), np.zeros(nu)]))
     else:
         level, fixed, back_off = svec(eye), 0 * eye, nothing
@@ -129,10 +130,10 @@ def _with_rise(
     model: Pieces, region: Region, pair: Pair, demand: Demand
 ) -> Iterator[tuple[PolynomialMatrix, PolynomialMatrix | None]]:
     """Yield each dissipation inequality at level 0, and what a level of 1 adds; None of a kind
-    whose supply rate has no level.
+    whose level multiplies the inputs alone, or that has none.
     """
     every = decrease(model, region, pair, demand, float)
-    if demand.kind.facets.supply is None:
+    if not (demand.kind.facets.rise.outputs or demand.kind.facets.rise.cross):
         yield from ((F, None) for F in every)
         return
     for F, higher in zip(every, decrease(model, region, pair, demand, float, 1.0), strict=True):

@@ -201,12 +201,13 @@ def _samples(model: Pieces, P: BoxLyapunov, demand: Demand, points: int) -> _Sam
     moves, here, outputs, rises = [], [], [], []
     for region in regions(model, P.knots, demand.motion, demand.moving(P.degrees)):
         pair = Pair(P.segment(region.segment), P.segment(region.next_segment))
-        higher = decrease(model, region, pair, demand, float, 1.0)
-        for F, G in zip(decrease(model, region, pair, demand, float), higher, strict=True):
+        for F in decrease(model, region, pair, demand, float):
             local = _grid(F, points)
             moves.append(F(local))
-            rises.append(moves[-1] - G(local))
             here.append(pair.here(local[:, : len(region.box)]))
+        if demand.kind.indexed:
+            for G in decrease(model, region, pair, demand, float, 1.0):
+                rises.append(moves[len(rises)] - G(_grid(G, points)))
         if demand.of_gramian:
             F = output_form(model, region, pair.here, demand, float)
             outputs.append(F(_grid(F, points)))
