@@ -177,7 +177,7 @@ def stubbed(monkeypatch, folder):
     for module, names in stubs:
         for name in names:
             monkeypatch.setattr(module, name, reached)
-    loop = SimpleNamespace(to_lft=lambda: SimpleNamespace(reduce=lambda: None))
+    loop = SimpleNamespace(to_lft=lambda: SimpleNamespace(reduce=lambda *_: None))
     monkeypatch.setattr(lateral, "lateral_loop", lambda *_, **__: loop)
     monkeypatch.setattr(experiments, "design", reached)
     monkeypatch.setattr(pays, "where_scheduling_pays", reached)
