@@ -134,7 +134,6 @@ def nearly_cancelling(kind):
     return kind.from_expressions(A, B.tolist(), C.tolist(), [[0, 0], [0, 0]], p, **names), [block]
 
 
-@pytest.mark.guard
 @pytest.mark.parametrize("kind", [LFT, LPVStateSpace])
 def test_a_parameter_of_little_effect_is_not_dropped(kind):
     """Its effect was taken for rounding, and the margin said 9.27; rounding of a thousandth of the

@@ -150,7 +150,6 @@ def circle_bound(model):
     return float(1 / most)
 
 
-@pytest.mark.guard
 @pytest.mark.parametrize(("numbers", "n"), [(MISSED, 6), (FALSE, 3)])
 def test_lightly_damped_modes_in_mixed_coordinates_are_not_missed(numbers, n):
     """The slopes were 990,164 and 1.7e13: a crossing was not taken for imaginary."""
@@ -188,7 +187,6 @@ def test_a_proof_with_other_numbers_is_refused(forged):
     assert not proof._replace(**forged(proof)).verified()
 
 
-@pytest.mark.guard
 @pytest.mark.parametrize("lie", ["garbage", "negative", "nothing", "too large"])
 def test_a_solver_that_lies_proves_no_slope(monkeypatch, lie):
     """What it returns is solved, it says; the true limit of the circle criterion is 4."""
