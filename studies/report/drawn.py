@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 LARGEST = 110_000
 """Bytes of an SVG that still stands in the page."""
 
+DPI = 130.0
+"""Pixels an inch of a PNG."""
+
 COLOURS = 64
 """Colours of a PNG in the page."""
 
@@ -65,10 +68,8 @@ def drawn(pictures: Iterable[tuple[str, str, str, Figure]], folder: Path) -> lis
     for name, caption, source, figure in pictures:
         for line, place in _curves(figure):
             line.set_gid(place)
-        figure.draw_without_rendering()
-        figure.set_layout_engine("none")  # laid out once, for every kind of file
         with matplotlib.rc_context(STABLE):
-            files = {ending: _saved(figure, ending) for ending in ("png", "svg", "pdf")}
+            files = _files(figure)
         axes, points = _axes(figure), _points(figure)
         plt.close(figure)
         for ending, content in files.items():
@@ -136,11 +137,24 @@ def _axes(figure: Figure) -> list[dict[str, Any]]:
     return out
 
 
-def _saved(figure: Figure, ending: str) -> bytes:
-    stream = io.BytesIO()
-    undated = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}[ending]
-    figure.savefig(stream, format=ending, dpi=130, metadata=undated)
-    return stream.getvalue()
+def _files(figure: Figure) -> dict[str, bytes]:
+    """PNG, SVG and PDF of a figure, undated: laid out once and drawn once for each, where
+    `savefig` draws twice.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.backends.backend_pdf import FigureCanvasPdf
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+    if (engine := figure.get_layout_engine()) is not None:
+        engine.execute(figure)
+    figure.set_layout_engine("none")
+    before, streams = figure.dpi, {ending: io.BytesIO() for ending in ("png", "svg", "pdf")}
+    figure.dpi = DPI
+    FigureCanvasAgg(figure).print_png(streams["png"])
+    FigureCanvasSVG(figure).print_svg(streams["svg"], metadata={"Date": None})
+    FigureCanvasPdf(figure).print_pdf(streams["pdf"], metadata={"CreationDate": None})
+    figure.dpi = before
+    return {ending: stream.getvalue() for ending, stream in streams.items()}
 
 
 def _points(figure: Figure) -> list[list[list[int]]]:

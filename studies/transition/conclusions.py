@@ -96,7 +96,7 @@ def _first_controller(study: Outcome) -> Iterator[str]:
     proven = (
         f"proven for a gain of {gain(proof)} at up to {RATE:g} m/s^2"
         if math.isfinite(proof)
-        else f"not proven (frozen gain {gain(made.frozen)})"
+        else f"not proven{' yet' if proofs is None else ''} (frozen gain {gain(made.frozen)})"
     )
     sentence = f"A first controller of {made.order} states, behind servos and delay at 50 Hz, is"
     flights = (

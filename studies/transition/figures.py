@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +14,7 @@ import numpy as np
 from studies.controllers.figure import RATIOS, SEEDS, energy_ratios, seeds
 from studies.known_kinematics import models
 from studies.known_kinematics.truth import SPEEDS
+from studies.report.drawn import Drawn, drawn
 from studies.setup.flights import NOISES
 from studies.transition.comparison import FAST
 from studies.transition.guarantees import curves
@@ -23,6 +27,7 @@ if TYPE_CHECKING:
     from identification.judge.frozen_models import FrozenModels
     from studies.known_kinematics.rivals import KnownKinematics
     from studies.setup.flights import StudyRecords
+    from studies.transition.baseline import Baseline
     from studies.transition.comparison import ComparedAxis
     from studies.transition.outcome import Outcome
     from studies.transition.paper_experiment import PaperExperiment
@@ -64,8 +69,9 @@ CAPTION = {
         " worst airspeed history found, on the linear model and not in flight, attains it. Grey:"
         " neither a gain is proven nor growth found."
     ),
+    "energy-ratios": RATIOS,
+    "seeds": SEEDS,
 }
-
 
 SOURCE = {
     "trim": "baseline.trim",
@@ -77,7 +83,8 @@ SOURCE = {
     "frozen": "comparison.frozen",
     "gaps": "known_kinematics.models",
     "gain": "guarantees.bounds",
-    "flown": "controllers.flights",
+    "energy-ratios": "controllers.flights",
+    "seeds": "controllers.flights",
 }
 """Where results.json has the numbers that each kind of figure shows, or those of the stage that a
 record was flown in.
@@ -100,48 +107,74 @@ STYLE: dict[Any, Any] = {
     "figure.constrained_layout.use": True,
 }
 
-Picture = tuple[str, str, str, "Figure"]
-"""Name, caption, where results.json has its numbers, and the figure."""
+SHOWN = {
+    "trim": ("baseline",),
+    "interpolation": ("baseline",),
+    "convergence": ("paper_experiment",),
+    "outputs": ("paper_experiment",),
+    "flights": ("flights",),
+    "prediction": ("comparison",),
+    "frozen": ("comparison",),
+    "gaps": ("known_kinematics",),
+    "gain": ("gust", "longitudinal"),
+    "energy-ratios": ("flown_controllers", "certified_controllers"),
+    "seeds": ("flown_controllers",),
+}
+"""The stages whose results each kind of figure shows."""
 
 
-def figures(study: Outcome) -> Iterator[Picture]:
-    """Everything the study has reached."""
+@dataclass(frozen=True)
+class Picture:
+    """A figure that a study has reached: its name, its caption, where results.json has its numbers,
+    the stages whose results it shows, and how it is made of these.
+    """
+
+    name: str
+    caption: str
+    source: str
+    stages: tuple[str, ...]
+    make: Callable[[], Figure]
+
+
+def drawn_in(out: Path, picture: Picture) -> Drawn:
+    """Write a figure below `out`, in three kinds of file, and return that of the page."""
     import matplotlib
 
     matplotlib.use("Agg")
     with matplotlib.rc_context(STYLE):
-        yield from _of_models(study)
-        if study.comparison:
-            for c in study.comparison.predictions:
-                if c.noise == NOISES[0]:
-                    name = c.axis.name
-                    yield _picture("prediction", prediction(c), f"prediction-{name}", name)
-            for f in study.comparison.frozen:
-                words = f.axis.name, f.found.fast
-                yield _picture("frozen", frozen(f.found), f"frozen-{f.axis.name}", *words)
-        if study.known_kinematics:
-            yield _picture("gaps", gaps(study.known_kinematics))
-        if found := curves(study.bounds):
-            yield _picture("gain", gain_curves(found), "gain-against-rate")
-        if study.flown_controllers and study.flown_controllers.flown:
-            ratios = energy_ratios(study.flown_controllers, study.certified_controllers)
-            yield "energy-ratios", RATIOS, SOURCE["flown"], ratios
-            yield "seeds", SEEDS, SOURCE["flown"], seeds(study.flown_controllers)
+        given = picture.name, picture.caption, picture.source, picture.make()
+        return drawn([given], out / "figures")[0]
 
 
-def _of_models(study: Outcome) -> Iterator[Picture]:
-    if study.baseline:
-        yield _picture("trim", trim(study))
-        yield _picture("interpolation", entries(study))
+def figures(study: Outcome) -> Iterator[Picture]:
+    """Everything the study has reached."""
+    if b := study.baseline:
+        yield _picture("trim", partial(trim, b))
+        yield _picture("interpolation", partial(entries, b))
     for e in study.paper_experiment.runs if study.paper_experiment else ():
-        yield _picture("convergence", convergence(e), f"convergence-{e.loop}", e.loop)
-        yield _picture("outputs", outputs(e), f"outputs-{e.loop}", e.loop)
+        yield _picture("convergence", partial(convergence, e), f"convergence-{e.loop}", e.loop)
+        yield _picture("outputs", partial(outputs, e), f"outputs-{e.loop}", e.loop)
     if study.flights:
-        yield _picture("flights", flights(study.flights))
+        yield _picture("flights", partial(flights, study.flights))
+    if study.comparison:
+        for c in study.comparison.predictions:
+            if c.noise == NOISES[0]:
+                name = c.axis.name
+                yield _picture("prediction", partial(prediction, c), f"prediction-{name}", name)
+        for f in study.comparison.frozen:
+            words = f.axis.name, f.found.fast
+            yield _picture("frozen", partial(frozen, f.found), f"frozen-{f.axis.name}", *words)
+    if study.known_kinematics:
+        yield _picture("gaps", partial(gaps, study.known_kinematics))
+    if found := curves(study.bounds):
+        yield _picture("gain", partial(gain_curves, found), "gain-against-rate")
+    if (flown := study.flown_controllers) and flown.flown:
+        yield _picture("energy-ratios", partial(energy_ratios, flown, study.certified_controllers))
+        yield _picture("seeds", partial(seeds, flown))
 
 
-def _picture(kind: str, figure: Figure, name: str = "", *words: object) -> Picture:
-    return name or kind, CAPTION[kind].format(*words), SOURCE[kind], figure
+def _picture(kind: str, make: Callable[[], Figure], name: str = "", *words: object) -> Picture:
+    return Picture(name or kind, CAPTION[kind].format(*words), SOURCE[kind], SHOWN[kind], make)
 
 
 def _subplots(
@@ -153,15 +186,15 @@ def _subplots(
     return figure, axes
 
 
-def _kinks(ax: Any, study: Outcome) -> None:
-    for speeds in study.baseline.between.kinks.values():  # type: ignore[union-attr]
+def _kinks(ax: Any, baseline: Baseline) -> None:
+    for speeds in baseline.between.kinks.values():
         for speed in speeds:
             ax.axvline(speed, color=GREY, linewidth=0.8, linestyle=":")
 
 
-def trim(study: Outcome) -> Figure:
+def trim(baseline: Baseline) -> Figure:
     """Attitude and controls against airspeed."""
-    family = study.baseline.nodes  # type: ignore[union-attr]
+    family = baseline.nodes
     figure, axes = _subplots(1, 4, 11, 2.4, sharex=True)
     for ax, name, where in zip(
         axes[0], ("theta", "phi", "d_col", "d_ped"), ("x", "x", "u", "u"), strict=True
@@ -171,14 +204,12 @@ def trim(study: Outcome) -> Figure:
         )
         ax.set_title(f"{name} (deg)")
         ax.set_xlabel("airspeed (m/s)")
-        _kinks(ax, study)
+        _kinks(ax, baseline)
     return figure
 
 
-def entries(study: Outcome) -> Figure:
+def entries(b: Baseline) -> Figure:
     """Four entries of A: exact and interpolated."""
-    b = study.baseline
-    assert b is not None  # noqa: S101
     figure, axes = _subplots(1, 4, 11, 2.8)
     fine = np.linspace(b.nodes.airspeeds[0], b.nodes.airspeeds[-1], 400)
     cubic, sextic, spline = (
@@ -198,7 +229,7 @@ def entries(study: Outcome) -> Figure:
         ax.plot(fine, spline[:, i, j], color=ORANGE, label="spline", linewidth=1)
         ax.set_title(f"{title} ({'1/(m s)' if row in 'qr' else '1/s'})")
         ax.set_xlabel("airspeed (m/s)")
-        _kinks(ax, study)
+        _kinks(ax, b)
     axes[0][0].legend()
     return figure
 

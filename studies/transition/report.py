@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from studies.report.drawn import Drawn, drawn
+from studies.report.drawn import Drawn
 from studies.report.equations import EQUATIONS
 from studies.report.labels import Labels
 from studies.report.pages import FOLDER, environment
@@ -41,7 +42,9 @@ if TYPE_CHECKING:
     from identification.model import LPVARXModel
     from studies.transition.identified import Identification
     from studies.transition.outcome import Outcome
+    from studies.transition.under_way import UnderWay
 
+REPORT = "report.html"
 TEMPLATE, STYLE, SCRIPTS = "page.html.j2", "page.css", ("hover.js", "explorer.js", "fit.js")
 ORDER = (
     *("question", "definitions", "vehicle", "baseline", "experiment", "identified", "terms"),
@@ -54,6 +57,17 @@ OWN_ORDER = (
 """Sections of the page; of another vehicle than the study's own questions about it come first, and
 the published experiment late.
 """
+SHOWS = {
+    "vehicle": "baseline",
+    "baseline": "baseline",
+    "experiment": "paper_experiment",
+    "identified": "identification",
+    "terms": "comparison",
+    "known": "known_kinematics",
+    "proven": "bounds",
+    "controllers": "controllers",
+}
+"""What a section of the page shows, where that is something which a run finds."""
 DIGITS = 4
 """Significant ones of the numbers that the slider moves over."""
 
@@ -68,16 +82,26 @@ def write_report(study: Outcome, out: Path) -> Path:
     """The proofs, results.json, figures (PNG, SVG, PDF) and report.html, in this order: no number
     waits for a picture, and what the page links is there.
     """
-    from studies.transition.figures import figures
+    from studies.transition.figures import drawn_in, figures
 
-    save_proofs(study, out)
-    results = to_dict(study)
-    _written(results, out)
-    pictures = {one.name: one for one in drawn(tracked("figures", figures(study)), out / "figures")}
-    return write_text(out / "report.html", page(study, pictures, results))
+    write_results(study, out)
+    each = tracked("figures", list(figures(study)))
+    return write_page(study, out, {one.name: drawn_in(out, one) for one in each})
 
 
-def page(study: Outcome, pictures: dict[str, Drawn], results: dict[str, Any]) -> str:
+def write_page(
+    study: Outcome, out: Path, pictures: Mapping[str, Drawn], under_way: UnderWay | None = None
+) -> Path:
+    """report.html with these figures, of a study that has ended or is `under_way`."""
+    return write_text(out / REPORT, page(study, pictures, to_dict(study), under_way))
+
+
+def page(
+    study: Outcome,
+    pictures: Mapping[str, Drawn],
+    results: dict[str, Any],
+    under_way: UnderWay | None = None,
+) -> str:
     """The report as HTML; rendered twice, so that what stands below can be referred to above."""
     from markupsafe import Markup
 
@@ -95,8 +119,11 @@ def page(study: Outcome, pictures: dict[str, Drawn], results: dict[str, Any]) ->
         "style": Markup((FOLDER / STYLE).read_text(encoding="utf-8")),
         "scripts": [Markup((FOLDER / name).read_text(encoding="utf-8")) for name in SCRIPTS],
         "held": Markup(compact(results["held"])),
+        "under_way": under_way,
         **_headline(study),
     }
+    if under_way is not None:
+        texts |= _as_far_as_it_is(study, pictures, texts)
     first = Labels()
     template.render(labels=first, contents=[], **texts)
     text = template.render(labels=Labels(first.given), contents=first.contents, **texts)
@@ -172,6 +199,18 @@ def _headline(study: Outcome) -> dict[str, object]:
             if model.excitation is not None
         },
     }
+
+
+def _as_far_as_it_is(
+    study: Outcome, pictures: Mapping[str, Drawn], texts: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Lead and order of a page that is not complete: a figure that is there, and the sections that
+    have something to say first.
+    """
+    there = [key for key in OWN_ORDER if getattr(study, SHOWS.get(key, ""), None)]
+    rest = [key for key in texts["order"] if key not in there]
+    lead = texts["lead"] if texts["lead"] in pictures else "trim"
+    return {"order": [*there, *rest], "lead": lead}
 
 
 def _models(found: Identification | None) -> dict[str, LPVARXModel]:

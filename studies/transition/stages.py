@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
+from functools import partial
 from inspect import Parameter, signature
 from typing import Any
 
@@ -12,6 +13,7 @@ from studies.controllers.covered import proven
 from studies.controllers.designs import Designs, design_questions
 from studies.controllers.flown import FlownControllers, fly_controllers
 from studies.setup.flights import fly_transitions
+from studies.setup.questions import Questions
 from studies.transition.baseline import Baseline, build_baseline
 from studies.transition.comparison import compare
 from studies.transition.effort import Effort
@@ -40,7 +42,7 @@ class Stage:
 
     Its parameters without default are entries of the effort, earlier stages, or `GIVEN`: nothing
     else can decide its result. It may return `Questions`, which processes answer. `cost` is about
-    its work in the whole study and in the quick one, s, for the remaining time.
+    its work in the whole study and in the quick one, s: by it stages are put in order.
     """
 
     name: str
@@ -64,10 +66,16 @@ class Stage:
         """The earlier stages among them."""
         return tuple(name for name in self.parameters if name not in ENTRIES | {*GIVEN})
 
-    def found(self, outcome: Outcome, effort: Effort) -> Any:
-        """Return its result, or its questions."""
+    @property
+    def asks(self) -> bool:
+        """Whether it says that it returns `Questions`, which is little work by itself."""
+        return signature(self.compute).return_annotation == Questions.__name__
+
+    def call(self, outcome: Outcome, effort: Effort) -> Callable[[], Any]:
+        """Return the call of its result, or of its questions, with all that it is computed from."""
         sources = {name: effort if name in ENTRIES else outcome for name in self.parameters}
-        return self.compute(**{name: getattr(source, name) for name, source in sources.items()})
+        given = {name: getattr(source, name) for name, source in sources.items()}
+        return partial(self.compute, **given)
 
 
 def paper_experiment(baseline: Baseline, seed: int) -> PaperExperiments:
@@ -144,7 +152,26 @@ STAGES = (
     ),
     Stage("flown_controllers", "Flying the controllers", flown_controllers, (6, 2)),
 )
-"""In the order in which they are begun: what others wait for comes first."""
+"""In the order in which results.json names them, what a stage needs before it."""
+
+
+SHORT, SOON = 2.0, 0.9
+"""Seconds of a stage that is not kept waiting, and its urgency beside the largest there is: what
+most waits for goes first, then what soon gives the page more to show.
+"""
+
+
+def urgencies(every: Sequence[Stage], quick: bool) -> dict[str, float]:
+    """By stage the work from its beginning to the end of what waits for it longest, s; more for a
+    short one.
+    """
+    out: dict[str, float] = {}
+    for stage in reversed(every):
+        after = (out[other.name] for other in every if stage.name in other.needs)
+        out[stage.name] = stage.cost[quick] + max(after, default=0.0)
+    soon = SOON * max(out.values())
+    short = {stage.name for stage in every if stage.cost[quick] <= SHORT}
+    return {name: max(own, soon) if name in short else own for name, own in out.items()}
 
 
 def stages(effort: Effort) -> tuple[Stage, ...]:

@@ -48,7 +48,9 @@ def helicopter(configuration):
 
 @pytest.fixture
 def short(monkeypatch):
-    """A study of the first stages only, without pictures; what is computed is counted."""
+    """A study of the first stages only, in this process and without figures; what is computed is
+    counted.
+    """
     counted, whole = [], study.stages
 
     def counting(stage):
@@ -64,8 +66,17 @@ def short(monkeypatch):
 
     monkeypatch.setattr(study, "stages", first)
     monkeypatch.setattr(study, "loaded", helicopter)
-    monkeypatch.setattr(study, "write_report", study.write_results)
+    monkeypatch.setattr(study, "Processes", Here)
+    monkeypatch.setattr(study, "figures", lambda _: ())
     return counted
+
+
+def alone(monkeypatch):
+    """Stages that find no results of a study: in this process, and nothing is written of them."""
+    monkeypatch.setattr(study, "Processes", Here)
+    for name in ("write_page", "write_results"):
+        monkeypatch.setattr(study, name, lambda *_: None)
+    monkeypatch.setattr(study, "figures", lambda _: ())
 
 
 @pytest.fixture
@@ -93,7 +104,12 @@ def test_an_interrupted_study_leaves_whole_results_of_its_finished_stages(stoppe
     assert found["baseline"]["lft_order"]["value"] == 45
     assert [run["loop"] for run in found["paper_experiment"]] == ["open", "closed"]
     assert found["exact_recovery"] is None
-    assert sorted(p.name for p in stopped.iterdir()) == ["results.json", "stages", "study.toml"]
+    assert sorted(p.name for p in stopped.iterdir()) == [
+        "report.html",
+        "results.json",
+        "stages",
+        "study.toml",
+    ]
     assert sorted(p.name for p in (stopped / "stages").iterdir()) == [
         "baseline.stage",
         "paper_experiment.stage",
@@ -246,7 +262,7 @@ def test_a_stage_is_given_what_its_parameters_name_and_nothing_else():
     stage = stages.Stage("servo", "A stage", servo)
     assert (stage.needs, stage.reads) == (("baseline",), ("servo_rates",))
     outcome = Outcome(vehicle="xcell60", quick=False, seed=3)
-    assert stage.found(outcome, Effort()) == ("xcell60", 3, None, Effort().servo_rates)
+    assert stage.call(outcome, Effort())() == ("xcell60", 3, None, Effort().servo_rates)
 
 
 def test_the_stages_need_earlier_ones_alone():
@@ -278,26 +294,25 @@ def test_one_rate_changed_in_the_file_computes_only_what_it_touches(tmp_path, mo
     every = tuple(stages.Stage(f.__name__, f.__name__, f) for f in (flights, servo, robust))
     monkeypatch.setattr(study, "stages", lambda effort: every)
     monkeypatch.setattr(study, "loaded", helicopter)
-    for name in ("write_report", "write_results"):
-        monkeypatch.setattr(study, name, lambda *_: None)
+    alone(monkeypatch)
     file = tmp_path / "my.toml"
 
     def again(entries):
         file.write_text(f'out = "."\n[effort]\n{entries}\n')
         computed.clear()
         done = study.run_study(Configuration.read(file, {}), resume=True)
-        return [*computed], (done.flights, done.servo, done.robust)
+        return sorted(computed), (done.flights, done.servo, done.robust)
 
     first = (5,), ((0.0, 3.0),), ((), (0.0, 3.0))
-    assert again("ramps = 5\nservo_rates = [0, 3]") == (["flights", "servo", "robust"], first)
+    assert again("ramps = 5\nservo_rates = [0, 3]") == (["flights", "robust", "servo"], first)
     assert again("ramps = 5\nservo_rates = [0, 3]") == ([], first)
     # an entry that none of them reads
     assert again("ramps = 5\nservo_rates = [0, 3]\ngust_rates = [0, 2]") == ([], first)
     other = (5,), ((0.0, 4.0),), ((), (0.0, 4.0))
-    assert again("ramps = 5\nservo_rates = [0, 4]") == (["servo", "robust"], other)
+    assert again("ramps = 5\nservo_rates = [0, 4]") == (["robust", "servo"], other)
     assert again("ramps = 6\nservo_rates = [0, 4]") == (["flights"], ((6,), *other[1:]))
     # what was stored for the first file is gone, and is not taken for it
-    assert again("ramps = 5\nservo_rates = [0, 3]") == (["flights", "servo", "robust"], first)
+    assert again("ramps = 5\nservo_rates = [0, 3]") == (["flights", "robust", "servo"], first)
 
 
 @pytest.mark.slow
@@ -332,9 +347,7 @@ def test_proofs_that_were_found_are_not_proven_again(tmp_path, monkeypatch):
 
     stage = stages.Stage("gust", "Three questions", gust)
     monkeypatch.setattr(study, "stages", lambda effort: (stage,))
-    monkeypatch.setattr(study, "Processes", Here)
-    for name in ("write_report", "write_results"):
-        monkeypatch.setattr(study, name, lambda *_: None)
+    alone(monkeypatch)
     with pytest.raises(KeyboardInterrupt):
         run(tmp_path)
     assert asked == [0, 1, 2]

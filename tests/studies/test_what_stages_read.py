@@ -25,7 +25,7 @@ def test_the_questions_of_a_stage_are_made_of_what_it_declares(full, stage, effo
     """Entries that only a branch reads are read with every option on, or off; the other stages read
     theirs in any case, which the outcome of the tests shows.
     """
-    questions = stage.found(full, effort)
+    questions = stage.call(full, effort)()
     count = len(questions.proofs)
     assert count > 0 or (stage.name, effort) in (
         ("longitudinal", Effort.look()),
