@@ -245,7 +245,12 @@ def test_an_interrupted_study_ends_its_processes_and_says_what_is_kept(tmp_path)
     end = time.monotonic() + 120
     while not (tmp_path / "stages" / "baseline.stage").exists() and time.monotonic() < end:
         time.sleep(0.1)
-    time.sleep(2.0)
+    page, text = tmp_path / "report.html", ""
+    while 'id="figure-trim"' not in text and time.monotonic() < end:
+        time.sleep(0.1)
+        text = page.read_text(encoding="utf-8")
+    assert "The study is running" in text
+    assert "Designing controllers" in text.partition("Still to come")[2].partition("</ul>")[0]
     computing = workers(child.pid)
     err, status, _ = interrupted(child)
     assert status == 130
@@ -256,3 +261,7 @@ def test_an_interrupted_study_ends_its_processes_and_says_what_is_kept(tmp_path)
     assert not [process for process in computing if process.exists()]
     assert (tmp_path / "stages" / "baseline.stage").exists()
     assert '"complete": false' in (tmp_path / "results.json").read_text()
+    text = page.read_text(encoding="utf-8")
+    assert "The study was interrupted." in text
+    assert 'id="figure-trim"' in text
+    assert "refresh" not in text

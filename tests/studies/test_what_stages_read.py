@@ -9,9 +9,7 @@ import pytest
 from studies.transition.effort import Effort
 from studies.transition.stages import stages
 
-ASKING = [
-    stage for stage in stages(Effort()) if stage.compute.__annotations__["return"] == "Questions"
-]
+ASKING = [stage for stage in stages(Effort()) if stage.asks]
 
 
 @pytest.mark.slow
