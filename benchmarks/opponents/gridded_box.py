@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from typing import Any
 
 import cvxpy as cp
 import numpy as np
@@ -25,7 +26,8 @@ def gain(
     constraints = []
     for p in itertools.product(np.linspace(0, 1, points), repeat=parameters):
         at = (1.0, *p)
-        drift, value = (sum(w * M for w, M in zip(at, Ms, strict=True)) for Ms in (A, P))
+        drift: np.ndarray = np.sum([w * M for w, M in zip(at, A, strict=True)], axis=0)
+        value: Any = sum(w * M for w, M in zip(at, P, strict=True))
         constraints.append(value >> 1e-6 * np.eye(n))
         for signs in itertools.product((-rate, rate), repeat=parameters):
             slope = sum(v * M for v, M in zip(signs, P[1:], strict=True))

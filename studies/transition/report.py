@@ -67,7 +67,7 @@ SHOWS = {
     "proven": "bounds",
     "controllers": "controllers",
 }
-"""What a section of the page shows, where that is something which a run finds."""
+"""By section of the page the finding of a run that it shows."""
 DIGITS = 4
 """Significant ones of the numbers that the slider moves over."""
 

@@ -14,7 +14,7 @@ from symheli.integrate.side_by_side import workers_of
 from symheli.progress import task
 
 _Answer = tuple[float, float, Stored]
-"""When it was begun and how long the processor worked (s), and what it is."""
+"""Begin (s, `time.time`), seconds of the processor, and the result."""
 
 
 class Span(NamedTuple):
@@ -63,18 +63,18 @@ class Schedule:
 
     @property
     def titles(self) -> tuple[str, ...]:
-        """What is under way or was when it failed, the most urgent first."""
+        """Titles of the calls under way, the most urgent first."""
         under_way = sorted(self._running.values(), key=lambda one: -one.urgency)
         return tuple(dict.fromkeys(one.title for one in (self._at, *under_way) if one is not None))
 
     @property
     def failed(self) -> str:
-        """What was done here, or which answer was taken, when an exception left `run`."""
+        """Title of the call, or of the answer, by which an exception left `run`."""
         return "" if self._at is None else self._at.title
 
     def run(self, idle: Callable[[], None] = lambda: None) -> None:
-        """Answer every call, also those that are put meanwhile; `idle` is called after each one here
-        and when there is nothing to do here.
+        """Answer every call, also those that are put meanwhile; `idle` is called after each call
+        here and when there is nothing to do here.
         """
         while self._waiting or self._running:
             self._hand_out()

@@ -85,10 +85,12 @@ def run_study(
             study = with_stage(study, stage, found)
     whole = sum(one.cost[study.quick] for one in every if one.name not in study.seconds)
     with task("study", whole or None, percent=True) as progress:
-        run = _Run(study, out, stored, resume, progress, every)
+        processes = Processes()
+        schedule = Schedule(processes, watch)
+        run = _Run(study, out, stored, resume, progress, every, schedule)
         try:
-            with Processes() as processes:
-                return run.finish(Schedule(processes, watch))
+            with processes:
+                return run.finish()
         except BaseException as error:
             run.stopped(error)
             raise
@@ -130,8 +132,8 @@ class _Run:
     resume: bool
     progress: Task
     every: Sequence[Stage]
+    schedule: Schedule
     todo: dict[str, Stage] = field(init=False)
-    schedule: Schedule | None = None
     answers: dict[str, dict[int, Stored]] = field(default_factory=dict)
     share: dict[str, float] = field(default_factory=dict)
     pictures: dict[str, Drawn | None] = field(default_factory=dict)
@@ -143,13 +145,12 @@ class _Run:
         self.cost = {one.name: one.cost[self.study.quick] for one in self.every}
         self.urgency = urgencies(self.every, self.study.quick)
 
-    def finish(self, schedule: Schedule) -> Study:
+    def finish(self) -> Study:
         """Compute every stage as soon as what it needs is there, and draw what it shows."""
-        self.schedule = schedule
         self._draw()
         self._begin()
         self._write_page()
-        schedule.run(self._show)
+        self.schedule.run(self._show)
         self.study = replace(self.study, complete=True)
         write_results(self.study, self.out)
         write_page(self.study, self.out, self._drawn)
@@ -160,7 +161,7 @@ class _Run:
         if isinstance(error, KeyboardInterrupt) or isinstance(error.__cause__, KeyboardInterrupt):
             reason = "The study was interrupted."
         else:
-            at = self.schedule.failed if self.schedule else ""
+            at = self.schedule.failed
             words = " ".join(str(error).split()).rstrip(".") or type(error).__name__
             reason = f"The study was stopped: {at and f'{at}: '}{words}."
         with suppress(SymheliError):
@@ -265,7 +266,7 @@ class _Run:
     @property
     def _titles(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Stages under way, and those to come."""
-        now = self.schedule.titles if self.schedule else ()
+        now = self.schedule.titles
         titles = [stage.title for stage in self.todo.values()]
         return tuple(t for t in titles if t in now), tuple(t for t in titles if t not in now)
 

@@ -1,4 +1,4 @@
-"""What report.html says of a run that has not ended, and of one that was stopped."""
+"""The part of report.html on a run that has not ended, and on one that was stopped."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class UnderWay:
 
     @property
     def lists(self) -> list[tuple[str, tuple[str, ...]]]:
-        """What is under way and what is to come, each with its heading, where there is any."""
+        """Stages under way and to come, each list with its heading, where there is any."""
         if self.stopped:
             given = [("Not finished", tuple(dict.fromkeys((*self.working, *self.coming))))]
         else:
