@@ -84,7 +84,8 @@ def test_nothing_is_cut_and_the_console_is_silent(opened, width):
 
 SCROLLS = """() => [...document.querySelectorAll("figure .scroll, .equation .scroll")]
     .filter((e) => e.scrollWidth > e.clientWidth + 1 || e.scrollHeight > e.clientHeight + 1)
-    .filter((e) => !(innerWidth <= 640 && e.querySelector('svg[style*="--least"]:not([data-whole])'))) // readable
+    .filter((e) => !(innerWidth <= 640
+        && e.querySelector('svg[style*="--least"]:not([data-whole])'))) // readable
     .map((e) => (e.closest("[id]") || {}).id)"""
 
 
