@@ -32,6 +32,7 @@ from studies.threads import one_thread  # noqa: E402
 
 one_thread()
 
+from benchmarks.gantt import drawn  # noqa: E402
 from benchmarks.race import table  # noqa: E402
 from studies.progress import displayed  # noqa: E402
 from studies.transition.configuration import Configuration  # noqa: E402
@@ -48,8 +49,6 @@ TRIMS = 'id="figure-trim"'
 """A page with this shows the trims."""
 EVERY = 0.1
 """Seconds between two looks at the page and the memory."""
-WIDTH = 60
-"""Columns of a drawn schedule."""
 
 
 class Run(NamedTuple):
@@ -169,28 +168,6 @@ def row(name: str, of: str, runs: Sequence[Run]) -> tuple[str, ...]:
     middle = [f"{statistics.median(values):.1f}" if values else "never" for values in each]
     wall, processor, memory, page, trims = middle
     return name, of, page, trims, wall, processor, f"{float(memory):.0f}"
-
-
-def drawn(spans: Sequence[Span], begin: float, end: float) -> str:
-    """A line a title, begun first on top: when its calls were computed (`#` in processes, `=` in
-    the one that waits for them), and how long the processor worked on them.
-    """
-    titles = list(dict.fromkeys(one.title for one in sorted(spans, key=lambda one: one.begin)))
-    lines = []
-    for title in titles:
-        own, bar = [one for one in spans if one.title == title], [" "] * WIDTH
-        for one in own:
-            first, last = (int((at - begin) / (end - begin) * WIDTH) for at in (one.begin, one.end))
-            for column in range(first, min(last, WIDTH - 1) + 1):
-                bar[column] = "=" if one.here else "#"
-        worked = sum(one.processor for one in own)
-        lines.append(f"{title[:44]:44} |{''.join(bar)}| {worked:6.1f} s")
-    worked = sum(one.processor for one in spans)
-    lines.append(
-        f"{end - begin:.1f} s on the wall; {worked:.1f} s of the processor in"
-        f" {len(spans)} calls, {worked / (end - begin):.2f} cores on the average"
-    )
-    return "\n".join(lines)
 
 
 def schedule(vehicle: str) -> str:

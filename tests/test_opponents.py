@@ -119,3 +119,23 @@ def test_python_control_finds_the_same_trims_and_models(ideal):
         )  # the solver stops at 1.5e-8
         np.testing.assert_allclose(u, family.trims[k].u.array, atol=1e-7)
         np.testing.assert_allclose(model.A, family.A[k], atol=5e-5)  # forward differences of 1e-6
+
+
+def test_a_gridded_lmi_over_two_parameters_finds_what_is_proven():
+    """Less than the proof by what its P between the points is worth, a few tenths of a percent."""
+    gridded_box = pytest.importorskip("benchmarks.opponents.gridded_box", reason="needs cvxpy")
+    from synthesis import l2_gain
+    from synthesis.forms import Spline
+
+    rng = np.random.default_rng(0)
+    A = [np.array([[-1.0, 2.0], [-2.0, -0.5]]), 0.3 * np.eye(2), np.diag([0.0, -0.3])]
+    B, C, none = rng.normal(size=(2, 1)), rng.normal(size=(1, 2)), (0, 0)
+    p = [symheli.Scheduling(name, "1", 0.0, 1.0, rate=1.0) for name in ("p", "q")]
+    powers = dict(zip([none, (1, 0), (0, 1)], A, strict=True))
+    model = symheli.LPVStateSpace.polynomial(
+        powers, {none: B}, {none: C}, {none: np.zeros((1, 1))}, p
+    )
+    proven = l2_gain(model, form=Spline(degree=1, segments=1), search=None)
+    assert proven.verified
+    found = gridded_box.gain(A, B, C, 1.0, 5, "CLARABEL")
+    assert 0.99 * proven.gamma <= found <= proven.gamma * 1.0001

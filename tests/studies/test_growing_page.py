@@ -13,6 +13,7 @@ from functools import partial
 
 import pytest
 
+from benchmarks.gantt import drawn as drawn_schedule
 from studies import cli
 from studies.campaigns.runners import Here
 from studies.processes import Processes
@@ -20,7 +21,7 @@ from studies.report import drawn
 from studies.transition import report, results, study
 from studies.transition.configuration import Configuration
 from studies.transition.recovery import Recoveries
-from studies.transition.schedule import Call, Schedule
+from studies.transition.schedule import Call, Schedule, Span
 from studies.transition.stages import SHORT, SOON, STAGES, Stage, urgencies
 from symheli.errors import AccuracyError
 
@@ -171,3 +172,19 @@ def test_the_longest_chain_is_the_most_urgent_and_short_stages_follow():
         "c": SOON * (12.0 + SHORT),
         "d": 3.0,
     }
+
+
+def test_a_drawn_schedule_says_when_a_call_ran_and_how_busy_the_cores_were():
+    spans = [
+        Span("a design", 10.0, 20.0, 9.0, False),
+        Span("a design", 25.0, 30.0, 5.0, False),
+        Span("a page", 10.0, 11.0, 1.0, True),
+    ]
+    design, page, last = drawn_schedule(spans, 10.0, 30.0).splitlines()
+    bar = design.split("|")[1]
+    assert (bar[0], bar[len(bar) * 5 // 8], bar[-1]) == ("#", " ", "#")
+    assert design.endswith("14.0 s")
+    assert page.split("|")[1].strip() == "=" * (len(bar) // 20 + 1)
+    assert (
+        last == "20.0 s on the wall; 15.0 s of the processor in 3 calls, 0.75 cores on the average"
+    )
