@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from studies.setup.stored_stages import Stored
 from symheli.integrate.side_by_side import workers_of
-from symheli.progress import task
+from symheli.progress import task, watched
 
 _Answer = tuple[float, float, Stored]
 """Begin (s, `time.time`), seconds of the processor, and the result."""
@@ -97,7 +97,7 @@ class Schedule:
             if len(self._running) >= most or any(one.done() for one in self._running):
                 break
             self._waiting.remove(call)
-            self._running[self.processes.submit(_answered, call.work)] = call
+            self._running[self.processes.submit(_in_silence, call.work)] = call
 
     def _take(self, call: Call, answer: Callable[[], _Answer]) -> None:
         self._at = call
@@ -111,6 +111,12 @@ def _answered(work: Callable[[], Any]) -> _Answer:
     at, begin = time.time(), time.process_time()
     found = timed(work)
     return at, time.process_time() - begin, found
+
+
+def _in_silence(work: Callable[[], Any]) -> _Answer:
+    """The answer of another process, whose progress would cover that of this one on a terminal."""
+    with watched(None):
+        return _answered(work)
 
 
 def timed(work: Callable[[], Any]) -> Stored:

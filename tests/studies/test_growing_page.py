@@ -24,6 +24,7 @@ from studies.transition.recovery import Recoveries
 from studies.transition.schedule import Call, Schedule, Span
 from studies.transition.stages import SHORT, SOON, STAGES, Stage, urgencies
 from symheli.errors import AccuracyError
+from symheli.progress import _listener
 
 RELOADS = '<meta http-equiv="refresh"'
 FIRST = ("baseline", "paper_experiment")
@@ -150,6 +151,20 @@ def test_what_is_most_urgent_begins_first(processes):
     assert away[0] == "first"
     assert away.index("after") < away.index("last")
     assert all(span.begin <= span.end <= time.time() for span in begun)
+
+
+def watched_by():
+    return _listener.get()
+
+
+def test_a_process_does_not_write_its_progress_over_that_of_the_study():
+    found = []
+    with Processes(1) as executor:
+        schedule = Schedule(executor, lambda _: None)
+        then = found.append
+        schedule.put(Call(title="a call", urgency=1.0, work=watched_by, then=then))
+        schedule.run()
+    assert [one.result for one in found] == [None]  # without a listener it raises LookupError
 
 
 def test_a_failure_is_that_of_its_call_and_ends_the_run():
