@@ -126,7 +126,7 @@ def test_a_study_that_never_began_its_designs_promises_no_proof(full):
     assert "is not proven yet" in " ".join([*report.of_the_vehicle(own), report.answer(own)])
 
 
-@pytest.mark.parametrize("processes", [Here, partial(Processes, 2)], ids=["here", "processes"])
+@pytest.mark.parametrize("processes", [Here, partial(Processes, 1)], ids=["here", "processes"])
 def test_what_is_most_urgent_begins_first(processes):
     begun, answers = [], []
     with processes() as executor:
