@@ -156,8 +156,8 @@ STAGES = (
 
 
 SHORT, SOON = 2.0, 0.9
-"""Seconds of a stage that is not kept waiting, and its urgency beside the largest there is: what
-most waits for goes first, then what soon gives the page more to show.
+"""Seconds of a stage that is not kept waiting, and its urgency over the largest: the longest chain
+goes first, then what gives the page more to show soon.
 """
 
 
