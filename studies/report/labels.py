@@ -14,10 +14,15 @@ from markupsafe import Markup
 
 
 class Labels:
-    """The numbers of one rendering; `known` are those of the one before."""
+    """The numbers of one rendering; `known` are those of the one before, `missing` the words where
+    there is none.
+    """
 
-    def __init__(self, known: Mapping[str, str] | None = None) -> None:
+    def __init__(
+        self, known: Mapping[str, str] | None = None, missing: str = "not reached"
+    ) -> None:
         self.known = known or {}
+        self.missing = missing
         self.given: dict[str, str] = {}
         self.contents: list[tuple[str, str, str]] = []
         self._counts: Counter[str] = Counter()
@@ -40,5 +45,5 @@ class Labels:
         """
         word, number = kind.capitalize() if first else kind, self.known.get(f"{kind}-{key}")
         if number is None:
-            return Markup(f"{escape(word)} not reached")
+            return Markup(f"{escape(word)} {self.missing}")
         return Markup(f'<a href="#{kind}-{escape(key)}">{escape(word)} {number}</a>')

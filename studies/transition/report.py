@@ -126,7 +126,8 @@ def page(
         texts |= _as_far_as_it_is(study, pictures, texts)
     first = Labels()
     template.render(labels=first, contents=[], **texts)
-    text = template.render(labels=Labels(first.given), contents=first.contents, **texts)
+    labels = Labels(first.given, "not reached" if under_way is None else under_way.missing)
+    text = template.render(labels=labels, contents=first.contents, **texts)
     return text.replace("m/s^2", "m/s²")
 
 

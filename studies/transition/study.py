@@ -65,9 +65,9 @@ def run_study(
     A process a core computes stages, proofs, designs and figures, those of the longest chain first;
     the baseline, which the page begins with, is computed here. `resume` takes the stages that an
     earlier run has stored in the folder, where code, libraries, vehicle, seed and what they read of
-    the effort are the same; others, and those that are damaged, are computed again. An interrupted run leaves
-    its finished stages, the proofs that are found and their results, and a page that says so; files
-    are whole or absent. `watch` is called with each call that has ended.
+    the effort are the same; others, and those that are damaged, are computed again. An interrupted
+    run leaves its finished stages, the proofs that are found and their results, and a page that
+    says so; files are whole or absent. `watch` is called with each call that has ended.
     """
     out, effort = configuration.out, configuration.effort
     heli, every = loaded(configuration), stages(effort)

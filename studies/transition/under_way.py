@@ -37,6 +37,11 @@ class UnderWay:
         return "" if self.left is None else f", about {duration(self.left)} left"
 
     @property
+    def missing(self) -> str:
+        """The word for a finding that is not there."""
+        return "not reached" if self.stopped else "still to come"
+
+    @property
     def lists(self) -> list[tuple[str, tuple[str, ...]]]:
         """Stages under way and to come, each list with its heading, where there is any."""
         if self.stopped:
