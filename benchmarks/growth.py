@@ -265,6 +265,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="few and small: under 40 s")
     parser.add_argument("--limit", type=float, default=LIMIT, metavar="S", help="for a call")
+    parser.add_argument(
+        "--parameters", nargs="+", type=int, choices=PARAMETERS, default=PARAMETERS, help="how many"
+    )
     parser.add_argument("--plot", type=Path, metavar="FILE", help="draw it (needs matplotlib)")
     parser.add_argument("--json", action="store_true", help="print every cell")
     parser.add_argument("--cell", nargs=3, help=argparse.SUPPRESS)
@@ -276,7 +279,7 @@ def main() -> None:
     sizes = list(STATES[:2] if options.quick else STATES)
     limit = min(options.limit, 3.0) if options.quick else options.limit
     found: dict[tuple[str, int], dict[int, Cell | None]] = {}
-    each = [(m, name) for m in PARAMETERS[: 1 if options.quick else None] for name in CALLS]
+    each = [(m, name) for m in options.parameters[: 1 if options.quick else None] for name in CALLS]
     with displayed():
         for m, name in tracked("rows", each):
             cells = found.setdefault((name, m), {})
