@@ -42,7 +42,7 @@ class Stage:
 
     Its parameters without default are entries of the effort, earlier stages, or `GIVEN`: nothing
     else can decide its result. It may return `Questions`, which processes answer. `cost` is about
-    its work in the whole study and in the quick one, s: by it stages are put in order.
+    its work in the whole study and in the quick one, s of processor: by it stages are put in order.
     """
 
     name: str
@@ -101,13 +101,13 @@ STAGES = (
         "gust",
         "Proving gains of the lateral gust loop (baseline and exact, continuous)",
         gust_questions,
-        (112, 4),
+        (110, 4),
     ),
     Stage(
         "longitudinal",
         "Proving gains of the longitudinal gust loop (baseline, continuous)",
         longitudinal_questions,
-        (13, 4),
+        (15, 4),
     ),
     Stage("paper_experiment", "The paper's experiment, open and closed loop", paper_experiment),
     Stage("exact_recovery", "Exact recovery of A(p), B(p)", exact_recovery),
@@ -117,40 +117,40 @@ STAGES = (
         "servo",
         "Proving gains of the servo loop (exact, baseline and identified, 50 Hz)",
         servo_questions,
-        (28, 3),
+        (50, 2),
     ),
     Stage("comparison", "Comparing with the baseline", compare, (2, 2)),
     Stage(
         "known_kinematics",
         "Identifying with known kinematics",
         identify_with_known_kinematics,
-        (60, 10),
+        (30, 15),
     ),
     Stage(
         "real_conditions",
         "Identifying through servos, delay and governor",
         identify_under_real_conditions,
-        (25, 12),
+        (14, 8),
     ),
     Stage(
         "robust",
         "Proving gains of the loop with a margin (exact, baseline, identified; 50 Hz)",
         robust_questions,
-        (32, 6),
+        (40, 11),
     ),
     Stage(
         "controllers",
         "Designing controllers from the baseline and from the identified model",
         design_questions,
-        (59, 39),
+        (100, 100),
     ),
     Stage(
         "certified_controllers",
         "Proving gains of the loops that flew (baseline, servos, delay; 50 Hz)",
         controller_questions,
-        (107, 22),
+        (150, 20),
     ),
-    Stage("flown_controllers", "Flying the controllers", flown_controllers, (6, 2)),
+    Stage("flown_controllers", "Flying the controllers", flown_controllers, (6, 3)),
 )
 """In the order in which results.json names them, what a stage needs before it."""
 
