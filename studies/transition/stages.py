@@ -101,7 +101,7 @@ STAGES = (
         "gust",
         "Proving gains of the lateral gust loop (baseline and exact, continuous)",
         gust_questions,
-        (110, 4),
+        (50, 4),
     ),
     Stage(
         "longitudinal",
@@ -117,7 +117,7 @@ STAGES = (
         "servo",
         "Proving gains of the servo loop (exact, baseline and identified, 50 Hz)",
         servo_questions,
-        (50, 2),
+        (58, 2),
     ),
     Stage("comparison", "Comparing with the baseline", compare, (2, 2)),
     Stage(
@@ -136,7 +136,7 @@ STAGES = (
         "robust",
         "Proving gains of the loop with a margin (exact, baseline, identified; 50 Hz)",
         robust_questions,
-        (40, 11),
+        (50, 11),
     ),
     Stage(
         "controllers",
@@ -148,7 +148,7 @@ STAGES = (
         "certified_controllers",
         "Proving gains of the loops that flew (baseline, servos, delay; 50 Hz)",
         controller_questions,
-        (150, 20),
+        (300, 20),
     ),
     Stage("flown_controllers", "Flying the controllers", flown_controllers, (6, 3)),
 )
