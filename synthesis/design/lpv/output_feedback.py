@@ -346,7 +346,8 @@ def _controllers(
     def other() -> Start | None:
         if start.gamma <= CLOSE_TO_OPTIMUM * floor or not both(DEGREES[1][0]):
             return None
-        found = best(plant, both, divisions, USUAL, attempts, worst, start.existence.states)
+        kept = start.existence.states
+        found = best(plant, both, divisions, USUAL, attempts, worst, kept, start.gamma)
         return found if found.gamma < MIN_IMPROVEMENT * start.gamma else None
 
     for own, design in _designs(plant, start, other(), factors, attempts):

@@ -120,28 +120,44 @@ def best(
     attempts: list[Attempt],
     worst: FrozenOptimum = NOTHING_KNOWN,
     states: int | None = None,
+    bound: float = math.inf,
 ) -> Start:
     """Return the shape of the least gamma: of the lowest degree first, then of higher degrees while
     that lowers it, then with a larger bound on X and Y where the bound is active; for the first
     `states` of the scaled plant (default: all). No controller has a gamma below the `worst` frozen
-    optimum.
+    optimum. A shape is given up once its gamma is known not to be `MIN_IMPROVEMENT` below the least
+    before it, at first `bound`.
     """
     floor = worst.level
     channel = floor if 0 < floor < math.inf else 1.0
     degrees = DEGREES.get(len(plant.parameters), (2,))
     starts: list[Start] = []
 
-    def tried(shape: Bases, unit: float = channel, largest: float = MATRIX_BOUNDS[0]) -> Start:
+    def tried(
+        shape: Bases, above: float, unit: float = channel, largest: float = MATRIX_BOUNDS[0]
+    ) -> Start:
         return least(
-            plant, shape, divisions, solver, attempts, unit, worst.p, largest=largest, states=states
+            plant,
+            shape,
+            divisions,
+            solver,
+            attempts,
+            unit,
+            worst.p,
+            above=above,
+            largest=largest,
+            states=states,
         )
 
     for shape in every(degrees[0]):
-        starts.append(tried(shape))
+        lowest = min((each.gamma for each in starts), default=bound)
+        starts.append(tried(shape, MIN_IMPROVEMENT * lowest))
         if starts[-1].gamma <= CLOSE_TO_OPTIMUM * floor:
             break
     chosen = min(range(len(starts)), key=lambda k: starts[k].gamma)
     start = starts[chosen]
+    if math.isfinite(bound) and not math.isfinite(start.gamma):
+        return start
 
     def worth(other: Start) -> bool:
         return other.gamma < MIN_IMPROVEMENT * start.gamma
@@ -150,7 +166,7 @@ def best(
         shape = every(degree)[chosen]
         if start.gamma <= CLOSE_TO_OPTIMUM * floor or shape.size == start.shape.size:
             break
-        richer = tried(shape)
+        richer = tried(shape, MIN_IMPROVEMENT * start.gamma)
         more = worth(richer)
         start = richer if richer.gamma < start.gamma else start
         if not more and math.isfinite(start.gamma):
@@ -158,9 +174,9 @@ def best(
     for largest in MATRIX_BOUNDS[1:]:
         if start.gamma <= CLOSE_TO_OPTIMUM * floor or not start.existence.bounded(start.found):
             break
-        if start.existence.least_share(start.found, largest, solver) >= MIN_IMPROVEMENT:
+        if not start.existence.could_fall(start.found, largest, MIN_IMPROVEMENT, solver):
             break
-        wider = tried(start.shape, start.gamma, largest)
+        wider = tried(start.shape, math.inf, start.gamma, largest)
         if not worth(wider):
             break
         start = wider
@@ -176,17 +192,19 @@ def least(
     channel: float = 1.0,
     p: Array | None = None,
     *,
+    above: float = math.inf,
     largest: float = MATRIX_BOUNDS[0],
     states: int | None = None,
 ) -> Start:
     """Return the least gamma of a shape, in a suitable unit of performance, at first `channel`; the
-    inequalities are imposed at this p (m,), too, on the first `states` of the scaled plant.
+    inequalities are imposed at this p (m,), too, on the first `states` of the scaled plant. It is
+    inf where it is not below `above`.
     """
     for _ in tracked(f"least gamma, {shape}", range(3)):
         own = scaled_plant_of(plant, channel)
         fewer = own if states is None else own.first(states)
         existence = Existence(fewer, shape.X, shape.Y, divisions, largest, p)
-        found = existence.least_gamma(solver)
+        found = existence.least_gamma(solver, above / channel)
         gamma = channel * found.gamma
         attempts.append(Attempt(f"least gamma, {shape}", 0.0, found.message, gamma))
         if not math.isfinite(found.gamma) or 1 / MAX_UNIT_RATIO < found.gamma < MAX_UNIT_RATIO:

@@ -76,30 +76,36 @@ CHUNK_ENTRIES = 200_000
 
 
 class Early(NamedTuple):
-    """A feasible P (K, n, n) and y near the centre of the cones, with the level <S, Z> / order of
-    the central path there and the least eigenvalue of a slack of every cone: a starting point for a
-    program with more blocks.
+    """A feasible P (K, n, n) and y near the centre of the cones, with the multipliers Z of every
+    cone, the level <S, Z> / order of the central path there and the least eigenvalue of a slack of
+    every cone: a starting point for a program with other bounds or more `places`.
     """
 
     P: Array
     y: Array
+    Z: list[Array]
     level: float
     least: tuple[float, ...]
+    places: int
 
 
 @dataclass(frozen=True, eq=False)
 class Minimum(SolverPoint):
     """Result: whether the requested gap is `reached`, at least nearly; with the point at which it
-    first was below `EARLY_GAP`, None where it never was.
+    first was below `EARLY_GAP`, None where it never was, and the level below which the multipliers
+    show that there is none.
     """
 
     reached: bool = False
     early: Early | None = None
+    lower: float = -math.inf
 
 
-def minimise(program: Program, solver: Solver, start: Early | None = None) -> Minimum:
+def minimise(
+    program: Program, solver: Solver, start: Early | None = None, above: float = math.inf
+) -> Minimum:
     """Minimise the level, to the tolerance of the solver or as near as rounding, iterations and
-    time allow.
+    time allow; no further once the multipliers show that it is not below `above`.
 
     The point has the coefficients of P as vectors, then the level; where it is not optimal, it is
     feasible to rounding or there is none. From `start`, of another program, and where that leads
@@ -108,13 +114,15 @@ def minimise(program: Program, solver: Solver, start: Early | None = None) -> Mi
     digits = -math.log10(solver.options["tolerance"])
     with task("digits of the least level", round(digits, 1)) as solving:
         if start is not None:
-            found = _minimised(program, solver, solving, start)
-            if found.reached:
+            found = _minimised(program, solver, solving, start, above)
+            if found.reached or found.lower > above:
                 return found
-        return _minimised(program, solver, solving, None)
+        return _minimised(program, solver, solving, None, above)
 
 
-def _minimised(program: Program, solver: Solver, solving: Task, start: Early | None) -> Minimum:
+def _minimised(
+    program: Program, solver: Solver, solving: Task, start: Early | None, above: float
+) -> Minimum:
     tolerance, iterations, seconds = (
         solver.options[name] for name in ("tolerance", "iterations", "seconds")
     )
@@ -132,13 +140,16 @@ def _minimised(program: Program, solver: Solver, solving: Task, start: Early | N
             at = cones.residuals(point)
         if feasible and early is None and at.gap <= EARLY_GAP:
             least = tuple(float(np.linalg.eigvalsh(S).min()) for S in point.S)
-            early = Early(point.P, point.y, at.product / cones.order, least)
+            level = at.product / cones.order
+            early = Early(point.P, point.y, point.Z, level, least, program.places)
         if close and at.gap <= tolerance and at.dual_size <= DUAL_RESIDUAL:
             word = "solved"
         elif close and at.gap <= tolerance and at.dual_size >= before:
             word = "out of digits"  # the multipliers no longer improve
         elif at.contradiction < INFEASIBILITY_RESIDUAL:
             word = "infeasible"
+        elif at.lower > above:
+            word = f"not below {above:.6g}"
         elif count == iterations:
             word = "out of iterations"
         elif time.perf_counter() - begin > seconds:
@@ -157,7 +168,7 @@ def _minimised(program: Program, solver: Solver, solving: Task, start: Early | N
         gap = "" if word == "infeasible" else f", relative gap {at.gap:.1e}"
         message = f"{word} after {count} iterations{gap}"
         reached = close and at.gap <= GAP_FACTOR * tolerance and at.dual_size <= MAX_DUAL_RESIDUAL
-        return Minimum(answer, x, time.perf_counter() - begin, message, reached, early)
+        return Minimum(answer, x, time.perf_counter() - begin, message, reached, early, at.lower)
 
 
 def _digits(gap: float, tolerance: float) -> float:
@@ -177,7 +188,7 @@ class _Point(NamedTuple):
 class _Residuals(NamedTuple):
     """Residuals: of the slacks `primal`, of the multipliers `dual` and `dual_y`, with their sizes;
     <S, Z> `product`, relative to the level `gap`. `contradiction`: relative residual of the
-    multipliers as a proof of infeasibility.
+    multipliers as a proof of infeasibility. `lower`: the level that the multipliers bound.
     """
 
     primal: list[Array]
@@ -188,6 +199,7 @@ class _Residuals(NamedTuple):
     product: float
     gap: float
     contradiction: float
+    lower: float
 
 
 class _Cone(Protocol):
@@ -431,9 +443,20 @@ class _Cones:
         """Return a starting point as close to the central path as the one of another program
         allows.
         """
-        slacks = self.slacks(start.P, start.y)
-        S = [_raised(slack, least) for slack, least in zip(slacks, start.least, strict=True)]
-        return _Point(start.P, start.y, S, [start.level * np.linalg.inv(s) for s in S])
+        S, Z = [], []
+        for slack, least, old in zip(
+            self.slacks(start.P, start.y), start.least, start.Z, strict=True
+        ):
+            raised = _raised(slack, least)
+            multiplier = start.level * np.linalg.inv(raised)
+            if len(old) * self.program.places == len(slack) * start.places:
+                # each kind of block at its former places, then at the new ones
+                kind = (-1, self.program.places, *slack.shape[1:])
+                known = old.reshape(-1, start.places, *slack.shape[1:])
+                multiplier.reshape(kind)[:, : start.places] = known
+            S.append(raised)
+            Z.append(multiplier)
+        return _Point(start.P, start.y, S, Z)
 
     def change(self, P: Array, y: Array) -> list[Array]:
         """Return the change of the slacks with P and y."""
@@ -476,15 +499,19 @@ class _Cones:
         dual_y, most = level.copy(), max(float(np.abs(z).max()) for z in point.Z)
         dual_y[0] -= self.program.cost
         product = sum(float(np.sum(s * z)) for s, z in zip(point.S, point.Z, strict=True))
+        dual_size = _largest(dual, dual_y) / max(1.0, most)
+        unknown = abs(float(np.sum(dual * point.P))) + abs(float(dual_y @ point.y))
+        lower = -(constant + unknown) / self.program.cost
         return _Residuals(
             primal,
             max(float(np.abs(r).max()) for r in primal) / self.size,
             dual,
             dual_y,
-            _largest(dual, dual_y) / max(1.0, most),
+            dual_size,
             product,
             product / max(abs(float(point.y[0])), MIN_LEVEL),
             _largest(dual, level) / -constant if constant < 0 else np.inf,
+            lower if self.program.cost > 0 and dual_size <= DUAL_RESIDUAL else -np.inf,
         )
 
 
