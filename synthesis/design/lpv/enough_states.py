@@ -23,8 +23,10 @@ FEW_STATES = 12
 """Number of states up to which all are kept: their design takes seconds."""
 NEGLIGIBLE = 0.01
 """Fraction of the sum of the characteristic values that the states left out may have together."""
-ABOVE = 1.01
-"""Ratio of the level that is tried to the worst optimum of the frozen models."""
+NEAREST, ABOVE = 1.005, 1.02
+"""Ratios to the worst optimum of the frozen models: of a level that fewer states must reach, too,
+and of the level at which their controllers are tried on the whole plant.
+"""
 LOSS = 2e-3
 """Fraction of that level by which the loop with the whole plant may exceed it."""
 POINTS = {1: 5, 2: 3}
@@ -45,24 +47,27 @@ def enough_states(scaled: ScaledPlant, worst: Array | None) -> int:
     p = tensor_grid(axes)
     p = p if worst is None else np.vstack([worst[None], p])
     for states in range(int(np.argmax(np.r_[share, 0.0] <= NEGLIGIBLE)), whole):
-        if states > 0 and _serves(scaled, scaled.first(states), ABOVE, p):
+        if states > 0 and _serves(scaled, scaled.first(states), p):
             return states
     return whole
 
 
-def _serves(scaled: ScaledPlant, fewer: ScaledPlant, level: float, p: Array) -> bool:
-    """Whether central controllers of the plant with `fewer` states keep the level on the whole."""
+def _serves(scaled: ScaledPlant, fewer: ScaledPlant, p: Array) -> bool:
+    """Whether the plant with `fewer` states has an optimum near that of the whole, and its central
+    controllers keep the level there.
+    """
     for q in p:
         try:
             whole, part = (
                 Generalized(*(M[0] for M in each.at(q[None]))) for each in (scaled, fewer)
             )
-            gains = central_gains(part, level, scaled.dt)
+            near = central_gains(part, NEAREST, scaled.dt)
+            gains = central_gains(part, ABOVE, scaled.dt)
         except np.linalg.LinAlgError:
             return False
-        if gains is None:
+        if near is None or gains is None:
             return False
         loop = Generalized(*(M[None] for M in whole)).closed(*(M[None] for M in gains))
-        if not below(*(M[0] for M in loop), level * (1 + LOSS), scaled.dt):
+        if not below(*(M[0] for M in loop), ABOVE * (1 + LOSS), scaled.dt):
             return False
     return True
