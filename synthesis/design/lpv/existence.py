@@ -188,7 +188,8 @@ class Existence:
                 break
             if not self._added(found, found.gamma) and found.tolerance <= FINE_TOLERANCE:
                 break
-            found = self._least(fine, found.early, above)
+            # later points are nearer the boundary, from where steps are short
+            found = self._least(fine, found.early, above)._replace(early=found.early)
         return found
 
     def _least(
