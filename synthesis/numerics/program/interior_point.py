@@ -38,7 +38,6 @@ from synthesis.numerics.program.cone_program import Solver, SolverPoint
 from synthesis.numerics.program.lyapunov_program import LyapunovBlocks, Program, Sizes
 
 Array = np.ndarray
-Normal = dict[tuple[int, int], Array]
 
 MIN_START = 10.0
 """Least multiple of the identity from which slacks and multipliers start."""
@@ -223,7 +222,7 @@ class _Cone(Protocol):
         """Add to `out` (K, n, n) the contribution to <Z, linear(.)>."""
         ...
 
-    def add_normal(self, H: Array, out: Normal) -> None:
+    def add_normal(self, H: Array, out: _NormalBlocks) -> None:
         """Add to the lower blocks of the normal equations those of P -> adjoint(H linear(P) H)."""
         ...
 
@@ -257,12 +256,12 @@ class _Inequalities:
     def add_adjoint(self, Z: Array, out: Array) -> None:
         np.add.at(out, self.blocks.columns, -self.blocks.adjoint(Z))
 
-    def add_normal(self, H: Array, out: Normal) -> None:
+    def add_normal(self, H: Array, out: _NormalBlocks) -> None:
         columns, weights = self.blocks.columns, self.blocks.weights
         n = self.blocks.fixed.shape[1]
         if weights is None:
-            for a, b, each in self._of_places(H, slice(None)):
-                _add(out, (columns[a], columns[b]), each[0])
+            for a, b, left, right in self._of_places(H, slice(None)):
+                out.add_products((columns[a], columns[b]), left[0], right[0])
             return
         G, k, A = weights.shape
         v = length(n)
@@ -273,7 +272,10 @@ class _Inequalities:
         for first in range(0, G, together):
             places = slice(first, first + together)
             g = [weights[places, j, a] for a, j in enumerate(own)]
-            for a, b, each in self._of_places(H, places):
+            for a, b, left, right in self._of_places(H, places):
+                each = _on_vectors(left, right)
+                if a == b:
+                    each = each + np.swapaxes(each, 1, 2)
                 total[own[a][:, None], own[b]] += _contracted(g[a], g[b], each)
                 if a != b:
                     turned = np.swapaxes(each, 1, 2)
@@ -281,11 +283,12 @@ class _Inequalities:
         blocks = total.reshape(k, k, v, v)
         for j in range(k):
             for i in range(j + 1):
-                _add(out, (columns[j], columns[i]), blocks[j, i])
+                out.add((columns[j], columns[i]), blocks[j, i])
 
-    def _of_places(self, H: Array, places: slice) -> Iterator[tuple[int, int, Array]]:
-        """Yield (a, b, blocks), a >= b, of the normal equations between the matrices Q_a and Q_b
-        of each of these places.
+    def _of_places(self, H: Array, places: slice) -> Iterator[tuple[int, int, Array, Array]]:
+        """Yield (a, b, left, right), a >= b: the block of the normal equations between the matrices
+        Q_a and Q_b of each of these places is V -> sum left V right, (places, terms, n, n) both;
+        if a = b, that and its adjoint.
         """
         f, n = self.blocks.fixed, self.blocks.fixed.shape[1]
         G, N = self.blocks.places, H.shape[1]
@@ -308,13 +311,16 @@ class _Inequalities:
             for b, s in enumerate(self.used[: a + 1]):
                 left = [xf[a][:, :, :, s]]
                 right = [np.swapaxes(xf[b][:, :, :, r], 2, 3)]
-                if self.blocks.symmetric:  # the other half is the same
-                    factor = 4.0
-                else:
+                if not self.blocks.symmetric:  # else the other half is the same
                     left.append(xH[:, :, r, a][:, :, :, None] @ x[:, :, s, b][:, :, None])
                     right.append(np.swapaxes(ff[:, :, s][:, :, :, r], 2, 3))
-                    factor = 2.0
-                yield a, b, factor * _on_vectors(stacked(*left), stacked(*right))
+                factor = 4.0 if self.blocks.symmetric else 2.0
+                share: Array | float = factor
+                if a == b:  # the map of s and r is the adjoint of that of r and s
+                    i, j = np.triu_indices(len(r))
+                    left, right = ([each[:, :, i, j] for each in M] for M in (left, right))
+                    share = np.where(i == j, 0.5 * factor, factor)[:, None, None]
+                yield a, b, stacked(*(share * each for each in left)), stacked(*right)
 
 
 class _Bounds:
@@ -336,9 +342,9 @@ class _Bounds:
     def add_adjoint(self, Z: Array, out: Array) -> None:
         out += self.sign * Z
 
-    def add_normal(self, H: Array, out: Normal) -> None:
+    def add_normal(self, H: Array, out: _NormalBlocks) -> None:
         for j, h in enumerate(H):
-            _add(out, (j, j), _on_vectors(h[None], h[None]))
+            out.add_products((j, j), 0.5 * h[None], h[None])
 
 
 class _Multiplier:
@@ -359,7 +365,7 @@ class _Multiplier:
     def add_adjoint(self, Z: Array, out: Array) -> None:
         pass
 
-    def add_normal(self, H: Array, out: Normal) -> None:
+    def add_normal(self, H: Array, out: _NormalBlocks) -> None:
         pass
 
 
@@ -380,14 +386,43 @@ def _contracted(g: Array, h: Array, blocks: Array) -> Array:
     return (pairs.T @ blocks.reshape(len(g), -1)).reshape(g.shape[1], h.shape[1], -1)
 
 
-def _add(out: Normal, at: tuple[int, int], block: Array) -> None:
-    i, j = (int(k) for k in at)
-    if i < j:
-        i, j, block = j, i, block.T
-    if (i, j) in out:
-        out[i, j] += block
-    else:
-        out[i, j] = block
+class _NormalBlocks:
+    """Lower blocks {(i, j): block}, i >= j, of the normal equations between coefficients of P."""
+
+    def __init__(self) -> None:
+        self.blocks: dict[tuple[int, int], Array] = {}
+        self.products: dict[tuple[int, int], Array] = {}
+
+    def add(self, at: tuple[int, int], block: Array) -> None:
+        """Add a block (v, v) on vectors."""
+        i, j = (int(k) for k in at)
+        if i < j:
+            i, j, block = j, i, block.T
+        if (i, j) in self.blocks:
+            self.blocks[i, j] += block
+        else:
+            self.blocks[i, j] = block
+
+    def add_products(self, at: tuple[int, int], left: Array, right: Array) -> None:
+        """Add the map V -> sum left V right, (terms, n, n) both, of a block on the diagonal with
+        its adjoint.
+        """
+        i, j = (int(k) for k in at)
+        if i < j:
+            i, j, left, right = j, i, np.swapaxes(left, 1, 2), np.swapaxes(right, 1, 2)
+        terms, n = left.shape[:2]
+        product = left.reshape(terms, n * n).T @ right.reshape(terms, n * n)
+        if (i, j) in self.products:
+            self.products[i, j] += product
+        else:
+            self.products[i, j] = product
+
+    def finished(self) -> dict[tuple[int, int], Array]:
+        """Return the blocks; the products of a block are summed before they are rearranged."""
+        for (i, j), product in self.products.items():
+            block = _of_symmetric(_by_entry(product))
+            self.add((i, j), block + block.T if i == j else block)
+        return self.blocks
 
 
 def _on_vectors(left: Array, right: Array) -> Array:
@@ -395,7 +430,7 @@ def _on_vectors(left: Array, right: Array) -> Array:
     L and R of a map are `left` and `right` (..., terms, n, n).
     """
     terms, n = left.shape[-3:-1]
-    rows, columns, weight = indices(n)
+    rows, columns, _ = indices(n)
     if 2 * terms <= n:
         L = np.concatenate([left[..., rows, :], left[..., columns, :]], axis=-3)
         R = np.concatenate([right[..., columns], right[..., rows]], axis=-3)
@@ -403,10 +438,24 @@ def _on_vectors(left: Array, right: Array) -> Array:
         by_entry = np.ascontiguousarray(L) @ np.ascontiguousarray(R)
     else:  # one product for all entries
         shape = (*left.shape[:-3], terms, n * n)
-        product = np.swapaxes(left.reshape(shape), -1, -2) @ right.reshape(shape)
-        product = np.moveaxis(product.reshape(*shape[:-2], n, n, n, n), -1, -3)
-        by_entry = product[..., rows, columns, :, :] + product[..., columns, rows, :, :]
-    # of every entry of the image, the matrix that is multiplied with V entry by entry
+        by_entry = _by_entry(np.swapaxes(left.reshape(shape), -1, -2) @ right.reshape(shape))
+    return _of_symmetric(by_entry)
+
+
+def _by_entry(product: Array) -> Array:
+    """Return for every entry of the symmetric part of sum L V R the matrix (..., v, n, n) that is
+    multiplied with V entry by entry, of the products of entries of L and R, (..., n^2, n^2).
+    """
+    n = math.isqrt(product.shape[-1])
+    rows, columns, _ = indices(n)
+    product = np.moveaxis(product.reshape(*product.shape[:-2], n, n, n, n), -1, -3)
+    return product[..., rows, columns, :, :] + product[..., columns, rows, :, :]
+
+
+def _of_symmetric(by_entry: Array) -> Array:
+    """Return the map (..., v, v) on vectors of a symmetric V, of these matrices."""
+    n = by_entry.shape[-1]
+    rows, columns, weight = indices(n)
     flat = by_entry.reshape(*by_entry.shape[:-2], n * n)
     out = flat.take(rows * n + columns, axis=-1)
     out += flat.take(columns * n + rows, axis=-1)
@@ -579,9 +628,10 @@ class _NormalEquations:
 
     def __init__(self, cones: _Cones, scalings: list[_Scaling]):
         self.cones, self.scalings = cones, scalings
-        blocks: Normal = {}
+        normal = _NormalBlocks()
         for cone, scaling in zip(cones.each, scalings, strict=True):
-            cone.add_normal(scaling.H, blocks)
+            cone.add_normal(scaling.H, normal)
+        blocks = normal.finished()
         for (i, j), block in blocks.items():
             if i == j:
                 block[np.diag_indices(len(block))] *= 1.0 + DIAGONAL_SHIFT
