@@ -184,7 +184,9 @@ def _balancing(plants: Generalized, dt: float | None) -> tuple[Array | None, Arr
             return None, None
         values, vectors = np.linalg.eigh(one)
         return vectors * values**power, None
-    L = np.linalg.cholesky(Y)
+    values, vectors = np.linalg.eigh(Y)
+    # the mean cost of a state may be rounding beside that of another
+    L = vectors * np.sqrt(np.maximum(values, REGULARIZATION**2 * values[-1]))
     U, squares, _ = np.linalg.svd(L.T @ X @ L)
     return L @ U / squares**0.25, squares
 
