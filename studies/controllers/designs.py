@@ -135,7 +135,8 @@ def design_questions(
     last = partial(from_flights, from_data(identified), flown, identified, record, simulator)
     ways = from_equations(heli, base, design_points)
     calls = [partial(design, name, make, flown) for name, make in ways.items()]
-    return Questions([*calls, last], lambda designs: Designs(designs=designs, plant=flown), [last])
+    long = [last, *reversed(calls)]
+    return Questions([*calls, last], lambda designs: Designs(designs=designs, plant=flown), long)
 
 
 def from_equations(

@@ -66,8 +66,7 @@ def _blind(D: Array, inverse: Array) -> Array:
     D is.
     """
     ny, nw = D.shape[-2:]
-    middle = D[len(D) // 2]
-    start = np.linalg.svd(middle)[2][ny:].T
+    start = np.linalg.svd(D[0])[2][ny:].T
     return start - inverse @ (D @ start) if nw > ny else np.zeros((len(D), nw, 0))
 
 

@@ -37,9 +37,9 @@ Array = np.ndarray
 Divisions = int | Grid
 """In how many parts every range is cut at first, or the points themselves."""
 
-MATRIX_BOUNDS = (1e8, 1e10)
-"""X and Y are kept below this multiple of the identity, in scaled coordinates; the second bound is
-used where the first is active.
+MATRIX_BOUNDS = (1e5, 1e8, 1e10)
+"""X and Y are kept below this multiple of the identity, in scaled coordinates; a larger bound is
+used where the one before is active and a lower gamma is possible.
 """
 ACTIVE_FRACTION = 0.1
 """A bound counts as active where the largest eigenvalue of X or Y exceeds this fraction of it."""
@@ -95,6 +95,7 @@ class ExistenceProgram:
     blocks: tuple[LyapunovBlocks, ...]
     sizes: Sizes
     cost: float
+    places: int = 1
     level: Array = field(default_factory=lambda: np.zeros(()))
     back_off: Array = field(default_factory=lambda: np.zeros(()))
     bounds: tuple[tuple[float, float], ...] = ()
@@ -102,7 +103,8 @@ class ExistenceProgram:
 
 class Solution(NamedTuple):
     """Coefficients of X, Y (and of the bound of Y at the next sample) with the g they admit, the
-    solver's answer, whether it `reached` its tolerance, and a point to start again from.
+    solver's answer, whether it `reached` its tolerance, a point to start again from, and the g
+    below which there is none for the points imposed.
     """
 
     gamma: float
@@ -110,6 +112,8 @@ class Solution(NamedTuple):
     message: str
     reached: bool = False
     early: interior_point.Early | None = None
+    lower: float = -np.inf
+    tolerance: float = np.inf
 
 
 class Existence:
@@ -171,38 +175,47 @@ class Existence:
             axes.append(piecewise_lobatto(knots, count))
         return tensor_grid(axes)
 
-    def least_gamma(self, solver: Solver) -> Solution:
-        """Minimise g, adding points where a block is violated between them."""
-        if len(self.points) == 1:
-            return self._least(solver)
-        if self.fixed:
-            return self._least(replace(solver, tolerance=FINE_TOLERANCE))
-        start = None
+    def least_gamma(self, solver: Solver, above: float = np.inf) -> Solution:
+        """Minimise g, adding points where a block is violated between them; no further once it is
+        known not to be below `above`, and g is inf.
+        """
+        fine = replace(solver, tolerance=FINE_TOLERANCE)
+        if self.fixed or len(self.points) == 1:
+            return self._least(fine if self.fixed else solver, None, above)
+        found = self._least(replace(solver, tolerance=COARSE_TOLERANCE), None, above)
         for _ in range(MAX_ROUNDS):
-            found = self._least(replace(solver, tolerance=COARSE_TOLERANCE), start)
-            start = found.early
-            if not np.isfinite(found.gamma) or not self._added(found, found.gamma):
+            if not np.isfinite(found.gamma):
                 break
-        return self._least(replace(solver, tolerance=FINE_TOLERANCE), start)
+            if not self._added(found, found.gamma) and found.tolerance <= FINE_TOLERANCE:
+                break
+            # later points are nearer the boundary, from where steps are short
+            found = self._least(fine, found.early, above)._replace(early=found.early)
+        return found
 
-    def _least(self, solver: Solver, start: interior_point.Early | None = None) -> Solution:
-        return self._least_within(self.largest, solver, start)
+    def _least(
+        self, solver: Solver, start: interior_point.Early | None, above: float = np.inf
+    ) -> Solution:
+        return self._least_within(self.largest, solver, start, above)
 
     def _least_within(
-        self, largest: float, solver: Solver, start: interior_point.Early | None
+        self,
+        largest: float,
+        solver: Solver,
+        start: interior_point.Early | None,
+        above: float,
     ) -> Solution:
         blocks = [*self._halves(None, MARGIN), *self._coupling(False, largest)]
-        return self._solved(blocks, 1.0, solver, start)
+        found = self._solved(blocks, 1.0, solver, start, above)
+        return found._replace(gamma=np.inf) if found.lower > above else found
 
-    def least_share(self, found: Solution, largest: float, solver: Solver) -> float:
-        """Return the fraction of the g found below which none exists within a larger bound on X and
-        Y; 0 where the program does not decide. It holds for the present points: more of them raise
-        g.
+    def could_fall(self, found: Solution, largest: float, share: float, solver: Solver) -> bool:
+        """Whether g may be below this share of the one found within a larger bound on X and Y; for
+        the present points: more of them raise g.
         """
-        within = self._least_within(
-            largest, replace(solver, tolerance=COARSE_TOLERANCE), found.early
-        )
-        return (1 - COARSE_TOLERANCE) * within.gamma / found.gamma if within.reached else 0.0
+        above = share * found.gamma
+        coarse = replace(solver, tolerance=COARSE_TOLERANCE)
+        within = self._least_within(largest, coarse, found.early, above)
+        return not within.lower > above
 
     def bounded(self, found: Solution) -> bool:
         """Whether the bound on X and Y is active."""
@@ -243,8 +256,13 @@ class Existence:
         for margin in SETTLED_MARGINS:
             before: Solution | None = None
             for largest in SETTLED_BOUNDS:
+                start = None if before is None else before.early
                 found = self._widest(
-                    gamma, margin, largest, replace(solver, tolerance=SEPARATION_TOLERANCE)
+                    gamma,
+                    margin,
+                    largest,
+                    replace(solver, tolerance=SEPARATION_TOLERANCE),
+                    start,
                 )
                 if not np.any(found.coefficients):
                     continue
@@ -254,11 +272,19 @@ class Existence:
             if before is not None:
                 yield before._replace(gamma=gamma)
 
-    def _widest(self, gamma: float, margin: float, largest: float, solver: Solver) -> Solution:
+    def _widest(
+        self,
+        gamma: float,
+        margin: float,
+        largest: float,
+        solver: Solver,
+        start: interior_point.Early | None,
+    ) -> Solution:
         """Solve this within one bound, adding points as for the least g."""
         for _ in range(MAX_ROUNDS):
             blocks = [*self._halves(gamma, margin), *self._coupling(True, largest)]
-            found = self._solved(blocks, -1.0, solver)
+            found = self._solved(blocks, -1.0, solver, start)
+            start = found.early
             if not np.any(found.coefficients) or len(self.points) == 1 or self.fixed:
                 break
             if not self._added(found, gamma):
@@ -271,13 +297,18 @@ class Existence:
         cost: float,
         solver: Solver,
         start: interior_point.Early | None = None,
+        above: float = np.inf,
     ) -> Solution:
         n, count = self.states, self.count
         candidate = interior_point.minimise(
-            ExistenceProgram(tuple(blocks), Sizes(n, 1, count), cost), solver, start
+            ExistenceProgram(tuple(blocks), Sizes(n, 1, count), cost, len(self.points)),
+            solver,
+            start,
+            above,
         )
         if candidate.x is None:
-            return Solution(np.inf, np.zeros((count, n, n)), candidate.message)
+            empty = np.zeros((count, n, n))
+            return Solution(np.inf, empty, candidate.message, lower=candidate.lower)
         coefficients = smat(candidate.x[: count * length(n)].reshape(count, -1), n)
         return Solution(
             float(candidate.x[-1]),
@@ -285,6 +316,8 @@ class Existence:
             candidate.message,
             candidate.reached,
             candidate.early,
+            candidate.lower,
+            solver.options["tolerance"],
         )
 
     def _halves(self, gamma: float | None, margin: float) -> list[LyapunovBlocks]:

@@ -17,13 +17,14 @@ from synthesis.certify.statement.outcome import Attempt
 from synthesis.certify.statement.rates import Rate, limits
 from synthesis.design.loops.controller import Controller
 from synthesis.design.lpv.at_rest import at_rest
+from synthesis.design.lpv.enough_states import enough_states
 from synthesis.design.lpv.existence import MATRIX_BOUNDS, Divisions, Existence, Solution, imposed_at
 from synthesis.design.lpv.fitted import in_plant_units
 from synthesis.design.lpv.frozen_stability import frozen_stability
 from synthesis.design.lpv.recovery import controller, sampled_controller, split
 from synthesis.design.lpv.regular import regular
 from synthesis.design.lpv.robust import robust_plant
-from synthesis.design.lpv.scaled_plant import ScaledPlant, depends
+from synthesis.design.lpv.scaled_plant import ScaledPlant, depends, scaled_plant_of
 from synthesis.design.lpv.search import (
     BACK_OFF,
     CHECK_POINTS,
@@ -72,8 +73,12 @@ def output_feedback(
     divisions: int = 1,
     impose: Grid | None = None,
 ) -> Controller:
-    """Design a dynamic controller from the measurements, of the order of the plant, for every p(t)
-    within its range and rates.
+    """Design a dynamic controller from the measurements, of at most the order of the plant, for
+    every p(t) within its range and rates.
+
+    Where the plant has more than 12 states, those are left out without which the central
+    controllers of frozen models keep their level on the whole plant, such as states of fast servos
+    and delays; they are taken as at rest. The loops that are checked and certified have them all.
 
     X(p) is the matrix of the estimation inequality, Y(p) that of the control inequality. If only
     one of them depends on a parameter, the controller does not need its rate; both pairs are tried.
@@ -95,9 +100,10 @@ def output_feedback(
     X, Y : int, tuple or FunctionSpace, optional
         Degree in every parameter, one each, or functions, such as
         `UserFunctions.from_expressions([1, cos(t)], t)`; by default one of the two moves, with a
-        degree that rises from 2 while that lowers gamma and gamma is above the worst optimum of the
-        frozen models, which no controller can beat. Where both are given and move with a parameter
-        of a bounded rate, the controller neglects dp/dt, as above.
+        degree that rises from 2 while that lowers gamma by .5 % and gamma is above the worst
+        optimum of the frozen models, which no controller can beat. A shape is given up once its
+        multipliers show that it brings less. Where both are given and move with a parameter of a
+        bounded rate, the controller neglects dp/dt, as above.
     back_off : float or sequence
         Multiples of the least gamma at which X and Y are settled, tried in turn until the gains are
         smooth functions of p: at the least itself a controller has poles without limit.
@@ -263,7 +269,46 @@ def _nominal(
     worst = worst_optimum(plant)
     if worst.level == 0 and (refusal := failed(plant, attempts)).reasons != (NOTHING_WRONG,):
         raise refusal  # no frozen model has a controller, and it is known why
-    start = best(plant, every, divisions, USUAL, attempts, worst)
+    tried = []
+    for states in _orders(plant, worst, divisions):
+        start = best(plant, every, divisions, USUAL, attempts, worst, states)
+        made = _slowest(plant, start, both, factors, fastest, worst, divisions, attempts, free=free)
+        if made is not None:
+            tried.append(made)
+            if made.optimum is None or made.promised <= _far(min(factors)) * made.optimum:
+                break
+    if not tried:
+        raise failed(plant, attempts, _advice(start.shape.unmeasured_rates(plant.parameters)))
+    found = min(tried, key=lambda each: (_fastest(each) > fastest, each.promised))
+    return replace(found, attempts=tuple(attempts))
+
+
+def _orders(plant: Plant, worst: FrozenOptimum, divisions: Divisions) -> list[int]:
+    """Return the numbers of states to design with: those that matter, then all; all where the user
+    requested the points.
+    """
+    scaled = scaled_plant_of(plant, worst.level or 1.0)
+    whole = len(scaled.left)
+    if isinstance(divisions, Grid) or worst.level == 0:
+        return [whole]
+    return list(dict.fromkeys([enough_states(scaled, worst.p), whole]))
+
+
+def _slowest(
+    plant: Plant,
+    start: Start,
+    both: Callable[[int], Sequence[Bases]],
+    factors: Sequence[float],
+    fastest: float,
+    worst: FrozenOptimum,
+    divisions: Divisions,
+    attempts: list[Attempt],
+    *,
+    free: bool,
+) -> Controller | None:
+    """Return the first controller with no pole faster than `fastest`, else the slowest; None
+    without any.
+    """
     slowest = None
     for found, notes in _controllers(
         plant, start, both, factors, worst, divisions, attempts, free=free
@@ -276,9 +321,7 @@ def _nominal(
             slowest = replace(found, notes=(*notes, *_limited(found, min(factors), fastest)))
         if _fastest(found) <= fastest:
             break
-    if slowest is None:
-        raise failed(plant, attempts, _advice(start.shape.unmeasured_rates(plant.parameters)))
-    return replace(slowest, attempts=tuple(attempts))
+    return slowest
 
 
 def _controllers(
@@ -308,7 +351,8 @@ def _controllers(
     def other() -> Start | None:
         if start.gamma <= CLOSE_TO_OPTIMUM * floor or not both(DEGREES[1][0]):
             return None
-        found = best(plant, both, divisions, USUAL, attempts, worst)
+        kept = start.existence.states
+        found = best(plant, both, divisions, USUAL, attempts, worst, kept, start.gamma)
         return found if found.gamma < MIN_IMPROVEMENT * start.gamma else None
 
     for own, design in _designs(plant, start, other(), factors, attempts):
@@ -316,6 +360,9 @@ def _controllers(
             yield from central()
             still = False
         suffix = ", their rates neglected" if own.shape.unmeasured_rates(plant.parameters) else ""
+        kept, states = own.existence.states, len(plant.model.states)
+        if kept < states:
+            suffix += f", with {kept} of {states} states"
         method = f"output feedback, {own.shape}{suffix}"
         made = in_plant_units(plant, design.scaled, design.fit, design.gamma, method)
         made = replace(made, optimum=own.gamma, by_adjoint=own.shape.by_y)

@@ -46,7 +46,9 @@ NEGLIGIBLE_COEFFICIENT = 1e-10
 @dataclass(frozen=True, eq=False)
 class ScaledPlant:
     """x = right z (left = right^-1), time in units of `time` (s; 1 in discrete time), performance
-    in units of `channel`, u = controls u~ and y~ = measurements y.
+    in units of `channel`, u = controls u~ and y~ = measurements y. `values` (n,): cost of each
+    state by error of its estimate, falling; None where the coordinates are not balanced. The states
+    after the first `states` are at rest: what follows them at once.
     """
 
     matrices: MatricesAt
@@ -59,6 +61,8 @@ class ScaledPlant:
     channel: float
     controls: Array
     measurements: Array
+    values: Array | None = None
+    states: int | None = None
 
     @classmethod
     def of(
@@ -105,20 +109,24 @@ class ScaledPlant:
             controls,
             measurements,
         )
-        return own._in(_balancing(own.at(line), dt))
-
-    def _in(self, T: Array | None) -> ScaledPlant:
-        """Return the plant with T z for z."""
+        T, values = _balancing(own.at(line), dt)
         if T is None:
-            return self
-        return replace(self, left=np.linalg.solve(T, self.left), right=self.right @ T)
+            return own
+        left, right = np.linalg.solve(T, own.left), own.right @ T
+        return replace(own, left=left, right=right, values=values)
+
+    def first(self, states: int) -> ScaledPlant:
+        """Return the plant with the first so many states, the others at rest (singular
+        perturbation), which keeps the response to slow signals.
+        """
+        return self if states >= len(self.left) else replace(self, states=states)
 
     def at(self, p: Array) -> Generalized:
         """Return the matrices (K, ..) at p (K, m)."""
         A, B1, B2, C1, C2, D11, D12, D21, D22 = self.matrices(p)
         root, L, R = np.sqrt(self.time), self.left, self.right
         u, y = self.controls, self.measurements[:, None]
-        return Generalized(
+        whole = Generalized(
             self.time * L @ A @ R,
             root * L @ B1,
             root * L @ B2 * u,
@@ -129,6 +137,7 @@ class ScaledPlant:
             y * D21,
             y * D22 * u,
         )
+        return whole if self.states is None else whole.at_rest(self.states, self.dt)
 
     def motions(self, p: Array, matters: Sequence[bool]) -> list[Array]:
         """Return every extreme dp/dt (K, m) at p (K, m) per unit of time: the value of another
@@ -163,20 +172,23 @@ def _sizes(D: Array, axis: int) -> Array:
     return np.where(size > 0, size, 1.0)
 
 
-def _balancing(plants: Generalized, dt: float | None) -> Array | None:
+def _balancing(plants: Generalized, dt: float | None) -> tuple[Array | None, Array | None]:
     """Return T (n, n) with T'XT = T^-1 Y T^-T diagonal, X and Y the mean solutions of the Riccati
-    equations of control and of estimation; with one of them alone T'XT = I, or T^-1 Y T^-T = I.
+    equations of control and of estimation, and the squares of that diagonal; with one of X and Y
+    alone T'XT = I, or T^-1 Y T^-T = I, and None.
     """
     X, Y = _mean_cost(plants, dt), _mean_cost(plants.dual, dt)
     if X is None or Y is None:
         one, power = (Y, 0.5) if X is None else (X, -0.5)
         if one is None:
-            return None
+            return None, None
         values, vectors = np.linalg.eigh(one)
-        return vectors * values**power
-    L = np.linalg.cholesky(Y)
+        return vectors * values**power, None
+    values, vectors = np.linalg.eigh(Y)
+    # the mean cost of a state may be rounding beside that of another
+    L = vectors * np.sqrt(np.maximum(values, REGULARIZATION**2 * values[-1]))
     U, squares, _ = np.linalg.svd(L.T @ X @ L)
-    return L @ U / squares**0.25
+    return L @ U / squares**0.25, squares
 
 
 def _mean_cost(plants: Generalized, dt: float | None) -> Array | None:

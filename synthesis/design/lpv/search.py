@@ -79,7 +79,7 @@ Loop = Callable[[ScaledPlant, Gains, Array], tuple[Array, ...]]
 
 
 class Start(NamedTuple):
-    """The least gamma of a shape."""
+    """The least gamma of a shape; the plant of `existence` may have fewer states than `scaled`."""
 
     scaled: ScaledPlant
     existence: Existence
@@ -119,21 +119,45 @@ def best(
     solver: Solver,
     attempts: list[Attempt],
     worst: FrozenOptimum = NOTHING_KNOWN,
+    states: int | None = None,
+    bound: float = math.inf,
 ) -> Start:
     """Return the shape of the least gamma: of the lowest degree first, then of higher degrees while
-    that lowers it, then with a larger bound on X and Y where the bound is active. No controller has
-    a gamma below the `worst` frozen optimum.
+    that lowers it, then with a larger bound on X and Y where the bound is active; for the first
+    `states` of the scaled plant (default: all). No controller has a gamma below the `worst` frozen
+    optimum. A shape is given up once its gamma is known not to be `MIN_IMPROVEMENT` below the least
+    before it, at first `bound`.
     """
     floor = worst.level
     channel = floor if 0 < floor < math.inf else 1.0
     degrees = DEGREES.get(len(plant.parameters), (2,))
     starts: list[Start] = []
+
+    def tried(
+        shape: Bases, above: float, unit: float = channel, largest: float = MATRIX_BOUNDS[0]
+    ) -> Start:
+        return least(
+            plant,
+            shape,
+            divisions,
+            solver,
+            attempts,
+            unit,
+            worst.p,
+            above=above,
+            largest=largest,
+            states=states,
+        )
+
     for shape in every(degrees[0]):
-        starts.append(least(plant, shape, divisions, solver, attempts, channel, worst.p))
+        lowest = min((each.gamma for each in starts), default=bound)
+        starts.append(tried(shape, MIN_IMPROVEMENT * lowest))
         if starts[-1].gamma <= CLOSE_TO_OPTIMUM * floor:
             break
     chosen = min(range(len(starts)), key=lambda k: starts[k].gamma)
     start = starts[chosen]
+    if math.isfinite(bound) and not math.isfinite(start.gamma):
+        return start
 
     def worth(other: Start) -> bool:
         return other.gamma < MIN_IMPROVEMENT * start.gamma
@@ -142,7 +166,7 @@ def best(
         shape = every(degree)[chosen]
         if start.gamma <= CLOSE_TO_OPTIMUM * floor or shape.size == start.shape.size:
             break
-        richer = least(plant, shape, divisions, solver, attempts, channel, worst.p)
+        richer = tried(shape, MIN_IMPROVEMENT * start.gamma)
         more = worth(richer)
         start = richer if richer.gamma < start.gamma else start
         if not more and math.isfinite(start.gamma):
@@ -150,12 +174,9 @@ def best(
     for largest in MATRIX_BOUNDS[1:]:
         if start.gamma <= CLOSE_TO_OPTIMUM * floor or not start.existence.bounded(start.found):
             break
-        if start.existence.least_share(start.found, largest, solver) >= MIN_IMPROVEMENT:
+        if not start.existence.could_fall(start.found, largest, MIN_IMPROVEMENT, solver):
             break
-        unit = start.gamma
-        wider = least(
-            plant, start.shape, divisions, solver, attempts, unit, worst.p, largest=largest
-        )
+        wider = tried(start.shape, math.inf, start.gamma, largest)
         if not worth(wider):
             break
         start = wider
@@ -171,15 +192,19 @@ def least(
     channel: float = 1.0,
     p: Array | None = None,
     *,
+    above: float = math.inf,
     largest: float = MATRIX_BOUNDS[0],
+    states: int | None = None,
 ) -> Start:
     """Return the least gamma of a shape, in a suitable unit of performance, at first `channel`; the
-    inequalities are imposed at this p (m,), too.
+    inequalities are imposed at this p (m,), too, on the first `states` of the scaled plant. It is
+    inf where it is not below `above`.
     """
     for _ in tracked(f"least gamma, {shape}", range(3)):
         own = scaled_plant_of(plant, channel)
-        existence = Existence(own, shape.X, shape.Y, divisions, largest, p)
-        found = existence.least_gamma(solver)
+        fewer = own if states is None else own.first(states)
+        existence = Existence(fewer, shape.X, shape.Y, divisions, largest, p)
+        found = existence.least_gamma(solver, above / channel)
         gamma = channel * found.gamma
         attempts.append(Attempt(f"least gamma, {shape}", 0.0, found.message, gamma))
         if not math.isfinite(found.gamma) or 1 / MAX_UNIT_RATIO < found.gamma < MAX_UNIT_RATIO:
@@ -229,7 +254,7 @@ def settled(
             # X and Y of a solver that stopped short may be nothing, or not positive
             with contextlib.suppress(np.linalg.LinAlgError):
                 if np.any(found.coefficients):
-                    gains = recover(scaled, existence, found)
+                    gains = recover(existence.plant, existence, found)
                     design, outcome = _tried(start, found, gains, of_loop, neglecting, simplest)
                     if outcome == SHARP:
                         sharp.setdefault(factor, (found, gains))
@@ -258,8 +283,8 @@ def _tried(
     if not existence.fixed:
         points = check_points(existence.plant.parameters, points)
     if neglecting:
-        looped = closed(scaled, gains, points)
-        reached = max(reached, level_kept(scaled, existence, found, looped, points))
+        looped = closed(existence.plant, gains, points)
+        reached = max(reached, level_kept(existence.plant, existence, found, looped, points))
     further = reached / found.gamma
     if further > MAX_RATE_LOSS:
         outcome = RATE_UNMEASURED if further > HOPELESS_RATE_LOSS else "as dp/dt is not known"

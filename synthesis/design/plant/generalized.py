@@ -115,6 +115,25 @@ class Generalized(NamedTuple):
             blocks([[self.D11, self.D12], [self.D21, self.D22]]),
         )
 
+    def at_rest(self, states: int, dt: float | None) -> Generalized:
+        """Return the plant of the first so many `states`, with the others where they come to rest.
+
+        Raises `numpy.linalg.LinAlgError` where one of these integrates.
+        """
+        A, B, C, D = self.joined
+        n = states
+        left = A[..., n:, n:] - (0.0 if dt is None else np.eye(A.shape[-1] - n))
+        rest = -np.linalg.solve(left, blocks([[A[..., n:, :n], B[..., n:, :]]]))
+        x, w = rest[..., :n], rest[..., n:]
+        return Generalized.split(
+            A[..., :n, :n] + A[..., :n, n:] @ x,
+            B[..., :n, :] + A[..., :n, n:] @ w,
+            C[..., :n] + C[..., n:] @ x,
+            D + C[..., n:] @ w,
+            self.B2.shape[-1],
+            self.C2.shape[-2],
+        )
+
     @property
     def dual(self) -> Generalized:
         """The transposed plant: measurements become controls, disturbances performance."""

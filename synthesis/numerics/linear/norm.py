@@ -152,16 +152,23 @@ class _Response(NamedTuple):
         return self._replace(B=B, C=C, D=np.ldexp(self.D, power))
 
     def gain(self, omega: Array, refined: bool = True) -> Array:
-        """Return the gain at each omega (k,), `refined` once with residuals in extended precision:
-        with light damping rounding is magnified by its inverse.
+        """Return the gain at each omega (k,), the highest `refined` once with residuals in extended
+        precision: with light damping rounding is magnified by its inverse.
         """
-        omega = omega.astype(np.longdouble if refined else float)
+        found = self._values(omega)
+        if refined:
+            highest = found >= NEAR_THE_TOP * found.max()
+            found[highest] = self._values(omega[highest].astype(np.longdouble))
+        return found
+
+    def _values(self, omega: Array) -> Array:
+        """Return the gain at each omega (k,), refined for those in extended precision."""
         points = (1 + 1j * omega) / (1 - 1j * omega) if self.discrete else 1j * omega
         exact = points[:, None, None] * np.eye(len(self.A)) - self.A
         pencil = exact.astype(complex)
         X = np.linalg.solve(pencil, np.broadcast_to(self.B, (len(omega), *self.B.shape)))
         with np.errstate(over="ignore", invalid="ignore"):
-            if refined:
+            if omega.dtype == np.longdouble:
                 X = X + np.linalg.solve(pencil, (self.B - exact @ X).astype(complex))
             found = self.C @ X + self.D
         if not np.isfinite(found).all():
@@ -212,6 +219,8 @@ class _Peak(NamedTuple):
         return self.or_higher(response, np.array([top.omega]))
 
 
+NEAR_THE_TOP = 0.9
+"""Fraction of the highest gain above which one is refined."""
 WINDOW = np.linspace(-1.0, 1.0, 9)
 """Frequencies at which a response is evaluated, in units of the half-width of a window."""
 

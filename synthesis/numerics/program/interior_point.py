@@ -38,7 +38,6 @@ from synthesis.numerics.program.cone_program import Solver, SolverPoint
 from synthesis.numerics.program.lyapunov_program import LyapunovBlocks, Program, Sizes
 
 Array = np.ndarray
-Normal = dict[tuple[int, int], Array]
 
 MIN_START = 10.0
 """Least multiple of the identity from which slacks and multipliers start."""
@@ -76,30 +75,36 @@ CHUNK_ENTRIES = 200_000
 
 
 class Early(NamedTuple):
-    """A feasible P (K, n, n) and y near the centre of the cones, with the level <S, Z> / order of
-    the central path there and the least eigenvalue of a slack of every cone: a starting point for a
-    program with more blocks.
+    """A feasible P (K, n, n) and y near the centre of the cones, with the multipliers Z of every
+    cone, the level <S, Z> / order of the central path there and the least eigenvalue of a slack of
+    every cone: a starting point for a program with other bounds or more `places`.
     """
 
     P: Array
     y: Array
+    Z: list[Array]
     level: float
     least: tuple[float, ...]
+    places: int
 
 
 @dataclass(frozen=True, eq=False)
 class Minimum(SolverPoint):
     """Result: whether the requested gap is `reached`, at least nearly; with the point at which it
-    first was below `EARLY_GAP`, None where it never was.
+    first was below `EARLY_GAP`, None where it never was, and the level below which the multipliers
+    show that there is none.
     """
 
     reached: bool = False
     early: Early | None = None
+    lower: float = -math.inf
 
 
-def minimise(program: Program, solver: Solver, start: Early | None = None) -> Minimum:
+def minimise(
+    program: Program, solver: Solver, start: Early | None = None, above: float = math.inf
+) -> Minimum:
     """Minimise the level, to the tolerance of the solver or as near as rounding, iterations and
-    time allow.
+    time allow; no further once the multipliers show that it is not below `above`.
 
     The point has the coefficients of P as vectors, then the level; where it is not optimal, it is
     feasible to rounding or there is none. From `start`, of another program, and where that leads
@@ -108,13 +113,15 @@ def minimise(program: Program, solver: Solver, start: Early | None = None) -> Mi
     digits = -math.log10(solver.options["tolerance"])
     with task("digits of the least level", round(digits, 1)) as solving:
         if start is not None:
-            found = _minimised(program, solver, solving, start)
-            if found.reached:
+            found = _minimised(program, solver, solving, start, above)
+            if found.reached or found.lower > above:
                 return found
-        return _minimised(program, solver, solving, None)
+        return _minimised(program, solver, solving, None, above)
 
 
-def _minimised(program: Program, solver: Solver, solving: Task, start: Early | None) -> Minimum:
+def _minimised(
+    program: Program, solver: Solver, solving: Task, start: Early | None, above: float
+) -> Minimum:
     tolerance, iterations, seconds = (
         solver.options[name] for name in ("tolerance", "iterations", "seconds")
     )
@@ -132,13 +139,16 @@ def _minimised(program: Program, solver: Solver, solving: Task, start: Early | N
             at = cones.residuals(point)
         if feasible and early is None and at.gap <= EARLY_GAP:
             least = tuple(float(np.linalg.eigvalsh(S).min()) for S in point.S)
-            early = Early(point.P, point.y, at.product / cones.order, least)
+            level = at.product / cones.order
+            early = Early(point.P, point.y, point.Z, level, least, program.places)
         if close and at.gap <= tolerance and at.dual_size <= DUAL_RESIDUAL:
             word = "solved"
         elif close and at.gap <= tolerance and at.dual_size >= before:
             word = "out of digits"  # the multipliers no longer improve
         elif at.contradiction < INFEASIBILITY_RESIDUAL:
             word = "infeasible"
+        elif at.lower > above:
+            word = f"not below {above:.6g}"
         elif count == iterations:
             word = "out of iterations"
         elif time.perf_counter() - begin > seconds:
@@ -157,7 +167,7 @@ def _minimised(program: Program, solver: Solver, solving: Task, start: Early | N
         gap = "" if word == "infeasible" else f", relative gap {at.gap:.1e}"
         message = f"{word} after {count} iterations{gap}"
         reached = close and at.gap <= GAP_FACTOR * tolerance and at.dual_size <= MAX_DUAL_RESIDUAL
-        return Minimum(answer, x, time.perf_counter() - begin, message, reached, early)
+        return Minimum(answer, x, time.perf_counter() - begin, message, reached, early, at.lower)
 
 
 def _digits(gap: float, tolerance: float) -> float:
@@ -177,7 +187,7 @@ class _Point(NamedTuple):
 class _Residuals(NamedTuple):
     """Residuals: of the slacks `primal`, of the multipliers `dual` and `dual_y`, with their sizes;
     <S, Z> `product`, relative to the level `gap`. `contradiction`: relative residual of the
-    multipliers as a proof of infeasibility.
+    multipliers as a proof of infeasibility. `lower`: the level that the multipliers bound.
     """
 
     primal: list[Array]
@@ -188,6 +198,7 @@ class _Residuals(NamedTuple):
     product: float
     gap: float
     contradiction: float
+    lower: float
 
 
 class _Cone(Protocol):
@@ -211,7 +222,7 @@ class _Cone(Protocol):
         """Add to `out` (K, n, n) the contribution to <Z, linear(.)>."""
         ...
 
-    def add_normal(self, H: Array, out: Normal) -> None:
+    def add_normal(self, H: Array, out: _NormalBlocks) -> None:
         """Add to the lower blocks of the normal equations those of P -> adjoint(H linear(P) H)."""
         ...
 
@@ -245,12 +256,12 @@ class _Inequalities:
     def add_adjoint(self, Z: Array, out: Array) -> None:
         np.add.at(out, self.blocks.columns, -self.blocks.adjoint(Z))
 
-    def add_normal(self, H: Array, out: Normal) -> None:
+    def add_normal(self, H: Array, out: _NormalBlocks) -> None:
         columns, weights = self.blocks.columns, self.blocks.weights
         n = self.blocks.fixed.shape[1]
         if weights is None:
-            for a, b, each in self._of_places(H, slice(None)):
-                _add(out, (columns[a], columns[b]), each[0])
+            for a, b, left, right in self._of_places(H, slice(None)):
+                out.add_products((columns[a], columns[b]), left[0], right[0])
             return
         G, k, A = weights.shape
         v = length(n)
@@ -261,7 +272,10 @@ class _Inequalities:
         for first in range(0, G, together):
             places = slice(first, first + together)
             g = [weights[places, j, a] for a, j in enumerate(own)]
-            for a, b, each in self._of_places(H, places):
+            for a, b, left, right in self._of_places(H, places):
+                each = _on_vectors(left, right)
+                if a == b:
+                    each = each + np.swapaxes(each, 1, 2)
                 total[own[a][:, None], own[b]] += _contracted(g[a], g[b], each)
                 if a != b:
                     turned = np.swapaxes(each, 1, 2)
@@ -269,11 +283,12 @@ class _Inequalities:
         blocks = total.reshape(k, k, v, v)
         for j in range(k):
             for i in range(j + 1):
-                _add(out, (columns[j], columns[i]), blocks[j, i])
+                out.add((columns[j], columns[i]), blocks[j, i])
 
-    def _of_places(self, H: Array, places: slice) -> Iterator[tuple[int, int, Array]]:
-        """Yield (a, b, blocks), a >= b, of the normal equations between the matrices Q_a and Q_b
-        of each of these places.
+    def _of_places(self, H: Array, places: slice) -> Iterator[tuple[int, int, Array, Array]]:
+        """Yield (a, b, left, right), a >= b: the block of the normal equations between the matrices
+        Q_a and Q_b of each of these places is V -> sum left V right, (places, terms, n, n) both;
+        if a = b, that and its adjoint.
         """
         f, n = self.blocks.fixed, self.blocks.fixed.shape[1]
         G, N = self.blocks.places, H.shape[1]
@@ -296,13 +311,16 @@ class _Inequalities:
             for b, s in enumerate(self.used[: a + 1]):
                 left = [xf[a][:, :, :, s]]
                 right = [np.swapaxes(xf[b][:, :, :, r], 2, 3)]
-                if self.blocks.symmetric:  # the other half is the same
-                    factor = 4.0
-                else:
+                if not self.blocks.symmetric:  # else the other half is the same
                     left.append(xH[:, :, r, a][:, :, :, None] @ x[:, :, s, b][:, :, None])
                     right.append(np.swapaxes(ff[:, :, s][:, :, :, r], 2, 3))
-                    factor = 2.0
-                yield a, b, factor * _on_vectors(stacked(*left), stacked(*right))
+                factor = 4.0 if self.blocks.symmetric else 2.0
+                share: Array | float = factor
+                if a == b:  # the map of s and r is the adjoint of that of r and s
+                    i, j = np.triu_indices(len(r))
+                    left, right = ([each[:, :, i, j] for each in M] for M in (left, right))
+                    share = np.where(i == j, 0.5 * factor, factor)[:, None, None]
+                yield a, b, stacked(*(share * each for each in left)), stacked(*right)
 
 
 class _Bounds:
@@ -324,9 +342,9 @@ class _Bounds:
     def add_adjoint(self, Z: Array, out: Array) -> None:
         out += self.sign * Z
 
-    def add_normal(self, H: Array, out: Normal) -> None:
+    def add_normal(self, H: Array, out: _NormalBlocks) -> None:
         for j, h in enumerate(H):
-            _add(out, (j, j), _on_vectors(h[None], h[None]))
+            out.add_products((j, j), 0.5 * h[None], h[None])
 
 
 class _Multiplier:
@@ -347,7 +365,7 @@ class _Multiplier:
     def add_adjoint(self, Z: Array, out: Array) -> None:
         pass
 
-    def add_normal(self, H: Array, out: Normal) -> None:
+    def add_normal(self, H: Array, out: _NormalBlocks) -> None:
         pass
 
 
@@ -368,14 +386,43 @@ def _contracted(g: Array, h: Array, blocks: Array) -> Array:
     return (pairs.T @ blocks.reshape(len(g), -1)).reshape(g.shape[1], h.shape[1], -1)
 
 
-def _add(out: Normal, at: tuple[int, int], block: Array) -> None:
-    i, j = (int(k) for k in at)
-    if i < j:
-        i, j, block = j, i, block.T
-    if (i, j) in out:
-        out[i, j] += block
-    else:
-        out[i, j] = block
+class _NormalBlocks:
+    """Lower blocks {(i, j): block}, i >= j, of the normal equations between coefficients of P."""
+
+    def __init__(self) -> None:
+        self.blocks: dict[tuple[int, int], Array] = {}
+        self.products: dict[tuple[int, int], Array] = {}
+
+    def add(self, at: tuple[int, int], block: Array) -> None:
+        """Add a block (v, v) on vectors."""
+        i, j = (int(k) for k in at)
+        if i < j:
+            i, j, block = j, i, block.T
+        if (i, j) in self.blocks:
+            self.blocks[i, j] += block
+        else:
+            self.blocks[i, j] = block
+
+    def add_products(self, at: tuple[int, int], left: Array, right: Array) -> None:
+        """Add the map V -> sum left V right, (terms, n, n) both, of a block on the diagonal with
+        its adjoint.
+        """
+        i, j = (int(k) for k in at)
+        if i < j:
+            i, j, left, right = j, i, np.swapaxes(left, 1, 2), np.swapaxes(right, 1, 2)
+        terms, n = left.shape[:2]
+        product = left.reshape(terms, n * n).T @ right.reshape(terms, n * n)
+        if (i, j) in self.products:
+            self.products[i, j] += product
+        else:
+            self.products[i, j] = product
+
+    def finished(self) -> dict[tuple[int, int], Array]:
+        """Return the blocks; the products of a block are summed before they are rearranged."""
+        for (i, j), product in self.products.items():
+            block = _of_symmetric(_by_entry(product))
+            self.add((i, j), block + block.T if i == j else block)
+        return self.blocks
 
 
 def _on_vectors(left: Array, right: Array) -> Array:
@@ -383,7 +430,7 @@ def _on_vectors(left: Array, right: Array) -> Array:
     L and R of a map are `left` and `right` (..., terms, n, n).
     """
     terms, n = left.shape[-3:-1]
-    rows, columns, weight = indices(n)
+    rows, columns, _ = indices(n)
     if 2 * terms <= n:
         L = np.concatenate([left[..., rows, :], left[..., columns, :]], axis=-3)
         R = np.concatenate([right[..., columns], right[..., rows]], axis=-3)
@@ -391,10 +438,24 @@ def _on_vectors(left: Array, right: Array) -> Array:
         by_entry = np.ascontiguousarray(L) @ np.ascontiguousarray(R)
     else:  # one product for all entries
         shape = (*left.shape[:-3], terms, n * n)
-        product = np.swapaxes(left.reshape(shape), -1, -2) @ right.reshape(shape)
-        product = np.moveaxis(product.reshape(*shape[:-2], n, n, n, n), -1, -3)
-        by_entry = product[..., rows, columns, :, :] + product[..., columns, rows, :, :]
-    # of every entry of the image, the matrix that is multiplied with V entry by entry
+        by_entry = _by_entry(np.swapaxes(left.reshape(shape), -1, -2) @ right.reshape(shape))
+    return _of_symmetric(by_entry)
+
+
+def _by_entry(product: Array) -> Array:
+    """Return for every entry of the symmetric part of sum L V R the matrix (..., v, n, n) that is
+    multiplied with V entry by entry, of the products of entries of L and R, (..., n^2, n^2).
+    """
+    n = math.isqrt(product.shape[-1])
+    rows, columns, _ = indices(n)
+    product = np.moveaxis(product.reshape(*product.shape[:-2], n, n, n, n), -1, -3)
+    return product[..., rows, columns, :, :] + product[..., columns, rows, :, :]
+
+
+def _of_symmetric(by_entry: Array) -> Array:
+    """Return the map (..., v, v) on vectors of a symmetric V, of these matrices."""
+    n = by_entry.shape[-1]
+    rows, columns, weight = indices(n)
     flat = by_entry.reshape(*by_entry.shape[:-2], n * n)
     out = flat.take(rows * n + columns, axis=-1)
     out += flat.take(columns * n + rows, axis=-1)
@@ -431,9 +492,20 @@ class _Cones:
         """Return a starting point as close to the central path as the one of another program
         allows.
         """
-        slacks = self.slacks(start.P, start.y)
-        S = [_raised(slack, least) for slack, least in zip(slacks, start.least, strict=True)]
-        return _Point(start.P, start.y, S, [start.level * np.linalg.inv(s) for s in S])
+        S, Z = [], []
+        for slack, least, old in zip(
+            self.slacks(start.P, start.y), start.least, start.Z, strict=True
+        ):
+            raised = _raised(slack, least)
+            multiplier = start.level * np.linalg.inv(raised)
+            if len(old) * self.program.places == len(slack) * start.places:
+                # each kind of block at its former places, then at the new ones
+                kind = (-1, self.program.places, *slack.shape[1:])
+                known = old.reshape(-1, start.places, *slack.shape[1:])
+                multiplier.reshape(kind)[:, : start.places] = known
+            S.append(raised)
+            Z.append(multiplier)
+        return _Point(start.P, start.y, S, Z)
 
     def change(self, P: Array, y: Array) -> list[Array]:
         """Return the change of the slacks with P and y."""
@@ -476,15 +548,19 @@ class _Cones:
         dual_y, most = level.copy(), max(float(np.abs(z).max()) for z in point.Z)
         dual_y[0] -= self.program.cost
         product = sum(float(np.sum(s * z)) for s, z in zip(point.S, point.Z, strict=True))
+        dual_size = _largest(dual, dual_y) / max(1.0, most)
+        unknown = abs(float(np.sum(dual * point.P))) + abs(float(dual_y @ point.y))
+        lower = -(constant + unknown) / self.program.cost
         return _Residuals(
             primal,
             max(float(np.abs(r).max()) for r in primal) / self.size,
             dual,
             dual_y,
-            _largest(dual, dual_y) / max(1.0, most),
+            dual_size,
             product,
             product / max(abs(float(point.y[0])), MIN_LEVEL),
             _largest(dual, level) / -constant if constant < 0 else np.inf,
+            lower if self.program.cost > 0 and dual_size <= DUAL_RESIDUAL else -np.inf,
         )
 
 
@@ -552,9 +628,10 @@ class _NormalEquations:
 
     def __init__(self, cones: _Cones, scalings: list[_Scaling]):
         self.cones, self.scalings = cones, scalings
-        blocks: Normal = {}
+        normal = _NormalBlocks()
         for cone, scaling in zip(cones.each, scalings, strict=True):
-            cone.add_normal(scaling.H, blocks)
+            cone.add_normal(scaling.H, normal)
+        blocks = normal.finished()
         for (i, j), block in blocks.items():
             if i == j:
                 block[np.diag_indices(len(block))] *= 1.0 + DIAGONAL_SHIFT

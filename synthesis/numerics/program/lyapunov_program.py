@@ -161,6 +161,11 @@ class Program(Protocol):
         ...
 
     @property
+    def places(self) -> int:
+        """Number of points at which every kind of block is imposed, the last index of its order."""
+        ...
+
+    @property
     def cost(self) -> float:
         """Coefficient of the level in the objective."""
         ...
@@ -193,6 +198,11 @@ class LyapunovProgram:
     sizes: Sizes
     margin: float
     floor: float | None
+
+    @property
+    def places(self) -> int:
+        """One: a program of other cells has other blocks."""
+        return 1
 
     @property
     def cost(self) -> float:

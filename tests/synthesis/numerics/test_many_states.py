@@ -119,7 +119,7 @@ def test_the_normal_equations_are_what_the_blocks_say_one_direction_at_a_time(mo
     blocks = shape.products(scaled, 0)
     cones = method._Cones(LyapunovProgram(blocks, scaled.sizes(shape), 1e-6, 1e-6))
     rng = np.random.default_rng(1)
-    normal = {}
+    normal = method._NormalBlocks()
     H = []
     for cone in cones.each:
         m, N = cone.constant.shape[:2]
@@ -128,7 +128,7 @@ def test_the_normal_equations_are_what_the_blocks_say_one_direction_at_a_time(mo
         cone.add_normal(H[-1], normal)
     v = length(n)
     whole = np.zeros((shape.unknowns * v,) * 2)
-    for (i, j), block in normal.items():
+    for (i, j), block in normal.finished().items():
         whole[i * v : (i + 1) * v, j * v : (j + 1) * v] = block
         whole[j * v : (j + 1) * v, i * v : (i + 1) * v] = block.T
     P = symmetrized(rng.standard_normal((shape.unknowns, n, n)))
@@ -183,10 +183,10 @@ def test_the_normal_equations_of_functions_are_those_of_dense_matrices(
         images[i, blocks.columns[j]] += half + np.swapaxes(half, 1, 2)
     dense = np.einsum("ijvab,ibc,ikwcd,ida->jvkw", images, H, images, H, optimize=True)
     program = LyapunovProgram((blocks,), Sizes(n, N - n, count), 1e-6, 1e-6)
-    normal = {}
+    normal = method._NormalBlocks()
     method._Inequalities(blocks, program).add_normal(H, normal)
     found = np.zeros_like(dense)
-    for (i, j), block in normal.items():
+    for (i, j), block in normal.finished().items():
         found[i, :, j], found[j, :, i] = block, block.T
     # rounding of some hundred products of numbers of order one
     np.testing.assert_allclose(found, dense, rtol=0, atol=1e-12 * np.abs(dense).max())
