@@ -10,18 +10,24 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from symheli import LPVStateSpace, UncertainStateSpace
+from symheli.lpv.bases.polynomials import lobatto_points
 from synthesis.certify.assemble.bounded_real import (
     BlockMultipliers,
     Blocks,
     continuous_blocks,
     discrete_blocks,
 )
-from synthesis.certify.assemble.lyapunov_blocks import continuous_products, discrete_products
+from synthesis.certify.assemble.lyapunov_blocks import (
+    at_points,
+    continuous_products,
+    discrete_products,
+)
 from synthesis.certify.assemble.memory_blocks import memory_blocks
 from synthesis.certify.assemble.rounded import rounded
 from synthesis.certify.proof.one_parameter import IntervalEvidence
@@ -49,6 +55,9 @@ from synthesis.numerics.polynomial.symmetric_power import (
 from synthesis.numerics.program.lyapunov_program import MANY_STATES, LyapunovBlocks, Sizes
 
 Array = np.ndarray
+
+POINTS = 9
+"""Least number of values of p in a segment of P at which a program of few blocks begins."""
 
 
 class ScaledProblem(NamedTuple):
@@ -195,6 +204,21 @@ class Quadratic(Unknown):
             every = discrete_products(across, self.knots, self.degree, extra, self.by)
         W = extended(problem.units.weight, len(problem.lpv.inputs))
         return tuple(block.congruent(W) for block in every)
+
+    def at_points(self, problem: ScaledProblem) -> tuple[LyapunovBlocks, ...]:
+        """Return blocks at single p: `POINTS` a segment, and the breaks of the model."""
+        pace = problem.step if problem.discrete else problem.scaled_rate
+        W = extended(problem.units.weight, len(problem.lpv.inputs))
+        breaks, out = np.array([piece.low for piece in problem.pieces]), []
+        for j, ends in enumerate(pairwise(self.knots.tolist())):
+            inside = breaks[(breaks > ends[0]) & (breaks < ends[1])]
+            points = np.union1d(lobatto_points(POINTS, (ends,)).ravel(), inside)
+            model = problem.units.of_matrices(problem.lpv.matrices(points), problem.block)
+            block = at_points(
+                model, points, self.knots, j, self.degree, pace, problem.discrete, self.by
+            )
+            out.append(block.congruent(W))
+        return tuple(out)
 
     def _strips(self, problem: ScaledProblem) -> tuple[Strip, ...]:
         step = problem.step if self.degree else 0.0
