@@ -81,6 +81,7 @@ class Ladder(ABC):
         where that was not computed.
         """
         self.unit = self.expect(1.0)
+        self._begun: tuple[Found, Found | None] | None = None
 
     @cached_property
     def sampling_error(self) -> float:
@@ -153,6 +154,15 @@ class Ladder(ABC):
     def attempt(self, shape: Any, margin: float, alpha: float = 0.0) -> Found:
         """Assemble, solve and verify a program; `alpha` is the requested decay rate, 1/s."""
 
+    def begin(self, limit: float) -> bool:
+        """Make the attempts at a gain that cost least, whose result `search` goes on from; return
+        whether they prove one next to `limit`, the worst frozen one.
+        """
+        with task("searching a proof") as self._searching:
+            self.unit = self.expect(limit)
+            self._begun = self._cheapest(limit)
+        return any(found and self._next_to(found, limit) for found in self._begun)
+
     def search(self, limit: float) -> Found:
         """Return the best bound found. `limit`, the worst frozen value, sets the first scale and
         the level at which the search may stop.
@@ -172,7 +182,8 @@ class Ladder(ABC):
             return self._least(limit)
 
         def found(expected: float) -> tuple[Found, float, float]:
-            self.unit = self.expect(expected)
+            if self._begun is None:
+                self.unit = self.expect(expected)
             best = self._least(limit)
             return best, best.bound, self.unit
 
@@ -197,16 +208,12 @@ class Ladder(ABC):
 
     def _least(self, limit: float) -> Found:
         gains = self.problem.gains
-        best = self.proposed() if gains else Found(math.nan)
-        if best.proof is not None and best.bound <= (1 + CLOSE_TO_LOWER) * limit:
-            return best
-        self.unit = self.settle() if gains else self.unit
-        shapes, near, still = self.shapes(), self.problem.form.near, None
-        if gains and any(map(self.varies, shapes)):
-            # cheapest, and enough where p changes little
-            still = self._margins(self.constant(), Found(math.inf))
-            if still.proof is not None and still.bound <= (1 + CLOSE_TO_LOWER) * limit:
-                return still
+        best, still = self._begun or self._cheapest(limit)
+        self._begun = None
+        for found in (best, still):
+            if found and self._next_to(found, limit):
+                return found
+        shapes, near = self.shapes(), self.problem.form.near
         if gains and self.many_states:
             # before programs that take minutes
             best = best.or_better(self.of_frozen_models(limit), 1.0)
@@ -225,6 +232,24 @@ class Ladder(ABC):
             answer, best = best.answer, best.or_better(still, 1.0)
             best = best if best.proof is not None else best._replace(answer=answer)
         return best
+
+    def _cheapest(self, limit: float) -> tuple[Found, Found | None]:
+        """Return what is proven without a program, and by a constant P (None: not tried)."""
+        if not self.problem.gains:
+            return Found(math.nan), None
+        best = self.proposed()
+        if self._next_to(best, limit):
+            return best, None
+        self.unit = self.settle()
+        if not any(map(self.varies, self.shapes())):
+            return best, None
+        # cheapest, and enough where p changes little
+        return best, self._margins(self.constant(), Found(math.inf))
+
+    def _next_to(self, found: Found, limit: float) -> bool:
+        """Whether this gain is proven and cannot be improved to speak of."""
+        near = found.bound <= (1 + CLOSE_TO_LOWER) * limit
+        return self.problem.gains and found.proof is not None and near
 
     def _margins(self, shape: Any, best: Found) -> Found:
         for margin in self.margins:
