@@ -16,7 +16,6 @@ from synthesis.certify.assemble.bounded_real import (
     over_strips,
     supply_terms,
 )
-from synthesis.numerics.linear.norm import to_continuous
 from synthesis.numerics.polynomial.bernstein import blossom, product_weights
 from synthesis.numerics.polynomial.cells import Cell, Strip
 from synthesis.numerics.polynomial.pieces import ModelPiece
@@ -121,23 +120,22 @@ def at_points(
     j: int,
     degree: int,
     pace: float,
-    sampled: bool,
     multiplier: BlockMultipliers | None = None,
 ) -> LyapunovBlocks:
     """The blocks of a model at single p in segment j, where it has these matrices (K, ...) and p
-    moves by `pace` per unit of time or sample: fewer than Bernstein coefficients, so that the
-    resulting P is only a candidate.
+    moves by `pace` per unit of time: fewer than Bernstein coefficients, so that the resulting P is
+    only a candidate.
 
-    In the coordinates s = (x + x+)/sqrt(2) of a sampled model the change of V is s'P d + d'P s, d =
-    (x+ - x)/sqrt(2): that of its bilinear image in continuous time, well conditioned however short
-    the sample. What P(p+) - P(p) adds is taken as +-dP/dp at s, as slow states see it.
+    Of a sampled model the matrices are those of its bilinear image and `pace` is half the change of
+    p in a sample. In the coordinates s = (x + x+)/sqrt(2) the change of V is s'P d + d'P s, d = (x+
+    - x)/sqrt(2), well conditioned however short the sample. What P(p+) - P(p) adds is taken as
+    +-dP/dp at s, as slow states see it.
     """
-    A, B, C, D = map(np.asarray, to_continuous(*model) if sampled else model)
+    A, B, C, D = model
     flow, state = np.concatenate([A, B], axis=2), of_state(A, B)
     own = slice(None, None if multiplier is None else -multiplier.block.outputs)
     seen = np.concatenate([C, D], axis=2)[:, own]
-    pace = 0.25 * pace if sampled else 0.5 * pace
-    paces = (-pace, pace) if pace > 0 and degree else (0.0,)
+    paces = (-0.5 * pace, 0.5 * pace) if pace > 0 and degree else (0.0,)
     t = (points - knots[j]) / (knots[j + 1] - knots[j])
     value = np.stack([blossom([s] * degree) for s in t])
     lower = np.stack([blossom([s] * max(degree - 1, 0)) for s in t])

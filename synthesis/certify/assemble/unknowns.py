@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import NamedTuple
@@ -17,6 +17,7 @@ import numpy as np
 
 from symheli import LPVStateSpace, UncertainStateSpace
 from symheli.lpv.bases.polynomials import lobatto_points
+from symheli.lpv.tools import Matrices
 from synthesis.certify.assemble.bounded_real import (
     BlockMultipliers,
     Blocks,
@@ -205,20 +206,26 @@ class Quadratic(Unknown):
         W = extended(problem.units.weight, len(problem.lpv.inputs))
         return tuple(block.congruent(W) for block in every)
 
-    def at_points(self, problem: ScaledProblem) -> tuple[LyapunovBlocks, ...]:
-        """Return blocks at single p: `POINTS` a segment, and the breaks of the model."""
-        pace = problem.step if problem.discrete else problem.scaled_rate
-        W = extended(problem.units.weight, len(problem.lpv.inputs))
+    def points(self, problem: ScaledProblem) -> list[Array]:
+        """Return single values of p in every segment: `POINTS`, and the breaks of the model."""
         breaks, out = np.array([piece.low for piece in problem.pieces]), []
-        for j, ends in enumerate(pairwise(self.knots.tolist())):
+        for ends in pairwise(self.knots.tolist()):
             inside = breaks[(breaks > ends[0]) & (breaks < ends[1])]
-            points = np.union1d(lobatto_points(POINTS, (ends,)).ravel(), inside)
-            model = problem.units.of_matrices(problem.lpv.matrices(points), problem.block)
-            block = at_points(
-                model, points, self.knots, j, self.degree, pace, problem.discrete, self.by
-            )
-            out.append(block.congruent(W))
-        return tuple(out)
+            out.append(np.union1d(lobatto_points(POINTS, (ends,)).ravel(), inside))
+        return out
+
+    def at_points(
+        self, problem: ScaledProblem, points: Sequence[Array], models: Sequence[Matrices]
+    ) -> tuple[LyapunovBlocks, ...]:
+        """Return blocks at the points of every segment, where the model, of a sampled one its
+        bilinear image, has these matrices.
+        """
+        pace = 0.5 * problem.step if problem.discrete else problem.scaled_rate
+        W = extended(problem.units.weight, len(problem.lpv.inputs))
+        return tuple(
+            at_points(model, at, self.knots, j, self.degree, pace, self.by).congruent(W)
+            for j, (at, model) in enumerate(zip(points, models, strict=True))
+        )
 
     def _strips(self, problem: ScaledProblem) -> tuple[Strip, ...]:
         step = problem.step if self.degree else 0.0

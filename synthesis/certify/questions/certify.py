@@ -75,10 +75,11 @@ def certify(problem: BoundProblem) -> Certificate:
         frozen, search = Worst(0.0 if problem.gains else -MARGINAL_DECAY, frozen.p), None
     stability = demand.kind == STABILITY
     level = math.inf if stability else frozen.value if demand.kind.indexed else abs(frozen.value)
-    ladder = route(problem)
-    begun = time.perf_counter()
+    ladder, best, begun = route(problem), None, time.perf_counter()
     if demand.kind == L2_GAIN and search is not None and ladder.begin(level):
-        search = None  # no trajectory is worse by more than the proof leaves
+        best = ladder.search(level)
+        # a trajectory can only be worse by what such a proof leaves
+        search = None if ladder.next_to(best, level) else search
     start += time.perf_counter() - begun
     limit = frozen if stability else worst_moving(model.source, demand, frozen, search)
     beaten = Beaten(
@@ -90,7 +91,7 @@ def certify(problem: BoundProblem) -> Certificate:
     )
     if math.isinf(limit.value) if problem.gains else limit.value >= 0:
         return report.nothing(Status.GROWING, beaten)
-    best = ladder.search(level)
+    best = best or ladder.search(level)
     for other in (over_jumps, by_coefficients) if stability else (by_coefficients,):
         again = None if best.proof is not None else other(problem)
         if again is not None:

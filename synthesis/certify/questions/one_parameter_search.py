@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from symheli.lpv.tools import Matrices
 from synthesis.certify.assemble.bounded_real import assemble
 from synthesis.certify.assemble.lyapunov_blocks import kept
 from synthesis.certify.assemble.unknowns import (
@@ -28,7 +29,7 @@ from synthesis.certify.statement.impose import Bernstein
 from synthesis.certify.statement.outcome import Attempt
 from synthesis.certify.statement.scaling import dissipative, storage_of
 from synthesis.certify.statement.spline import Lyapunov, SplineLyapunov
-from synthesis.numerics.linear.norm import norm
+from synthesis.numerics.linear.norm import norm, to_continuous
 from synthesis.numerics.polynomial.symmetric import smat
 from synthesis.numerics.program import interior_point
 from synthesis.numerics.program.answer import Answer
@@ -139,7 +140,7 @@ class OneParameter(Ladder):
             return interior_point.minimise(LyapunovProgram(blocks, sizes, margin, floor), solver)
         active: list[Array] = [np.zeros(len(block.constant), bool) for block in blocks]
         coarse = replace(solver, tolerance=max(POINT_TOLERANCE, solver.options["tolerance"]))
-        chosen, seconds, rounds = form.at_points(self.scaled), 0.0, 0
+        chosen, seconds, rounds = self._at_points(form), 0.0, 0
         while True:
             rounds += 1
             program = LyapunovProgram(chosen, sizes, margin, floor)
@@ -168,6 +169,15 @@ class OneParameter(Ladder):
             chosen = (*chosen, *added)
         message = f"{candidate.message} ({rounds} round(s))"
         return replace(candidate, seconds=seconds, message=message)
+
+    def _at_points(self, form: Quadratic) -> tuple[LyapunovBlocks, ...]:
+        """Return the blocks at single p with which a program of many blocks begins."""
+        scaled, models = self.scaled, []
+        points = form.points(scaled)
+        for at in points:
+            model = scaled.units.of_matrices(scaled.lpv.matrices(at), scaled.block)
+            models.append(Matrices(*to_continuous(*model)) if scaled.discrete else model)
+        return form.at_points(scaled, points, models)
 
     def _target(self, sizes: Sizes, level: float) -> Array:
         """Return what a block of weight 1 may be at most at this level, g or -t."""
@@ -235,6 +245,13 @@ class OneParameter(Ladder):
     def many_states(self) -> bool:  # type: ignore[override]
         """Whether there are so many states that a program takes minutes."""
         return len(self.scaled.lpv.states) > MANY_STATES
+
+    def simple(self) -> Unknown | None:
+        """Return P in one segment, of many states where the user left the segments open."""
+        tried = self.problem.form.segments_tried(1)
+        if not self.many_states or (tried and len(tried) == 1):
+            return None
+        return next(unknowns(self.scaled, replace(self.problem.form, segments=1)))
 
     def of_frozen_models(self, limit: float) -> Found:
         """Return the gain proven by P linear between storage functions of frozen models; nothing
