@@ -24,6 +24,7 @@ from synthesis import Certificate, Solver, decay_rate, frozen_gain, l2_gain, lft
 from synthesis.analysis import Status, energy_to_peak
 from synthesis.certify.assemble.bounded_real import BlockMultipliers
 from synthesis.certify.assemble.unknowns import Quadratic, scaled_problem
+from synthesis.certify.questions import one_parameter_search
 from synthesis.certify.questions.problem import pose
 from synthesis.certify.statement.spline import graded_knots
 from synthesis.forms import LaggedParameter, Spline
@@ -419,6 +420,21 @@ def test_numbers_beyond_the_doubles_are_left_to_the_pivots():
     assert exact.positive_definite(M)
     # beside it smaller ones are zero in one unit
     assert exact.positive_definite(np.stack([M, rational(np.eye(8))]))
+
+
+@pytest.mark.parametrize("sampled", [False, True])
+def test_a_program_that_begins_at_single_p_proves_nearly_the_same(monkeypatch, sampled):
+    """Its level is 4e-3 of gamma squared from the least one at most, its gap 1e-3."""
+    model = springs(2, 0.5)
+    model = model.discretize(0.05) if sampled else model
+    form, gains = Spline(segments=4, degree=2), []
+    for few in (one_parameter_search.FEW_BLOCKS, 0):
+        monkeypatch.setattr(one_parameter_search, "FEW_BLOCKS", few)
+        cert = l2_gain(model, form=form, solver=LYAPUNOV, search=None)
+        assert cert.verify(rigorous=True)
+        gains.append(cert.gamma)
+    assert "round(s)" in str(cert.attempts[-1])
+    assert gains[1] == pytest.approx(gains[0], rel=4e-3)
 
 
 def nearly_singular(rng):
