@@ -8,20 +8,27 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from symheli import LPVStateSpace, UncertainStateSpace
+from symheli.lpv.bases.polynomials import lobatto_points
+from symheli.lpv.tools import Matrices
 from synthesis.certify.assemble.bounded_real import (
     BlockMultipliers,
     Blocks,
     continuous_blocks,
     discrete_blocks,
 )
-from synthesis.certify.assemble.lyapunov_blocks import continuous_products, discrete_products
+from synthesis.certify.assemble.lyapunov_blocks import (
+    at_points,
+    continuous_products,
+    discrete_products,
+)
 from synthesis.certify.assemble.memory_blocks import memory_blocks
 from synthesis.certify.assemble.rounded import rounded
 from synthesis.certify.proof.one_parameter import IntervalEvidence
@@ -49,6 +56,9 @@ from synthesis.numerics.polynomial.symmetric_power import (
 from synthesis.numerics.program.lyapunov_program import MANY_STATES, LyapunovBlocks, Sizes
 
 Array = np.ndarray
+
+POINTS = 9
+"""Least number of values of p in a segment of P at which a program of few blocks begins."""
 
 
 class ScaledProblem(NamedTuple):
@@ -195,6 +205,27 @@ class Quadratic(Unknown):
             every = discrete_products(across, self.knots, self.degree, extra, self.by)
         W = extended(problem.units.weight, len(problem.lpv.inputs))
         return tuple(block.congruent(W) for block in every)
+
+    def points(self, problem: ScaledProblem) -> list[Array]:
+        """Return single values of p in every segment: `POINTS`, and the breaks of the model."""
+        breaks, out = np.array([piece.low for piece in problem.pieces]), []
+        for ends in pairwise(self.knots.tolist()):
+            inside = breaks[(breaks > ends[0]) & (breaks < ends[1])]
+            out.append(np.union1d(lobatto_points(POINTS, (ends,)).ravel(), inside))
+        return out
+
+    def at_points(
+        self, problem: ScaledProblem, points: Sequence[Array], models: Sequence[Matrices]
+    ) -> tuple[LyapunovBlocks, ...]:
+        """Return blocks at the points of every segment, where the model, of a sampled one its
+        bilinear image, has these matrices.
+        """
+        pace = 0.5 * problem.step if problem.discrete else problem.scaled_rate
+        W = extended(problem.units.weight, len(problem.lpv.inputs))
+        return tuple(
+            at_points(model, at, self.knots, j, self.degree, pace, self.by).congruent(W)
+            for j, (at, model) in enumerate(zip(points, models, strict=True))
+        )
 
     def _strips(self, problem: ScaledProblem) -> tuple[Strip, ...]:
         step = problem.step if self.degree else 0.0

@@ -85,8 +85,7 @@ def proven(statement: Statement, gamma: float) -> bool:
     """Check in exact rational arithmetic over the whole interval: P > 0 and every block < 0 with g
     = gamma^2 (NaN: stability).
 
-    The doubles of the pieces, of P, of rate and of gamma are taken as the rationals they are. Uses
-    python-flint where installed, else the (slower) fractions of the standard library.
+    The doubles of the pieces, of P, of rate and of gamma are taken as the rationals they are.
     """
     number, P = rational(), statement.P
     if not (statement.meaningful and statement.invariant(number)):

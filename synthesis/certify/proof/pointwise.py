@@ -20,7 +20,7 @@ from symheli.lpv.lpv_matrices import Matrices
 from synthesis.certify.statement.box import BoxLyapunov
 from synthesis.certify.statement.norm_bounded import NormBounded
 from synthesis.certify.statement.spline import MemoryLyapunov, SplineLyapunov
-from synthesis.numerics.polynomial.exact import Number, exact, growth_of, positive_definite
+from synthesis.numerics.polynomial.exact import Number, exact, growth_of, matmul, positive_definite
 from synthesis.numerics.polynomial.symmetric import extended, symmetrized
 
 if TYPE_CHECKING:
@@ -177,22 +177,24 @@ def dissipation(
     x, u = one[:n], one[n + inputs :]
     move, out = np.hstack([A, B]), np.hstack([C, D])
     if after is None:
-        change = x.T @ (P @ move) + (x.T @ (P @ move)).T
-        change = change if drift is None else change + x.T @ (drift @ x)
+        change = matmul(x.T, matmul(P, move))
+        change = change + change.T
+        change = change if drift is None else change + matmul(x.T, matmul(drift, x))
     else:
-        change = move.T @ (after @ move) - x.T @ (P @ x)
+        change = matmul(move.T, matmul(after, move)) - matmul(x.T, matmul(P, x))
     if block is not None:
         places = block.block.places(n, len(C))
         for (rows, columns), factor in zip(places, block.multipliers, strict=True):
             d, v = one[rows], out[columns]
-            change = change + factor * (block.bound * block.bound * (v.T @ v) - d.T @ d)
+            seen = matmul(v.T, v)
+            change = change + factor * (block.bound * block.bound * seen - d.T @ d)
     if g is None:
         return change[: n + inputs, : n + inputs]
     if supply is not None:
         q, s, r = supply
-        across = out.T @ u
-        return change - q * (out.T @ out) - s * (across + across.T) - r * (u.T @ u)
-    return change + out[:y].T @ out[:y] - g * (u.T @ u)
+        across = matmul(out.T, u)
+        return change - q * matmul(out.T, out) - s * (across + across.T) - r * (u.T @ u)
+    return change + matmul(out[:y].T, out[:y]) - g * (u.T @ u)
 
 
 def paces(
@@ -309,7 +311,7 @@ def _states_of(P: SplineLyapunov | BoxLyapunov, number: Number) -> Callable[[Arr
     if isinstance(P, BoxLyapunov) or P.coordinates is None:
         return lambda form: form
     T = exact(P.coordinates, number)
-    return lambda form: T.T @ form @ T
+    return lambda form: matmul(T.T, matmul(form, T))
 
 
 def _output_form(P: Array, model: Matrices, rows: bool, dt: float | None, g: Any) -> Array:

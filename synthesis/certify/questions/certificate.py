@@ -273,12 +273,11 @@ class Certificate(ProvenStatement):
         return max(self.rates, default=0.0)
 
     def verify(self, rigorous: bool = False) -> bool:
-        """Verify proof and bound anew; `rigorous`: in exact rational arithmetic (python-flint makes
-        it fast).
+        """Verify proof and bound anew; `rigorous`: in exact rational arithmetic.
 
         Exact: the doubles of the model, of the proof, of rates and bound are taken as the rationals
-        they are, and LDL' factorisations decide; nothing between grid points is left out. Without a
-        proof nothing is verified.
+        they are. Factorisations with a bound of their rounding decide, else exact ones; nothing
+        between grid points is left out. Without a proof nothing is verified.
         """
         if self.proof is None or self.status is Status.UNPROVEN or self.fault is not None:
             return False

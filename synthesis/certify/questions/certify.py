@@ -29,7 +29,7 @@ from synthesis.certify.questions.one_parameter_search import OneParameter
 from synthesis.certify.questions.problem import BoundProblem
 from synthesis.certify.statement.forms import Spline
 from synthesis.certify.statement.impose import Grid
-from synthesis.certify.statement.kind import STABILITY
+from synthesis.certify.statement.kind import L2_GAIN, STABILITY
 from synthesis.certify.statement.outcome import Seconds, Status
 from synthesis.certify.statement.trajectory import SchedulingTrajectory
 from synthesis.numerics.polynomial.pieces import Pieces, pieces
@@ -74,6 +74,13 @@ def certify(problem: BoundProblem) -> Certificate:
         # stable or not to rounding: nothing is known from below
         frozen, search = Worst(0.0 if problem.gains else -MARGINAL_DECAY, frozen.p), None
     stability = demand.kind == STABILITY
+    level = math.inf if stability else frozen.value if demand.kind.indexed else abs(frozen.value)
+    ladder, best, begun = route(problem), None, time.perf_counter()
+    if demand.kind == L2_GAIN and search is not None and ladder.begin(level):
+        best = ladder.search(level)
+        # a trajectory can only be worse by what such a proof leaves
+        search = None if ladder.next_to(best, level) else search
+    start += time.perf_counter() - begun
     limit = frozen if stability else worst_moving(model.source, demand, frozen, search)
     beaten = Beaten(
         sign * frozen.value,
@@ -84,9 +91,7 @@ def certify(problem: BoundProblem) -> Certificate:
     )
     if math.isinf(limit.value) if problem.gains else limit.value >= 0:
         return report.nothing(Status.GROWING, beaten)
-    level = math.inf if stability else frozen.value if demand.kind.indexed else abs(frozen.value)
-    ladder = route(problem)
-    best = ladder.search(level)
+    best = best or ladder.search(level)
     for other in (over_jumps, by_coefficients) if stability else (by_coefficients,):
         again = None if best.proof is not None else other(problem)
         if again is not None:

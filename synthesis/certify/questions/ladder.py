@@ -35,6 +35,8 @@ more accurate.
 """
 CLOSE_TO_LOWER = 1e-3
 """A bound within this fraction of the lower bound is not improved further by a constant P."""
+CLOSE_OF_MANY = 1e-2
+"""The same where there are many states and form, impose and solver were left to the search."""
 MAX_FROZEN_RATIO = 1.05
 """Ratio to the worst frozen gain up to which a bound by storage functions of frozen models ends the
 search where there are many states.
@@ -81,6 +83,7 @@ class Ladder(ABC):
         where that was not computed.
         """
         self.unit = self.expect(1.0)
+        self._begun: tuple[Found, Found | None] | None = None
 
     @cached_property
     def sampling_error(self) -> float:
@@ -124,6 +127,12 @@ class Ladder(ABC):
         """Return a bound on the gain proven without a program."""
         return Found(math.inf)
 
+    def simple(self) -> Any:
+        """Return the form of P in one segment, None where it costs about as much as the others or
+        was not asked for.
+        """
+        return None
+
     many_states = False
     """Whether there are so many states that a program takes minutes."""
 
@@ -153,6 +162,15 @@ class Ladder(ABC):
     def attempt(self, shape: Any, margin: float, alpha: float = 0.0) -> Found:
         """Assemble, solve and verify a program; `alpha` is the requested decay rate, 1/s."""
 
+    def begin(self, limit: float) -> bool:
+        """Make the attempts at a gain that cost least, from whose result `search` goes on; return
+        whether they prove any. `limit` is the worst frozen gain.
+        """
+        with task("searching a proof") as self._searching:
+            self.unit = self.expect(limit)
+            self._begun = self._cheapest(limit)
+        return any(found and found.proof for found in self._begun)
+
     def search(self, limit: float) -> Found:
         """Return the best bound found. `limit`, the worst frozen value, sets the first scale and
         the level at which the search may stop.
@@ -172,7 +190,8 @@ class Ladder(ABC):
             return self._least(limit)
 
         def found(expected: float) -> tuple[Found, float, float]:
-            self.unit = self.expect(expected)
+            if self._begun is None:
+                self.unit = self.expect(expected)
             best = self._least(limit)
             return best, best.bound, self.unit
 
@@ -197,16 +216,12 @@ class Ladder(ABC):
 
     def _least(self, limit: float) -> Found:
         gains = self.problem.gains
-        best = self.proposed() if gains else Found(math.nan)
-        if best.proof is not None and best.bound <= (1 + CLOSE_TO_LOWER) * limit:
-            return best
-        self.unit = self.settle() if gains else self.unit
-        shapes, near, still = self.shapes(), self.problem.form.near, None
-        if gains and any(map(self.varies, shapes)):
-            # cheapest, and enough where p changes little
-            still = self._margins(self.constant(), Found(math.inf))
-            if still.proof is not None and still.bound <= (1 + CLOSE_TO_LOWER) * limit:
-                return still
+        best, still = self._begun or self._cheapest(limit)
+        self._begun = None
+        for found in (best, still):
+            if found and self.next_to(found, limit):
+                return found
+        shapes, near = self.shapes(), self.problem.form.near
         if gains and self.many_states:
             # before programs that take minutes
             best = best.or_better(self.of_frozen_models(limit), 1.0)
@@ -225,6 +240,29 @@ class Ladder(ABC):
             answer, best = best.answer, best.or_better(still, 1.0)
             best = best if best.proof is not None else best._replace(answer=answer)
         return best
+
+    def _cheapest(self, limit: float) -> tuple[Found, Found | None]:
+        """Return what is proven without a program, and by a constant P or, of many states, by one
+        polynomial P (None: not tried).
+        """
+        if not self.problem.gains:
+            return Found(math.nan), None
+        best = self.proposed()
+        if self.next_to(best, limit):
+            return best, None
+        self.unit = self.settle()
+        if not any(map(self.varies, self.shapes())):
+            return best, None
+        # cheapest, and enough where p changes little
+        still = self._margins(self.constant(), Found(math.inf))
+        simple = None if self.next_to(still, limit) else self.simple()
+        return best, still if simple is None else self._margins(simple, still)
+
+    def next_to(self, found: Found, limit: float) -> bool:
+        """Whether this gain is proven and cannot be improved to speak of."""
+        long = self.many_states and self.problem.usual
+        near = found.bound <= (1 + (CLOSE_OF_MANY if long else CLOSE_TO_LOWER)) * limit
+        return self.problem.gains and found.proof is not None and near
 
     def _margins(self, shape: Any, best: Found) -> Found:
         for margin in self.margins:

@@ -10,7 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from symheli.lpv.tools import Matrices
 from synthesis.certify.assemble.bounded_real import assemble
+from synthesis.certify.assemble.lyapunov_blocks import kept
 from synthesis.certify.assemble.unknowns import (
     Quadratic,
     ScaledProblem,
@@ -27,11 +29,17 @@ from synthesis.certify.statement.impose import Bernstein
 from synthesis.certify.statement.outcome import Attempt
 from synthesis.certify.statement.scaling import dissipative, storage_of
 from synthesis.certify.statement.spline import Lyapunov, SplineLyapunov
-from synthesis.numerics.linear.norm import norm
+from synthesis.numerics.linear.norm import norm, to_continuous
+from synthesis.numerics.polynomial.symmetric import smat
 from synthesis.numerics.program import interior_point
 from synthesis.numerics.program.answer import Answer
 from synthesis.numerics.program.cone_program import LYAPUNOV, SolverPoint, solve
-from synthesis.numerics.program.lyapunov_program import MANY_STATES, LyapunovProgram
+from synthesis.numerics.program.lyapunov_program import (
+    MANY_STATES,
+    LyapunovBlocks,
+    LyapunovProgram,
+    Sizes,
+)
 
 Array = np.ndarray
 
@@ -41,6 +49,14 @@ GAIN_MARGINS = (1e-6, 1e-5, 1e-4, 5e-4, 2e-3, 1e-2)
 """Fractions above the expected gain at which a storage function of a frozen model is computed."""
 SHIFTS_TO_IDENTITY = (1e-3, 1e-2, 0.1, 0.5)
 """Weights of I in the convex combinations of P and I that are tried."""
+FEW_BLOCKS = 256
+"""Number of blocks up to which a program of products with P has all of them at once."""
+POINT_TOLERANCE = 1e-3
+"""Least relative gap to which a program that begins with blocks at single p is solved."""
+LEVEL_TOLERANCE = 4e-3
+"""Fraction above its level, a square of a gain, up to which a block outside it is not added."""
+ADDED = 8
+"""Number of blocks of one cell that are added in a round, about."""
 MAX_ROUNDS = 12
 """Largest number of rounds in which violated blocks are added; blocks violated after the last one
 only raise the recomputed gain.
@@ -114,12 +130,60 @@ class OneParameter(Ladder):
         return self._solve_by_rounds(shape, margin)
 
     def _solve_by_products(self, form: Unknown, margin: float) -> SolverPoint:
-        """Solve with all blocks, kept as products with P."""
+        """Solve with the blocks kept as products with P: all where they are few; else those at
+        single p, with some of every cell where one is violated added until none is.
+        """
         assert isinstance(form, Quadratic)  # noqa: S101 - see `Problem`
-        blocks = form.products(self.scaled, self.elevation)
+        blocks, solver = form.products(self.scaled, self.elevation), self.problem.solver
         sizes, floor = self.scaled.sizes(form), self.problem.impose.least
-        program = LyapunovProgram(blocks, sizes, margin, floor)
-        return interior_point.minimise(program, self.problem.solver)
+        if sum(len(block.constant) for block in blocks) <= FEW_BLOCKS:
+            return interior_point.minimise(LyapunovProgram(blocks, sizes, margin, floor), solver)
+        active: list[Array] = [np.zeros(len(block.constant), bool) for block in blocks]
+        coarse = replace(solver, tolerance=max(POINT_TOLERANCE, solver.options["tolerance"]))
+        chosen, seconds, rounds = self._at_points(form), 0.0, 0
+        while True:
+            rounds += 1
+            program = LyapunovProgram(chosen, sizes, margin, floor)
+            candidate = interior_point.minimise(program, coarse)
+            seconds += candidate.seconds
+            if candidate.x is None or rounds == MAX_ROUNDS:
+                break
+            level = candidate.x[-1] * (1 + LEVEL_TOLERANCE if self.problem.gains else 1)
+            P = smat(form.coefficients(candidate.x), form.size)
+            multiplier = form.multiplier(candidate.x)
+            added: list[LyapunovBlocks] = []
+            for block, which in zip(blocks, active, strict=True):
+                excess = block.linear(P) + block.constant - self._target(sizes, level)
+                if block.supply is not None:
+                    excess = excess + block.supply.matrices(multiplier)
+                largest = np.where(which, 0.0, np.linalg.eigvalsh(excess)[:, -1])
+                if largest.max() > 0.0:
+                    # others beside the worst would be the next
+                    apart = max(1, len(which) // ADDED)
+                    new = np.arange(largest.argmax() % apart, len(which), apart)
+                    new = new[~which[new]]
+                    which[new] = True
+                    added.append(kept(block, new))
+            if not added:
+                break
+            chosen = (*chosen, *added)
+        message = f"{candidate.message} ({rounds} round(s))"
+        return replace(candidate, seconds=seconds, message=message)
+
+    def _at_points(self, form: Quadratic) -> tuple[LyapunovBlocks, ...]:
+        """Return the blocks at single p with which a program of many blocks begins."""
+        scaled, models = self.scaled, []
+        points = form.points(scaled)
+        for at in points:
+            model = scaled.units.of_matrices(scaled.lpv.matrices(at), scaled.block)
+            models.append(Matrices(*to_continuous(*model)) if scaled.discrete else model)
+        return form.at_points(scaled, points, models)
+
+    def _target(self, sizes: Sizes, level: float) -> Array:
+        """Return what a block of weight 1 may be at most at this level, g or -t."""
+        if self.problem.gains:
+            return np.diag(np.r_[np.zeros(sizes.strict), np.full(sizes.inputs, level)])
+        return -level * np.eye(sizes.rows)
 
     def _solve_by_rounds(self, form: Unknown, margin: float) -> SolverPoint:
         """Solve with the blocks likely to be active, add the violated ones, and repeat: this needs
@@ -144,13 +208,7 @@ class OneParameter(Ladder):
             if candidate.x is None or rounds == MAX_ROUNDS or all(which.all() for which in active):
                 break
             P, multiplier = form.coefficients(candidate.x), form.multiplier(candidate.x)
-            level = candidate.x[-1]
-            target = (
-                np.diag(np.r_[np.zeros(sizes.strict), np.full(sizes.inputs, level)])
-                if self.problem.gains
-                else -level * np.eye(sizes.rows)
-            )
-            added = 0
+            target, added = self._target(sizes, candidate.x[-1]), 0
             for block, which in zip(blocks, active, strict=True):
                 if which.all():
                     continue
@@ -187,6 +245,13 @@ class OneParameter(Ladder):
     def many_states(self) -> bool:  # type: ignore[override]
         """Whether there are so many states that a program takes minutes."""
         return len(self.scaled.lpv.states) > MANY_STATES
+
+    def simple(self) -> Unknown | None:
+        """Return P in one segment, of many states where the user left the segments open."""
+        tried = self.problem.form.segments_tried(1)
+        if not self.many_states or (tried and len(tried) == 1):
+            return None
+        return next(unknowns(self.scaled, replace(self.problem.form, segments=1)))
 
     def of_frozen_models(self, limit: float) -> Found:
         """Return the gain proven by P linear between storage functions of frozen models; nothing

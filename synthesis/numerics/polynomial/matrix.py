@@ -15,6 +15,7 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.values.summary import summarized
 from synthesis.numerics.polynomial.bernstein import blossom, elevation_matrix, restriction
+from synthesis.numerics.polynomial.exact import matmul, quotient, whole
 
 Array = np.ndarray
 Box = tuple[tuple[Any, Any], ...]
@@ -161,7 +162,8 @@ class PolynomialMatrix:
         """The product F(p) G(p); degrees add."""
         self._common(other)
         m = len(self.box)
-        F, G = _stacked(self._weighted(), other._weighted(), m)
+        (F, first), (G, second) = self._weighted(), other._weighted()
+        F, G = _stacked(F, G, m)
         shape = tuple(a + b - 1 for a, b in zip(F.shape[:m], G.shape[:m], strict=True))
         out: Any = None
         few, many, left = (F, G, True) if prod(F.shape[:m]) <= prod(G.shape[:m]) else (G, F, False)
@@ -170,7 +172,7 @@ class PolynomialMatrix:
             if out is None:
                 out = np.zeros((*shape, *part.shape[m:]), dtype=part.dtype)
             out[tuple(slice(i, i + n) for i, n in zip(index, many.shape[:m], strict=True))] += part
-        return _unweighted(self.box, out)
+        return _unweighted(self.box, out, first * second)
 
     def congruence(self, T: PolynomialMatrix) -> PolynomialMatrix:
         """T(p)' F(p) T(p)."""
@@ -188,14 +190,14 @@ class PolynomialMatrix:
         extra = tuple(b - a for a, b in zip(self.degrees, degrees, strict=True))
         if not any(extra):
             return self
-        F, m = self._weighted(), len(self.box)
+        (F, common), m = self._weighted(), len(self.box)
         out = np.zeros((*(d + 1 for d in degrees), *F.shape[m:]), dtype=F.dtype)
         for index in np.ndindex(*(e + 1 for e in extra)):
             factor = prod(comb(e, i) for e, i in zip(extra, index, strict=True))
             out[tuple(slice(i, i + n) for i, n in zip(index, F.shape[:m], strict=True))] += (
                 factor * F
             )
-        return _unweighted(self.box, out)
+        return _unweighted(self.box, out, common)
 
     def restrict(self, box: Box) -> PolynomialMatrix:
         """Return the same polynomial over another box."""
@@ -237,8 +239,13 @@ class PolynomialMatrix:
             raise InputError(f"the boxes differ: {self.box} and {other.box}")
         return tuple(map(max, self.degrees, other.degrees))
 
-    def _weighted(self) -> Array:
-        return self.coefficients * _binomials(self.coefficients, len(self.box))
+    def _weighted(self) -> tuple[Array, int]:
+        """Return the coefficients times their binomials, of rationals as integers over one
+        denominator.
+        """
+        exact = self.coefficients.dtype == object
+        c, common = whole(self.coefficients) if exact else (self.coefficients, 1)
+        return c * _binomials(c, len(self.box)), common
 
 
 def block(rows: Sequence[Sequence[PolynomialMatrix]]) -> PolynomialMatrix:
@@ -272,7 +279,8 @@ def _stacked(F: Array, G: Array, m: int) -> tuple[Array, Array]:
 
 def _along(T: Array, coefficients: Array, axis: int) -> Array:
     """Apply the matrix T to one axis, in any arithmetic."""
-    return np.moveaxis(np.tensordot(T, coefficients, axes=(1, axis)), 0, axis)
+    c = np.moveaxis(coefficients, axis, 0)
+    return np.moveaxis(matmul(T, c.reshape(len(c), -1)).reshape(len(T), *c.shape[1:]), 0, axis)
 
 
 def _binomials(c: Array, m: int) -> Array:
@@ -286,16 +294,11 @@ def _binomials(c: Array, m: int) -> Array:
     )
 
 
-# the integer 0 of an empty sum must not become the float 0.0
-_exact_quotient = np.frompyfunc(
-    lambda numerator, weight: numerator if numerator == 0 else numerator / weight, 2, 1
-)
-
-
-def _unweighted(box: Box, c: Array) -> PolynomialMatrix:
+def _unweighted(box: Box, c: Array, common: int) -> PolynomialMatrix:
     weights = _binomials(c, len(box))
+    exact = c.dtype == object
     return PolynomialMatrix(
-        box, np.asarray(_exact_quotient(c, weights)) if c.dtype == object else c / weights
+        box, np.asarray(quotient(c, weights * common), dtype=object) if exact else c / weights
     )
 
 
