@@ -39,7 +39,7 @@ OPTIONAL = {
     "zarr": "datasets of campaigns",
     "shtab": "completion in a shell: symheli completion bash|zsh|tcsh",
     "ipywidgets": "sliders in notebooks",
-    "python-flint": "fast exact verification of certificates",
+    "python-flint": "balls over frequency and the stand-alone checker, in less time",
     "scs": "a second solver to cross-check",
     "jsbsim": "flying the AH-1S, a helicopter from elsewhere",
 }

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from synthesis.numerics.polynomial.exact import Number
+from synthesis.numerics.polynomial.exact import Number, matmul
 from synthesis.numerics.program.affine_program import from_lower
 
 Array = np.ndarray
@@ -196,7 +196,7 @@ def conditions(
 
 def _motion(P: Any, F: Array, decay: Any) -> Any:
     q = F.shape[-1]
-    product = _in_corner(P, (q, len(F))) @ F
+    product = matmul(_in_corner(P, (q, len(F))), F)
     return product + np.swapaxes(product, -1, -2) + decay * _in_corner(P, (q, q))
 
 
@@ -205,7 +205,7 @@ def _symbols(over: MatrixSet, by: Multipliers) -> Any:
     M = sum(weight * by.terms[..., k : k + 1, k : k + 1] for k, weight in enumerate(over.weights))
     for symbols, multiplier in ((over.tube, by.tube), (over.gust, by.gust)):
         for H in symbols:
-            M = M + H.T @ multiplier @ H
+            M = M + matmul(matmul(H.T, multiplier), H)
     return M
 
 

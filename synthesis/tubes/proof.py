@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from synthesis.numerics.polynomial.exact import Number, exact, positive_definite, rational
+from synthesis.numerics.polynomial.exact import Number, exact, matmul, positive_definite, rational
 from synthesis.tubes.deviations import CommandCell
 from synthesis.tubes.inequality import (
     MatrixSet,
@@ -48,7 +48,9 @@ def holds(
         return False
     P, matrices = found
     L, unit = exact(factor, number), exact(np.eye(len(factor)), number)
-    return all(map(positive_definite, [*(L.T @ end @ L - unit for end in P.ends), *matrices]))
+    return all(
+        map(positive_definite, [*(matmul(matmul(L.T, end), L) - unit for end in P.ends), *matrices])
+    )
 
 
 def is_bounded(
@@ -77,7 +79,7 @@ def is_above(nodes: Array, output: Array) -> bool:
     """Whether e'Q e > |output e|^2 at all nodes, in rational arithmetic."""
     number = rational()
     C = exact(output, number)
-    return all(positive_definite(_symmetric(Q, number) - C.T @ C) for Q in nodes)
+    return all(positive_definite(_symmetric(Q, number) - matmul(C.T, C)) for Q in nodes)
 
 
 def falls_in(jump: Array, after: Array, before: Array) -> bool:
@@ -86,7 +88,7 @@ def falls_in(jump: Array, after: Array, before: Array) -> bool:
     """
     number = rational()
     R, last = exact(jump, number), _symmetric(before, number)
-    return positive_definite(last - R.T @ _symmetric(after, number) @ R)
+    return positive_definite(last - matmul(matmul(R.T, _symmetric(after, number)), R))
 
 
 def is_within(nodes: Array, rows: Array, bound: float) -> bool:
