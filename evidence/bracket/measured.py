@@ -27,7 +27,6 @@ from studies.output import as_json, columns, progress
 from symheli import Helicopter, LPVStateSpace, UncertainStateSpace
 from symheli.lpv.bases import Polynomial
 from symheli.values.arrays import Array
-from synthesis import Solver
 from synthesis.analysis import LowerBoundSearch
 from synthesis.certify.questions.gain_curve import GainCurve
 from synthesis.certify.statement.forms import LyapunovForm
@@ -75,8 +74,6 @@ GROWING = (7.5, 7.52, 7.54, 7.6)
 COVER = Spline(segments=16)
 """The P(p) that covers a remainder; on 32 segments the solver fails where it matters."""
 
-PATIENT = Solver(time_limit=3600.0)
-
 
 class Bracket(NamedTuple):
     """Gains at one acceleration (m/s^2): of a computed trajectory (no bound is smaller), proven
@@ -110,7 +107,11 @@ def bracket(
     """
     plain = synthesis.l2_gain(loop, rate, search=None)
     memory = synthesis.l2_gain(
-        loop, rate, form=form, search=search or LowerBoundSearch(seconds=math.inf), solver=PATIENT
+        loop,
+        rate,
+        form=form,
+        search=search or LowerBoundSearch(seconds=math.inf),
+        solver="CLARABEL",
     )
     better = min(plain, memory, key=lambda c: c.gamma)
     covered, proof = math.nan, None
@@ -126,7 +127,7 @@ def bracket(
 
 def proves(loop: LPVStateSpace, rate: float, form: LyapunovForm) -> bool:
     """Whether this form of V proves stability at this acceleration, in exact arithmetic."""
-    return synthesis.stability(loop, rate, form=form, search=None, solver=PATIENT).verify(
+    return synthesis.stability(loop, rate, form=form, search=None, solver="CLARABEL").verify(
         rigorous=True
     )
 

@@ -52,7 +52,8 @@ class Solver:
     iterations : int, optional
         At most: 200; SCS 20000.
     time_limit : float, optional
-        s: 600; none for CVXOPT and SDPA, which have no option for one.
+        s of wall time at most: no limit. A solve that it ends says so, and its result depends on
+        the machine. CVXOPT and SDPA have no option for it.
 
     Raises
     ------
@@ -84,11 +85,11 @@ class Solver:
                 f"solver {self.name!r} is not available; installed here:"
                 f" {', '.join(installed_solvers())}, and solver={LYAPUNOV!r}, {_OWN}"
             )
-        for setting, usual in _USUAL.items():
+        for setting in ("tolerance", "iterations", "time_limit"):
             given = getattr(self, setting)
             if given is None:
-                usual = _OTHER.get(self.name, {}).get(setting, usual)
-                object.__setattr__(self, setting, usual if setting in _OPTIONS[self.name] else None)
+                usual = _OTHER.get(self.name, {}).get(setting, _USUAL.get(setting))
+                object.__setattr__(self, setting, usual)
             elif setting not in _OPTIONS[self.name]:
                 raise InputError(
                     f"{self.name} has no option for {setting}, got {given}; leave it None or take"
@@ -102,10 +103,13 @@ class Solver:
 
     @property
     def options(self) -> dict[str, Any]:
-        """The settings in the solver's own names, as they are passed to it."""
+        """The settings in the solver's own names, as they are passed to it: no time without a
+        limit.
+        """
         return {
             option: getattr(self, setting)
             for setting, options in _OPTIONS[self.name].items()
+            if getattr(self, setting) is not None
             for option in options
         }
 
@@ -136,7 +140,7 @@ _PACKAGES = {
 }
 
 
-_USUAL: dict[str, Any] = {"tolerance": 1e-8, "iterations": 200, "time_limit": 600.0}
+_USUAL: dict[str, Any] = {"tolerance": 1e-8, "iterations": 200}
 _OTHER: dict[str, dict[str, Any]] = {
     "SCS": {"tolerance": 1e-5, "iterations": 20000},
     LYAPUNOV: {"tolerance": 1e-5},

@@ -122,9 +122,8 @@ def minimise(
 def _minimised(
     program: Program, solver: Solver, solving: Task, start: Early | None, above: float
 ) -> Minimum:
-    tolerance, iterations, seconds = (
-        solver.options[name] for name in ("tolerance", "iterations", "seconds")
-    )
+    tolerance, iterations = (solver.options[name] for name in ("tolerance", "iterations"))
+    seconds = solver.options.get("seconds", math.inf)
     begin = time.perf_counter()
     cones = _Cones(program)
     point = cones.start() if start is None else cones.near(start)

@@ -28,12 +28,15 @@ def test_every_setting_reaches_the_solver_or_is_refused(name, monkeypatch):
     assert usual.tolerance == (1e-5 if name == "SCS" else 1e-8)
     own = Solver(name, tolerance=1e-4, iterations=17)
     assert set(own.options.values()) >= {1e-4, 17}
+    # a limit in seconds is the user's own: without one nothing depends on the machine
+    assert usual.time_limit is None
+    assert usual.options.keys() == own.options.keys()
     if name in ("CVXOPT", "SDPA"):
-        assert usual.time_limit is None
         with pytest.raises(InputError, match=f"{name} has no option for time_limit"):
             Solver(name, time_limit=3.0)
     else:
-        assert 3.0 in Solver(name, time_limit=3.0).options.values()
+        (limit,) = Solver(name, time_limit=3.0).options.keys() - usual.options.keys()
+        assert Solver(name, time_limit=3.0).options[limit] == 3.0
     for wrong in (
         {"tolerance": 0.0},
         {"tolerance": 1.0},
@@ -54,7 +57,7 @@ def test_what_is_printed_is_what_the_solver_was_given(monkeypatch):
 
     monkeypatch.setattr(scs, "SCS", spy)
     assert (
-        "tolerance 1e-05, at most 20000 iterations, 600 s"
+        "tolerance 1e-05, at most 20000 iterations, no time limit"
         in l2_gain(lag(), form=COARSE, solver="SCS", search=None).solver
     )
     assert given == {
@@ -62,13 +65,31 @@ def test_what_is_printed_is_what_the_solver_was_given(monkeypatch):
         "eps_abs": 1e-5,
         "eps_rel": 1e-5,
         "max_iters": 20000,
-        "time_limit_secs": 600.0,
     }
     sharp = l2_gain(
         lag(), form=COARSE, solver=Solver("SCS", tolerance=1e-7, iterations=300), search=None
     )
     assert "tolerance 1e-07, at most 300 iterations" in sharp.details
     assert (given["eps_abs"], given["eps_rel"], given["max_iters"]) == (1e-7, 1e-7, 300)
+
+
+@pytest.mark.parametrize(
+    ("name", "word"),
+    [
+        ("CLARABEL", "MaxTime"),
+        ("SCS", "reached time_limit_secs"),
+        ("LYAPUNOV", "out of time after 0 iterations"),
+    ],
+)
+def test_a_solve_that_a_limit_of_the_user_ended_says_so(name, word):
+    if name == "SCS":
+        pytest.importorskip("scs")
+    cut = l2_gain(lag(), form=COARSE, solver=Solver(name, time_limit=1e-6), search=None)
+    assert all(word in str(attempt) for attempt in cut.attempts)
+    assert word in cut.details
+    assert "1e-06 s" in cut.solver
+    assert cut.verified == (cut.status is Status.PROVEN)
+    assert word not in l2_gain(lag(), form=COARSE, solver=name, search=None).details
 
 
 @pytest.mark.parametrize("analysis", [l2_gain, stability, energy_to_peak, decay_rate])
