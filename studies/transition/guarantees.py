@@ -164,7 +164,7 @@ def _bound(
     search: LowerBoundSearch,
 ) -> list[Bound]:
     form = CONSTANT if math.isinf(rate) else PLAIN
-    thorough = LowerBoundSearch(seconds=math.inf) if math.isinf(rate) else search
+    thorough = LowerBoundSearch() if math.isinf(rate) else search
     certificate = synthesis.l2_gain(lpv, rate, form=spline, search=thorough)
     found = [Bound(name, channel, rate, form, certificate)]
     if not certificate.verified and math.isfinite(certificate.lower):

@@ -68,8 +68,8 @@ class LowerBoundSearch:
     samples : int
         Of the explicit input, at most.
     seconds : float
-        Wall time, for all lines through a box together; math.inf makes the result independent of
-        the machine.
+        Wall time at most, for all lines through a box together: no limit. The result of a search
+        that it ends depends on the machine.
 
     Raises
     ------
@@ -90,7 +90,7 @@ class LowerBoundSearch:
     cycles: float = 3.0
     steps: int = 200
     samples: int = 150_000
-    seconds: float = 10.0
+    seconds: float = math.inf
 
     def __post_init__(self) -> None:
         least = {
@@ -109,7 +109,7 @@ class LowerBoundSearch:
 
 
 THOROUGH = LowerBoundSearch()
-"""Default effort: some seconds for five states, ten at most."""
+"""Default effort: some seconds for five states."""
 
 
 class LowerBound(NamedTuple):
@@ -139,7 +139,7 @@ def lower_bound(
 ) -> LowerBound:
     """Compute a lower bound on the L2 gain, from the worst trajectory of p that is found.
 
-    Deterministic as long as `search.seconds` suffice. In continuous time the error of the time
+    Deterministic unless `search.seconds` end it. In continuous time the error of the time
     steps, judged by halving them, is taken off.
 
     Parameters

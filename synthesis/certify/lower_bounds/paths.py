@@ -341,13 +341,14 @@ UNLIMITED = Budget()
 
 
 def search_hypothesis(seconds: float | None, spent: float) -> tuple[str, ...]:
-    """Return the budget of a search as a hypothesis of its bound; None: nothing was searched."""
+    """Return the limit of a search, s, as a hypothesis of its bound; None: nothing was searched."""
     if seconds is None:
         return ("no trajectory was searched: the lower bound is that of the worst frozen model",)
+    limit = "" if math.isinf(seconds) else f" for at most {seconds:g} s"
     ended = ", which ended the search" if spent >= seconds else ""
     return (
         (
-            f"worst trajectories were searched for at most {seconds:g} s{ended}: a longer search"
-            " can only increase their lower bound"
+            f"worst trajectories were searched{limit}{ended}: a longer search can only increase"
+            " their lower bound"
         ),
     )
