@@ -37,9 +37,9 @@ Array = np.ndarray
 Divisions = int | Grid
 """In how many parts every range is cut at first, or the points themselves."""
 
-MATRIX_BOUNDS = (1e5, 1e8, 1e10)
-"""X and Y are kept below this multiple of the identity, in scaled coordinates; a larger bound is
-used where the one before is active and a lower gamma is possible.
+MATRIX_BOUNDS = (1e8, 1e10)
+"""X and Y are kept below this multiple of the identity, in scaled coordinates; the second bound is
+used where the first is active and a lower gamma is possible.
 """
 ACTIVE_FRACTION = 0.1
 """A bound counts as active where the largest eigenvalue of X or Y exceeds this fraction of it."""

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scheduled_plants import spring
 
-from synthesis.design.lpv import existence as module
 from synthesis.design.lpv.existence import FINE_TOLERANCE, MATRIX_BOUNDS, Existence
 from synthesis.design.lpv.output_feedback import USUAL
 from synthesis.design.lpv.scaled_plant import scaled_plant_of
@@ -47,13 +46,10 @@ def test_a_level_that_can_be_reached_is_not_given_up(least):
     assert found.gamma == pytest.approx(least.gamma, rel=2 * FINE_TOLERANCE)
 
 
-def test_larger_bounds_on_both_matrices_are_worth_nothing_here(least, monkeypatch):
+def test_larger_bounds_on_both_matrices_are_worth_nothing_here(least):
     solved = program()
     found = solved.least_gamma(USUAL)
     assert not solved.could_fall(found, MATRIX_BOUNDS[-1], 0.995, USUAL)
-    monkeypatch.setattr(module, "MATRIX_BOUNDS", (1e8, 1e10))
-    far = Existence(solved.plant, solved.X.basis, solved.Y.basis, 1, 1e8).least_gamma(USUAL)
-    assert far.gamma == pytest.approx(least.gamma, rel=1e-3)
 
 
 def test_small_bounds_on_both_matrices_could_be_worth_more():
