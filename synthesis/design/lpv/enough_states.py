@@ -67,7 +67,7 @@ def _serves(scaled: ScaledPlant, fewer: ScaledPlant, p: Array) -> bool:
             return False
         if near is None or gains is None:
             return False
-        loop = Generalized(*(M[None] for M in whole)).closed(*(M[None] for M in gains))
-        if not below(*(M[0] for M in loop), ABOVE * (1 + LOSS), scaled.dt):
+        A, B, C, D = whole.closed(*gains)
+        if not below(A, B, C, D, ABOVE * (1 + LOSS), scaled.dt):
             return False
     return True
