@@ -50,7 +50,11 @@ def frozen_stability(loop: LPVStateSpace) -> FrozenVerdict:
         if root is None:
             return FrozenVerdict(False, middle)
         if not negative_definite(_decrease(A, root, loop.dt), cells=MAX_BOXES):
-            waiting += A.split(int(np.argmax(_variation(A))))
+            axis = int(np.argmax(_variation(A)))
+            low, high = A.box[axis]
+            if not low < middle[axis] < high:  # no double lies between: an eigenvalue on the border
+                return FrozenVerdict(None, middle)
+            waiting += A.split(axis)
     return FrozenVerdict(None, middle)
 
 
