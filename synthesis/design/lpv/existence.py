@@ -256,13 +256,9 @@ class Existence:
         for margin in SETTLED_MARGINS:
             before: Solution | None = None
             for largest in SETTLED_BOUNDS:
-                start = None if before is None else before.early
+                # from afar: near the boundary of the bound before, gains change steeply with p
                 found = self._widest(
-                    gamma,
-                    margin,
-                    largest,
-                    replace(solver, tolerance=SEPARATION_TOLERANCE),
-                    start,
+                    gamma, margin, largest, replace(solver, tolerance=SEPARATION_TOLERANCE)
                 )
                 if not np.any(found.coefficients):
                     continue
@@ -272,19 +268,11 @@ class Existence:
             if before is not None:
                 yield before._replace(gamma=gamma)
 
-    def _widest(
-        self,
-        gamma: float,
-        margin: float,
-        largest: float,
-        solver: Solver,
-        start: interior_point.Early | None,
-    ) -> Solution:
+    def _widest(self, gamma: float, margin: float, largest: float, solver: Solver) -> Solution:
         """Solve this within one bound, adding points as for the least g."""
         for _ in range(MAX_ROUNDS):
             blocks = [*self._halves(gamma, margin), *self._coupling(True, largest)]
-            found = self._solved(blocks, -1.0, solver, start)
-            start = found.early
+            found = self._solved(blocks, -1.0, solver)
             if not np.any(found.coefficients) or len(self.points) == 1 or self.fixed:
                 break
             if not self._added(found, gamma):
