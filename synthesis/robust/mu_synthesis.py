@@ -59,6 +59,13 @@ LIMIT, FITS = 30.0, 400
 NOT_SAMPLED = "the controller of the continuous plant has no sampled one: it would not be causal"
 
 
+MAX_PROVEN_STATES = 24
+"""Number of states of the loop up to which `mu` is proven: the integers of its determinant double
+with each, and the proof of the distillation column, of more, takes over ten minutes. Above it `mu`
+is the peak on the frequencies of the design, and not verified.
+"""
+
+
 @dataclass(frozen=True, eq=False)
 class MuDesign:
     """A controller u = K y with a bound `mu` of the structured singular value of its loop, proven
@@ -307,6 +314,8 @@ class _Plant(NamedTuple):
         of the model itself.
         """
         loop = self.closed(K)._replace(exact=self.loop.in_rationals.behind(named))
+        if len(loop.A) > MAX_PROVEN_STATES:
+            return Upper(level, math.nan, None)
         return proven_level(loop, level, performance=False)
 
     def named(self, K: LinearModel) -> LinearModel | None:
