@@ -1,5 +1,6 @@
 """D-K iteration: what mu promises, and routes that agree; a published plant: docs/gallery.md."""
 
+import sys
 from dataclasses import replace
 
 import control
@@ -52,6 +53,15 @@ def test_mu_is_the_margin_of_the_loop_with_the_performance_as_a_block(design):
     assert 1 / margin.lower == pytest.approx(design.mu, rel=3e-3)
     assert 1 / margin.upper <= design.mu
     assert design.mu < 0.9 * design.levels[0]
+
+
+def test_of_a_loop_of_many_states_mu_is_computed_and_says_so(monkeypatch):
+    monkeypatch.setattr(sys.modules[mu_synthesis.__module__], "MAX_PROVEN_STATES", 1)
+    found = mu_synthesis(lag(), ["u"], ["y"], BLOCK, order=0, iterations=1)
+    assert found.mu == min(found.levels)
+    assert not found.verified
+    assert not found.verify(rigorous=True)
+    assert np.isnan(found.omega)
 
 
 @pytest.mark.slow
