@@ -27,6 +27,7 @@ from synthesis.design.lti.hinf import hinf
 from synthesis.design.lti.point_design import PointDesign, named_loop
 from synthesis.design.plant.generalized import Channels, Generalized, sampled_controller
 from synthesis.numerics.linear.model import as_model
+from synthesis.numerics.linear.norm import to_continuous
 from synthesis.robust import witness
 from synthesis.robust.covers import rational
 from synthesis.robust.intervals import LevelProof
@@ -262,9 +263,12 @@ class _Plant(NamedTuple):
             for side in ("columns", "rows")
         )
         own = loop.in_rationals.select(into, out)
-        moved = loop._replace(
-            B=loop.B[:, into], C=loop.C[out], D=loop.D[np.ix_(out, into)], exact=own
-        )
+        # a design in coordinates of the modes loses levels: its Riccati equations are worse
+        # conditioned there
+        A, B, C, D = own.nearest()
+        if loop.dt is not None:
+            A, B, C, D = to_continuous(A, B, C, D)
+        moved = loop._replace(A=A, B=B, C=C, D=D, exact=own)
         ends = np.cumsum([(0, 0), *((_size(p.rows), _size(p.columns)) for p in parts)], axis=0)
         own = tuple(
             Part(slice(a, b), slice(c, d), part.real)

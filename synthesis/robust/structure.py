@@ -153,6 +153,11 @@ class ExactLoop(NamedTuple):
         """The transfer matrix from w to z, of a sampled loop over s = (z - 1)/(z + 1)."""
         return Transfer.of(*self)
 
+    def nearest(self) -> tuple[Array, Array, Array, Array]:
+        """Return the loop in doubles, in the coordinates of the model."""
+        A, B, C, D = (M.astype(float) for M in (self.A, self.B, self.C, self.D))
+        return A, B, C, D
+
     def rounded(self) -> tuple[Array, Array, Array, Array]:
         """Return the loop in doubles, in coordinates of its modes, or of Schur's where these are
         nearly parallel: there entries do not cancel.
