@@ -103,16 +103,6 @@ def discrete_products(
         )
 
 
-def kept(blocks: LyapunovBlocks, which: Array) -> LyapunovBlocks:
-    """Return these blocks only, with their supply rates; of blocks without weights."""
-    supply = blocks.supply
-    return blocks._replace(
-        varying=blocks.varying[which],
-        constant=blocks.constant[which],
-        supply=supply and supply._replace(each=supply.each[which]),
-    )
-
-
 def at_points(
     model: Matrices,
     points: Array,

@@ -12,7 +12,6 @@ import numpy as np
 
 from symheli.lpv.tools import Matrices
 from synthesis.certify.assemble.bounded_real import assemble
-from synthesis.certify.assemble.lyapunov_blocks import kept
 from synthesis.certify.assemble.unknowns import (
     Quadratic,
     ScaledProblem,
@@ -163,7 +162,7 @@ class OneParameter(Ladder):
                     new = np.arange(largest.argmax() % apart, len(which), apart)
                     new = new[~which[new]]
                     which[new] = True
-                    added.append(kept(block, new))
+                    added.append(block.keep(new))
             if not added:
                 break
             chosen = (*chosen, *added)

@@ -103,17 +103,15 @@ class ExistenceProgram:
 
 class Solution(NamedTuple):
     """Coefficients of X, Y (and of the bound of Y at the next sample) with the g they admit, the
-    solver's answer, whether it `reached` its tolerance, a point to start again from, and the g
-    below which there is none for the points imposed.
+    solver's answer, a point to start again from, and the g below which there is none for the points
+    imposed.
     """
 
     gamma: float
     coefficients: Array
     message: str
-    reached: bool = False
     early: interior_point.Early | None = None
     lower: float = -np.inf
-    tolerance: float = np.inf
 
 
 class Existence:
@@ -183,28 +181,22 @@ class Existence:
         if self.fixed or len(self.points) == 1:
             return self._least(fine if self.fixed else solver, None, above)
         found = self._least(replace(solver, tolerance=COARSE_TOLERANCE), None, above)
-        for _ in range(MAX_ROUNDS):
-            if not np.isfinite(found.gamma):
-                break
-            if not self._added(found, found.gamma) and found.tolerance <= FINE_TOLERANCE:
+        for k in range(MAX_ROUNDS):
+            if not np.isfinite(found.gamma) or not (self._added(found, found.gamma) or k == 0):
                 break
             # later points are nearer the boundary, from where steps are short
             found = self._least(fine, found.early, above)._replace(early=found.early)
         return found
 
     def _least(
-        self, solver: Solver, start: interior_point.Early | None, above: float = np.inf
-    ) -> Solution:
-        return self._least_within(self.largest, solver, start, above)
-
-    def _least_within(
         self,
-        largest: float,
         solver: Solver,
-        start: interior_point.Early | None,
-        above: float,
+        start: interior_point.Early | None = None,
+        above: float = np.inf,
+        largest: float | None = None,
     ) -> Solution:
-        blocks = [*self._halves(None, MARGIN), *self._coupling(False, largest)]
+        bound = self.largest if largest is None else largest
+        blocks = [*self._halves(None, MARGIN), *self._coupling(False, bound)]
         found = self._solved(blocks, 1.0, solver, start, above)
         return found._replace(gamma=np.inf) if found.lower > above else found
 
@@ -214,8 +206,7 @@ class Existence:
         """
         above = share * found.gamma
         coarse = replace(solver, tolerance=COARSE_TOLERANCE)
-        within = self._least_within(largest, coarse, found.early, above)
-        return not within.lower > above
+        return not self._least(coarse, found.early, above, largest).lower > above
 
     def bounded(self, found: Solution) -> bool:
         """Whether the bound on X and Y is active."""
@@ -256,7 +247,6 @@ class Existence:
         for margin in SETTLED_MARGINS:
             before: Solution | None = None
             for largest in SETTLED_BOUNDS:
-                # from afar: near the boundary of the bound before, gains change steeply with p
                 found = self._widest(
                     gamma, margin, largest, replace(solver, tolerance=SEPARATION_TOLERANCE)
                 )
@@ -302,10 +292,8 @@ class Existence:
             float(candidate.x[-1]),
             coefficients,
             candidate.message,
-            candidate.reached,
             candidate.early,
             candidate.lower,
-            solver.options["tolerance"],
         )
 
     def _halves(self, gamma: float | None, margin: float) -> list[LyapunovBlocks]:

@@ -122,16 +122,20 @@ class LyapunovBlocks(NamedTuple):
         return self._replace(varying=wide.reshape(m, R, k, n, N), weights=None)
 
     def keep(self, which: Array) -> LyapunovBlocks:
-        """Return these blocks only, places with all their blocks once; without a `supply` or a
-        level of their own.
+        """Return these blocks only, places with all their blocks once; without a level of their
+        own.
         """
         weights = self.weights
         if weights is not None:
             each = which.reshape(-1, len(weights))
             whole = bool(np.all(each == each[0]))
             weights = weights[each[0] if whole else np.nonzero(each)[1]]
+        supply = self.supply
         return self._replace(
-            varying=self.varying[which], constant=self.constant[which], weights=weights
+            varying=self.varying[which],
+            constant=self.constant[which],
+            supply=supply and supply._replace(each=supply.each[which]),
+            weights=weights,
         )
 
     def congruent(self, W: Array) -> LyapunovBlocks:
