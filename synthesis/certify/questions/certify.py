@@ -21,7 +21,13 @@ from synthesis.certify.lower_bounds.perturbation import worst_perturbation
 from synthesis.certify.questions.adjoint import ADJOINT, FAR_ABOVE, backwards
 from synthesis.certify.questions.apart import apart
 from synthesis.certify.questions.certificate import Certificate
-from synthesis.certify.questions.finer import ABOVE_FROZEN, by_coefficients, finer, over_jumps
+from synthesis.certify.questions.finer import (
+    ABOVE_FROZEN,
+    by_coefficients,
+    finer,
+    long,
+    over_jumps,
+)
 from synthesis.certify.questions.general_search import General
 from synthesis.certify.questions.hypotheses import VERIFIED, hypotheses
 from synthesis.certify.questions.ladder import CLOSE_TO_LOWER, Found, Ladder
@@ -30,9 +36,10 @@ from synthesis.certify.questions.problem import BoundProblem
 from synthesis.certify.statement.forms import Spline
 from synthesis.certify.statement.impose import Grid
 from synthesis.certify.statement.kind import L2_GAIN, STABILITY
-from synthesis.certify.statement.outcome import Seconds, Status
+from synthesis.certify.statement.outcome import Attempt, Seconds, Status
 from synthesis.certify.statement.trajectory import SchedulingTrajectory
 from synthesis.numerics.polynomial.pieces import Pieces, pieces
+from synthesis.numerics.program.answer import Answer
 
 Array = np.ndarray
 
@@ -105,6 +112,10 @@ def certify(problem: BoundProblem) -> Certificate:
         beaten = beaten._replace(seconds=beaten.seconds + time.perf_counter() - start)
         if worst is not None:
             return report.nothing(Status.GROWING, beaten._replace(worst=worst), ladder)
+    if long(problem):
+        ladder.attempts.append(Attempt("P on both sides of a jump", 0.0, "left out", math.inf))
+        if best.answer is Answer.INFEASIBLE:  # that no constant P exists says less
+            best = best._replace(answer=Answer.UNTRIED)
     cert = report.found(best, beaten, ladder)
     if cert.status is Status.INFEASIBLE and all(map(math.isinf, demand.rates)):
         witness = no_common(model) if isinstance(problem.form, Spline) else ""

@@ -8,7 +8,7 @@ from dataclasses import replace
 from synthesis.certify.questions.problem import BoundProblem
 from synthesis.certify.statement.impose import Bernstein, SumOfSquares, Vertices
 from synthesis.numerics.program.cone_program import LYAPUNOV, Solver
-from synthesis.numerics.program.lyapunov_program import MAX_STATES_GENERAL
+from synthesis.numerics.program.lyapunov_program import MANY_STATES, MAX_STATES_GENERAL
 
 ABOVE_FROZEN = 1.05
 """Ratio of a proven gain to the worst frozen one beyond which P of a higher degree is tried."""
@@ -36,9 +36,16 @@ def finer(problem: BoundProblem) -> BoundProblem | None:
 
 def over_jumps(problem: BoundProblem) -> BoundProblem | None:
     """Return the problem of a sampled model with P(p) on both sides of a jump of p, as the general
-    search has it; None where p does not jump or that was asked already.
+    search has it; None where p does not jump, that was asked already, or it takes too `long`.
     """
-    return problem._replace(general=True) if problem.jumps else None
+    return problem._replace(general=True) if problem.jumps and not long(problem) else None
+
+
+def long(problem: BoundProblem) -> bool:
+    """Whether P(p) on both sides of a jump is left out: for a gain of many states its programs take
+    minutes to hours.
+    """
+    return problem.jumps and problem.gains and problem.model.sizes[0] > MANY_STATES
 
 
 def by_coefficients(problem: BoundProblem) -> BoundProblem | None:

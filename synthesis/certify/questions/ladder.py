@@ -231,8 +231,9 @@ class Ladder(ABC):
             best = self._margins(shape, best)
             if best.proof is not None and not best.bound > near * limit:
                 break
-        if still is None and best.proof is None and any(map(self.varies, shapes)):
-            still = self._margins(self.constant(), Found(math.nan))
+        untried = still is None or (self.many_states and still.proof is None)
+        if untried and best.proof is None and any(map(self.varies, shapes)):
+            still = self._margins(self.constant(), Found(math.inf if gains else math.nan))
         if gains and not self.many_states and not best.bound <= near * limit:
             best = best.or_better(self.of_frozen_models(limit), 1.0)
         if still is not None:
@@ -253,10 +254,12 @@ class Ladder(ABC):
         self.unit = self.settle()
         if not any(map(self.varies, self.shapes())):
             return best, None
+        if self.many_states:
+            # P in one segment costs as little as a constant one, which is a case of it
+            simple = self.simple()
+            return best, None if simple is None else self._margins(simple, Found(math.inf))
         # cheapest, and enough where p changes little
-        still = self._margins(self.constant(), Found(math.inf))
-        simple = None if self.next_to(still, limit) else self.simple()
-        return best, still if simple is None else self._margins(simple, still)
+        return best, self._margins(self.constant(), Found(math.inf))
 
     def next_to(self, found: Found, limit: float) -> bool:
         """Whether this gain is proven and cannot be improved to speak of."""

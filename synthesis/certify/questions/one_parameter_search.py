@@ -294,12 +294,7 @@ class OneParameter(Ladder):
         """Return the gain of the model frozen at p that a program in these units proves."""
         whole, self.scaled = self.scaled, scaled.frozen(p)
         margin = self.problem.impose.tried[0]
-        solve = (
-            self._solve_by_products
-            if self.problem.solver.name == LYAPUNOV
-            else self._solve_by_rounds
-        )
-        found = self._judged(solve(shape, margin), shape)
+        found = self._judged(self._solve(shape, margin), shape)
         self.scaled = whole
         return found.bound
 

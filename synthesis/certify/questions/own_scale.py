@@ -8,7 +8,7 @@ from typing import TypeVar
 
 from synthesis.certify.statement.scaling import NEGLIGIBLE_GAIN
 
-MAX_SCALE_RATIO = 30.0
+MAX_SCALE_RATIO = 100.0
 """Ratio of a bound to the scale in which it was found beyond which it is computed again in a new
 scale.
 """

@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 import pytest
+from scipy.linalg import block_diag
 
 from symheli import LPVStateSpace, Scheduling
-from synthesis import decay_rate, stability
+from synthesis import decay_rate, l2_gain, stability
 from synthesis.analysis import Status
 from synthesis.forms import Spline
 from synthesis.impose import Bernstein, SumOfSquares, Vertices
@@ -42,9 +43,9 @@ def test_stability_does_not_depend_on_channels_or_relaxation(B, C, impose):
 
 
 def between(first, second, dt):
-    n = Scheduling("n", "1", 0.0, 1.0)
+    n, states = Scheduling("n", "1", 0.0, 1.0), len(first)
     return LPVStateSpace.polynomial(
-        [first, second - first], [np.zeros((2, 1))], [np.eye(1, 2)], [[[0.0]]], n, dt=dt
+        [first, second - first], [np.eye(states, 1)], [np.eye(1, states)], [[[0.0]]], n, dt=dt
     )
 
 
@@ -60,6 +61,19 @@ def test_stability_over_jumps_has_the_functions_of_the_decay_rate():
     refused = stability(model, math.inf, search=None, form=Spline(degree=0))
     assert refused.status is Status.INFEASIBLE
     assert "meets the inequalities imposed" in refused.why
+
+
+def test_a_gain_of_many_states_over_jumps_says_what_was_left_out():
+    """The set above beside 11 states of its own: no constant P exists."""
+    pair = [np.array([[-1.0, -1], [-4, 0]]), np.array([[3.0, 3], [-2, 1]])]
+    few, many = (
+        between(*(block_diag(A / (1.01 * 3.917384715148), *[0.5] * more) for A in pair), 1.0)
+        for more in (0, 11)
+    )
+    assert l2_gain(few, math.inf, search=None).verified
+    refused = l2_gain(many, math.inf, search=None)
+    assert refused.status is Status.UNTRIED
+    assert refused.attempts[-1].answer == "left out"
 
 
 def test_a_refusal_over_jumps_names_two_frozen_models():
