@@ -41,6 +41,12 @@ SCHEDULED_STANDSTILL = 1e-6
 """`STANDSTILL` of BFGS over several conditions. Where one of them decides, a finer search only
 moves the gains at the others, and the gain while p moves with them.
 """
+ROOM = 2e-3
+"""Fraction of the least largest gain that is given for the gains at the other conditions."""
+ASIDE = 1e-4
+"""Share of the way to gains well within their bounds at which it begins."""
+SETTLING, SETTLED = 200, 1e-5
+"""Steps of BFGS at most on the mean gain, and its standstill."""
 KEPT = 3
 """So many of the starts are continued."""
 ROUNDS = 5
@@ -399,6 +405,23 @@ class _StructureSearch:
             if self.best is not None:
                 end, self.stationarity = sampled_descent(self.function, self.best, rng)
                 self.best = end if end.value <= self.best.value else self.best
+                if len(self.points) > 1:
+                    self._settle(self.best)
+
+    def _settle(self, best: Point) -> None:
+        """Lower the mean gain over the conditions while the largest stays within `ROOM` of the
+        least.
+        """
+        level = best.value + math.log1p(ROOM)
+
+        def mean(x: Array, _: float = 0.0) -> Value:
+            return self.loops.mean(x, level)
+
+        # from beside the bounds that it reached, where one slope says nothing
+        start = best.x + ASIDE * (self.inside - best.x)
+        end = bfgs(mean, Point(start, mean(start)), SETTLING, standstill=SETTLED)
+        if end.value < mean(best.x).value:
+            self.best = Point(end.x, self.loops.gain(end.x)[0])
 
     def _descended(self, start: Point, iterations: int) -> Point:
         """The gain after so many steps from a stable point at most."""

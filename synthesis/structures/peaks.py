@@ -156,12 +156,40 @@ class StructureLoops:
         active = self._largest(closed, known, math.exp(min(limit, 700.0)))
         if not math.isfinite(active.gain) or active.gain <= 0:
             return Value(math.inf, np.zeros(len(x))), active
+        slope = self._slope(closed, active) / active.gain
+        return self._penalised(x, closed, Value(math.log(active.gain), slope)), active
+
+    def mean(self, x: Array, level: float) -> Value:
+        """Return the mean logarithm of the gains over their bounds, with penalties: of the largest
+        above `level`, and those of `gain`; infinite where a loop is not stable.
+        """
+        closed = self._closed(x)
+        nothing = Value(math.inf, np.zeros(len(x)))
+        if closed is None:
+            return nothing
+        at = [(k, s) for k in range(len(closed.A)) for s in range(len(self.channels))]
+        try:
+            found = [norm(*self._channel(closed, k, s), self.dt) for k, s in at]
+        except (AccuracyError, np.linalg.LinAlgError):
+            return nothing
+        each = [Active(gain, k, s, omega) for (gain, omega), (k, s) in zip(found, at, strict=True)]
+        if not all(0 < one.gain < math.inf for one in each):
+            return nothing
+        values = np.log([one.gain for one in each])
+        slopes = np.array([self._slope(closed, one) / one.gain for one in each])
+        worst = int(np.argmax(values))
+        above = max(float(values[worst]) - level, 0.0)
+        slope = slopes.mean(axis=0) + STEEP * (above > 0) * slopes[worst]
+        own = Value(float(values.mean()) + STEEP * above, slope)
+        return self._penalised(x, closed, own)
+
+    def _penalised(self, x: Array, closed: _Closed, own: Value) -> Value:
+        """Return the value with the penalties of bounds and of the decay."""
         more, steeper = self._beyond(x)
-        slope = self._slope(closed, active) / active.gain + steeper
         if self.decay > 0 and (pole := self._pole(closed)).value > -self.decay:
             more += SLOW * (1 + pole.value / self.decay)
-            slope = slope + SLOW / self.decay * pole.slope
-        return Value(math.log(active.gain) + more, slope), active
+            steeper = steeper + SLOW / self.decay * pole.slope
+        return Value(own.value + more, own.slope + steeper)
 
     def pole(self, x: Array) -> Value:
         """Return the largest real part of a pole (1/s; of sampled loops log|z| over the period)

@@ -8,10 +8,12 @@ import signal
 import numpy as np
 import pytest
 from scheduled_plants import spring
+from scipy.optimize import minimize_scalar
 
-from symheli import LinearModel, Scheduling
+from symheli import LinearModel, LPVStateSpace, Scheduling
 from symheli.errors import InputError, SynthesisError, UnknownNameError
 from symheli.lpv import BSpline, Polynomial
+from symheli.lpv.bases.polynomials import lobatto_points
 from symheli.progress import watched
 from synthesis import Plant, hinf, structured
 from synthesis.objectives import L2
@@ -53,9 +55,11 @@ def random_plant(seed, dt=None):
 
 
 @pytest.mark.parametrize("dt", [None, 0.1])
-@pytest.mark.parametrize("what", ["gain", "pole"])
+@pytest.mark.parametrize("what", ["gain", "mean", "mean above", "pole"])
 def test_slopes_are_those_of_differences(dt, what):
-    """Of the largest gain with the penalties of bounds and decay, and of the largest pole."""
+    """Of the largest and the mean gain with the penalties of bounds and decay, and of the largest
+    pole.
+    """
     plant = random_plant(3, dt)
     paths = {(u, y): "PID" for u in plant.controls for y in plant.measurements}
     structure = TunableController.pid(plant, paths, corner=5.0, bounds={"u1_y1_P": (-0.1, 0.1)})
@@ -71,7 +75,13 @@ def test_slopes_are_those_of_differences(dt, what):
         300,
         -1e-2,
     ).x
-    function = loops.pole if what == "pole" else lambda x: loops.gain(x)[0]
+    largest = loops.gain(x)[1].gain
+    function = {
+        "gain": lambda x: loops.gain(x)[0],
+        "mean": lambda x: loops.mean(x, math.log(largest) + 1.0),
+        "mean above": lambda x: loops.mean(x, math.log(largest) - 1.0),
+        "pole": loops.pole,
+    }[what]
     assert math.isfinite(function(x).value)
     for _ in range(3):
         d = 1e-6 * rng.standard_normal(12)
@@ -340,7 +350,29 @@ def test_an_interrupted_search_returns_the_best_so_far_and_says_so(interruptible
         structured(plant, TunableController.pid(plant), starts=3)
 
 
-@pytest.mark.slow
+def test_gains_at_conditions_that_do_not_decide_are_settled_by_the_mean():
+    """x' = (1 - 2 p) x + u + w, z = (x, u), u = k x, k >= -4, which decides at p = 0."""
+    p = Scheduling("p", "1", 0.0, 1.0)
+    model = LPVStateSpace.from_expressions(
+        [[1 - 2 * p.symbol]], [[1, 1]], [[1], [0], [1]], [[0, 0], [0, 1], [0, 0]], p
+    )
+    plant = Plant(model, ["u1"], ["y1", "y2"], ["u2"], ["y3"])
+    basis = Polynomial(1, 0.0, 1.0)
+    structure = TunableController.pid(plant, basis=basis, bounds={"": (-4.0, 0.0)})
+    made = structured(plant, structure, starts=1, start={"u2_y3_P": -3.0})
+
+    at = np.ravel(lobatto_points(9, ((0.0, 1.0),)))
+
+    def mean(end):
+        k = -4.0 + (end + 4.0) * at
+        return float(np.mean(np.log(np.sqrt(1 + k**2) / np.abs(1 - 2 * at + k))))
+
+    best = minimize_scalar(mean, bounds=(-4.0, 0.0), method="bounded").x
+    assert abs(best + 4.0) > 0.5
+    assert made.promised == pytest.approx(math.sqrt(17) / 3, rel=1.01 * design.ROOM)
+    assert made.gain("u2_y3_P", 1.0) == pytest.approx(best, abs=0.02)
+
+
 def test_conditions_are_added_where_the_gain_between_is_larger():
     """With two conditions, at the ends, the middle is found."""
     plant = spring(0.5)
