@@ -1,7 +1,13 @@
 """What a newcomer types and prints first: it works, or the refusal says exactly what to write."""
 
+import json
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
+from executed import blocks
 
 import identification
 import symheli
@@ -9,6 +15,7 @@ import synthesis
 from symheli import LPVStateSpace, Scheduling
 from symheli.errors import InputError, UnknownNameError
 
+ROOT = Path(__file__).resolve().parents[1]
 CLIMB = symheli.AirspeedSchedule.transition(4.0, 6.0, acceleration=2.0, hold=1.0)
 T = 0.02 * np.arange(5)
 
@@ -128,3 +135,19 @@ def test_a_certificate_is_three_lines_and_a_sampled_controller_says_so():
     assert "continuous, y -> u over p" in first
     assert f"promised gain {made.promised:.6g}" in second
     assert "sampled every 0.05 s" in str(made.discretize(0.05))
+
+
+@pytest.mark.slow
+def test_a_type_checker_accepts_the_first_pages(tmp_path):
+    """Names as lists and matrices as nested lists, as an editor shows them while one types."""
+    for name in ("README.md", "docs/plant.md", "docs/structured.md", "docs/lft.md"):
+        code = [b.code for b in blocks((ROOT / name).read_text()) if b.kind == "python"]
+        (tmp_path / f"{Path(name).stem}.py").write_text("\n".join(code))
+    settings = {"extraPaths": [str(ROOT)], "typeCheckingMode": "basic"}
+    (tmp_path / "pyrightconfig.json").write_text(json.dumps(settings))
+    checked = subprocess.run(
+        [sys.executable, "-m", "pyright", "--pythonpath", sys.executable, "-p", str(tmp_path)],
+        capture_output=True,
+        text=True,
+    )
+    assert " 0 errors" in f" {checked.stdout}", checked.stdout

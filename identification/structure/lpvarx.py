@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
-from typing import Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -184,6 +184,23 @@ class LPVARX:
     scheduling_at: Literal["lag", "now"] = "lag"
     offset: bool = False
     offset_rate: bool = False
+
+    if TYPE_CHECKING:  # one name, or several
+
+        def __init__(
+            self,
+            outputs: str | Sequence[str],
+            inputs: str | Sequence[str],
+            scheduling: str | Sequence[str] = UNSCHEDULED,
+            *,
+            na: Orders,
+            nb: Orders,
+            delay: Orders = 1,
+            basis: FunctionSpace = CONSTANT,
+            scheduling_at: Literal["lag", "now"] = "lag",
+            offset: bool = False,
+            offset_rate: bool = False,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         for group in ("outputs", "inputs"):

@@ -23,6 +23,7 @@ from symheli.values.summary import summarized
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from numpy.typing import ArrayLike
 
     from symheli.lpv.linear_models import LinearModels
     from symheli.lpv.step_response import StepResponse
@@ -72,6 +73,21 @@ class LinearModel(Operators):
     outputs: tuple[Signal, ...]
     dt: float | None = None
     point: OperatingPoint | None = None
+
+    if TYPE_CHECKING:  # what is given becomes arrays and signals
+
+        def __init__(
+            self,
+            A: ArrayLike,
+            B: ArrayLike,
+            C: ArrayLike,
+            D: ArrayLike,
+            states: Sequence[str],
+            inputs: Sequence[str],
+            outputs: Sequence[str],
+            dt: float | None = None,
+            point: OperatingPoint | None = None,
+        ) -> None: ...
 
     __repr__ = summarized
     _repr_html_ = as_table

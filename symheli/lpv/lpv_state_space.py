@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
     from matplotlib.axes import Axes
+    from numpy.typing import ArrayLike
 
     from symheli.lpv.balanced_truncation import Balance, BalancedTruncation
     from symheli.lpv.lft import LFT
@@ -117,6 +118,24 @@ class LPVStateSpace(Operators, LPVMatrices):
 
     trim: TrimSchedule | None = None
     residuals: FitResiduals | None = None
+
+    if TYPE_CHECKING:  # what is given becomes arrays, parameters and signals
+
+        def __init__(
+            self,
+            basis: FunctionSpace,
+            A: ArrayLike,
+            B: ArrayLike,
+            C: ArrayLike,
+            D: ArrayLike,
+            parameters: Scheduling | Sequence[Scheduling],
+            states: Sequence[str],
+            inputs: Sequence[str],
+            outputs: Sequence[str],
+            dt: float | None = None,
+            trim: TrimSchedule | None = None,
+            residuals: FitResiduals | None = None,
+        ) -> None: ...
 
     __repr__ = summarized
     _repr_html_ = as_table

@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -96,6 +96,19 @@ class UncertainStateSpace(Operators):
     probability: float
     source: str
     parts: tuple[DeltaPart, ...] = ()
+
+    if TYPE_CHECKING:  # names that are given become signals
+
+        def __init__(
+            self,
+            model: LPVStateSpace,
+            perturbation_inputs: Sequence[str],
+            perturbation_outputs: Sequence[str],
+            bound: float,
+            probability: float,
+            source: str,
+            parts: tuple[DeltaPart, ...] = (),
+        ) -> None: ...
 
     __repr__ = summarized
     _repr_html_ = as_table

@@ -26,7 +26,7 @@ from symheli.values.arrays import Array
 
 def sweep(
     heli: Helicopter,
-    airspeeds: Sequence[float],
+    airspeeds: Sequence[float] | Array,
     *,
     climb_rate: float = 0.0,
     acceleration: float = 0.0,

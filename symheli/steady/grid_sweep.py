@@ -36,9 +36,9 @@ CONDITION = {"acceleration", "climb_rate"}
 
 def sweep_grid(
     heli: Helicopter,
-    airspeeds: Sequence[float],
+    airspeeds: Sequence[float] | Array,
     *,
-    acceleration: Sequence[float] | None = None,
+    acceleration: Sequence[float] | Array | None = None,
     climb_rate: Sequence[float] | None = None,
     density: Sequence[float] | None = None,
     altitude: Sequence[float] | None = None,

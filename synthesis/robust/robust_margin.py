@@ -165,7 +165,10 @@ def robust_margin(
     if not isinstance(model, UncertainStateSpace):
         return _of_blocks(model, blocks, largest)
     if not isinstance(model.model.basis, Polynomial):
-        raise InputError("expected a model that is polynomial in one parameter, which is grown")
+        raise InputError(
+            "the range of the parameter is grown with the block, and functions in pieces end with"
+            " it: rate=0.0 grows the block alone, a model polynomial in one parameter both"
+        )
     if not model.bound > 0:
         raise InputError("expected a block with a bound > 0")
 

@@ -141,9 +141,12 @@ def _balancing(reach: Array, seen: Array) -> Array:
     reach, seen = (
         M + 1e-6 * max(float(np.trace(M)) / len(M), 1e-300) * np.eye(len(M)) for M in (reach, seen)
     )
-    root = linalg.cholesky(reach, lower=True)
+    size, directions = linalg.eigh(reach)
+    # a loop on the border of stability leaves negative ones by rounding
+    root = directions * np.sqrt(np.maximum(size, 1e-12 * float(size.max())))
     values, V = linalg.eigh(root.T @ seen @ root)
-    return unit[:, None] * root @ V / np.maximum(values, 1e-300) ** 0.25
+    least = max(1e-24 * float(values.max()), 1e-300)
+    return unit[:, None] * root @ V / np.maximum(values, least) ** 0.25
 
 
 def _adjoint(G: Array) -> Array:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from symheli import LinearModel, LPVStateSpace, Scheduling, UncertainStateSpace
 from symheli.errors import InputError, UnknownNameError
@@ -103,6 +103,17 @@ class Plant:
     performance: tuple[Signal, ...] = ()
     controls: tuple[Signal, ...] = ()
     measurements: tuple[Signal, ...] = ()
+
+    if TYPE_CHECKING:  # names and systems that are given become those above
+
+        def __init__(
+            self,
+            model: Any,
+            disturbances: Sequence[str] = (),
+            performance: Sequence[str] = (),
+            controls: Sequence[str] = (),
+            measurements: Sequence[str] = (),
+        ) -> None: ...
 
     __repr__ = summarized
     _repr_html_ = as_table

@@ -194,11 +194,15 @@ class AffineProgram:
 
     def minimise(self, cost: Array, solver: Solver) -> SolverPoint:
         """Return the solver's candidate for the least cost' x."""
+        return solve(self.cone_program(cost), solver)
+
+    def cone_program(self, cost: Array) -> ConeProgram:
+        """Return the program of the least cost' x, whose `to_cvxpy` hands it to other solvers."""
         rows = [*self._zero, *self._positive]
         A = sparse.csc_matrix(sparse.vstack([-A for A, _ in rows]))
         b = np.concatenate([b for _, b in rows])
         equalities = sum(len(b) for _, b in self._zero)
-        return solve(ConeProgram(cost, A, b, tuple(self._sizes), equalities), solver)
+        return ConeProgram(cost, A, b, tuple(self._sizes), equalities)
 
 
 def from_lower(rows: Sequence[Sequence[Array | None]]) -> Array:

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from itertools import groupby
 from threading import Event
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy import sparse
@@ -28,6 +28,9 @@ from symheli.errors import InputError, SolverError
 from synthesis.numerics.polynomial.symmetric import basis, length
 from synthesis.numerics.program.answer import Answer
 from synthesis.numerics.program.interruptible import in_process, in_thread, no_panic
+
+if TYPE_CHECKING:
+    import cvxpy
 
 Array = np.ndarray
 
@@ -184,6 +187,50 @@ option.
 """
 
 
+_CLARABEL = {
+    "Solved": Answer.SOLVED,
+    "AlmostSolved": Answer.SOLVED,
+    "PrimalInfeasible": Answer.INFEASIBLE,
+    **dict.fromkeys(
+        (
+            "AlmostPrimalInfeasible",
+            "DualInfeasible",
+            "AlmostDualInfeasible",
+            "MaxIterations",
+            "MaxTime",
+            "NumericalError",
+            "InsufficientProgress",
+            "CallbackTerminated",
+            "Unsolved",
+        ),
+        Answer.FAILED,
+    ),
+}
+"""Answers by the status of Clarabel: that something almost has no solution says nothing."""
+_SCS = {
+    **dict.fromkeys((-7, -6, -5, -4, -3, -1, 0), Answer.FAILED),
+    **{-2: Answer.INFEASIBLE, 1: Answer.SOLVED, 2: Answer.SOLVED},
+}
+"""The same of SCS, by the numbers of glbopts.h: -7 is inaccurately infeasible."""
+_CVXPY = {
+    "optimal": Answer.SOLVED,
+    "infeasible": Answer.INFEASIBLE,
+    **dict.fromkeys(
+        (
+            "optimal_inaccurate",
+            "infeasible_inaccurate",
+            "infeasible_or_unbounded",
+            "unbounded",
+            "unbounded_inaccurate",
+            "user_limit",
+            "solver_error",
+        ),
+        Answer.FAILED,
+    ),
+}
+"""The same of cvxpy."""
+
+
 def general_solver(solver: Solver | str) -> Solver:
     """Return a solver for any cone program; raise `InputError` for the one that is not."""
     solver = solver if isinstance(solver, Solver) else Solver(solver)
@@ -235,6 +282,25 @@ class ConeProgram:
     sizes: tuple[int, ...]
     equalities: int = 0
     own_units: bool = False
+
+    def to_cvxpy(self) -> tuple[cvxpy.Problem, cvxpy.Variable]:
+        """Return it as a problem of cvxpy, for its other solvers and for constraints of one's own,
+        and the variable x (count,).
+        """
+        import cvxpy as cp
+
+        x = cp.Variable(len(self.c))
+        s = self.b - self.A @ x
+        start = self.equalities
+        constraints: list[Any] = [s[:start] == 0] if start else []
+        for n, group in groupby(self.sizes):
+            expand = basis(n).reshape(length(n), n * n).T
+            for _ in group:
+                constraints.append(
+                    cp.reshape(expand @ s[start : start + length(n)], (n, n), order="C") >> 0
+                )
+                start += length(n)
+        return cp.Problem(cp.Minimize(self.c @ x), constraints), x
 
 
 @dataclass(frozen=True, eq=False)
@@ -333,10 +399,9 @@ def _clarabel(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
     except SolverError as error:
         return Answer.FAILED, None, str(error)
     word = str(solution.status)
-    if "PrimalInfeasible" in word:
-        return Answer.INFEASIBLE, None, word
+    answer = _CLARABEL[word]
     # a point that ran out of iterations or progress may still pass the verification
-    return (Answer.SOLVED if "Solved" in word else Answer.FAILED), solution.x, word
+    return answer, None if "PrimalInfeasible" in word else solution.x, word
 
 
 def _scs(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
@@ -355,9 +420,8 @@ def _scs(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
     word = str(solution["info"]["status"])
     if word == "interrupted":  # SCS handles the interrupt itself
         raise KeyboardInterrupt
-    if word.startswith("infeasible"):
-        return Answer.INFEASIBLE, None, word
-    return (Answer.SOLVED if word.startswith("solved") else Answer.FAILED), solution["x"], word
+    answer = _SCS[solution["info"]["status_val"]]
+    return answer, None if answer is Answer.INFEASIBLE else solution["x"], word
 
 
 @lru_cache(maxsize=32)
@@ -369,21 +433,9 @@ def _scs_order(n: int) -> Array:
 
 
 def _cvxpy(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
-    import cvxpy as cp
     from cvxpy.error import SolverError as CvxpyError
 
-    x = cp.Variable(len(program.c))
-    s = program.b - program.A @ x
-    start = program.equalities
-    constraints: list[Any] = [s[:start] == 0] if start else []
-    for n, group in groupby(program.sizes):
-        expand = basis(n).reshape(length(n), n * n).T
-        for _ in group:
-            constraints.append(
-                cp.reshape(expand @ s[start : start + length(n)], (n, n), order="C") >> 0
-            )
-            start += length(n)
-    problem = cp.Problem(cp.Minimize(program.c @ x), constraints)
+    problem, x = program.to_cvxpy()
     try:
         # cvxpy hands MOSEK's parameters on under a name of their own
         problem.solve(
@@ -392,10 +444,5 @@ def _cvxpy(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
         )
     except CvxpyError as error:
         return Answer.FAILED, None, str(error)
-    if problem.status in ("infeasible", "infeasible_inaccurate"):
-        return Answer.INFEASIBLE, None, problem.status
-    return (
-        (Answer.SOLVED if problem.status == "optimal" else Answer.FAILED),
-        x.value,
-        str(problem.status),
-    )
+    answer = _CVXPY[problem.status]
+    return answer, None if answer is Answer.INFEASIBLE else x.value, str(problem.status)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from models import constant, lag, lateral, random_stable, spring
 
-from symheli import LFT, LinearModel, Scheduling
+from symheli import LFT, LinearModel, LPVStateSpace, Scheduling
 from symheli.errors import CertificateError, InputError, UnknownNameError
 from symheli.lpv import connect
 from synthesis import Solver, frozen_gain, l2_gain, lft_gain, lower_bound
@@ -425,3 +425,21 @@ def test_on_the_lateral_loop_no_lft_test_proves_the_whole_range_and_a_varying_p_
         assert lft_gain(lft, scaling, search=None).status is Status.INFEASIBLE
     assert lft_gain(lft).status is Status.GROWING
     assert l2_gain(lateral(), 1.0, search=None).verified
+
+
+def test_a_loop_of_gains_of_a_hundred_million_is_refused_in_words():
+    """A crane over 1/length; the responses by which coordinates are chosen are singular to
+    rounding.
+    """
+    p = Scheduling("p", "1/m", 1 / 8, 1 / 2, 0.25)
+    A0, A1 = np.diag([1.0, 0, 1], 1), np.zeros((4, 4))
+    A1[3, 2], A0[3, 3] = -9.81, -0.05
+    B0, B1 = np.eye(4)[:, [1]], -np.eye(4)[:, [3]]
+    K = np.array([[-1.8584e8, -3.5902e8, 6.9817e8, 4.0393e8]])
+    C = np.vstack([np.eye(4)[0], 5.0 * np.eye(4)[2], K])
+    D = np.array([[0.0], [0.0], [0.1]])
+    closed = [A0 + B0 @ K, A1 + B1 @ K]
+    loop = LPVStateSpace.polynomial(closed, [0.1 * B0, 0.1 * B1], [C], [D], p)
+    found = lft_gain(loop.to_lft(), search=None)
+    assert not found.verified
+    assert found.why
