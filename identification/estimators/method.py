@@ -57,13 +57,18 @@ class Estimate:
 
 
 class Method(ABC):
-    """An estimator with its options; a subclass in a file of its own, exported, is all that `fit`
-    needs.
+    """An estimator with its options: the interface that `fit` needs, and nothing else.
+
+    A subclass is known by its shorthand as soon as it is defined. One of the package is a file of
+    its own whose class `identification.methods` exports.
 
     Attributes
     ----------
     shorthand : str
         Stands for the defaults, and is what a model says it was fitted by.
+    least_squares : bool
+        The coefficients minimise the squared residuals alone: `uncertainty` holds for them, and
+        noise in the regressors biases them, which their covariance does not tell.
     needs_excitation : bool
         The data alone must determine every coefficient, `fit` refuses them otherwise. False where a
         penalty decides what they leave open.
@@ -80,6 +85,7 @@ class Method(ABC):
     """
 
     shorthand: ClassVar[str]
+    least_squares: ClassVar[bool] = False
     needs_excitation: ClassVar[bool] = True
 
     @abstractmethod
@@ -92,14 +98,41 @@ class Method(ABC):
         return cls()
 
 
+def known_methods() -> dict[str, type[Method]]:
+    """Return every estimator by its shorthand: the exports of `identification.methods`, then
+    subclasses defined elsewhere.
+
+    Raises `InputError` where two of them have one shorthand.
+    """
+    from identification import methods
+
+    exports = [getattr(methods, name) for name in methods.__all__]
+    own = [each for each in exports if isinstance(each, type) and issubclass(each, Method)]
+    known: dict[str, type[Method]] = {}
+    for method in (*own, *_subclasses(Method)):
+        if isabstract(method) or "shorthand" not in vars(method):
+            continue
+        other = known.setdefault(method.shorthand, method)
+        if (other.__module__, other.__qualname__) != (method.__module__, method.__qualname__):
+            raise InputError(
+                f"the estimators {other.__qualname__} and {method.__qualname__} are both called"
+                f" {method.shorthand!r}: give one of them another shorthand"
+            )
+        known[method.shorthand] = method  # where a class is defined once more, the latest counts
+    return known
+
+
 def method_of(value: Method | str) -> Method:
     """A method, or the defaults of the one a shorthand names.
 
     Raises `UnknownNameError` for any other string, `InputError` for anything else.
     """
     if isinstance(value, Method):
+        if not hasattr(value, "shorthand"):
+            name = type(value).__name__
+            raise InputError(f"method {name}: give the class a name, such as shorthand = {name!r}")
         return value
-    known = {m.shorthand: m for m in _subclasses(Method) if not isabstract(m)}
+    known = known_methods()
     if not isinstance(value, str):
         raise InputError(
             f"method: expected one of {', '.join(known)}, or a method with its options such as"

@@ -33,10 +33,6 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
-LEAST_SQUARES = ("ls", "rls")
-"""Methods that are biased by noise in the regressors; their covariance does not include the bias.
-"""
-
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LPVARXModel:
@@ -60,6 +56,8 @@ class LPVARXModel:
         Samples of the fit.
     method : str
         How it was fitted.
+    least_squares : bool
+        Whether that was least squares alone: see `identification.methods.Method`.
     excitation : ExcitationReport, optional
         On the data.
     details : mapping
@@ -95,6 +93,7 @@ class LPVARXModel:
     rows_used: int
     rows_dropped: int = 0
     method: str = "ls"
+    least_squares: bool = field(default=True, repr=False)
     excitation: ExcitationReport | None = field(default=None, repr=False)
     details: Mapping[str, Any] = field(default_factory=dict, repr=False)
     covariance: Array | None = field(default=None, repr=False)

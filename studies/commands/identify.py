@@ -8,13 +8,14 @@ import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
+from inspect import Parameter, signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from studies.commands import options
-from studies.commands.arguments import add, flag, option, positional
+from studies.commands.arguments import Listed, add, flag, option, positional
 from studies.output import Output
 from symheli.errors import InputError, SymheliError
 from symheli.logs.format import FORMATS, OWN_CLOCKS, Format, format_of
@@ -22,6 +23,7 @@ from symheli.values.whole_files import write_text
 
 if TYPE_CHECKING:
     from identification import LPVARX
+    from identification.methods import Method
     from studies.log.suggestion import Suggestion
     from symheli.logs.contents import Contents
     from symheli.logs.segments import Segment
@@ -29,13 +31,13 @@ if TYPE_CHECKING:
     from symheli.logs.survey import Survey
     from symheli.records import FlightRecord, KinematicCheck
 
-METHODS = ("ls", "rls", "ridge", "lasso", "iv", "riv", "oe")
-"""Methods of `identification.fit`."""
-
 HELP = (
     "fit an LPV-ARX model to a flight log and judge it on data it has not seen; with the log alone,"
     " say what it holds and suggest a command"
 )
+INSTRUMENTS = "instruments"
+"""The parameter by which an estimator takes the names of external excitation."""
+
 XPLANE = {"outputs": ("q", "theta"), "inputs": ("stick_lon",), "scheduling": "airspeed"}
 """Default signals of an X-Plane log."""
 
@@ -59,6 +61,23 @@ ONE_MODEL = {
     "save": "writes",
     "loop": "judges",
 }
+
+
+
+def _parameters(method: type[Method]) -> Mapping[str, Parameter]:
+    return signature(method).parameters
+
+
+def _methods() -> list[str]:
+    """Return the estimators that need nothing, or nothing but names of instruments."""
+    from identification.estimators.method import known_methods
+
+    return [
+        name
+        for name, method in known_methods().items()
+        if {p.name for p in _parameters(method).values() if p.default is p.empty} <= {INSTRUMENTS}
+    ]
+
 
 ARGUMENTS = (
     positional("log", "flight log", type=Path, metavar="LOG"),
@@ -120,9 +139,13 @@ ARGUMENTS = (
         " better in sample",
         default="auto",
     ),
-    option("--method", METHODS, "estimator", default="ls"),
+    option("--method", "NAME", "estimator: %(choices)s", default="ls", choices=Listed(_methods)),
     option(
-        "--instruments", "E,F", "external excitation, for --method iv, riv or oe", options.names, ()
+        "--instruments",
+        "E,F",
+        "external excitation, for a method that takes instruments, such as iv",
+        options.names,
+        (),
     ),
     option("--start", "S", "drop samples before this time, s on the log's clock", options.number),
     option("--stop", "S", "drop samples after this time, s", options.number),
@@ -183,7 +206,6 @@ def run(arguments: argparse.Namespace) -> Output:
 def _identified(arguments: argparse.Namespace) -> Output:
     """The answer, with the advice of the libraries as it is."""
     from identification.judge import compare_constant, slow_modes
-    from identification.model.lpvarx_model import LEAST_SQUARES
     from studies.log import in_feedback, report, tried
 
     if arguments.log.suffix.lower() == ".toml":
@@ -245,7 +267,7 @@ def _identified(arguments: argparse.Namespace) -> Output:
         return _requested(other, kind)[:3]
 
     mended, slow = tried.mended(result, vars(arguments), again), ""
-    if result.scheduled.method in LEAST_SQUARES:
+    if result.scheduled.least_squares:
         found = slow_modes(result.scheduled, result.training)
         slow = tried.seen_slowly(found, vars(arguments), again)
     text = report.text(facts, result, check, mended=mended, slow=slow)
@@ -451,16 +473,17 @@ class _Prepared(NamedTuple):
     slower: Mapping[str, float]
 
 
-def _method(name: str, instruments: tuple[str, ...]) -> Any:
+def _method(name: str, instruments: tuple[str, ...]) -> Method | str:
     """The method of this name, with its instruments."""
-    from identification.methods import InstrumentalVariables, OutputError, RefinedInstruments
+    from identification.estimators.method import known_methods
 
     if not instruments:
         return name
-    takes = {"iv": InstrumentalVariables, "riv": RefinedInstruments, "oe": OutputError}
+    known = known_methods()
+    takes = [each for each in _methods() if INSTRUMENTS in _parameters(known[each])]
     if name not in takes:
-        raise InputError(f"--instruments are for --method iv, riv or oe, not {name}")
-    return takes[name](instruments)
+        raise InputError(f"--instruments are for --method {', '.join(takes)}, not {name}")
+    return known[name](**{INSTRUMENTS: instruments})
 
 
 def _prepared(
@@ -544,7 +567,6 @@ def _declared(arguments: argparse.Namespace, log: Path) -> dict[str, str]:
 def _write(arguments: argparse.Namespace, result: Any) -> Iterator[Path]:
     """Write the requested plots and the model; return their paths."""
     from identification import uncertainty
-    from identification.model.lpvarx_model import LEAST_SQUARES
     from studies.log import figure
 
     if arguments.plot:
@@ -554,7 +576,7 @@ def _write(arguments: argparse.Namespace, result: Any) -> Iterator[Path]:
         yield figure.save(bands[0].figure, arguments.bands)
     if arguments.save:
         model = result.scheduled
-        if model.method in LEAST_SQUARES:
+        if model.least_squares:
             model = replace(model, covariance=uncertainty(model, result.training).covariance)
         yield (
             model.save(arguments.save)
