@@ -5,9 +5,8 @@ coefficients.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from inspect import isabstract
 from typing import Any, ClassVar
 
 from identification.model.noise_model import NoiseModel
@@ -16,6 +15,7 @@ from identification.structure.regressors import Regression
 from symheli.errors import ConvergenceWarning, InputError, UnknownNameError
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
+from symheli.values.named_subclasses import named_subclasses
 from symheli.values.summary import summarized
 
 
@@ -108,18 +108,7 @@ def known_methods() -> dict[str, type[Method]]:
 
     exports = [getattr(methods, name) for name in methods.__all__]
     own = [each for each in exports if isinstance(each, type) and issubclass(each, Method)]
-    known: dict[str, type[Method]] = {}
-    for method in (*own, *_subclasses(Method)):
-        if isabstract(method) or "shorthand" not in vars(method):
-            continue
-        other = known.setdefault(method.shorthand, method)
-        if (other.__module__, other.__qualname__) != (method.__module__, method.__qualname__):
-            raise InputError(
-                f"the estimators {other.__qualname__} and {method.__qualname__} are both called"
-                f" {method.shorthand!r}: give one of them another shorthand"
-            )
-        known[method.shorthand] = method  # where a class is defined once more, the latest counts
-    return known
+    return named_subclasses(Method, "shorthand", own)
 
 
 def method_of(value: Method | str) -> Method:
@@ -146,9 +135,3 @@ def method_of(value: Method | str) -> Method:
 def not_settled(method: Method, advice: str) -> ConvergenceWarning:
     """The remark of an iteration that stops early, with what to try."""
     return ConvergenceWarning(f"{method.shorthand!r} did not settle: {advice}")
-
-
-def _subclasses(parent: type[Method]) -> Iterator[type[Method]]:
-    for child in parent.__subclasses__():
-        yield child
-        yield from _subclasses(child)

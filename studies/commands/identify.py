@@ -18,7 +18,7 @@ from studies.commands import options
 from studies.commands.arguments import Listed, add, flag, option, positional
 from studies.output import Output
 from symheli.errors import InputError, SymheliError
-from symheli.logs.format import FORMATS, OWN_CLOCKS, Format, format_of
+from symheli.logs.format import format_named, format_of, known_formats, own_clocks
 from symheli.values.whole_files import write_text
 
 if TYPE_CHECKING:
@@ -63,7 +63,6 @@ ONE_MODEL = {
 }
 
 
-
 def _parameters(method: type[Method]) -> Mapping[str, Parameter]:
     return signature(method).parameters
 
@@ -82,7 +81,11 @@ def _methods() -> list[str]:
 ARGUMENTS = (
     positional("log", "flight log", type=Path, metavar="LOG"),
     option(
-        "--format", ("auto", *FORMATS), "how the log is read; auto: by its content", default="auto"
+        "--format",
+        "NAME",
+        "how the log is read, %(choices)s; auto: by its content",
+        default="auto",
+        choices=Listed(lambda: ("auto", *known_formats())),
     ),
     option(
         "--map",
@@ -322,12 +325,12 @@ def _requested(
     return structure, training, test, prepared
 
 
-def _format(arguments: argparse.Namespace) -> Format:
+def _format(arguments: argparse.Namespace) -> str:
     """Return the format of the log: the given one, or that of its content."""
     return format_of(arguments.log) if arguments.format == "auto" else arguments.format
 
 
-def _log_format(arguments: argparse.Namespace, log: Path) -> Format:
+def _log_format(arguments: argparse.Namespace, log: Path) -> str:
     """Return the format of a log: the given one, the map's, or that of its content."""
     given = _map(arguments).format if arguments.map and arguments.format == "auto" else None
     return given or (format_of(log) if arguments.format == "auto" else arguments.format)
@@ -375,7 +378,7 @@ def _contents(arguments: argparse.Namespace, log: Path) -> Contents:
     from symheli.logs.contents import Contents
 
     kind = _log_format(arguments, log)
-    if not arguments.map or kind in OWN_CLOCKS:
+    if not arguments.map or own_clocks(kind):
         status = log.stat() if log.is_file() else None
         return _all_of(log, kind, *((status.st_mtime_ns, status.st_size) if status else (0, 0)))
     record = read_mapped(log, _map(arguments), arguments.time_unit)
@@ -384,7 +387,7 @@ def _contents(arguments: argparse.Namespace, log: Path) -> Contents:
 
 
 @lru_cache(maxsize=1)
-def _all_of(log: Path, kind: Format, _modified: int, _size: int) -> Contents:
+def _all_of(log: Path, kind: str, _modified: int, _size: int) -> Contents:
     """Return the content of a file, read once while it does not change."""
     from symheli.logs.contents import contents_of
 
@@ -507,18 +510,17 @@ def _prepared(
     if arguments.map:
         record = read_mapped(log, _map(arguments), arguments.time_unit)
     else:
-        kind = format_of(log) if arguments.format == "auto" else arguments.format
         record = read(
             log,
             list(dict.fromkeys(wanted)),
-            format=kind,
+            format=_log_format(arguments, log),
             dt=arguments.dt,
             time=arguments.time,
             units=dict(arguments.units),
             time_unit=arguments.time_unit,
         )
     samples, used, seen = len(record), (), None
-    if _log_format(arguments, log) in OWN_CLOCKS or arguments.segments:
+    if own_clocks(_log_format(arguments, log)) or arguments.segments:
         seen = _contents(arguments, log)
         segments = _surveyed(arguments, log, seen).segments
         cut_by_hand = cut and (arguments.start is not None or arguments.stop is not None)
@@ -556,12 +558,10 @@ def _prepared(
 
 def _declared(arguments: argparse.Namespace, log: Path) -> dict[str, str]:
     """Units by signal, as the map, the header or the options declare them."""
-    from symheli.logs.separated import SeparatedTable
-
     if arguments.map:
         return {n: s.unit for n, s in _map(arguments).signals.items() if s.unit}
-    header = SeparatedTable.read(log).units if _log_format(arguments, log) == "csv" else {}
-    return {**header, **dict(arguments.units)}
+    header = format_named(_log_format(arguments, log)).declared(log)
+    return {**{n: unit for n, unit in header.items() if unit}, **dict(arguments.units)}
 
 
 def _write(arguments: argparse.Namespace, result: Any) -> Iterator[Path]:
