@@ -1304,7 +1304,7 @@ WORDS = (
     (
         "identify log.csv FIT --method lms",
         2,
-        "argument --method: invalid choice: 'lms' (choose from 'ls', 'rls', 'ridge',",
+        "argument --method: invalid choice: 'lms' (choose from 'armax', 'bj', 'iv',",
     ),
     (
         "identify log.csv FIT --start 30 --stop 20",

@@ -106,7 +106,7 @@ def known_methods() -> dict[str, type[Method]]:
     """
     from identification import methods
 
-    exports = [getattr(methods, name) for name in methods.__all__]
+    exports = [getattr(methods, name) for name in dir(methods)]
     own = [each for each in exports if isinstance(each, type) and issubclass(each, Method)]
     return named_subclasses(Method, "shorthand", own)
 

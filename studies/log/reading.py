@@ -32,6 +32,9 @@ STILL = 1e-6
 COMBINED = "speed"
 """The scheduling signal made of --scheduling-from."""
 
+TIMES = ("t", "time")
+"""Columns taken as the time where none is named."""
+
 
 def read_mapped(path: Path, found: SignalMap, taken: str | None = None) -> FlightRecord:
     """The record by a signal map, on one step; `taken` is the unit of time that was given."""
@@ -141,7 +144,7 @@ def read(
         if name not in declared:
             raise UnknownNameError("signal in --units", name, declared)
     if form.time_column:
-        time = time or form.usual_time(path, dt)
+        time = time or _time_column(path, known, dt)
     sources = {name: Source(name, unit) for name, unit in declared.items()}
     found = SignalMap(sources, format, time, time_unit, dt)
     return read_mapped(path, found, time_unit or known.get(time or ""))
@@ -151,6 +154,20 @@ def _undeclared(name: str) -> str:
     raise InputError(
         f"the unit of {name!r} is not known: --units {shlex.quote(f'{name}=UNIT')}, such as rad,"
         " deg/s, m/s, or 1 where it has none"
+    )
+
+
+def _time_column(path: Path, known: Mapping[str, str | None], dt: float | None) -> str | None:
+    for name in TIMES:
+        if name in known:
+            return name
+    if not known:  # a log that does not list its columns
+        return TIMES[0]
+    if dt is not None:
+        return None
+    raise InputError(
+        f"{path}: no column is called {' or '.join(TIMES)}; name it with --time, or give the sample"
+        f" period with --dt; found {', '.join(map(repr, known))}"
     )
 
 

@@ -18,22 +18,18 @@ import os
 import struct
 from array import array
 from collections.abc import Callable, Iterator, Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.logs.column import GAP, Column, on_one_axis
-from symheli.logs.contents import Contents
 from symheli.logs.files import Table, bounded, positive, warn_of_damage
 from symheli.logs.format import LogFormat
 from symheli.logs.meaning import BLACKBOX as GUESSED
-from symheli.logs.meaning import Named
+from symheli.logs.signal_map import SignalMap
 from symheli.progress import task
 from symheli.values.units import to_si
-
-if TYPE_CHECKING:
-    from symheli.logs.signal_map import SignalMap
 
 BLACKBOX = b"H Product:Blackbox"
 """At the beginning of each log of a Blackbox file."""
@@ -472,20 +468,14 @@ class Blackbox(LogFormat):
     """Blackbox logs of Betaflight, Rotorflight and INAV."""
 
     name, own_clocks = "blackbox", True
+    guessed = GUESSED
+    columns = staticmethod(blackbox_columns)
 
     def recognises(self, head: bytes) -> bool:
         """Whether a log begins in its head."""
         return BLACKBOX in head
 
-    def contents(self, path: str | os.PathLike[str]) -> Contents:
-        """Return every field of every kind of frame."""
-        return Contents(self.name, blackbox_columns(path))
-
     def read(self, path: str | os.PathLike[str], by: SignalMap) -> Table:
         """Read the fields of a map, on its step."""
         fields = {column: (column, unit or "") for column, unit in by.given.items()}
         return read_blackbox(path, fields, by.needed_step(path))
-
-    def named(self, columns: Mapping[str, Column]) -> Named:
-        """Return the columns of the firmware."""
-        return GUESSED

@@ -8,25 +8,18 @@ import csv
 import io
 import os
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from symheli.errors import InputError
 from symheli.logs.column import Column
-from symheli.logs.contents import Contents
 from symheli.logs.files import Table, positive, seconds_in
 from symheli.logs.format import LogFormat
 from symheli.logs.order import in_order
-from symheli.logs.separated import SEPARATORS, SeparatedTable
+from symheli.logs.separated import SeparatedTable
+from symheli.logs.signal_map import SignalMap
 from symheli.values.arrays import Array
 from symheli.values.signal import Signal
-
-if TYPE_CHECKING:
-    from symheli.logs.signal_map import SignalMap
-
-TIMES = ("t", "time")
-"""Columns taken as the time where none is named."""
 
 
 def read_csv(
@@ -100,14 +93,11 @@ class CommaSeparated(LogFormat):
     """Text tables: what no other format recognises."""
 
     name, time_column, any_text = "csv", True, True
+    columns = staticmethod(csv_columns)
 
     def recognises(self, head: bytes) -> bool:
         """Whether it is a table is seen when it is read."""
         return True
-
-    def contents(self, path: str | os.PathLike[str]) -> Contents:
-        """Return every column of numbers."""
-        return Contents(self.name, csv_columns(path))
 
     def read(self, path: str | os.PathLike[str], by: SignalMap) -> Table:
         """Read the columns of a map; without a time column its rows are dt apart."""
@@ -117,19 +107,3 @@ class CommaSeparated(LogFormat):
         """Return the names in the header with their units."""
         table = SeparatedTable.read(path)
         return {name: table.units.get(name) for name in table.names}
-
-    def usual_time(self, path: str | os.PathLike[str], dt: float | None) -> str | None:
-        """Return the first of `TIMES` that the table has; raise `InputError` where there is none
-        and no `dt`.
-        """
-        table = SeparatedTable.read(path)
-        for name in TIMES:
-            if name in table.names:
-                return name
-        if dt is not None:
-            return None
-        found = f"{', '.join(map(repr, table.names))} (separated by {SEPARATORS[table.separator]})"
-        raise InputError(
-            f"{path}: no column is called {' or '.join(TIMES)}; name it with --time, or give the"
-            f" sample period with --dt; found {found}"
-        )

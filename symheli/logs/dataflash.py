@@ -20,21 +20,18 @@ import re
 from array import array
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.extras import extra
 from symheli.logs.column import GAP, RESTART, Column, continuous, on_one_axis
-from symheli.logs.contents import Contents
 from symheli.logs.files import Table, bounded, error_text, positive, quiet, units_of, warn_of_damage
 from symheli.logs.format import LogFormat
 from symheli.logs.meaning import DATAFLASH, SDLOG2, Named
+from symheli.logs.signal_map import SignalMap
 from symheli.values.units import to_si
-
-if TYPE_CHECKING:
-    from symheli.logs.signal_map import SignalMap
 
 LABELS = {
     "deg": "deg",
@@ -437,15 +434,12 @@ class DataFlash(LogFormat):
     """ArduPilot's DataFlash, binary or text, and PX4's older logs of the same form."""
 
     name, own_clocks = "dataflash", True
+    columns = staticmethod(dataflash_columns)
 
     def recognises(self, head: bytes) -> bool:
         """Whether it declares messages."""
         text = re.search(rb"^FMT, ?\d+, ?\d+, ?\w+,", head, re.MULTILINE)
         return head.startswith(FORMAT_HEAD[:2]) or text is not None
-
-    def contents(self, path: str | os.PathLike[str]) -> Contents:
-        """Return every field of every message."""
-        return Contents(self.name, dataflash_columns(path))
 
     def read(self, path: str | os.PathLike[str], by: SignalMap) -> Table:
         """Read the fields of a map, on its step."""

@@ -7,7 +7,7 @@ import os
 import pkgutil
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
@@ -46,6 +46,8 @@ class LogFormat(ABC):
         The log has signals, not columns: all are read, under their names and in their units.
     any_text : bool
         Nothing marks it: it is asked last, and takes what no other format recognises.
+    guessed : mapping
+        Columns that a survey guesses signals from, with their units, the best first.
     """
 
     name: ClassVar[str]
@@ -53,14 +55,16 @@ class LogFormat(ABC):
     time_column: ClassVar[bool] = False
     own_names: ClassVar[bool] = False
     any_text: ClassVar[bool] = False
+    guessed: ClassVar[Named] = {}
 
     @abstractmethod
     def recognises(self, head: bytes) -> bool:
         """Whether a file that begins with these `LOOKED_AT` bytes is of this format."""
 
+    @staticmethod
     @abstractmethod
-    def contents(self, path: str | os.PathLike[str]) -> Contents:
-        """Return all that a log holds; raise `InputError` for a file that is no such log."""
+    def columns(path: str | os.PathLike[str]) -> Mapping[str, Column]:
+        """Return every column of numbers; raise `InputError` for a file that is no such log."""
 
     @abstractmethod
     def read(self, path: str | os.PathLike[str], by: SignalMap) -> Table:
@@ -70,15 +74,15 @@ class LogFormat(ABC):
         """Return the columns of a table with the units that its head declares; none by default."""
         return {}
 
-    def named(self, columns: Mapping[str, Column]) -> Named:
-        """Return the columns that signals are guessed from, by signal; none: by their names."""
-        return {}
+    def contents(self, path: str | os.PathLike[str]) -> Contents:
+        """Return its columns, and its sample period where the log has no clock but shows it."""
+        from symheli.logs.contents import Contents
 
-    def usual_time(self, path: str | os.PathLike[str], dt: float | None) -> str | None:
-        """Return the column that is the time where the user names none; None where rows are `dt`
-        (s) apart.
-        """
-        return None if dt is not None else "t"
+        return Contents(self.name, self.columns(path))
+
+    def named(self, columns: Mapping[str, Column]) -> Named:
+        """Return the columns that signals are guessed from; {}: those with usual names."""
+        return self.guessed
 
 
 def known_formats() -> dict[str, LogFormat]:
@@ -86,7 +90,8 @@ def known_formats() -> dict[str, LogFormat]:
     folder = str(Path(__file__).parent)
     for module in pkgutil.iter_modules([folder]):
         importlib.import_module(f"{__package__}.{module.name}")
-    return {name: form() for name, form in named_subclasses(LogFormat, "name").items()}
+    made: dict[str, Callable[[], LogFormat]] = {**named_subclasses(LogFormat, "name")}
+    return {name: form() for name, form in made.items()}
 
 
 def format_named(name: str) -> LogFormat:

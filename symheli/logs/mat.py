@@ -5,21 +5,18 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.extras import extra
 from symheli.logs.column import Column
-from symheli.logs.contents import Contents
 from symheli.logs.files import Table, bounded, error_text, seconds_in
 from symheli.logs.format import LogFormat
 from symheli.logs.mat5 import MAX_INFLATED, check_mat5
 from symheli.logs.order import in_order
-
-if TYPE_CHECKING:
-    from symheli.logs.signal_map import SignalMap
+from symheli.logs.signal_map import SignalMap
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
 """At the beginning, or behind the 512 bytes that MATLAB writes about itself."""
@@ -154,14 +151,11 @@ class Matlab(LogFormat):
     """MATLAB files, of one vector a signal."""
 
     name, time_column = "mat", True
+    columns = staticmethod(mat_columns)
 
     def recognises(self, head: bytes) -> bool:
         """Whether MATLAB wrote it, or it is an HDF5 file."""
         return head.startswith(b"MATLAB") or _is_hdf5(head)
-
-    def contents(self, path: str | os.PathLike[str]) -> Contents:
-        """Return every vector of numbers."""
-        return Contents(self.name, mat_columns(path))
 
     def read(self, path: str | os.PathLike[str], by: SignalMap) -> Table:
         """Read the vectors of a map, which names that of the time."""

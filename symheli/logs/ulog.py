@@ -12,20 +12,17 @@ import os
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.extras import extra
 from symheli.logs.column import Column, continuous, on_one_axis
-from symheli.logs.contents import Contents
 from symheli.logs.files import Table, bounded, error_text, positive, quiet, warn_of_damage
 from symheli.logs.format import LogFormat
-from symheli.logs.meaning import ULOG, Named
-
-if TYPE_CHECKING:
-    from symheli.logs.signal_map import SignalMap
+from symheli.logs.meaning import ULOG
+from symheli.logs.signal_map import SignalMap
 
 QUATERNION = tuple(f"q[{i}]" for i in range(4))
 ANGLES = ("phi", "theta", "psi")
@@ -212,14 +209,12 @@ class ULog(LogFormat):
     """PX4's ULog."""
 
     name, own_clocks = "ulog", True
+    guessed = ULOG
+    columns = staticmethod(ulog_columns)
 
     def recognises(self, head: bytes) -> bool:
         """Whether it begins as one."""
         return head.startswith(b"ULog")
-
-    def contents(self, path: str | os.PathLike[str]) -> Contents:
-        """Return every field of every topic."""
-        return Contents(self.name, ulog_columns(path))
 
     def read(self, path: str | os.PathLike[str], by: SignalMap) -> Table:
         """Read the fields of a map, on its step."""
@@ -229,7 +224,3 @@ class ULog(LogFormat):
             topic, field = split_column(column)
             topics[column] = topic, field, unit or unit_of(field)
         return read_ulog(path, topics, step)
-
-    def named(self, columns: Mapping[str, Column]) -> Named:
-        """Return the columns of PX4."""
-        return ULOG

@@ -20,7 +20,6 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -29,11 +28,9 @@ from symheli.logs.column import Column
 from symheli.logs.contents import Contents
 from symheli.logs.files import Table, positive, text
 from symheli.logs.format import LogFormat
-from symheli.logs.meaning import XPLANE, Named
+from symheli.logs.meaning import XPLANE
+from symheli.logs.signal_map import SignalMap
 from symheli.values.units import to_si
-
-if TYPE_CHECKING:
-    from symheli.logs.signal_map import SignalMap
 
 CLOCKS = ("totl,time", "real,time", "missn,time", "timer,time")
 """Columns that count seconds, the best first."""
@@ -265,11 +262,17 @@ class XPlane(LogFormat):
     """X-Plane's Data.txt."""
 
     name, own_names = "xplane", True
+    guessed = XPLANE
 
     def recognises(self, head: bytes) -> bool:
         """Whether its first line has "name,unit |"."""
         first = next((line for line in head.splitlines() if line.strip()), b"")
         return b"|" in first and b"," in first.split(b"|")[0]
+
+    @staticmethod
+    def columns(path: str | os.PathLike[str]) -> Mapping[str, Column]:
+        """Return every signal."""
+        return xplane_columns(path)[0]
 
     def contents(self, path: str | os.PathLike[str]) -> Contents:
         """Return every signal, and an estimate of the step of a log without a clock."""
@@ -278,7 +281,3 @@ class XPlane(LogFormat):
     def read(self, path: str | os.PathLike[str], by: SignalMap) -> Table:
         """Read every signal; with dt in the map rows are dt apart."""
         return read_xplane(path, by.dt)
-
-    def named(self, columns: Mapping[str, Column]) -> Named:
-        """Return its signals."""
-        return XPLANE
