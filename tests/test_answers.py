@@ -1284,7 +1284,8 @@ WORDS = (
     (
         "identify log.csv FIT --instruments u",
         1,
-        "--instruments are for --method armax, bj, iv, oe, riv, not ls",
+        "--instruments are for --method armax, bj, iv, oe, riv",
+        ", not ls",
     ),
     (
         "identify log.csv FIT --method iv",

@@ -146,6 +146,7 @@ def _with_methods(text: str | None) -> str:
             subsequent_indent=10 * " ",
         )
         for name, method in known_methods().items()
+        if method.__module__.startswith(str(__package__))
     ]
     before, all_of, after = (text or "").partition("biases all of least squares:\n")
     return "\n".join([before + all_of, *lines, after])

@@ -108,7 +108,7 @@ def known_methods() -> dict[str, type[Method]]:
 
     exports = [getattr(methods, name) for name in dir(methods)]
     own = [each for each in exports if isinstance(each, type) and issubclass(each, Method)]
-    return named_subclasses(Method, "shorthand", own)
+    return named_subclasses(Method, "shorthand", "symheli.methods", own)
 
 
 def method_of(value: Method | str) -> Method:

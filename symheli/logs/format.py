@@ -90,7 +90,9 @@ def known_formats() -> dict[str, LogFormat]:
     folder = str(Path(__file__).parent)
     for module in pkgutil.iter_modules([folder]):
         importlib.import_module(f"{__package__}.{module.name}")
-    made: dict[str, Callable[[], LogFormat]] = {**named_subclasses(LogFormat, "name")}
+    made: dict[str, Callable[[], LogFormat]] = {
+        **named_subclasses(LogFormat, "name", "symheli.formats")
+    }
     return {name: form() for name, form in made.items()}
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from functools import cache
+from importlib.metadata import entry_points
 from inspect import isabstract
 from typing import TypeVar
 
@@ -12,14 +14,15 @@ T = TypeVar("T")
 
 
 def named_subclasses(
-    parent: type[T], name: str, first: Iterable[type[T]] = ()
+    parent: type[T], name: str, group: str, first: Iterable[type[T]] = ()
 ) -> dict[str, type[T]]:
-    """Return every subclass with an attribute `name` of its own by its value, those of `first`
-    first.
+    """Return every subclass with an attribute `name` of its own by its value: those of `first`,
+    then those defined elsewhere, as by packages with entry points of this group.
 
     Where a class is defined once more, as in a notebook, the latest counts. Raises `InputError`
     where two classes have one name.
     """
+    _loaded(group)
     known: dict[str, type[T]] = {}
     for each in (*first, *_below(parent)):
         if isabstract(each) or name not in vars(each):
@@ -33,6 +36,12 @@ def named_subclasses(
             )
         known[own] = each
     return known
+
+
+@cache
+def _loaded(group: str) -> None:
+    for point in entry_points(group=group):
+        point.load()
 
 
 def _below(parent: type[T]) -> Iterator[type[T]]:
