@@ -141,7 +141,7 @@ class KinematicModel:
     @property
     def least_squares(self) -> bool:
         """Whether it was fitted by least squares alone."""
-        return self.aerodynamics.least_squares
+        return bool(self.aerodynamics.least_squares)
 
     @property
     def details(self) -> Any:

@@ -56,8 +56,9 @@ class LPVARXModel:
         Samples of the fit.
     method : str
         How it was fitted.
-    least_squares : bool
-        Whether that was least squares alone: see `identification.methods.Method`.
+    least_squares : bool, optional
+        Whether that was least squares alone: see `identification.methods.Method`. Default, as of
+        files that do not say it: what "ls" and "rls" are.
     excitation : ExcitationReport, optional
         On the data.
     details : mapping
@@ -93,7 +94,7 @@ class LPVARXModel:
     rows_used: int
     rows_dropped: int = 0
     method: str = "ls"
-    least_squares: bool = field(default=True, repr=False)
+    least_squares: bool | None = field(default=None, repr=False)
     excitation: ExcitationReport | None = field(default=None, repr=False)
     details: Mapping[str, Any] = field(default_factory=dict, repr=False)
     covariance: Array | None = field(default=None, repr=False)
@@ -118,6 +119,8 @@ class LPVARXModel:
             "residual_covariance",
             frozen(self.residual_covariance, "residual covariance", (arx.ny, arx.ny)),
         )
+        if self.least_squares is None:
+            object.__setattr__(self, "least_squares", self.method in ("ls", "rls"))
         if self.covariance is not None:
             n = arx.n_regressors
             object.__setattr__(

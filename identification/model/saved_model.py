@@ -97,8 +97,7 @@ def model_of(structure: LPVARX, content: dict[str, Any]) -> LPVARXModel:
         rows_used=content["rows_used"],
         rows_dropped=content["rows_dropped"],
         method=content["method"],
-        # of files that do not say it yet
-        least_squares=content.get("least_squares", content["method"] in ("ls", "rls")),
+        least_squares=content.get("least_squares"),
         excitation=None,
         details=content["details"],
         covariance=_covariance_of(structure, content),
