@@ -60,10 +60,7 @@ class Told(idn.methods.Method):
 class Lines(LogFormat):
     """A signal a line: name, unit, numbers; the step (s) in the first."""
 
-    name, own_names = "toy lines", True
-
-    def recognises(self, head):
-        return head.startswith(b"toy lines ")
+    name, begins, own_names = "toy lines", b"toy lines ", True
 
     @staticmethod
     def columns(path):
@@ -83,7 +80,7 @@ class Lines(LogFormat):
 class Timed(Lines):
     """The same, where the user names the time and the units."""
 
-    name, own_names, time_column = "toy timed", False, True
+    name, begins, own_names, time_column = "toy timed", b"", False, True
 
     def recognises(self, head):
         return head.startswith(b"toy timed ")

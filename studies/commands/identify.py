@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from inspect import Parameter, signature
+from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -35,9 +35,6 @@ HELP = (
     "fit an LPV-ARX model to a flight log and judge it on data it has not seen; with the log alone,"
     " say what it holds and suggest a command"
 )
-INSTRUMENTS = "instruments"
-"""The parameter by which an estimator takes the names of external excitation."""
-
 XPLANE = {"outputs": ("q", "theta"), "inputs": ("stick_lon",), "scheduling": "airspeed"}
 """Default signals of an X-Plane log."""
 
@@ -63,19 +60,17 @@ ONE_MODEL = {
 }
 
 
-def _parameters(method: type[Method]) -> Mapping[str, Parameter]:
-    return signature(method).parameters
-
-
-def _methods() -> list[str]:
-    """Return the estimators that need nothing, or nothing but names of instruments."""
+def _methods(*, told: bool = False) -> list[str]:
+    """Return the estimators that need nothing but names of instruments; `told`: that take them."""
     from identification.estimators.method import known_methods
 
-    return [
-        name
-        for name, method in known_methods().items()
-        if {p.name for p in _parameters(method).values() if p.default is p.empty} <= {INSTRUMENTS}
-    ]
+    found = []
+    for name, method in known_methods().items():
+        parameters = signature(method).parameters
+        needed = {p.name for p in parameters.values() if p.default is p.empty}
+        if needed <= {"instruments"} and (not told or "instruments" in parameters):
+            found.append(name)
+    return found
 
 
 ARGUMENTS = (
@@ -217,7 +212,7 @@ def _identified(arguments: argparse.Namespace) -> Output:
             " --map FILE.toml beside the log, and a vehicle is shown by `symheli vehicles"
             " FILE.toml`"
         )
-    kind = "mapped" if arguments.map else _format(arguments)
+    kind = "mapped" if arguments.map else _log_format(arguments, arguments.log)
     if not any(getattr(arguments, name) for name in FIT_OPTIONS):
         seen = _contents(arguments, arguments.log)
         if not _at_once(arguments, kind, seen):
@@ -323,11 +318,6 @@ def _requested(
         offset=not arguments.no_offset,
     )
     return structure, training, test, prepared
-
-
-def _format(arguments: argparse.Namespace) -> str:
-    """Return the format of the log: the given one, or that of its content."""
-    return format_of(arguments.log) if arguments.format == "auto" else arguments.format
 
 
 def _log_format(arguments: argparse.Namespace, log: Path) -> str:
@@ -441,7 +431,7 @@ def _refused(hint: Suggestion) -> str:
             write_text(arguments.map, hint.map)
         try:
             structure, training, _, _ = _requested(
-                arguments, "mapped" if arguments.map else _format(arguments)
+                arguments, "mapped" if arguments.map else _log_format(arguments, arguments.log)
             )
             fit(structure, training)
         except SymheliError as error:
@@ -482,11 +472,9 @@ def _method(name: str, instruments: tuple[str, ...]) -> Method | str:
 
     if not instruments:
         return name
-    known = known_methods()
-    takes = [each for each in _methods() if INSTRUMENTS in _parameters(known[each])]
-    if name not in takes:
+    if name not in (takes := _methods(told=True)):
         raise InputError(f"--instruments are for --method {', '.join(takes)}, not {name}")
-    return known[name](**{INSTRUMENTS: instruments})
+    return known_methods()[name](**{"instruments": instruments})
 
 
 def _prepared(

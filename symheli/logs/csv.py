@@ -95,10 +95,6 @@ class CommaSeparated(LogFormat):
     name, time_column, any_text = "csv", True, True
     columns = staticmethod(csv_columns)
 
-    def recognises(self, head: bytes) -> bool:
-        """Whether it is a table is seen when it is read."""
-        return True
-
     def read(self, path: str | os.PathLike[str], by: SignalMap) -> Table:
         """Read the columns of a map; without a time column its rows are dt apart."""
         return read_csv(path, by.time, by.given, by.dt if by.time is None else None, by.time_unit)

@@ -38,6 +38,9 @@ class LogFormat(ABC):
     ----------
     name : str
         Names it in signal maps and on the command line.
+    begins : bytes
+        The first bytes of every file; where these do not decide, `recognises` is overridden. A
+        format with neither is read where it is named.
     own_clocks : bool
         Every topic, message or kind of frame has its own rate; a map with a step dt reads it.
     time_column : bool
@@ -51,15 +54,16 @@ class LogFormat(ABC):
     """
 
     name: ClassVar[str]
+    begins: ClassVar[bytes] = b""
     own_clocks: ClassVar[bool] = False
     time_column: ClassVar[bool] = False
     own_names: ClassVar[bool] = False
     any_text: ClassVar[bool] = False
     guessed: ClassVar[Named] = {}
 
-    @abstractmethod
     def recognises(self, head: bytes) -> bool:
-        """Whether a file that begins with these `LOOKED_AT` bytes is of this format."""
+        """Whether a file with these first `LOOKED_AT` bytes is of this format: as it `begins`."""
+        return bool(self.begins) and head.startswith(self.begins)
 
     @staticmethod
     @abstractmethod
@@ -113,7 +117,7 @@ def format_of(path: str | os.PathLike[str]) -> str:
     with existing(path).open("rb") as file:
         head = file.read(LOOKED_AT)
     forms = sorted(known_formats().values(), key=lambda form: form.any_text)
-    found = next(form for form in forms if form.recognises(head))
+    found = next(form for form in forms if form.any_text or form.recognises(head))
     lines = head.splitlines()[:20]
     if found.any_text and sum(PARAMETER.fullmatch(line) is not None for line in lines) > 10:
         raise InputError(

@@ -208,13 +208,9 @@ def euler_angles(
 class ULog(LogFormat):
     """PX4's ULog."""
 
-    name, own_clocks = "ulog", True
+    name, begins, own_clocks = "ulog", b"ULog", True
     guessed = ULOG
     columns = staticmethod(ulog_columns)
-
-    def recognises(self, head: bytes) -> bool:
-        """Whether it begins as one."""
-        return head.startswith(b"ULog")
 
     def read(self, path: str | os.PathLike[str], by: SignalMap) -> Table:
         """Read the fields of a map, on its step."""
