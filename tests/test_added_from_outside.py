@@ -21,8 +21,7 @@ from identification.model.saved_model import SCHEMA
 from studies import cli
 from symheli.errors import InputError, UnknownNameError
 from symheli.logs.column import Column
-from symheli.logs.contents import contents_of
-from symheli.logs.format import LogFormat, format_of
+from symheli.logs.format import LogFormat, contents_of, format_of
 from symheli.values import plain_file
 from symheli.values.named_subclasses import named_subclasses
 from synthesis.certify.questions.certificate import Certificate

@@ -18,14 +18,20 @@ from studies.commands import options
 from studies.commands.arguments import Listed, add, flag, option, positional
 from studies.output import Output
 from symheli.errors import InputError, SymheliError
-from symheli.logs.format import format_named, format_of, known_formats, own_clocks
+from symheli.logs.format import (
+    Contents,
+    contents_of,
+    format_named,
+    format_of,
+    known_formats,
+    own_clocks,
+)
 from symheli.values.whole_files import write_text
 
 if TYPE_CHECKING:
     from identification import LPVARX
     from identification.methods import Method
     from studies.log.suggestion import Suggestion
-    from symheli.logs.contents import Contents
     from symheli.logs.segments import Segment
     from symheli.logs.signal_map import SignalMap
     from symheli.logs.survey import Survey
@@ -365,7 +371,6 @@ def _contents(arguments: argparse.Namespace, log: Path) -> Contents:
     """Return all columns of a log, or of a table the signals of the map."""
     from studies.log.reading import read_mapped
     from symheli.logs.column import Column
-    from symheli.logs.contents import Contents
 
     kind = _log_format(arguments, log)
     if not arguments.map or own_clocks(kind):
@@ -379,8 +384,6 @@ def _contents(arguments: argparse.Namespace, log: Path) -> Contents:
 @lru_cache(maxsize=1)
 def _all_of(log: Path, kind: str, _modified: int, _size: int) -> Contents:
     """Return the content of a file, read once while it does not change."""
-    from symheli.logs.contents import contents_of
-
     return contents_of(log, kind)
 
 

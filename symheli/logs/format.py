@@ -8,6 +8,7 @@ import pkgutil
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
@@ -17,7 +18,6 @@ from symheli.values.named_subclasses import named_subclasses
 
 if TYPE_CHECKING:
     from symheli.logs.column import Column
-    from symheli.logs.contents import Contents
     from symheli.logs.meaning import Named
     from symheli.logs.signal_map import SignalMap
 
@@ -26,6 +26,17 @@ LOOKED_AT = 4096
 
 PARAMETER = re.compile(rb"[A-Z][A-Z0-9_]{1,15}(,| +|\t)-?[0-9.]+(e[+-]?\d+)?\s*")
 """A line of a file of parameters: ArduPilot's name and value."""
+
+
+@dataclass(frozen=True, eq=False)
+class Contents:
+    """Every column of numbers of a log ("mapped": the signals of a map) by its name; `step` is an
+    estimate of the sample period (s) where the log has no clock but gives itself away, else None.
+    """
+
+    format: str
+    columns: Mapping[str, Column]
+    step: float | None = None
 
 
 class LogFormat(ABC):
@@ -80,8 +91,6 @@ class LogFormat(ABC):
 
     def contents(self, path: str | os.PathLike[str]) -> Contents:
         """Return its columns, and its sample period where the log has no clock but shows it."""
-        from symheli.logs.contents import Contents
-
         return Contents(self.name, self.columns(path))
 
     def named(self, columns: Mapping[str, Column]) -> Named:
@@ -125,6 +134,14 @@ def format_of(path: str | os.PathLike[str]) -> str:
             " them too"
         )
     return found.name
+
+
+def contents_of(path: str | os.PathLike[str], format: str | None = None) -> Contents:
+    """Return the content of a log of this format (default: recognised by its first bytes).
+
+    Raises `InputError` for a file that is no such log.
+    """
+    return format_named(format or format_of(path)).contents(path)
 
 
 def own_clocks(name: str) -> bool:

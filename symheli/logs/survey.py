@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from symheli.logs.column import Column, forward, unresolved
-from symheli.logs.contents import Contents
-from symheli.logs.format import own_clocks
+from symheli.logs.format import Contents, own_clocks
 from symheli.logs.meaning import Guess, guesses, moves, plain_name
 from symheli.logs.segments import Segment, segments, serving
 from symheli.values.sample_period import JITTER, USUAL

@@ -25,9 +25,8 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.logs.column import Column
-from symheli.logs.contents import Contents
 from symheli.logs.files import Table, positive, text
-from symheli.logs.format import LogFormat
+from symheli.logs.format import Contents, LogFormat
 from symheli.logs.meaning import XPLANE
 from symheli.logs.signal_map import SignalMap
 from symheli.values.units import to_si
