@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import re
@@ -19,6 +20,7 @@ import symheli
 from identification.estimators.method import known_methods
 from identification.model.saved_model import SCHEMA
 from studies import cli
+from studies.commands import calibrate
 from symheli.errors import InputError, UnknownNameError
 from symheli.logs.column import Column
 from symheli.logs.format import LogFormat, contents_of, format_of
@@ -116,9 +118,9 @@ def record():
 
 def written(record, path, name):
     """A log of one of the toy formats."""
-    columns = {"t": record.time, **{str(s): record[s] for s in record.signals}}
-    rows = [" ".join([n, "1", *map(repr, map(float, v))]) for n, v in columns.items()]
-    path.write_text("\n".join([f"{name} 0.1", *rows]) + "\n", "utf-8")
+    rows = [["t", "s", *record.time], *([str(s), s.unit, *record[s]] for s in record.signals)]
+    lines = [" ".join(map(str, row)) for row in rows]
+    path.write_text("\n".join([f"{name} 0.1", *lines]) + "\n", "utf-8")
     return path
 
 
@@ -247,6 +249,23 @@ def test_identify_takes_a_log_of_ones_own(record, tmp_path, capsys, name):
     assert found["models"] == plain["models"]
     assert cli.main(["identify", str(log), *FIT, "--format", "toy"]) == 2
     assert "'toy lines'" in capsys.readouterr().err
+
+
+def test_commands_that_fly_take_a_log_of_ones_own(record, tmp_path, capsys):
+    """The records of calibrate and tune; experiment asks for a map, and takes it."""
+    names = dict.fromkeys(calibrate.INPUTS, "rad") | {"q": "rad/s"}
+    flight = record.with_signals(names, **dict.fromkeys(names, record["u"]))
+    asked = argparse.Namespace(map=None, start=None, stop=5.0)
+    found = calibrate.record_of(asked, written(flight, tmp_path / "log", "toy lines"))
+    assert set(names) <= set(map(str, found.signals))
+    assert len(found) == 50
+    assert [s.unit for s in found.signals if s == "q"] == ["rad/s"]
+    words = ["experiment", "--flown", str(tmp_path / "log"), "--plan", str(tmp_path / "plan.json")]
+    assert cli.main(words) == 1
+    assert "format toy lines needs a signal map, --map FILE.toml" in capsys.readouterr().err
+    (tmp_path / "map.toml").write_text('[signals]\nq = { column = "q" }\n')
+    assert cli.main([*words, "--map", str(tmp_path / "map.toml")]) == 1
+    assert "plan.json: there is no such file" in capsys.readouterr().err
 
 
 # --- a question ----------------------------------------------------------------------------------
