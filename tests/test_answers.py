@@ -1284,7 +1284,8 @@ WORDS = (
     (
         "identify log.csv FIT --instruments u",
         1,
-        "--instruments are for --method iv, riv or oe, not ls",
+        "--instruments are for --method armax, bj, iv, oe, riv",
+        ", not ls",
     ),
     (
         "identify log.csv FIT --method iv",
@@ -1304,7 +1305,7 @@ WORDS = (
     (
         "identify log.csv FIT --method lms",
         2,
-        "argument --method: invalid choice: 'lms' (choose from 'ls', 'rls', 'ridge',",
+        "argument --method: invalid choice: 'lms' (choose from 'armax', 'bj', 'iv',",
     ),
     (
         "identify log.csv FIT --start 30 --stop 20",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 import warnings
 from collections.abc import Iterable
 from dataclasses import replace
@@ -9,17 +10,9 @@ from typing import overload
 
 from identification.design.excitation import excitation_of
 from identification.design.leakage import warn_of_leakage
-from identification.estimators import (  # noqa: F401  known by their shorthand once loaded
-    instrumental_variables,
-    lasso,
-    prediction_error,
-    recursion,
-    refined_instruments,
-    ridge,
-)
 from identification.estimators.filter_error import FilterError
 from identification.estimators.least_squares import residual_covariance
-from identification.estimators.method import Method, method_of
+from identification.estimators.method import Method, known_methods, method_of
 from identification.estimators.prediction_error import OutputError
 from identification.estimators.state_space_search import state_space_of
 from identification.model.flown_in import flown_in
@@ -75,20 +68,9 @@ def fit(
         Of one sample period and in the same units; lags never reach across a gap or from one record
         into the next.
     method : Method or str, optional
-        An estimator with its options, or the shorthand of one with its defaults; a `StateSpace`
-        takes "oe" (default) only, the others "ls" (default) and:
-
-        - `LeastSquares`, "ls": least squares over all samples;
-        - `Recursion`, "rls": the same sample by sample, with forgetting;
-        - `Ridge`, "ridge" and `Lasso`, "lasso": with a price on coefficients. Noise on the outputs
-          biases all of these;
-        - `InstrumentalVariables`, "iv": unbiased by noise in closed loop; it needs the external
-          excitation, so the shorthand alone is refused;
-        - `RefinedInstruments`, "riv": the model's own response as instruments and filters;
-        - `OutputError`, "oe": the closest free run; `BoxJenkins`, "bj": the same beside coloured
-          noise at the outputs; `ARMAX`, "armax": with coloured noise in the equations.
-
-        Any other subclass of `Method` will do.
+        An estimator with its options, or the shorthand of one with its defaults: "ls", of a
+        `StateSpace` "oe", which is all that it takes. Any subclass of `Method` will do. Those of
+        `identification.methods`, of which noise on the outputs biases all of least squares:
 
     Returns
     -------
@@ -152,6 +134,30 @@ def fit(
     if isinstance(structure, KinematicARX):
         return _rigid(structure, as_records(records), method)
     return _fitted(structure, records, method)
+
+
+def _with_methods(text: str | None) -> str:
+    """Return the docstring of `fit` with the estimators that the package has."""
+    lines = [
+        textwrap.fill(
+            f'- `{method.__name__}`, "{name}": {_first(method)}',
+            width=100,
+            initial_indent=8 * " ",
+            subsequent_indent=10 * " ",
+        )
+        for name, method in known_methods().items()
+        if method.__module__.startswith(str(__package__))
+    ]
+    before, all_of, after = (text or "").partition("biases all of least squares:\n")
+    return "\n".join([before + all_of, *lines, after])
+
+
+def _first(method: type[Method]) -> str:
+    """Return the first paragraph of its docstring."""
+    return " ".join((method.__doc__ or "").partition("\n\n")[0].split())
+
+
+fit.__doc__ = _with_methods(fit.__doc__)
 
 
 def _states(
@@ -232,6 +238,7 @@ def _fitted(
         rows_used=len(data.phi),
         rows_dropped=data.dropped,
         method=method.shorthand,
+        least_squares=method.least_squares,
         excitation=report,
         details=found.details,
         covariance=found.covariance,

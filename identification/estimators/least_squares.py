@@ -32,6 +32,7 @@ class LeastSquares(Method):
     """
 
     shorthand: ClassVar[str] = "ls"
+    least_squares: ClassVar[bool] = True
 
     def estimate(self, arx: LPVARX, records: Sequence[FlightRecord], data: Regression) -> Estimate:
         """Estimate by an orthogonal factor for each group of equations with the same regressors."""

@@ -5,9 +5,8 @@ coefficients.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from inspect import isabstract
 from typing import Any, ClassVar
 
 from identification.model.noise_model import NoiseModel
@@ -16,6 +15,7 @@ from identification.structure.regressors import Regression
 from symheli.errors import ConvergenceWarning, InputError, UnknownNameError
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
+from symheli.values.named_subclasses import named_subclasses
 from symheli.values.summary import summarized
 
 
@@ -57,13 +57,18 @@ class Estimate:
 
 
 class Method(ABC):
-    """An estimator with its options; a subclass in a file of its own, exported, is all that `fit`
-    needs.
+    """An estimator with its options: the interface that `fit` needs, and nothing else.
+
+    A subclass is known by its shorthand as soon as it is defined. One of the package is a file of
+    its own whose class `identification.methods` exports.
 
     Attributes
     ----------
     shorthand : str
         Stands for the defaults, and is what a model says it was fitted by.
+    least_squares : bool
+        The coefficients minimise the squared residuals alone: `uncertainty` holds for them, and
+        noise in the regressors biases them, which their covariance does not tell.
     needs_excitation : bool
         The data alone must determine every coefficient, `fit` refuses them otherwise. False where a
         penalty decides what they leave open.
@@ -80,6 +85,7 @@ class Method(ABC):
     """
 
     shorthand: ClassVar[str]
+    least_squares: ClassVar[bool] = False
     needs_excitation: ClassVar[bool] = True
 
     @abstractmethod
@@ -92,14 +98,30 @@ class Method(ABC):
         return cls()
 
 
+def known_methods() -> dict[str, type[Method]]:
+    """Return every estimator by its shorthand: the exports of `identification.methods`, then
+    subclasses defined elsewhere.
+
+    Raises `InputError` where two of them have one shorthand.
+    """
+    from identification import methods
+
+    exports = [getattr(methods, name) for name in dir(methods)]
+    own = [each for each in exports if isinstance(each, type) and issubclass(each, Method)]
+    return named_subclasses(Method, "shorthand", "symheli.methods", own)
+
+
 def method_of(value: Method | str) -> Method:
     """A method, or the defaults of the one a shorthand names.
 
     Raises `UnknownNameError` for any other string, `InputError` for anything else.
     """
     if isinstance(value, Method):
+        if not hasattr(value, "shorthand"):
+            name = type(value).__name__
+            raise InputError(f"method {name}: give the class a name, such as shorthand = {name!r}")
         return value
-    known = {m.shorthand: m for m in _subclasses(Method) if not isabstract(m)}
+    known = known_methods()
     if not isinstance(value, str):
         raise InputError(
             f"method: expected one of {', '.join(known)}, or a method with its options such as"
@@ -113,9 +135,3 @@ def method_of(value: Method | str) -> Method:
 def not_settled(method: Method, advice: str) -> ConvergenceWarning:
     """The remark of an iteration that stops early, with what to try."""
     return ConvergenceWarning(f"{method.shorthand!r} did not settle: {advice}")
-
-
-def _subclasses(parent: type[Method]) -> Iterator[type[Method]]:
-    for child in parent.__subclasses__():
-        yield child
-        yield from _subclasses(child)

@@ -41,6 +41,7 @@ class Recursion(Method):
 
     forgetting: float | Forgetting = 1.0
     shorthand: ClassVar[str] = "rls"
+    least_squares: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         forgetting_of(self.forgetting)

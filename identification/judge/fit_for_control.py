@@ -28,7 +28,6 @@ from identification.judge.criteria import (
 from identification.judge.frozen_plant import AtPoint, FrozenPlant, Model, Point
 from identification.judge.response_regions import StructureBias, with_neighbours
 from identification.model.kinematic_model import KinematicModel
-from identification.model.lpvarx_model import LEAST_SQUARES
 from identification.structure.regressors import as_records
 from symheli import LinearModel, LPVStateSpace, UncertainStateSpace
 from symheli.errors import InputError, NotFitError
@@ -284,7 +283,7 @@ def fit_for_control(
         )
     known = {"truth": truth, "bias": None if bias is None else bias.exact}
     chosen = _points(model, points, {k: v for k, v in known.items() if v is not None})
-    if covariance is None and model.method not in LEAST_SQUARES:
+    if covariance is None and not model.least_squares:
         covariance = model.covariance
     if covariance is not None:
         covariance = frozen(covariance, "covariance", 2 * model.theta.shape[::-1])

@@ -14,7 +14,7 @@ from scipy.stats import t as student
 
 from identification.design.excitation import excitation_of
 from identification.judge.coefficient_covariance import covariances, drawn
-from identification.model.lpvarx_model import LEAST_SQUARES, LPVARXModel
+from identification.model.lpvarx_model import LPVARXModel
 from identification.model.realization import one_value
 from identification.structure.regressors import Regression, as_records, stacked
 from symheli.errors import InputError
@@ -272,7 +272,7 @@ def uncertainty(
     """
     records = as_records(records)
     arx = model.structure
-    if model.method not in LEAST_SQUARES:
+    if not model.least_squares:
         raise InputError(
             f'uncertainty is that of least squares; the model was fitted by "{model.method}"'
         )

@@ -16,7 +16,7 @@ from identification.model.excited_directions import excited_directions
 from identification.model.flown_in import sentence
 from identification.model.kinematic_realization import Realization
 from identification.model.kinematic_run import Run
-from identification.model.lpvarx_model import LEAST_SQUARES, LPVARXModel
+from identification.model.lpvarx_model import LPVARXModel
 from identification.model.prediction import named_fit, require_horizon
 from identification.model.realization import held_value
 from identification.structure.actuators import bare
@@ -137,6 +137,11 @@ class KinematicModel:
     def method(self) -> str:
         """Name of the estimation method."""
         return self.aerodynamics.method
+
+    @property
+    def least_squares(self) -> bool:
+        """Whether it was fitted by least squares alone."""
+        return bool(self.aerodynamics.least_squares)
 
     @property
     def details(self) -> Any:
@@ -409,7 +414,7 @@ class KinematicModel:
         """Raises `InputError` for a model without a covariance that holds, of another structure
         than `first`, or with more than the vehicle in it.
         """
-        if self.covariance is None or self.method in LEAST_SQUARES:
+        if self.covariance is None or self.least_squares:
             raise InputError(
                 f"method {self.method!r} gives no covariance that holds for noise in the"
                 " regressors: fit by FilterError(SimulatedFlight(...))"

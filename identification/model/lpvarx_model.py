@@ -33,10 +33,6 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
-LEAST_SQUARES = ("ls", "rls")
-"""Methods that are biased by noise in the regressors; their covariance does not include the bias.
-"""
-
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LPVARXModel:
@@ -60,6 +56,9 @@ class LPVARXModel:
         Samples of the fit.
     method : str
         How it was fitted.
+    least_squares : bool, optional
+        Whether that was least squares alone: see `identification.methods.Method`. Default, as of
+        files that do not say it: what "ls" and "rls" are.
     excitation : ExcitationReport, optional
         On the data.
     details : mapping
@@ -95,6 +94,7 @@ class LPVARXModel:
     rows_used: int
     rows_dropped: int = 0
     method: str = "ls"
+    least_squares: bool | None = field(default=None, repr=False)
     excitation: ExcitationReport | None = field(default=None, repr=False)
     details: Mapping[str, Any] = field(default_factory=dict, repr=False)
     covariance: Array | None = field(default=None, repr=False)
@@ -119,6 +119,8 @@ class LPVARXModel:
             "residual_covariance",
             frozen(self.residual_covariance, "residual covariance", (arx.ny, arx.ny)),
         )
+        if self.least_squares is None:
+            object.__setattr__(self, "least_squares", self.method in ("ls", "rls"))
         if self.covariance is not None:
             n = arx.n_regressors
             object.__setattr__(

@@ -50,6 +50,7 @@ def described(model: LPVARXModel) -> dict[str, Any]:
         "rows_used": model.rows_used,
         "rows_dropped": model.rows_dropped,
         "method": model.method,
+        "least_squares": model.least_squares,
         "details": dict(model.details),
         "noise": None if model.noise is None else model.noise.described(),
     }
@@ -96,6 +97,7 @@ def model_of(structure: LPVARX, content: dict[str, Any]) -> LPVARXModel:
         rows_used=content["rows_used"],
         rows_dropped=content["rows_dropped"],
         method=content["method"],
+        least_squares=content.get("least_squares"),
         excitation=None,
         details=content["details"],
         covariance=_covariance_of(structure, content),

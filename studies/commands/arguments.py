@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,6 +26,16 @@ class ArgumentGroup:
     arguments: tuple[Argument, ...]
     title: str = ""
     about: str | None = None
+
+
+@dataclass(frozen=True)
+class Listed:
+    """Choices that a registry lists when they are asked for, not when the command line is made."""
+
+    names: Callable[[], Iterable[str]]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names())
 
 
 def option(

@@ -143,8 +143,7 @@ def record_of(arguments: argparse.Namespace, log: Path) -> FlightRecord:
     """The inputs and outputs of a log between --start and --stop."""
     from studies.log.reading import read
     from symheli import FlightRecord
-    from symheli.logs.contents import contents_of
-    from symheli.logs.format import format_of
+    from symheli.logs.format import contents_of, format_of
 
     if arguments.map is not None:
         record = FlightRecord.from_map(log, arguments.map)

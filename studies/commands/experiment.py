@@ -86,6 +86,15 @@ def run(arguments: argparse.Namespace) -> Output:
     return Output(text, data)
 
 
+def _table(log: Path) -> Path:
+    """Return a log that is a table; raise `InputError` for one of a format that a map reads."""
+    from symheli.logs.format import format_named, format_of
+
+    if not format_named(kind := format_of(log)).any_text:
+        raise InputError(f"{log}: a log of the format {kind} needs a signal map, --map FILE.toml")
+    return log
+
+
 def _flown(arguments: argparse.Namespace) -> Output:
     """Hold records against a plan."""
     from studies.campaigns.flyable import flown
@@ -100,7 +109,7 @@ def _flown(arguments: argparse.Namespace) -> Output:
         if log.suffix == ".npz"
         else FlightRecord.from_map(log, arguments.map)
         if arguments.map
-        else FlightRecord.from_csv(log)
+        else FlightRecord.from_csv(_table(log))
         for log in arguments.flown
     ]
     found = flown(arguments.plan, records, sweeps=arguments.sweeps)

@@ -8,29 +8,34 @@ import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
+from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from studies.commands import options
-from studies.commands.arguments import add, flag, option, positional
+from studies.commands.arguments import Listed, add, flag, option, positional
 from studies.output import Output
 from symheli.errors import InputError, SymheliError
-from symheli.logs.format import FORMATS, OWN_CLOCKS, Format, format_of
+from symheli.logs.format import (
+    Contents,
+    contents_of,
+    format_named,
+    format_of,
+    known_formats,
+    own_clocks,
+)
 from symheli.values.whole_files import write_text
 
 if TYPE_CHECKING:
     from identification import LPVARX
+    from identification.methods import Method
     from studies.log.suggestion import Suggestion
-    from symheli.logs.contents import Contents
     from symheli.logs.segments import Segment
     from symheli.logs.signal_map import SignalMap
     from symheli.logs.survey import Survey
     from symheli.records import FlightRecord, KinematicCheck
-
-METHODS = ("ls", "rls", "ridge", "lasso", "iv", "riv", "oe")
-"""Methods of `identification.fit`."""
 
 HELP = (
     "fit an LPV-ARX model to a flight log and judge it on data it has not seen; with the log alone,"
@@ -60,10 +65,28 @@ ONE_MODEL = {
     "loop": "judges",
 }
 
+
+def _methods(*, told: bool = False) -> list[str]:
+    """Return the estimators that need nothing but names of instruments; `told`: that take them."""
+    from identification.estimators.method import known_methods
+
+    found = []
+    for name, method in known_methods().items():
+        parameters = signature(method).parameters
+        needed = {p.name for p in parameters.values() if p.default is p.empty}
+        if needed <= {"instruments"} and (not told or "instruments" in parameters):
+            found.append(name)
+    return found
+
+
 ARGUMENTS = (
     positional("log", "flight log", type=Path, metavar="LOG"),
     option(
-        "--format", ("auto", *FORMATS), "how the log is read; auto: by its content", default="auto"
+        "--format",
+        "NAME",
+        "how the log is read, %(choices)s; auto: by its content",
+        default="auto",
+        choices=Listed(lambda: ("auto", *known_formats())),
     ),
     option(
         "--map",
@@ -120,9 +143,13 @@ ARGUMENTS = (
         " better in sample",
         default="auto",
     ),
-    option("--method", METHODS, "estimator", default="ls"),
+    option("--method", "NAME", "estimator: %(choices)s", default="ls", choices=Listed(_methods)),
     option(
-        "--instruments", "E,F", "external excitation, for --method iv, riv or oe", options.names, ()
+        "--instruments",
+        "E,F",
+        "external excitation, for a method that takes instruments, such as iv",
+        options.names,
+        (),
     ),
     option("--start", "S", "drop samples before this time, s on the log's clock", options.number),
     option("--stop", "S", "drop samples after this time, s", options.number),
@@ -183,7 +210,6 @@ def run(arguments: argparse.Namespace) -> Output:
 def _identified(arguments: argparse.Namespace) -> Output:
     """The answer, with the advice of the libraries as it is."""
     from identification.judge import compare_constant, slow_modes
-    from identification.model.lpvarx_model import LEAST_SQUARES
     from studies.log import in_feedback, report, tried
 
     if arguments.log.suffix.lower() == ".toml":
@@ -192,7 +218,7 @@ def _identified(arguments: argparse.Namespace) -> Output:
             " --map FILE.toml beside the log, and a vehicle is shown by `symheli vehicles"
             " FILE.toml`"
         )
-    kind = "mapped" if arguments.map else _format(arguments)
+    kind = "mapped" if arguments.map else _log_format(arguments, arguments.log)
     if not any(getattr(arguments, name) for name in FIT_OPTIONS):
         seen = _contents(arguments, arguments.log)
         if not _at_once(arguments, kind, seen):
@@ -245,7 +271,7 @@ def _identified(arguments: argparse.Namespace) -> Output:
         return _requested(other, kind)[:3]
 
     mended, slow = tried.mended(result, vars(arguments), again), ""
-    if result.scheduled.method in LEAST_SQUARES:
+    if result.scheduled.least_squares:
         found = slow_modes(result.scheduled, result.training)
         slow = tried.seen_slowly(found, vars(arguments), again)
     text = report.text(facts, result, check, mended=mended, slow=slow)
@@ -300,12 +326,7 @@ def _requested(
     return structure, training, test, prepared
 
 
-def _format(arguments: argparse.Namespace) -> Format:
-    """Return the format of the log: the given one, or that of its content."""
-    return format_of(arguments.log) if arguments.format == "auto" else arguments.format
-
-
-def _log_format(arguments: argparse.Namespace, log: Path) -> Format:
+def _log_format(arguments: argparse.Namespace, log: Path) -> str:
     """Return the format of a log: the given one, the map's, or that of its content."""
     given = _map(arguments).format if arguments.map and arguments.format == "auto" else None
     return given or (format_of(log) if arguments.format == "auto" else arguments.format)
@@ -350,10 +371,9 @@ def _contents(arguments: argparse.Namespace, log: Path) -> Contents:
     """Return all columns of a log, or of a table the signals of the map."""
     from studies.log.reading import read_mapped
     from symheli.logs.column import Column
-    from symheli.logs.contents import Contents
 
     kind = _log_format(arguments, log)
-    if not arguments.map or kind in OWN_CLOCKS:
+    if not arguments.map or own_clocks(kind):
         status = log.stat() if log.is_file() else None
         return _all_of(log, kind, *((status.st_mtime_ns, status.st_size) if status else (0, 0)))
     record = read_mapped(log, _map(arguments), arguments.time_unit)
@@ -362,10 +382,8 @@ def _contents(arguments: argparse.Namespace, log: Path) -> Contents:
 
 
 @lru_cache(maxsize=1)
-def _all_of(log: Path, kind: Format, _modified: int, _size: int) -> Contents:
+def _all_of(log: Path, kind: str, _modified: int, _size: int) -> Contents:
     """Return the content of a file, read once while it does not change."""
-    from symheli.logs.contents import contents_of
-
     return contents_of(log, kind)
 
 
@@ -416,7 +434,7 @@ def _refused(hint: Suggestion) -> str:
             write_text(arguments.map, hint.map)
         try:
             structure, training, _, _ = _requested(
-                arguments, "mapped" if arguments.map else _format(arguments)
+                arguments, "mapped" if arguments.map else _log_format(arguments, arguments.log)
             )
             fit(structure, training)
         except SymheliError as error:
@@ -451,16 +469,15 @@ class _Prepared(NamedTuple):
     slower: Mapping[str, float]
 
 
-def _method(name: str, instruments: tuple[str, ...]) -> Any:
+def _method(name: str, instruments: tuple[str, ...]) -> Method | str:
     """The method of this name, with its instruments."""
-    from identification.methods import InstrumentalVariables, OutputError, RefinedInstruments
+    from identification.estimators.method import known_methods
 
     if not instruments:
         return name
-    takes = {"iv": InstrumentalVariables, "riv": RefinedInstruments, "oe": OutputError}
-    if name not in takes:
-        raise InputError(f"--instruments are for --method iv, riv or oe, not {name}")
-    return takes[name](instruments)
+    if name not in (takes := _methods(told=True)):
+        raise InputError(f"--instruments are for --method {', '.join(takes)}, not {name}")
+    return known_methods()[name](**{"instruments": instruments})
 
 
 def _prepared(
@@ -484,18 +501,17 @@ def _prepared(
     if arguments.map:
         record = read_mapped(log, _map(arguments), arguments.time_unit)
     else:
-        kind = format_of(log) if arguments.format == "auto" else arguments.format
         record = read(
             log,
             list(dict.fromkeys(wanted)),
-            format=kind,
+            format=_log_format(arguments, log),
             dt=arguments.dt,
             time=arguments.time,
             units=dict(arguments.units),
             time_unit=arguments.time_unit,
         )
     samples, used, seen = len(record), (), None
-    if _log_format(arguments, log) in OWN_CLOCKS or arguments.segments:
+    if own_clocks(_log_format(arguments, log)) or arguments.segments:
         seen = _contents(arguments, log)
         segments = _surveyed(arguments, log, seen).segments
         cut_by_hand = cut and (arguments.start is not None or arguments.stop is not None)
@@ -533,18 +549,15 @@ def _prepared(
 
 def _declared(arguments: argparse.Namespace, log: Path) -> dict[str, str]:
     """Units by signal, as the map, the header or the options declare them."""
-    from symheli.logs.separated import SeparatedTable
-
     if arguments.map:
         return {n: s.unit for n, s in _map(arguments).signals.items() if s.unit}
-    header = SeparatedTable.read(log).units if _log_format(arguments, log) == "csv" else {}
-    return {**header, **dict(arguments.units)}
+    header = format_named(_log_format(arguments, log)).declared(log)
+    return {**{n: unit for n, unit in header.items() if unit}, **dict(arguments.units)}
 
 
 def _write(arguments: argparse.Namespace, result: Any) -> Iterator[Path]:
     """Write the requested plots and the model; return their paths."""
     from identification import uncertainty
-    from identification.model.lpvarx_model import LEAST_SQUARES
     from studies.log import figure
 
     if arguments.plot:
@@ -554,7 +567,7 @@ def _write(arguments: argparse.Namespace, result: Any) -> Iterator[Path]:
         yield figure.save(bands[0].figure, arguments.bands)
     if arguments.save:
         model = result.scheduled
-        if model.method in LEAST_SQUARES:
+        if model.least_squares:
             model = replace(model, covariance=uncertainty(model, result.training).covariance)
         yield (
             model.save(arguments.save)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from studies.commands import options
-from studies.commands.arguments import flag, one_of
+from studies.commands.arguments import flag, one_of, option
 from studies.output import Output
+from symheli.values.whole_files import write_text
 
 HELP = (
     "list the packaged airframes and identified models, their sources, and how much of each is"
@@ -22,6 +24,7 @@ ARGUMENTS = (
             "print every part and entry of a vehicle file: meaning, units, plausible range",
         ),
     ),
+    option("--write", "PAGE", "write the reference into its section of this page", Path),
 )
 
 
@@ -30,14 +33,18 @@ def run(arguments: argparse.Namespace) -> Output:
     reference.
     """
     from symheli.airframe.vehicle import load_vehicle
-    from symheli.airframe.written import as_toml, reference
+    from symheli.airframe.written import as_toml, reference, with_reference
     from symheli.helicopter import Helicopter
     from symheli.steady.validity import Validity, warn
 
     if arguments.reference:
         options.refuse(arguments, ["vehicle"], "on the reference, which is that of every vehicle")
         text = reference()
+        if arguments.write:
+            write_text(arguments.write, with_reference(arguments.write.read_text("utf-8")))
+            return Output(f"wrote {arguments.write}", {"written": arguments.write})
         return Output(text.rstrip("\n"), {"reference": text})
+    options.refuse(arguments, ["write"], "without --reference")
     if arguments.toml:
         text = as_toml(load_vehicle(arguments.vehicle or "xcell60"))
         return Output(text.rstrip("\n"), {"toml": text})

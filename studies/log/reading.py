@@ -12,9 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from symheli.errors import DataWarning, InputError, UnknownNameError
-from symheli.logs.format import OWN_CLOCKS, Format
-from symheli.logs.separated import SEPARATORS, SeparatedTable
-from symheli.logs.signal_map import SignalMap
+from symheli.logs.format import format_named
+from symheli.logs.signal_map import SignalMap, Source
 from symheli.records import FlightRecord
 from symheli.records.kinematics import COMPARED
 from symheli.records.tied_units import POSITIONS
@@ -32,6 +31,7 @@ STILL = 1e-6
 
 COMBINED = "speed"
 """The scheduling signal made of --scheduling-from."""
+
 TIMES = ("t", "time")
 """Columns taken as the time where none is named."""
 
@@ -112,7 +112,7 @@ def read(
     path: Path,
     signals: Sequence[str],
     *,
-    format: Format,
+    format: str,
     dt: float | None,
     time: str | None,
     units: Mapping[str, str],
@@ -121,44 +121,33 @@ def read(
     """Return the record on a uniform step, `dt` (s) if it is given; a time column is in
     `time_unit`.
 
-    X-Plane logs declare their units. Of a table, what `check_kinematics` compares is read too where
-    it is there. Elsewhere `units` declares those of `signals`, before the header of a table; the
-    names every room knows (u, q, theta, ...) are SI unless declared otherwise. A time column and
-    `dt` together resample. Raises `InputError`.
+    A log that names its own signals is read as a whole. Of a table, what `check_kinematics`
+    compares is read too where it is there. `units` declares those of `signals`, before the header
+    of a table; the names every room knows (u, q, theta, ...) are SI unless declared otherwise. A
+    time column and `dt` together resample. Raises `InputError`.
     """
-    if format == "xplane":
-        return on_one_step(FlightRecord.from_xplane(path, dt), None, path, "s")
-    if format in OWN_CLOCKS:
+    form = format_named(format)
+    if form.own_names:
+        return read_mapped(path, SignalMap({}, format, dt=dt), "s")
+    if form.own_clocks:
         raise InputError(
             f"{path}: the columns of an autopilot's log are named in a signal map, --map FILE.toml;"
             " symheli identify with the log alone suggests one"
         )
-    known: dict[str, str] = {}
-    if format == "csv":
-        table = SeparatedTable.read(path)
-        known = table.units
-        signals = list(
-            dict.fromkeys(
-                [*signals, *(n for n in (*COMPARED, "airspeed", *POSITIONS) if n in table.names)]
-            )
-        )
+    known = form.declared(path)
+    beside = (n for n in (*COMPARED, "airspeed", *POSITIONS) if n in known)
     declared = {
         name: units.get(name) or known.get(name) or UNITS.get(name) or _undeclared(name)
-        for name in signals
+        for name in (*signals, *beside)
     }
     for name in units:
         if name not in declared:
             raise UnknownNameError("signal in --units", name, declared)
-    with _steps_told_here():
-        if format == "mat":
-            record = FlightRecord.from_mat(path, time or "t", declared, time_unit or "s")
-        else:
-            time = time or _time_column(path, dt)
-            record = FlightRecord.from_csv(
-                path, time, declared, dt if time is None else None, time_unit
-            )
-            time_unit = time_unit or known.get(time or "")
-    return on_one_step(record, None if time is None else dt, path, time_unit)
+    if form.time_column:
+        time = time or _time_column(path, known, dt)
+    sources = {name: Source(name, unit) for name, unit in declared.items()}
+    found = SignalMap(sources, format, time, time_unit, dt)
+    return read_mapped(path, found, time_unit or known.get(time or ""))
 
 
 def _undeclared(name: str) -> str:
@@ -168,17 +157,17 @@ def _undeclared(name: str) -> str:
     )
 
 
-def _time_column(path: Path, dt: float | None) -> str | None:
-    table = SeparatedTable.read(path)
+def _time_column(path: Path, known: Mapping[str, str | None], dt: float | None) -> str | None:
     for name in TIMES:
-        if name in table.names:
+        if name in known:
             return name
+    if not known:  # a log that does not list its columns
+        return TIMES[0]
     if dt is not None:
         return None
-    found = f"{', '.join(map(repr, table.names))} (separated by {SEPARATORS[table.separator]})"
     raise InputError(
         f"{path}: no column is called {' or '.join(TIMES)}; name it with --time, or give the sample"
-        f" period with --dt; found {found}"
+        f" period with --dt; found {', '.join(map(repr, known))}"
     )
 
 

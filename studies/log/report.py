@@ -15,7 +15,6 @@ from identification.judge import slow_modes
 from identification.judge.against_constant import HORIZONS, PAYS, AgainstConstant
 from identification.judge.scores import Scores, percent
 from identification.model import LPVARXModel
-from identification.model.lpvarx_model import LEAST_SQUARES
 from studies.log.accuracy import OPEN, OpenGap, open_gap
 from studies.output import columns
 from symheli.logs.segments import Segment
@@ -136,7 +135,7 @@ def data(
     judged = len(result.judged) > 1 and result.test is not None
     pays = {str(y): result.pays(str(y)) for y in result.scheduled.outputs} if judged else None
     worth = {str(y): result.verdict_on(str(y)) for y in pays} if pays is not None else None
-    certain = result.scheduled.method in LEAST_SQUARES
+    certain = result.scheduled.least_squares
     return {
         "read": found,
         "kinematics": None if check is None else [_sensor(row) for row in check.rows],
@@ -312,7 +311,7 @@ def _horizons(result: AgainstConstant) -> list[str]:
 
 def _open(result: AgainstConstant) -> OpenGap | None:
     model = result.scheduled
-    return open_gap(model, result.training) if model.method in LEAST_SQUARES else None
+    return open_gap(model, result.training) if model.least_squares else None
 
 
 def _slow(result: AgainstConstant) -> dict[str, Any]:
@@ -332,7 +331,7 @@ def _certainty(result: AgainstConstant) -> list[str]:
     model = result.scheduled
     lags = min(25, len(result.training) // 20)
     analysis = f"in sample, {residual_analysis(model, result.training, lags)}"
-    if model.method not in LEAST_SQUARES:
+    if not model.least_squares:
         return [analysis]
     known = uncertainty(model, result.training)
     colour = ", ".join(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from studies.log.flown import COARSE, SERVING, UNRESOLVED
-from symheli.logs.format import OWN_CLOCKS
+from symheli.logs.format import own_clocks
 from symheli.logs.meaning import CONTROLS, Guess
 from symheli.logs.segments import MIN_DURATION
 from symheli.logs.survey import Survey
@@ -58,7 +58,7 @@ def suggestion(
         ),
         None,
     )
-    timed = found.clock or found.step or found.format in OWN_CLOCKS
+    timed = found.clock or found.step or own_clocks(found.format)
     if axis is None or not timed:
         least = ("a clock", "an input") if set(CONTROLS) & there.keys() == set() else ("a clock",)
         why = next((m for m in missing if m.startswith((*least, "angular rates"))), "")
@@ -68,7 +68,7 @@ def suggestion(
         ["airspeed"] if "airspeed" in there else ["u", "v"] if {"u", "v"} <= there.keys() else []
     )
     step = dt or (found.clock.step if found.clock else found.step) or 0.0
-    by_map, means = found.format in OWN_CLOCKS, SLOW
+    by_map, means = own_clocks(found.format), SLOW
     if by_map and not found.serving and found.segments:
         why = f"flight: no segment of {MIN_DURATION:g} s in the air; --segments all overrides"
         return Suggestion((*missing, why), refused=why)
@@ -144,7 +144,7 @@ def _map(used: list[Guess], found: Survey, dt: float) -> str:
 
 def _missing(found: Survey, there: Mapping[str, Guess]) -> tuple[str, ...]:
     sentences = []
-    if found.clock is None and found.format not in OWN_CLOCKS:
+    if found.clock is None and not own_clocks(found.format):
         hint = (
             f"; angles against rates, or positions against velocities, suggest {found.step:.4g} s"
             if found.step

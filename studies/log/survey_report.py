@@ -8,7 +8,7 @@ from typing import Any
 
 from studies.log.suggestion import Suggestion
 from studies.output import columns
-from symheli.logs.format import OWN_CLOCKS
+from symheli.logs.format import own_clocks
 from symheli.logs.survey import Survey
 from symheli.values.units import to_si
 
@@ -81,7 +81,7 @@ def data(found: Survey, hint: Suggestion) -> dict[str, Any]:
 
 
 def _clock_text(found: Survey) -> list[str]:
-    if found.format in OWN_CLOCKS:
+    if own_clocks(found.format):
         return ["  every column has the clock of its message; they are brought to one step, dt"]
     if found.clock is None:
         return ["  no column is its time"]

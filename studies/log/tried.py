@@ -14,7 +14,6 @@ from identification.judge import slow_modes
 from identification.judge.against_constant import LEAST, AgainstConstant, Scored
 from identification.judge.scores import DIVERGES, percent
 from identification.judge.slow_modes import SlowModes
-from identification.model.lpvarx_model import LEAST_SQUARES
 from symheli.errors import SymheliError
 from symheli.records import FlightRecord
 
@@ -85,7 +84,7 @@ def seen_slowly(found: SlowModes, given: Flags, again: Again) -> str:
 
 def _simpler(result: AgainstConstant, given: Flags) -> Iterator[Flags]:
     """Lower orders and coarser steps; by least squares too, where that was not asked for."""
-    methods = [{}] if result.scheduled.method in LEAST_SQUARES else [{"method": "ls"}]
+    methods = [{}] if result.scheduled.least_squares else [{"method": "ls"}]
     if methods != [{}]:
         yield {"method": "ls"}
     for method in methods:

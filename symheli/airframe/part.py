@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any
 
-from symheli.airframe.sections import PLACE
+from symheli.airframe.sections import PLACE, required_place
 from symheli.components import AirMotion, Component, Effect, Entry, Flow
 from symheli.values.signal import Signal
 
@@ -19,8 +19,8 @@ class InstalledPart:
     suffix: added to the names of its states, flow and switches; empty for the first of a kind, "_"
     + section for the others. controls: {control of the component: {control of the vehicle: gain}}
     where they differ. flow: {needed: name it is taken from} where they differ. placed: whether it
-    has an x, y or z. given: the component's optional entries it has. kind: the component as the
-    file names it.
+    has or needs an x, y or z. given: the component's optional entries it has. kind: the component
+    as the file names it.
     """
 
     section: str
@@ -37,7 +37,7 @@ class InstalledPart:
         """Entries of its section, without optional entries that are absent."""
         own = self.component.entries
         required = {name: e for name, e in own.items() if not e.optional or name in self.given}
-        return {**required, **(PLACE if self.placed else {})}
+        return {**required, **(PLACE if self.placed else {}), **required_place(self.component)}
 
     @property
     def subscript(self) -> str:

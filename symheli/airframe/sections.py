@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from symheli.components import Entry
+from dataclasses import replace
+
+from symheli.components import Component, Entry
 
 BODY = {
     "mass": Entry("kg", "mass in flight", "m", "mass", positive=True),
@@ -53,8 +55,17 @@ FIXED = {"body": BODY, "drivetrain": DRIVETRAIN, "controls": CONTROLS}
 """Sections of every airframe, {entry: its description}; every other section is a component."""
 
 PLACE = {
-    "x": Entry("m", "reference point from the centre of gravity, forward", kind="distance"),
-    "y": Entry("m", "reference point from the centre of gravity, right", kind="distance"),
-    "z": Entry("m", "reference point from the centre of gravity, down", kind="distance"),
+    axis: Entry(
+        "m",
+        f"reference point from the centre of gravity, {toward}",
+        kind="distance",
+        optional=True,
+    )
+    for axis, toward in (("x", "forward"), ("y", "right"), ("z", "down"))
 }
-"""Optional entries of a component's section: the position of its reference point, body axes."""
+"""Entries of a component's section: the position of its reference point, body axes."""
+
+
+def required_place(component: Component) -> dict[str, Entry]:
+    """Return the entries of the place that a component cannot do without."""
+    return {axis: replace(PLACE[axis], optional=False) for axis in component.place}

@@ -90,6 +90,10 @@ class VehicleFile:
             names = {f"[{kind}]", *component.states, *component.makes}
             suffix = f"_{section}" if names & taken else ""
             taken |= {f"{name}{suffix}" for name in names}
+            for name, axis in component.opposite.items():
+                if name in table and axis in table:
+                    wrong = f"{name} gives it, {axis} = -{name}: leave {axis} out"
+                    self._problem(section, axis, wrong)
             optional = (name for name, entry in component.entries.items() if entry.optional)
             parts[section] = InstalledPart(
                 section,
@@ -97,7 +101,7 @@ class VehicleFile:
                 suffix,
                 self._controls(section, table),
                 self._flow(section, table, component),
-                any(axis in table for axis in PLACE),
+                bool(component.place) or any(axis in table for axis in PLACE),
                 tuple(entry for entry in optional if entry in table),
                 kind,
             )
@@ -214,7 +218,7 @@ class VehicleFile:
         written = self._entries.get((section, name), name)
         table = self.tables[self._written.get(section, section)].get(written)
         unit = entry.unit
-        if table is None and name in PLACE:
+        if table is None and entry.optional:
             return Quantity(0.0, unit, "not given: at the c.g.")
         if table is None:
             raise InputError(

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from symheli.airframe.part import InstalledPart
 from symheli.airframe.plausibility import RANGES
 from symheli.airframe.quantity import Quantity
-from symheli.airframe.sections import FIXED, PLACE
+from symheli.airframe.sections import FIXED, PLACE, required_place
 from symheli.airframe.vehicle import Vehicle
 from symheli.components import Component, Entry, find, packaged
 from symheli.values.units import dimension, units_of
@@ -21,6 +21,9 @@ _HEAD = """\
 # meant although no helicopter is known to have it, and { ref = "section.entry" } takes the value of
 # another entry.
 """
+
+REFERENCE = "## Every part and entry"
+"""Heading of the reference."""
 
 
 def as_toml(vehicle: Vehicle) -> str:
@@ -41,10 +44,10 @@ def as_toml(vehicle: Vehicle) -> str:
 
 
 def reference() -> str:
-    """Every part and entry a vehicle file may have, as tables in Markdown: meaning, unit, the units
-    that are read, and the plausible range.
+    """Every part and entry a vehicle file may have, as a section in Markdown: meaning, unit, the
+    units that are read, and the plausible range.
     """
-    lines: list[str] = []
+    lines = [REFERENCE, ""]
     for section, entries in FIXED.items():
         lines += [f"### [{section}]", "", "Every airframe has it.", "", *_table(entries), ""]
     for kind in packaged():
@@ -56,9 +59,16 @@ def reference() -> str:
             if names
         ]
         lines += [f"Flow it {'; '.join(flow)}.", ""] if flow else []
-        lines += [*_table(component.entries), ""]
+        lines += [*_table(component.entries | required_place(component)), ""]
     lines += ["### In the section of any part", "", *_table(PLACE), ""]
     return "\n".join(lines).rstrip() + "\n"
+
+
+def with_reference(page: str) -> str:
+    """Return a page in Markdown with that section in place of its own, or at its end."""
+    before, _, old = page.partition(f"{REFERENCE}\n")
+    _, next_heading, after = old.partition("\n## ")
+    return f"{before}{reference()}{next_heading}{after}"
 
 
 def _table(entries: Mapping[str, Entry]) -> Iterator[str]:

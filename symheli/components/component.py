@@ -71,6 +71,8 @@ class Component:
 
     `parameters` {name: `Entry`} come from the vehicle file (a unit alone stands for an `Entry` of
     that unit); `states` are its own; it may use the flow in `needs` and makes the flow in `makes`.
+    `place` names the coordinates x y z that its section must give, `opposite` {entry: coordinate
+    that it gives with the other sign}, as published distances behind and above the c.g. do.
     `evaluate(parameters, motion, controls, own, flow)` returns an `Effect` under these names: where
     a vehicle has two of a kind or puts one off the c.g., `symheli.airframe.part.InstalledPart`
     translates. In print, `subscript` marks its forces.
@@ -84,12 +86,16 @@ class Component:
     needs: tuple[str, ...] = ()
     makes: tuple[str, ...] = ()
     subscript: str = ""
+    place: tuple[str, ...] = ()
+    opposite: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        if unknown := {*self.place, *self.opposite.values()} - {"x", "y", "z"}:
+            raise InputError(f"place: expected x, y or z, got {', '.join(sorted(unknown))}")
         if reserved := {"x", "y", "z"} & set(self.parameters):
             raise InputError(
                 f"parameters {', '.join(sorted(reserved))}: every part has a place x y z already;"
-                " choose other names"
+                " choose other names, or require it: place=('x', 'z')"
             )
 
     @property

@@ -48,4 +48,5 @@ COMPONENT = Component(
     },
     needs=("w_wake",),
     subscript="ht",
+    opposite={"arm": "x"},
 )

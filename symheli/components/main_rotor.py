@@ -195,4 +195,5 @@ COMPONENT = Component(
         "Q_mr",
     ),
     subscript="mr",
+    opposite={"hub_height": "z"},
 )

@@ -119,4 +119,5 @@ COMPONENT = Component(
         "Q_tr",
     ),
     subscript="tr",
+    opposite={"arm": "x", "height": "z"},
 )

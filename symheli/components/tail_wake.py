@@ -83,4 +83,5 @@ COMPONENT = Component(
         "w_wake",
         "K_lam",
     ),
+    opposite={"tail_arm": "x", "tail_height": "z"},
 )

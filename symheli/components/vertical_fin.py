@@ -61,4 +61,5 @@ COMPONENT = Component(
         "V_itr",
     ),
     subscript="vf",
+    opposite={"arm": "x", "height": "z"},
 )

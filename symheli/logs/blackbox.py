@@ -25,9 +25,14 @@ import numpy as np
 from symheli.errors import InputError, UnknownNameError
 from symheli.logs.column import GAP, Column, on_one_axis
 from symheli.logs.files import Table, bounded, positive, warn_of_damage
-from symheli.logs.format import BLACKBOX
+from symheli.logs.format import LogFormat
+from symheli.logs.meaning import BLACKBOX as GUESSED
+from symheli.logs.signal_map import SignalMap
 from symheli.progress import task
 from symheli.values.units import to_si
+
+BLACKBOX = b"H Product:Blackbox"
+"""At the beginning of each log of a Blackbox file."""
 
 MAX_BYTES = 64 * 2**20
 """Largest file that is read; a MiB takes about a second."""
@@ -457,3 +462,20 @@ def _units(header: _Header) -> dict[str, str]:
     if _gyro_scale(header) is not None:
         known |= {f"gyroADC[{axis}]": "deg/s" for axis in range(3)}
     return known
+
+
+class Blackbox(LogFormat):
+    """Blackbox logs of Betaflight, Rotorflight and INAV."""
+
+    name, own_clocks = "blackbox", True
+    guessed = GUESSED
+    columns = staticmethod(blackbox_columns)
+
+    def recognises(self, head: bytes) -> bool:
+        """Whether a log begins in its head."""
+        return BLACKBOX in head
+
+    def read(self, path: str | os.PathLike[str], by: SignalMap) -> Table:
+        """Read the fields of a map, on its step."""
+        fields = {column: (column, unit or "") for column, unit in by.given.items()}
+        return read_blackbox(path, fields, by.needed_step(path))

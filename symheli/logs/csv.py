@@ -14,8 +14,10 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.logs.column import Column
 from symheli.logs.files import Table, positive, seconds_in
+from symheli.logs.format import LogFormat
 from symheli.logs.order import in_order
 from symheli.logs.separated import SeparatedTable
+from symheli.logs.signal_map import SignalMap
 from symheli.values.arrays import Array
 from symheli.values.signal import Signal
 
@@ -85,3 +87,19 @@ def with_units(time: Array, columns: Sequence[tuple[Signal, Array]]) -> str:
     for row in zip(time, *(values for _, values in columns), strict=True):
         writer.writerow(["" if np.isnan(value) else repr(float(value)) for value in row])
     return out.getvalue()
+
+
+class CommaSeparated(LogFormat):
+    """Text tables: what no other format recognises."""
+
+    name, time_column, any_text = "csv", True, True
+    columns = staticmethod(csv_columns)
+
+    def read(self, path: str | os.PathLike[str], by: SignalMap) -> Table:
+        """Read the columns of a map; without a time column its rows are dt apart."""
+        return read_csv(path, by.time, by.given, by.dt if by.time is None else None, by.time_unit)
+
+    def declared(self, path: str | os.PathLike[str]) -> Mapping[str, str | None]:
+        """Return the names in the header with their units."""
+        table = SeparatedTable.read(path)
+        return {name: table.units.get(name) for name in table.names}

@@ -28,6 +28,9 @@ from symheli.errors import InputError, UnknownNameError
 from symheli.extras import extra
 from symheli.logs.column import GAP, RESTART, Column, continuous, on_one_axis
 from symheli.logs.files import Table, bounded, error_text, positive, quiet, units_of, warn_of_damage
+from symheli.logs.format import LogFormat
+from symheli.logs.meaning import DATAFLASH, SDLOG2, Named
+from symheli.logs.signal_map import SignalMap
 from symheli.values.units import to_si
 
 LABELS = {
@@ -425,3 +428,25 @@ def _unit(name: str, column: str, logged: str | None, given: str | None) -> str:
             f"{name}: the log says that {column} is in {logged}, not {given}; leave out the unit"
         )
     return logged or given or "1"
+
+
+class DataFlash(LogFormat):
+    """ArduPilot's DataFlash, binary or text, and PX4's older logs of the same form."""
+
+    name, own_clocks = "dataflash", True
+    columns = staticmethod(dataflash_columns)
+
+    def recognises(self, head: bytes) -> bool:
+        """Whether it declares messages."""
+        text = re.search(rb"^FMT, ?\d+, ?\d+, ?\w+,", head, re.MULTILINE)
+        return head.startswith(FORMAT_HEAD[:2]) or text is not None
+
+    def read(self, path: str | os.PathLike[str], by: SignalMap) -> Table:
+        """Read the fields of a map, on its step."""
+        fields = {column: column for column in by.given}
+        units = {column: unit for column, unit in by.given.items() if unit}
+        return read_dataflash(path, fields, by.needed_step(path), units)
+
+    def named(self, columns: Mapping[str, Column]) -> Named:
+        """Return the columns of the firmware."""
+        return SDLOG2 if "ATT.RollRate" in columns else DATAFLASH

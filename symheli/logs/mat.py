@@ -13,9 +13,13 @@ from symheli.errors import InputError, UnknownNameError
 from symheli.extras import extra
 from symheli.logs.column import Column
 from symheli.logs.files import Table, bounded, error_text, seconds_in
-from symheli.logs.format import is_hdf5
+from symheli.logs.format import LogFormat
 from symheli.logs.mat5 import MAX_INFLATED, check_mat5
 from symheli.logs.order import in_order
+from symheli.logs.signal_map import SignalMap
+
+HDF5 = b"\x89HDF\r\n\x1a\n"
+"""At the beginning, or behind the 512 bytes that MATLAB writes about itself."""
 
 NUMBERS = {
     *("double", "single", "logical"),
@@ -59,8 +63,9 @@ def _content(file: Path) -> Mapping[str, Any]:
     """Return variables and nested structs by name; arrays, or any other MATLAB value."""
     from scipy.io import loadmat
 
-    if is_hdf5(file):
-        return _hdf5(file)
+    with file.open("rb") as opened:
+        if _is_hdf5(opened.read(512 + len(HDF5))):
+            return _hdf5(file)
     try:
         check_mat5(file)
         content = loadmat(file, simplify_cells=True)
@@ -70,6 +75,10 @@ def _content(file: Path) -> Mapping[str, Any]:
             " save it once more"
         ) from error
     return {name: value for name, value in content.items() if not name.startswith("__")}
+
+
+def _is_hdf5(head: bytes) -> bool:
+    return head.startswith(HDF5) or head[512:].startswith(HDF5)
 
 
 def _hdf5(file: Path) -> Mapping[str, Any]:
@@ -136,3 +145,21 @@ def _vector(content: Mapping[str, Any], name: str, file: object) -> np.ndarray:
     if array.ndim != 1:
         raise InputError(f"{file}: expected {name!r} to be a vector, its shape is {array.shape}")
     return array
+
+
+class Matlab(LogFormat):
+    """MATLAB files, of one vector a signal."""
+
+    name, time_column = "mat", True
+    columns = staticmethod(mat_columns)
+
+    def recognises(self, head: bytes) -> bool:
+        """Whether MATLAB wrote it, or it is an HDF5 file."""
+        return head.startswith(b"MATLAB") or _is_hdf5(head)
+
+    def read(self, path: str | os.PathLike[str], by: SignalMap) -> Table:
+        """Read the vectors of a map, which names that of the time."""
+        if by.time is None:
+            raise InputError(f"{path}: name the time vector in the signal map: time = ...")
+        declared = {column: unit or "1" for column, unit in by.given.items()}
+        return read_mat(path, by.time, declared, by.time_unit or "s")

@@ -5,13 +5,17 @@ confirm, never used automatically.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from symheli.logs.column import Column
+from symheli.logs.format import known_formats
 from symheli.values.signal import UNITS
+
+Named = Mapping[str, Sequence[tuple[str, str]]]
+"""Columns of a format and their units by signal, the best first."""
 
 
 @dataclass(frozen=True)
@@ -166,19 +170,15 @@ XPLANE = {
 
 def guesses(columns: Mapping[str, Column], format: str) -> dict[str, Guess]:
     """{signal: the column that it probably is}, for p q r phi theta psi airspeed u v w and the
-    controls lon lat col ped; what moves before what stays where it is.
+    controls lon lat col ped, by a table of its format or else by name; what moves before what stays
+    where it is.
     """
-    older = "ATT.RollRate" in columns
-    tables = {
-        "dataflash": SDLOG2 if older else DATAFLASH,
-        "ulog": ULOG,
-        "blackbox": BLACKBOX,
-        "xplane": XPLANE,
-    }
-    if format in tables:
+    form = known_formats().get(format)
+    named = form.named(columns) if form else {}
+    if named:
         found = {
-            signal: [Guess(signal, name, unit, "name") for name, unit in named if name in columns]
-            for signal, named in tables[format].items()
+            signal: [Guess(signal, name, unit, "name") for name, unit in best if name in columns]
+            for signal, best in named.items()
         }
     else:
         found = _by_name(columns)

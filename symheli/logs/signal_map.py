@@ -1,7 +1,7 @@
 """A TOML file that says where a log keeps which signal, in which unit: written once for an
 aircraft, used for every flight of it.
 
-    format = "csv"          # csv, mat, xplane, ulog, dataflash, blackbox; default: by its content
+    format = "csv"          # the names of `symheli identify --help`; default: by its content
     time = "time_us"        # time column of csv and mat
     time_unit = "us"
     dt = 0.02               # s: resample to (needed for autopilots, and without a clock)
@@ -10,11 +10,8 @@ aircraft, used for every flight of it.
     q = { column = "gyro_y", unit = "deg/s", scale = -1 }
     airspeed = { column = "pitot", unit = "km/h", offset = 0.4 }
 
-A signal is (scale * column + offset) in `unit`. Columns of a ulog are "topic.field" or
-"topic.1.field", those of a dataflash log "message.field" or "message[1].field", those of a blackbox
-log as in its header ("gyroADC[0]"); the last two need no unit where the log declares it. Those of a
-MATLAB file may reach into a struct ("log.theta"), those of X-Plane are the names of
-`symheli.logs.xplane` and need no unit.
+A signal is (scale * column + offset) in `unit`; a log that declares the unit needs none. What the
+columns are called stands at the head of the module of the format, such as `symheli.logs.ulog`.
 """
 
 from __future__ import annotations
@@ -27,14 +24,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from symheli.errors import InputError, UnknownNameError
-from symheli.logs.blackbox import read_blackbox
-from symheli.logs.csv import read_csv
-from symheli.logs.dataflash import read_dataflash
 from symheli.logs.files import Table, text
-from symheli.logs.format import FORMATS, OWN_CLOCKS, Format, format_of
-from symheli.logs.mat import read_mat
-from symheli.logs.ulog import read_ulog, split_column, unit_of
-from symheli.logs.xplane import read_xplane
+from symheli.logs.format import LogFormat, format_named, format_of, known_formats
 from symheli.values.units import to_si
 
 KEYS = ("format", "time", "time_unit", "dt", "signals")
@@ -55,10 +46,12 @@ class Source:
 
 @dataclass(frozen=True)
 class SignalMap:
-    """The content of a signal map; `load` reads one, `read` applies it to a log."""
+    """The content of a signal map; `load` reads one, `read` applies it to a log. Without signals
+    those of a log that names its own are read.
+    """
 
     signals: dict[str, Source]
-    format: Format | None = None
+    format: str | None = None
     time: str | None = None
     time_unit: str | None = None
     dt: float | None = None
@@ -85,8 +78,8 @@ class SignalMap:
             )
         signals = {name: _source(entry, f"{path}, signals.{name}") for name, entry in given.items()}
         kind, dt = table.get("format"), table.get("dt")
-        if kind is not None and kind not in FORMATS:
-            raise UnknownNameError(f"format in {path}", str(kind), FORMATS)
+        if kind is not None and kind not in known_formats():
+            raise UnknownNameError(f"format in {path}", str(kind), tuple(known_formats()))
         if dt is not None and not (isinstance(dt, int | float) and math.isfinite(dt) and dt > 0):
             raise InputError(f"{path}: dt must be a positive number of seconds, got {dt!r}")
         return cls(signals, kind, table.get("time"), table.get("time_unit"), dt)
@@ -113,9 +106,9 @@ class SignalMap:
 
     def read(self, log: str | os.PathLike[str]) -> Table:
         """Time (s), the mapped signals and their units."""
-        time, columns, units = self._columns(log, self._kind(log))
+        time, columns, units = self._format(log).read(log, self)
         mapped = {}
-        for name, source in self.signals.items():
+        for name, source in (self.signals or {n: Source(n, None) for n in columns}).items():
             if source.column not in columns:
                 raise UnknownNameError("signal", source.column, columns)
             unit = self._unit(name, source, units[source.column])
@@ -130,57 +123,28 @@ class SignalMap:
 
     def step(self, log: str | os.PathLike[str]) -> float | None:
         """The sample period (s) to which the log is still to be brought, None where it has it."""
-        return self.dt if self._kind(log) in ("csv", "mat") and self.time is not None else None
+        return self.dt if self._format(log).time_column and self.time is not None else None
 
     def resampled(self, log: str | os.PathLike[str]) -> str:
         """How the samples that `read` gives were made of others; empty where they were not."""
-        own_clocks = self._kind(log) in OWN_CLOCKS
-        return f"columns interpolated to {self.dt:g} s" if own_clocks else ""
+        return f"columns interpolated to {self.dt:g} s" if self._format(log).own_clocks else ""
 
-    def _kind(self, log: str | os.PathLike[str]) -> Format:
-        return self.format or format_of(log)
+    @property
+    def given(self) -> dict[str, str | None]:
+        """The columns it names, with the unit it gives each (None: that of the log)."""
+        return {s.column: s.unit for s in self.signals.values()}
 
-    def _columns(self, log: str | os.PathLike[str], kind: str) -> Table:
-        given = {s.column: s.unit for s in self.signals.values()}
-        declared = {column: unit or "1" for column, unit in given.items()}
-        match kind:
-            case "xplane":
-                return read_xplane(log, self.dt)
-            case "ulog":
-                step = self._needed_step(log)
-                split = {column: split_column(column) for column in given}
-                topics = {
-                    column: (topic, field, given[column] or unit_of(field))
-                    for column, (topic, field) in split.items()
-                }
-                return read_ulog(log, topics, step)
-            case "dataflash":
-                return read_dataflash(
-                    log,
-                    {column: column for column in given},
-                    self._needed_step(log),
-                    {column: unit for column, unit in given.items() if unit},
-                )
-            case "blackbox":
-                return read_blackbox(
-                    log,
-                    {column: (column, unit or "") for column, unit in given.items()},
-                    self._needed_step(log),
-                )
-            case "mat":
-                if self.time is None:
-                    raise InputError(f"{log}: name the time vector in the signal map: time = ...")
-                return read_mat(log, self.time, declared, self.time_unit or "s")
-        step = self.dt if self.time is None else None
-        return read_csv(log, self.time, given, step, self.time_unit)
-
-    def _needed_step(self, log: str | os.PathLike[str]) -> float:
+    def needed_step(self, log: str | os.PathLike[str]) -> float:
+        """Return dt (s); raise `InputError` where it has none."""
         if self.dt is None:
             raise InputError(
                 f"{log}: its columns have clocks of their own; give dt (s) in the signal map to"
                 " resample them"
             )
         return self.dt
+
+    def _format(self, log: str | os.PathLike[str]) -> LogFormat:
+        return format_named(self.format or format_of(log))
 
     def _unit(self, name: str, source: Source, found: str) -> str:
         if source.unit is None:

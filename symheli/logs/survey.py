@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from symheli.logs.column import Column, forward, unresolved
-from symheli.logs.contents import Contents
-from symheli.logs.format import OWN_CLOCKS
+from symheli.logs.format import Contents, own_clocks
 from symheli.logs.meaning import Guess, guesses, moves, plain_name
 from symheli.logs.segments import Segment, segments, serving
 from symheli.values.sample_period import JITTER, USUAL
@@ -111,12 +110,12 @@ def survey(
                 if len(c.values) == len(stamps)
             }
             clock = _clock(name, unit, stamps)
-    elif contents.format not in OWN_CLOCKS:
+    elif not own_clocks(contents.format):
         stamps = next(iter(held.values())).time
         clock = None if stamps is None else _clock("", "s", stamps)
     guessed = guesses(held, contents.format)
     step = contents.step if dt is None else dt
-    if step is None and clock is None and contents.format not in OWN_CLOCKS:
+    if step is None and clock is None and not own_clocks(contents.format):
         step = _step_of(held, guessed)
     return Survey(
         log,

@@ -20,6 +20,9 @@ from symheli.errors import InputError, UnknownNameError
 from symheli.extras import extra
 from symheli.logs.column import Column, continuous, on_one_axis
 from symheli.logs.files import Table, bounded, error_text, positive, quiet, warn_of_damage
+from symheli.logs.format import LogFormat
+from symheli.logs.meaning import ULOG
+from symheli.logs.signal_map import SignalMap
 
 QUATERNION = tuple(f"q[{i}]" for i in range(4))
 ANGLES = ("phi", "theta", "psi")
@@ -200,3 +203,20 @@ def euler_angles(
     psi, known = np.arctan2(2 * (a * d + b * c), 1 - 2 * (c**2 + d**2)), np.isfinite(size)
     psi[known] = np.unwrap(psi[known])
     return phi, theta, psi
+
+
+class ULog(LogFormat):
+    """PX4's ULog."""
+
+    name, begins, own_clocks = "ulog", b"ULog", True
+    guessed = ULOG
+    columns = staticmethod(ulog_columns)
+
+    def read(self, path: str | os.PathLike[str], by: SignalMap) -> Table:
+        """Read the fields of a map, on its step."""
+        step = by.needed_step(path)
+        topics = {}
+        for column, unit in by.given.items():
+            topic, field = split_column(column)
+            topics[column] = topic, field, unit or unit_of(field)
+        return read_ulog(path, topics, step)

@@ -26,6 +26,9 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.logs.column import Column
 from symheli.logs.files import Table, positive, text
+from symheli.logs.format import Contents, LogFormat
+from symheli.logs.meaning import XPLANE
+from symheli.logs.signal_map import SignalMap
 from symheli.values.units import to_si
 
 CLOCKS = ("totl,time", "real,time", "missn,time", "timer,time")
@@ -252,3 +255,28 @@ def _unit(signal: str) -> str:
     if signal in ("u", "v", "w"):
         return "m/s"
     return to_si(next(iter(SOURCES[signal][1].values())))[1]
+
+
+class XPlane(LogFormat):
+    """X-Plane's Data.txt."""
+
+    name, own_names = "xplane", True
+    guessed = XPLANE
+
+    def recognises(self, head: bytes) -> bool:
+        """Whether its first line has "name,unit |"."""
+        first = next((line for line in head.splitlines() if line.strip()), b"")
+        return b"|" in first and b"," in first.split(b"|")[0]
+
+    @staticmethod
+    def columns(path: str | os.PathLike[str]) -> Mapping[str, Column]:
+        """Return every signal."""
+        return xplane_columns(path)[0]
+
+    def contents(self, path: str | os.PathLike[str]) -> Contents:
+        """Return every signal, and an estimate of the step of a log without a clock."""
+        return Contents(self.name, *xplane_columns(path))
+
+    def read(self, path: str | os.PathLike[str], by: SignalMap) -> Table:
+        """Read every signal; with dt in the map rows are dt apart."""
+        return read_xplane(path, by.dt)

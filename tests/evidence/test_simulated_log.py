@@ -9,7 +9,7 @@ import symheli
 from evidence import simulated_log
 from evidence.tuning import parameters
 from symheli import AirspeedSchedule, FlightRecord, Helicopter
-from symheli.logs.contents import contents_of
+from symheli.logs.format import contents_of
 from symheli.logs.meaning import guesses
 from symheli.logs.parameters import read_parameters
 

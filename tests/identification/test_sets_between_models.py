@@ -27,7 +27,9 @@ def models():
 
     def of(factor):
         model = vehicle.model(record, factor * vehicle.theta)
-        known = replace(model.aerodynamics, covariance=covariance, method="filter error")
+        known = replace(
+            model.aerodynamics, covariance=covariance, method="filter error", least_squares=False
+        )
         return replace(model, aerodynamics=known)
 
     return of(1.0), of(1.1)
@@ -129,6 +131,7 @@ def test_sets_that_make_no_sense_are_refused(models):
         model.aerodynamics,
         covariance=np.zeros((6, len(other.theta)) * 2),
         method="filter error",
+        least_squares=False,
     )
     with pytest.raises(InputError, match="same structure"):
         models[0].uncertain(0.95, OUTPUTS, INPUTS, other=replace(model, aerodynamics=known))

@@ -13,8 +13,7 @@ import pytest
 
 from symheli.errors import InputError
 from symheli.logs import files
-from symheli.logs.contents import contents_of
-from symheli.logs.format import format_of
+from symheli.logs.format import contents_of, format_of
 from symheli.logs.mat5 import MAX_INFLATED
 
 

@@ -15,6 +15,7 @@ from airframes import AFT_ROTOR, DOCS, FORWARD, WING, WING_COMPONENT, write
 import symheli
 from studies import cli
 from symheli.airframe.vehicle import load_vehicle
+from symheli.components import Component
 from symheli.errors import InputError
 
 
@@ -98,6 +99,67 @@ def test_a_rotor_off_the_centre_of_gravity_adds_its_arm_to_pitch(tmp_path, ideal
     # fuselage and tail in the changed downwash take part in Am - A by under 1 % of the rotor's own
     # effect; flapping not at all
     assert (Am - A)[q, q] == pytest.approx(x**2 * z_w / 0.34, rel=0.02)
+
+
+LEGS = """
+from symheli.components import Component, Effect, Entry
+
+
+def evaluate(par, motion, controls, own, flow):
+    return Effect(force=(-par.drag * motion.u_a, 0.0, 0.0))
+
+
+COMPONENT = Component(
+    evaluate, parameters={"drag": Entry("N s/m", "drag by speed")}, place=("x", "z")
+)
+"""
+
+ON_LEGS = """
+[legs]
+component = "./legs.py"
+drag = { value = 2.0, unit = "N s/m", source = "test" }
+x = { value = 0.0, unit = "m", source = "test" }
+z = { value = 30.0, unit = "cm", source = "test" }
+"""
+
+
+def test_a_part_may_require_its_place(tmp_path, ideal):
+    """Drag d u at z below the c.g.: X_u loses d/m, M_u d z/I_yy, M_q d z^2/I_yy. Without z it is
+    refused.
+    """
+    (tmp_path / "legs.py").write_text(LEGS, encoding="utf-8")
+    path = write(tmp_path, ON_LEGS)
+    placed = symheli.Helicopter.load(str(path), governor="ideal", allow_code=True)
+    point = symheli.trim(ideal, 0.0)
+    at = (point.x.array, point.u.array, 0.0)
+    A, Ap = (h.numeric("jacobian")(*at)[0] for h in (ideal, placed))
+    u, q = ideal.states.index("u"), ideal.states.index("q")
+    assert (Ap - A)[u, u] == pytest.approx(-2.0 / 8.2, rel=1e-9)
+    assert (Ap - A)[q, u] == pytest.approx(-2.0 * 0.3 / 0.34, rel=1e-9)
+    assert (Ap - A)[q, q] == pytest.approx(-2.0 * 0.3**2 / 0.34, rel=1e-9)
+    write(tmp_path, "\n".join(line for line in ON_LEGS.splitlines() if line[:1] != "z"))
+    with pytest.raises(InputError) as caught:
+        symheli.Helicopter.load(str(path), governor="ideal", allow_code=True)
+    said = "legs.z: missing (reference point from the centre of gravity, down); add z = { value"
+    assert said in str(caught.value)
+    assert "unit = 'm'" in str(caught.value)
+
+
+def test_a_place_that_is_given_twice_is_refused(tmp_path):
+    """The advice of the message is followed, and x stands beside a height."""
+    x = 'x = { value = 0.1, unit = "m", source = "test" }\n'
+    z = 'z = { value = 0.1, unit = "m", source = "test" }\n'
+    path = write(tmp_path, replace={"[tail_rotor]\n": f"[tail_rotor]\n{x}{z}"})
+    with pytest.raises(InputError) as caught:
+        load(path)
+    for said in (
+        "arm gives it, x = -arm: leave x out",
+        "height gives it, z = -height: leave z out",
+    ):
+        assert said in str(caught.value)
+    load(write(tmp_path, replace={"[main_rotor]\n": f"[main_rotor]\n{x}"}))
+    with pytest.raises(InputError, match="place: expected x, y or z, got h"):
+        Component(None, {}, place=("h",))
 
 
 def test_a_second_rotor_far_away_in_still_air_doubles_the_hover_force(tmp_path, ideal):

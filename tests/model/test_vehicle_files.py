@@ -12,7 +12,7 @@ import symheli
 from studies import cli
 from symheli.airframe.plausibility import RANGES, implausibilities
 from symheli.airframe.vehicle import load_vehicle, vehicles
-from symheli.airframe.written import as_toml, reference
+from symheli.airframe.written import as_toml, reference, with_reference
 from symheli.components import find, packaged
 from symheli.values.units import dimension, quotient, text, to_si
 
@@ -338,10 +338,22 @@ def test_a_template_keeps_the_wiring_of_its_parts(tmp_path):
 
 
 def test_the_page_has_the_reference_of_the_code():
-    """To renew it: symheli vehicles --reference, below the heading of docs/vehicles.md."""
-    _, found, rest = DOCS.partition("## Every part and entry\n\n")
-    assert found
-    assert rest.partition("\n## ")[0].strip() == reference().strip()
+    """To renew it: symheli vehicles --reference --write docs/vehicles.md."""
+    assert reference() in DOCS
+    assert with_reference(DOCS) == DOCS
+
+
+def test_the_reference_is_written_in_its_place_or_at_the_end(tmp_path, capsys):
+    page = tmp_path / "page.md"
+    page.write_text("# Parts\n\n## Every part and entry\n\nold\n\n## More\n\nnew\n", "utf-8")
+    for _ in range(2):
+        assert cli.main(["vehicles", "--reference", "--write", str(page)]) == 0
+        assert page.read_text("utf-8") == f"# Parts\n\n{reference()}\n## More\n\nnew\n"
+    page.write_text("# Parts\n\n", "utf-8")
+    assert cli.main(["vehicles", "--reference", "--write", str(page)]) == 0
+    assert page.read_text("utf-8") == f"# Parts\n\n{reference()}"
+    assert cli.main(["vehicles", "--write", str(page)]) == 1
+    assert "--write: no effect without --reference" in capsys.readouterr().err
 
 
 def test_every_packaged_entry_says_what_it_means_and_has_a_known_range():

@@ -18,6 +18,7 @@ from valid_calls import caught
 import identification
 import symheli
 import synthesis
+from evidence import written_logs
 from studies.campaigns.campaign import Campaign
 from studies.campaigns.dataset import CampaignDataset
 from studies.campaigns.trial import Trial, TrialOutcome
@@ -52,7 +53,7 @@ class Reader(NamedTuple):
 
 def readers(folder: Path) -> list[Reader]:
     """Every reader, each with a good file in `folder`."""
-    found = [*_logs(folder), *_saved(folder), *_families(folder), *folders(folder)]
+    found = [*logs(folder), *_saved(folder), *_families(folder), *folders(folder)]
     vehicle = folder / "vehicle.toml"
     packaged = ROOT / "symheli" / "airframe" / "vehicles" / "xcell60.toml"
     vehicle.write_bytes(packaged.read_bytes())
@@ -77,7 +78,8 @@ def readers(folder: Path) -> list[Reader]:
     return found
 
 
-def _logs(folder: Path) -> list[Reader]:
+def logs(folder: Path) -> list[Reader]:
+    """The readers of flight logs whose libraries are here."""
     t = 0.02 * np.arange(40)
     csv = folder / "log.csv"
     rows = [f"{a:.2f},{np.sin(a):.6f},{0.1 * a:.4f}" for a in t]
@@ -105,6 +107,19 @@ def _logs(folder: Path) -> list[Reader]:
         topics = {"q": ("rates", "xyz[1]", "rad/s")}
         found.append(
             Reader("ULog", ulog, lambda p: symheli.FlightRecord.from_ulog(p, topics, dt=0.02))
+        )
+    if importlib.util.find_spec("pymavlink"):
+        binary = folder / "log.bin"
+        messages = {"FMT": written_logs.FMT, "ATT": (141, "Qff", "TimeUS,Pitch,Yaw")}
+        rows = [("ATT", (int(1e6 * a) + 1, np.sin(a), 0.0)) for a in t]
+        binary.write_bytes(written_logs.dataflash(rows, messages))
+        attitude, rad = {"theta": "ATT.Pitch"}, {"theta": "rad"}
+        found.append(
+            Reader(
+                "DataFlash",
+                binary,
+                lambda p: symheli.FlightRecord.from_dataflash(p, attitude, 0.02, rad),
+            )
         )
     return found
 

@@ -4,6 +4,8 @@ import damaged_files
 import good_files
 import pytest
 
+from symheli.logs.format import format_of, known_formats
+
 # pyulog leaves a file open that it cannot read
 pytestmark = [
     pytest.mark.guard,
@@ -23,3 +25,10 @@ def test_no_damage_of_a_file_fails_silently(readers):
     kinds = len(damaged_files.KINDS)
     told = [fault for reader in readers for fault in damaged_files.tally(reader, kinds).faults]
     assert not told, "\n".join(map(str, told))
+
+
+def test_every_format_of_logs_is_damaged_here(tmp_path):
+    for library in ("pyulog", "pymavlink"):
+        pytest.importorskip(library)
+    ours = {n for n, form in known_formats().items() if type(form).__module__.startswith("symheli")}
+    assert {format_of(reader.path) for reader in good_files.logs(tmp_path)} == ours

@@ -388,6 +388,10 @@ def test_identify_reads_matlab_files_by_content(answer, tmp_path):
     got = answer("identify", tmp_path / "flight", *STRUCTURE, *UNITS)
     assert got["read"]["format"] == "mat"
     assert got["scheduling_pays"]["y"]
+    coarse = answer(
+        "identify", tmp_path / "flight", *STRUCTURE, *UNITS, "--dt", 3 * got["read"]["dt"]
+    )
+    assert coarse["read"]["dt"] == pytest.approx(3 * got["read"]["dt"])
 
 
 @pytest.mark.slow
