@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from symheli import LinearModel, LPVStateSpace, Scheduling, UncertainStateSpace
@@ -197,6 +198,67 @@ class Plant:
             indices(self.performance, outputs, "output"),
             indices(self.measurements, outputs, "output"),
         )
+
+    @classmethod
+    def sized(
+        cls,
+        model: Any,
+        *,
+        disturbances: Mapping[str, float] = MappingProxyType({}),
+        performance: Mapping[str, float] = MappingProxyType({}),
+        controls: Mapping[str, float],
+        measurements: Mapping[str, float],
+        servos: Mapping[str, object] = MappingProxyType({}),
+        delay: float = 0.0,
+    ) -> Plant:
+        """Return a plant from the size of each of its signals, in the unit of the signal.
+
+        A gain below 1 then means: with disturbances and noise of these sizes, performance and
+        controls stay within theirs, in the sense of energies.
+
+        Parameters
+        ----------
+        model : LPVStateSpace, LinearModel, UncertainStateSpace or system of python-control
+            The model.
+        disturbances : mapping
+            {input: the size to expect}.
+        performance : mapping
+            {output: the size to permit}.
+        controls : mapping
+            {input: the size to permit}: each is performance too.
+        measurements : mapping
+            {output: the size of its noise}, 0 without.
+        servos : mapping
+            {control: actuator}, as of `with_servo`, before the weights.
+        delay : float
+            Of all controls, s: as of `with_delay`, before the weights.
+
+        Raises
+        ------
+        InputError
+            A size that is not > 0 (of noise: >= 0), and what `Plant` refuses.
+
+        Examples
+        --------
+        >>> import symheli, synthesis
+        >>> lag = symheli.LinearModel([[-2.0]], [[1.0, 1.0]], [[1.0]], [[0.0, 0.0]],
+        ...                           ["p"], ["gust", "d_lat"], ["p"])
+        >>> plant = synthesis.Plant.sized(lag, disturbances={"gust": 2.0}, performance={"p": 0.5},
+        ...                               controls={"d_lat": 0.1}, measurements={"p": 0.01})
+        >>> print(plant.disturbances, plant.performance)
+        ('gust', 'p_noise') ('true_p', 'weighted_d_lat')
+        """
+        permitted = {**performance, **controls}
+        for name, size in {**disturbances, **permitted}.items():
+            parts.positive(size, f"the size of {name}")
+        plant = cls(model, [*disturbances], [*permitted], [*controls], [*measurements])
+        if servos:
+            plant = plant.with_servo(servos)
+        if delay:
+            plant = plant.with_delay(delay)
+        noisy = {name: size for name, size in measurements.items() if size != 0}
+        weights = {name: 1.0 / size for name, size in permitted.items()}
+        return plant.with_noise(noisy).weighted({**disturbances, **weights})
 
     def weighted(self, weights: Mapping[str, object]) -> Plant:
         """Add `weights` {disturbance or performance signal: weight}: a number > 0, a LinearModel or

@@ -678,3 +678,31 @@ def test_a_design_of_a_model_says_that_it_needs_a_plant(design, given):
 def test_a_point_design_of_a_plant_says_where_its_model_is():
     with pytest.raises(InputError, match=r"got Plant; .* a Plant \.nominal\.at\(p\)"):
         synthesis.hinf(plant(), ["d_lat"], ["phi"])
+
+
+@pytest.mark.parametrize("dt", [None, 0.02])
+def test_a_plant_of_sizes_is_that_of_its_parts(dt):
+    of = plant(roll(dt))
+    servos = {"d_lat": SERVO}
+    parts = of.with_servo(servos).with_delay(0.04).with_noise({"phi": 0.01})
+    parts = parts.weighted({"gust": 2.0, "phi": 1 / 0.2, "d_lat": 1 / 0.05})
+    whole = Plant.sized(
+        roll(dt),
+        disturbances={"gust": 2.0},
+        performance={"phi": 0.2},
+        controls={"d_lat": 0.05},
+        measurements={"phi": 0.01, "p": 0.0},
+        servos=servos,
+        delay=0.04,
+    )
+    assert whole.performance == parts.performance
+    assert whole.disturbances == parts.disturbances
+    for p in SPEEDS:
+        for found, expected in zip(whole.at(p), parts.at(p), strict=True):
+            np.testing.assert_allclose(found, expected, rtol=1e-14, atol=0)
+
+
+@pytest.mark.parametrize("size", [0.0, -1.0, np.nan, "2"])
+def test_a_size_that_is_none_is_refused_by_name(size):
+    with pytest.raises(InputError, match="the size of phi"):
+        Plant.sized(roll(), performance={"phi": size}, controls={"d_lat": 1.0}, measurements={})
