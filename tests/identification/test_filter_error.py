@@ -86,7 +86,7 @@ def test_a_step_is_generalized_least_squares_with_the_dense_covariance(vehicle, 
             H = np.zeros((8, 3))
             H[:6] = -A1[k + 1, :3].T
             S[8 * k : 8 * k + 8, 8 * k : 8 * k + 8] += H @ H.T * gust**2 * (1 - remains**2)
-    normal, right = s.normal(theta, Noise(R, Q, gust**2, remains))
+    normal, right = s.linearized(theta, Noise(R, Q, gust**2, remains)).normal()
     weighed = np.linalg.solve(S, X)
     # differences of 1e-6: eps / h of every slope, and S is conditioned like R / Q
     tolerance = 1e-5 * np.abs(normal).max()
