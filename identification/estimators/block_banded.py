@@ -17,8 +17,8 @@ TOGETHER = 8
 are more.
 """
 
-AT_ONCE = 64
-"""Number of blocks whose rows are formed together."""
+WIDEST = 160
+"""Number of columns that are taken from block to block together, at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,93 +81,106 @@ class WhitenedRegressors:
     equations have D (m, size, a).
 
     In blocks of w rows, after whose end G is the identity. A is the inverse of the diagonal blocks
-    of G, `corner` what is not 0 of those below them: q rows and columns.
+    of G, `corner` what is not 0 of those below them: q rows and columns. `groups`: the columns,
+    those of an equation or of D, that are taken from block to block together.
     """
 
     def __init__(self, white: Whitening, F: Array, D: Array, own: int) -> None:
         m, size, deep = white.columns.shape
         samples = max(TOGETHER, deep // size - 1)
         count, w, self.q = -(-m // samples), samples * size, deep - size
-        columns = np.zeros((count * samples, size, deep))
-        columns[:, :, 0] = 1.0
-        columns[:m] = white.columns
-        columns = columns.reshape(count, w, deep)
-
-        def entries(rows: Array, of: Array) -> Array:
-            below = rows[:, None] - of
-            inside = (below >= 0) & (below < deep)
-            return np.where(inside, columns[:, of, below * inside], 0.0)
 
         def blocks(each: Array) -> Array:
             out = np.zeros((count * samples, *each.shape[1:]))
             out[:m] = each
             return out.reshape(count, -1, each.shape[-1])
 
-        inner = np.arange(w)
-        self.A = _inverse(entries(inner, inner))
-        self.corner = entries(w + inner[: self.q], inner[w - self.q :])
+        columns, G = blocks(white.columns), np.zeros((count, w + deep, w))
+        columns.reshape(-1, deep)[m * size :, 0] = 1.0
+        for column in range(w):
+            G[:, column : column + deep, column] = columns[:, column]
+        self.A = _inverse(G[:, :w])
+        self.corner = G[:, w : w + self.q, w - self.q :].copy()
         self.F, self.D, self.own, self.size = blocks(F), blocks(D), own, size
+        together = max(WIDEST // max(F.shape[1], 1), 1)
+        self.groups = [range(j, min(j + together, own)) for j in range(0, own, together)]
+        self.groups.append(range(own, own + 1))
 
     def gram(self) -> Array:
         """X' X = Y' (G G')^-1 Y: with S = A' A, rows of (G G')^-1 Y are S Y less what the block
         before adds through the first rows of A, and the one after through the last.
         """
-        A, q, n, size = self.A, self.q, self.F.shape[2], self.size
-        S, ends = A.swapaxes(1, 2) @ A, A[:, -q:].swapaxes(1, 2)
-        links = -np.concatenate([S[:, :, :q], ends], axis=2)
-        within, pull = S[:, :q, :q], np.ascontiguousarray(ends[:, :q])
-        before = self._before()
-        after = self._times(S[:, :q]) - within @ before
-        beyond = np.zeros_like(after[0])
-        for b in reversed(range(len(A))):
-            after[b], beyond = beyond, self.corner[b - 1].T @ (after[b] - pull[b] @ beyond)
-        last = self.own * n
-        out = np.zeros((before.shape[2],) * 2)
-        parts = [slice(b, b + AT_ONCE) for b in range(0, len(A), AT_ONCE)]
-        for j in range(self.own):
-            here = slice(j * n, j * n + n)
-            for part in parts:
-                F = self.F[part]
-                W = np.concatenate([S[part, :, j::size], links[part]], axis=2)
-                W = W.reshape(len(W), -1, size, W.shape[2])[:, :, : j + 1].reshape(
-                    len(W), -1, W.shape[2]
+        A, q, n, a = self.A, self.q, self.F.shape[2], self.D.shape[2]
+        S = A.swapaxes(1, 2) @ A
+        links = np.concatenate([S[:, :, :q], A[:, -q:].swapaxes(1, 2)], axis=2)
+        edges, last = links[:, :q].copy(), self.own * n
+        F, D, out = self.F.reshape(-1, n), self.D.reshape(-1, a), np.zeros((last + a, last + a))
+        for group in self.groups:
+            around = np.empty((len(A), 2 * q, self._width(group)))
+            self._before(group, around[:, :q])
+            self._times(S[:, :q], group, around[:, q:])
+            beyond = np.zeros_like(around[0, q:])
+            for b in reversed(range(len(A))):
+                head, around[b, q:] = around[b, q:].copy(), beyond
+                beyond = self.corner[b - 1].T @ (head - edges[b] @ around[b])
+            for j, beside in zip(group, np.split(around, len(group), axis=2), strict=True):
+                rows = min(j + 1, self.own)
+                found = self._weighed(S, links, j, beside)
+                here = slice(j * n, j * n + beside.shape[2])
+                by_row = F.T @ found[:, :rows].reshape(len(F), -1)
+                out[: rows * n, here] = (
+                    by_row.reshape(n, rows, -1).swapaxes(0, 1).reshape(rows * n, -1)
                 )
-                Z = W @ np.concatenate([F, before[part, :, here], after[part, :, here]], axis=1)
-                found = F.reshape(-1, n).T @ Z.reshape(-1, (j + 1) * n)
-                out[: j * n + n, here] += found.reshape(n, j + 1, n).swapaxes(0, 1).reshape(-1, n)
-        Z = S @ self.D + links @ np.concatenate([before[..., last:], after[..., last:]], axis=1)
-        a = Z.shape[2]
-        found = self.F.reshape(-1, n).T @ Z.reshape(-1, size * a)
-        out[:last, last:] = found.reshape(n, size, a)[:, : self.own].swapaxes(0, 1).reshape(-1, a)
-        out[last:, last:] = self.D.reshape(-1, a).T @ Z.reshape(-1, a)
+                if j == self.own:
+                    out[here, here] = D.T @ found.reshape(len(D), a)
         return np.triu(out) + np.triu(out, 1).T
+
+    def _weighed(self, S: Array, links: Array, j: int, around: Array) -> Array:
+        """Rows (m, equations, n) of (G G')^-1 Y of the columns of equation j, or of D: those of the
+        equations up to j.
+        """
+        of, each = self._column(j)
+        W = np.concatenate([S[:, :, of], -links], axis=2)
+        W = W.reshape(len(W), -1, self.size, W.shape[2])[:, :, : j + 1 if j < self.own else None]
+        equations = W.shape[2]
+        W = W.reshape(len(W), -1, W.shape[3])
+        return (W @ np.concatenate([each, around], axis=1)).reshape(-1, equations, around.shape[2])
 
     def products(self, e: Array) -> Array:
         """X' e (m, own n + a) of each sample, for e (m, size)."""
         count, w, _ = self.A.shape
         weights = np.zeros((count * w, 1))
         weights[: e.size, 0] = e.reshape(-1)
-        M = self.A * weights.reshape(count, w, 1)
-        M = M.reshape(count, -1, self.size, w).sum(axis=2)
-        found = self._times(M) - M[:, :, : self.q] @ self._before()
-        return found.reshape(-1, found.shape[2])[: len(e)]
+        M = (self.A * weights.reshape(count, w, 1)).reshape(count, -1, self.size, w).sum(axis=2)
+        parts = []
+        for group in self.groups:
+            before = np.empty((count, self.q, self._width(group)))
+            self._before(group, before)
+            found = np.empty((count, M.shape[1], before.shape[2]))
+            self._times(M, group, found)
+            found -= M[:, :, : self.q] @ before
+            parts.append(found.reshape(-1, before.shape[2])[: len(e)])
+        return np.hstack(parts)
 
-    def _times(self, M: Array) -> Array:
-        """M Y (count, .., own n + a), for M (count, .., w)."""
-        n = self.F.shape[2]
-        out = np.empty((*M.shape[:2], self.own * n + self.D.shape[2]))
-        for j in range(self.own):
-            out[:, :, j * n : j * n + n] = np.ascontiguousarray(M[:, :, j :: self.size]) @ self.F
-        out[:, :, self.own * n :] = M @ self.D
-        return out
+    def _column(self, j: int) -> tuple[slice, Array]:
+        """Which rows of a block the columns of equation j have, or of D, and what."""
+        return (slice(j, None, self.size), self.F) if j < self.own else (slice(None), self.D)
 
-    def _before(self) -> Array:
-        """What the block before adds to the first rows of each block (count, q, own n + a)."""
-        out = self._times(self.A[:, -self.q :])
+    def _width(self, group: range) -> int:
+        return sum(self._column(j)[1].shape[2] for j in group)
+
+    def _times(self, M: Array, group: range, out: Array) -> None:
+        """Write M Y (count, .., columns), for M (count, .., w)."""
+        for j, here in zip(group, np.split(out, len(group), axis=2), strict=True):
+            of, each = self._column(j)
+            np.matmul(np.ascontiguousarray(M[:, :, of]), each, out=here)
+
+    def _before(self, group: range, out: Array) -> None:
+        """Write what the block before adds to the first rows of each block (count, q, columns)."""
+        self._times(self.A[:, -self.q :], group, out)
         push, added = self.A[:, -self.q :, : self.q].copy(), np.zeros_like(out[0])
         for b, corner in enumerate(self.corner):
             out[b], added = added, corner @ (out[b] - push[b] @ added)
-        return out
 
 
 def _inverse(G: Array) -> Array:
