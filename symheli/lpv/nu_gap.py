@@ -18,8 +18,11 @@ ON_THE_CIRCLE = 1e3 * np.finfo(float).eps
 matrix by.
 """
 
-ROUNDING = 1e-9
-"""Relative, between two ways to a norm."""
+LEAST_LEFT = 1e-2
+"""What of a column is left after projection, as a fraction, where one projection is enough."""
+
+ROUNDING = 1e-10
+"""Largest rounding of norms and their squares, where 1 is the largest."""
 
 MAX_REFINEMENTS = 30
 """Largest number of bisections of a frequency interval until the phase of the determinant changes
@@ -103,21 +106,21 @@ def nu_gap(
     angle = angles(np.concatenate(poles), points)
     one, two = (_graphs(m.A, m.B, m.C, m.D, su, sy) for m in (first, second))
     Q1, Q2 = one(angle), two(angle)
-    for _ in range(MAX_REFINEMENTS):
-        coarse = np.flatnonzero(np.abs(_turns(Q1, Q2)) > np.pi / 4)
-        if not len(coarse):
+    for left in reversed(range(MAX_REFINEMENTS + 1)):
+        cosines = _cosines(Q1, Q2)
+        turns = _turns(cosines)
+        coarse = np.flatnonzero(np.abs(turns) > np.pi / 4)
+        if not len(coarse) or not left:
             break
         between = 0.5 * (angle[coarse] + angle[coarse + 1])
-        angle = np.concatenate([angle, between])
-        order = np.argsort(angle)
-        angle = angle[order]
         Q1, Q2 = (
-            np.concatenate([Q, graphs(between)], axis=2)[:, :, order]
+            np.insert(Q, coarse + 1, graphs(between), axis=2)
             for Q, graphs in ((Q1, one), (Q2, two))
         )
-    if _winding(_turns(Q1, Q2)) + unstable[0] - unstable[1] != 0:
+        angle = np.insert(angle, coarse + 1, between)
+    if _winding(turns) + unstable[0] - unstable[1] != 0:
         return 1.0
-    return _largest(Q1, Q2)[0]
+    return _largest(Q1, Q2, cosines)[0]
 
 
 def sampled_alike(*models: LinearModel) -> tuple[LinearModel, ...]:
@@ -208,7 +211,7 @@ def chordal_distance(
         )
         for m in (first, second)
     )
-    return _norms(_apart(Q1, Q2))
+    return _norms(_apart(Q1, Q2, _cosines(Q1, Q2)))
 
 
 def require_same_signals(
@@ -299,7 +302,8 @@ def nu_gaps(
     for k, matrices in enumerate(zip(others.A, others.B, others.C, others.D, strict=True)):
         two = _graphs(*matrices, su, sy)
         Q2 = two(angle)
-        turns = _turns(Q1, Q2)
+        cosines = _cosines(Q1, Q2)
+        turns = _turns(cosines)
         if np.abs(turns).max() > np.pi / 4:
             out[k] = nu_gap(
                 model, others[k], input_scale=su, output_scale=sy, points=FINER * points
@@ -307,10 +311,11 @@ def nu_gaps(
         elif _winding(turns) + extra[k] != 0:
             out[k] = 1.0
         else:
-            largest, peak = _largest(Q1, Q2)
+            largest, peak = _largest(Q1, Q2, cosines)
             ends = angle[max(peak - 1, 0)], angle[min(peak + 1, len(angle) - 1)]
             near = np.linspace(*ends, REFINED_FREQUENCIES)
-            out[k] = max(largest, _largest(one(near), two(near))[0])
+            Q3, Q4 = one(near), two(near)
+            out[k] = max(largest, _largest(Q3, Q4, _cosines(Q3, Q4))[0])
     return out
 
 
@@ -342,25 +347,35 @@ def _graphs(
 
 
 def _orthonormal(P: Array) -> Array:
-    """Orthonormal basis (nu + ny, nu, n) of [I; P] for P (ny, nu, n), by Gram and Schmidt, twice.
+    """Orthonormal basis (nu + ny, nu, n) of [I; P] for P (ny, nu, n), by Gram and Schmidt; again
+    where much of a column lies along those before.
 
     It forms no square of P, which at the gains near an integrator's pole would lose the identity.
     """
     _, nu, n = P.shape
     Q = np.concatenate([np.broadcast_to(np.eye(nu)[:, :, None], (nu, nu, n)), P])
     for j in range(nu):
+        v, where = Q[:, j], slice(None)
+        size = np.linalg.norm(v, axis=0)
         for _ in range(2):
-            along = np.einsum("ikn,in->kn", Q[:, :j].conj(), Q[:, j])
-            Q[:, j] -= np.einsum("ikn,kn->in", Q[:, :j], along)
-        Q[:, j] /= np.linalg.norm(Q[:, j], axis=0)
+            along = np.einsum("ikn,in->kn", Q[:, :j, where].conj(), v[:, where])
+            v[:, where] -= np.einsum("ikn,kn->in", Q[:, :j, where], along)
+            left = np.linalg.norm(v, axis=0)
+            where = np.flatnonzero(left < LEAST_LEFT * size)
+        v /= left
     return Q
 
 
-def _turns(Q1: Array, Q2: Array) -> Array:
+def _cosines(Q1: Array, Q2: Array) -> Array:
+    """Q2* Q1 (nu, nu, n)."""
+    return np.einsum("kin,kjn->ijn", Q2.conj(), Q1)
+
+
+def _turns(cosines: Array) -> Array:
     """Angles (n - 1,) by which det(Q2* Q1), and with it det(I + P2* P1), turns from one frequency
     to the next.
     """
-    f = np.linalg.det(np.einsum("kin,kjn->nij", Q2.conj(), Q1))
+    f = np.linalg.det(np.moveaxis(cosines, 2, 0))
     return np.angle(f[1:] / f[:-1])
 
 
@@ -371,25 +386,29 @@ def _winding(turns: Array) -> int:
     return -round(float(np.sum(turns) / np.pi))  # both half circles: 2 x sum / (2 pi)
 
 
-def _apart(Q1: Array, Q2: Array) -> Array:
-    """Q1 less its projection on Q2: its largest singular value is the chordal distance, that of
-    (I + P2 P2*)^-1/2 (P1 - P2)(I + P1* P1)^-1/2.
+def _apart(Q1: Array, Q2: Array, cosines: Array) -> Array:
+    """Q1 less its projection on Q2 (n, nu + ny, nu): its largest singular value is the chordal
+    distance, that of (I + P2 P2*)^-1/2 (P1 - P2)(I + P1* P1)^-1/2.
     """
-    return Q1 - np.einsum("kin,ijn->kjn", Q2, np.einsum("kin,kjn->ijn", Q2.conj(), Q1))
+    return np.moveaxis(Q1 - np.einsum("kin,ijn->kjn", Q2, cosines), 2, 0)
 
 
 def _norms(W: Array) -> Array:
-    """Largest singular value of W (.., .., n) at each frequency, at most 1."""
-    return np.minimum(np.linalg.svd(np.moveaxis(W, 2, 0), compute_uv=False)[:, 0], 1.0)
+    """Largest singular value of each W, at most 1."""
+    square = np.linalg.eigvalsh(W.conj().swapaxes(1, 2) @ W)[:, -1]
+    return np.sqrt(np.clip(square, 0.0, 1.0))
 
 
-def _largest(Q1: Array, Q2: Array) -> tuple[float, int]:
-    """Largest chordal distance, and where: only where the Frobenius norm is above the distance at
-    its largest value, the distance can be.
+def _largest(Q1: Array, Q2: Array, cosines: Array) -> tuple[float, int]:
+    """Largest chordal distance, and where: sought only where the sum of the squares of all singular
+    values allows it.
     """
-    W = _apart(Q1, Q2)
-    above = np.linalg.norm(W, axis=(0, 1))
-    most = int(above.argmax())
-    near = np.flatnonzero(above >= _norms(W[:, :, most : most + 1]) * (1 - ROUNDING))
-    found = _norms(W[:, :, near])
-    return float(found.max()), int(near[found.argmax()])
+    nu = len(cosines)
+    squares = nu - np.einsum("ijn,ijn->n", cosines, cosines.conj()).real
+    near = np.flatnonzero(squares >= squares.max() / nu - ROUNDING)
+    W = _apart(Q1[:, :, near], Q2[:, :, near], cosines[:, :, near])
+    sizes = np.linalg.norm(W, axis=(1, 2))
+    least = _norms(W[[sizes.argmax()]]) * (1 - ROUNDING)
+    large = np.flatnonzero(sizes >= least)
+    found = _norms(W[large])
+    return float(found.max()), int(near[large[found.argmax()]])
