@@ -24,6 +24,12 @@ LEAST_LEFT = 1e-2
 ROUNDING = 1e-10
 """Largest rounding of norms and their squares, where 1 is the largest."""
 
+STRIDE, STEEPER = 4, 2.0
+"""A pair is compared on every so many frequencies first, and between them only where it matters."""
+
+TURN = np.pi / 4
+"""Largest turn of the determinant between two frequencies, rad."""
+
 MAX_REFINEMENTS = 30
 """Largest number of bisections of a frequency interval until the phase of the determinant changes
 little in it.
@@ -103,24 +109,49 @@ def nu_gap(
             raise InputError("nu_gap: a pole lies on the stability boundary")
         unstable.append(int(np.sum(np.abs(found) > 1)))
         poles.append(found)
-    angle = angles(np.concatenate(poles), points)
-    one, two = (_graphs(m.A, m.B, m.C, m.D, su, sy) for m in (first, second))
-    Q1, Q2 = one(angle), two(angle)
+    grid = angles(np.concatenate(poles), points)
+    graphs = [_graphs(m.A, m.B, m.C, m.D, su, sy) for m in (first, second)]
+
+    def with_more(angle: Array, Q: list[Array], more: Array) -> tuple[Array, list[Array]]:
+        """The angles with more among them, and the bases there."""
+        at = np.searchsorted(angle, more)
+        Q = [np.insert(own, at, new(more), axis=2) for own, new in zip(Q, graphs, strict=True)]
+        return np.insert(angle, at, more), Q
+
+    angle = grid[_every(len(grid))]
+    Q = [new(angle) for new in graphs]
+    angle, Q = with_more(angle, Q, grid[_to_fill(len(grid), *Q)])
     for left in reversed(range(MAX_REFINEMENTS + 1)):
-        cosines = _cosines(Q1, Q2)
+        cosines = _cosines(*Q)
         turns = _turns(cosines)
-        coarse = np.flatnonzero(np.abs(turns) > np.pi / 4)
+        coarse = np.flatnonzero(np.abs(turns) > TURN)
         if not len(coarse) or not left:
             break
-        between = 0.5 * (angle[coarse] + angle[coarse + 1])
-        Q1, Q2 = (
-            np.insert(Q, coarse + 1, graphs(between), axis=2)
-            for Q, graphs in ((Q1, one), (Q2, two))
-        )
-        angle = np.insert(angle, coarse + 1, between)
+        angle, Q = with_more(angle, Q, 0.5 * (angle[coarse] + angle[coarse + 1]))
     if _winding(turns) + unstable[0] - unstable[1] != 0:
         return 1.0
-    return _largest(Q1, Q2, cosines)[0]
+    return _largest(*Q, cosines)[0]
+
+
+def _every(count: int) -> Array:
+    """Every `STRIDE`th of so many points, and the last."""
+    return np.append(np.arange(0, count - 1, STRIDE), count - 1)
+
+
+def _to_fill(count: int, Q1: Array, Q2: Array) -> Array:
+    """Which of the points between are needed, from the bases at every `STRIDE`th: where the
+    determinant turns, and where the distance may come to the largest by `STEEPER` times the change
+    it has about there.
+    """
+    cosines = _cosines(Q1, Q2)
+    distance, turns = _norms(_apart(Q1, Q2, cosines)), _turns(cosines)
+    change = np.pad(np.abs(np.diff(distance)), 1, mode="edge")
+    steepest = np.max([change[:-2], change[1:-1], change[2:]], axis=0)
+    highest = np.maximum(distance[1:], distance[:-1]) + STEEPER * steepest
+    most = distance.max()
+    wanted = (highest >= most) & (most > ROUNDING) | (np.abs(turns) > TURN)
+    k = np.arange(count - 1)
+    return np.flatnonzero(wanted[k // STRIDE] & (k % STRIDE > 0))
 
 
 def sampled_alike(*models: LinearModel) -> tuple[LinearModel, ...]:
@@ -304,7 +335,7 @@ def nu_gaps(
         Q2 = two(angle)
         cosines = _cosines(Q1, Q2)
         turns = _turns(cosines)
-        if np.abs(turns).max() > np.pi / 4:
+        if np.abs(turns).max() > TURN:
             out[k] = nu_gap(
                 model, others[k], input_scale=su, output_scale=sy, points=FINER * points
             )
@@ -356,12 +387,15 @@ def _orthonormal(P: Array) -> Array:
     Q = np.concatenate([np.broadcast_to(np.eye(nu)[:, :, None], (nu, nu, n)), P])
     for j in range(nu):
         v, where = Q[:, j], slice(None)
-        size = np.linalg.norm(v, axis=0)
-        for _ in range(2):
-            along = np.einsum("ikn,in->kn", Q[:, :j, where].conj(), v[:, where])
-            v[:, where] -= np.einsum("ikn,kn->in", Q[:, :j, where], along)
+        left = size = np.linalg.norm(v, axis=0)
+        for _ in range(2 if j else 0):
+            before, own = Q[:, :j, where], v[:, where]
+            own = own - np.einsum("ikn,kn->in", before, np.einsum("ikn,in->kn", before.conj(), own))
+            v[:, where] = own
             left = np.linalg.norm(v, axis=0)
             where = np.flatnonzero(left < LEAST_LEFT * size)
+            if not len(where):
+                break
         v /= left
     return Q
 
