@@ -17,8 +17,10 @@ TOGETHER = 8
 are more.
 """
 
-WIDEST = 160
-"""Number of columns that are taken from block to block together, at most."""
+WIDEST, AT_ONCE = 160, 64
+"""Number of columns that are taken from block to block together, at most, and of blocks whose rows
+are formed together.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,46 +107,38 @@ class WhitenedRegressors:
         together = max(WIDEST // max(F.shape[1], 1), 1)
         self.groups = [range(j, min(j + together, own)) for j in range(0, own, together)]
         self.groups.append(range(own, own + 1))
+        self.parts = [slice(b, b + AT_ONCE) for b in range(0, count, AT_ONCE)]
 
     def gram(self) -> Array:
         """X' X = Y' (G G')^-1 Y: with S = A' A, rows of (G G')^-1 Y are S Y less what the block
         before adds through the first rows of A, and the one after through the last.
         """
         A, q, n, a = self.A, self.q, self.F.shape[2], self.D.shape[2]
-        S = A.swapaxes(1, 2) @ A
-        links = np.concatenate([S[:, :, :q], A[:, -q:].swapaxes(1, 2)], axis=2)
-        edges, last = links[:, :q].copy(), self.own * n
-        F, D, out = self.F.reshape(-1, n), self.D.reshape(-1, a), np.zeros((last + a, last + a))
+        S, back = A.swapaxes(1, 2) @ A, self.corner.swapaxes(1, 2)
+        links = -np.concatenate([S[:, :, :q], A[:, -q:].swapaxes(1, 2)], axis=2)
+        pull, later = back[:-1] @ S[1:, :q], back[:-1] @ links[1:, :q]
+        last = self.own * n
+        out = np.zeros((last + a, last + a))
         for group in self.groups:
-            around = np.empty((len(A), 2 * q, self._width(group)))
-            self._before(group, around[:, :q])
-            self._times(S[:, :q], group, around[:, q:])
-            beyond = np.zeros_like(around[0, q:])
-            for b in reversed(range(len(A))):
-                head, around[b, q:] = around[b, q:].copy(), beyond
-                beyond = self.corner[b - 1].T @ (head - edges[b] @ around[b])
+            around = np.zeros((len(A), 2 * q, self._width(group)))
+            before, after = around[:, :q], around[:, q:]
+            self._before(group, before)
+            self._times(pull, group, slice(1, None), after[:-1])
+            _carried(later[::-1], around[:0:-1], after[-2::-1])
             for j, beside in zip(group, np.split(around, len(group), axis=2), strict=True):
-                rows = min(j + 1, self.own)
-                found = self._weighed(S, links, j, beside)
-                here = slice(j * n, j * n + beside.shape[2])
-                by_row = F.T @ found[:, :rows].reshape(len(F), -1)
-                out[: rows * n, here] = (
-                    by_row.reshape(n, rows, -1).swapaxes(0, 1).reshape(rows * n, -1)
-                )
-                if j == self.own:
-                    out[here, here] = D.T @ found.reshape(len(D), a)
+                here, rows = slice(j * n, j * n + beside.shape[2]), min(j + 1, self.own)
+                of, each = self._column(j)
+                for part in self.parts:
+                    W = np.concatenate([S[part, :, of], links[part]], axis=2)
+                    W = W.reshape(len(W), -1, self.size, W.shape[2])
+                    W = W[:, :, : None if j == self.own else rows].reshape(len(W), -1, W.shape[3])
+                    Z = W @ np.concatenate([each[part], beside[part]], axis=1)
+                    F, D = self.F[part].reshape(-1, n), self.D[part].reshape(-1, a)
+                    found = (F.T @ Z.reshape(len(F), -1)).reshape(n, -1, Z.shape[2])[:, :rows]
+                    out[: rows * n, here] += found.swapaxes(0, 1).reshape(rows * n, -1)
+                    if j == self.own:
+                        out[here, here] += D.T @ Z.reshape(len(D), a)
         return np.triu(out) + np.triu(out, 1).T
-
-    def _weighed(self, S: Array, links: Array, j: int, around: Array) -> Array:
-        """Rows (m, equations, n) of (G G')^-1 Y of the columns of equation j, or of D: those of the
-        equations up to j.
-        """
-        of, each = self._column(j)
-        W = np.concatenate([S[:, :, of], -links], axis=2)
-        W = W.reshape(len(W), -1, self.size, W.shape[2])[:, :, : j + 1 if j < self.own else None]
-        equations = W.shape[2]
-        W = W.reshape(len(W), -1, W.shape[3])
-        return (W @ np.concatenate([each, around], axis=1)).reshape(-1, equations, around.shape[2])
 
     def products(self, e: Array) -> Array:
         """X' e (m, own n + a) of each sample, for e (m, size)."""
@@ -152,15 +146,15 @@ class WhitenedRegressors:
         weights = np.zeros((count * w, 1))
         weights[: e.size, 0] = e.reshape(-1)
         M = (self.A * weights.reshape(count, w, 1)).reshape(count, -1, self.size, w).sum(axis=2)
-        parts = []
+        each = []
         for group in self.groups:
-            before = np.empty((count, self.q, self._width(group)))
-            self._before(group, before)
+            before = np.zeros((count, self.q, self._width(group)))
             found = np.empty((count, M.shape[1], before.shape[2]))
-            self._times(M, group, found)
+            self._before(group, before)
+            self._times(M, group, slice(None), found)
             found -= M[:, :, : self.q] @ before
-            parts.append(found.reshape(-1, before.shape[2])[: len(e)])
-        return np.hstack(parts)
+            each.append(found.reshape(-1, before.shape[2])[: len(e)])
+        return np.hstack(each)
 
     def _column(self, j: int) -> tuple[slice, Array]:
         """Which rows of a block the columns of equation j have, or of D, and what."""
@@ -169,18 +163,25 @@ class WhitenedRegressors:
     def _width(self, group: range) -> int:
         return sum(self._column(j)[1].shape[2] for j in group)
 
-    def _times(self, M: Array, group: range, out: Array) -> None:
-        """Write M Y (count, .., columns), for M (count, .., w)."""
+    def _times(self, M: Array, group: range, blocks: slice, out: Array) -> None:
+        """Write M Y (count, .., columns) of some blocks, for M (count, .., w)."""
         for j, here in zip(group, np.split(out, len(group), axis=2), strict=True):
             of, each = self._column(j)
-            np.matmul(np.ascontiguousarray(M[:, :, of]), each, out=here)
+            np.matmul(np.ascontiguousarray(M[:, :, of]), each[blocks], out=here)
 
     def _before(self, group: range, out: Array) -> None:
-        """Write what the block before adds to the first rows of each block (count, q, columns)."""
-        self._times(self.A[:, -self.q :], group, out)
-        push, added = self.A[:, -self.q :, : self.q].copy(), np.zeros_like(out[0])
-        for b, corner in enumerate(self.corner):
-            out[b], added = added, corner @ (out[b] - push[b] @ added)
+        """Write what the block before adds to the first rows of each (count, q, columns) but the
+        first.
+        """
+        push = self.corner[:-1] @ self.A[:-1, -self.q :]
+        self._times(push, group, slice(None, -1), out[1:])
+        _carried(-push[:, :, : self.q], out[:-1], out[1:])
+
+
+def _carried(M: Array, of: Array, to: Array) -> None:
+    """Add M of one to the other, one after the other."""
+    for own, known, sought in zip(np.ascontiguousarray(M), of, to, strict=True):
+        sought += own @ known
 
 
 def _inverse(G: Array) -> Array:
