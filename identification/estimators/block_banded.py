@@ -17,10 +17,8 @@ TOGETHER = 8
 are more.
 """
 
-WIDEST, AT_ONCE = 160, 64
-"""Number of columns that are taken from block to block together, at most, and of blocks whose rows
-are formed together.
-"""
+AT_ONCE = 64
+"""Number of blocks whose rows are formed together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +51,7 @@ class Whitening:
         band = columns.reshape(m * size, -1).T
         whole = band[0].copy()
         try:
-            band = cholesky_banded(band, lower=True)
+            band = cholesky_banded(band, overwrite_ab=True, lower=True)
             # what rounding leaves of a pivot has either sign, by the library that computes it
             if np.any(band[0] ** 2 <= len(band) * np.finfo(float).eps * whole):
                 raise ValueError("a pivot is rounding")
@@ -83,14 +81,13 @@ class WhitenedRegressors:
     equations have D (m, size, a).
 
     In blocks of w rows, after whose end G is the identity. A is the inverse of the diagonal blocks
-    of G, `corner` what is not 0 of those below them: q rows and columns. `groups`: the columns,
-    those of an equation or of D, that are taken from block to block together.
+    of G, `corner` what is not 0 of those below them: q rows and columns.
     """
 
     def __init__(self, white: Whitening, F: Array, D: Array, own: int) -> None:
-        m, size, deep = white.columns.shape
-        samples = max(TOGETHER, deep // size - 1)
-        count, w, self.q = -(-m // samples), samples * size, deep - size
+        m, self.size, deep = white.columns.shape
+        samples = max(TOGETHER, deep // self.size - 1)
+        count, w, self.q = -(-m // samples), samples * self.size, deep - self.size
 
         def blocks(each: Array) -> Array:
             out = np.zeros((count * samples, *each.shape[1:]))
@@ -98,46 +95,42 @@ class WhitenedRegressors:
             return out.reshape(count, -1, each.shape[-1])
 
         columns, G = blocks(white.columns), np.zeros((count, w + deep, w))
-        columns.reshape(-1, deep)[m * size :, 0] = 1.0
+        columns.reshape(-1, deep)[m * self.size :, 0] = 1.0
         for column in range(w):
             G[:, column : column + deep, column] = columns[:, column]
         self.A = _inverse(G[:, :w])
-        self.corner = G[:, w : w + self.q, w - self.q :].copy()
-        self.F, self.D, self.own, self.size = blocks(F), blocks(D), own, size
-        together = max(WIDEST // max(F.shape[1], 1), 1)
-        self.groups = [range(j, min(j + together, own)) for j in range(0, own, together)]
-        self.groups.append(range(own, own + 1))
-        self.parts = [slice(b, b + AT_ONCE) for b in range(0, count, AT_ONCE)]
+        self.corner = G[:-1, w : w + self.q, w - self.q :].copy()
+        self.push = self.corner @ self.A[:-1, w - self.q :]
+        F = blocks(F)
+        each = [(slice(i, None, self.size), F) for i in range(own)]
+        self.columns = [*each, (slice(None), blocks(D))]
 
     def gram(self) -> Array:
         """X' X = Y' (G G')^-1 Y: with S = A' A, rows of (G G')^-1 Y are S Y less what the block
         before adds through the first rows of A, and the one after through the last.
         """
-        A, q, n, a = self.A, self.q, self.F.shape[2], self.D.shape[2]
-        S, back = A.swapaxes(1, 2) @ A, self.corner.swapaxes(1, 2)
+        A, q, back, own = self.A, self.q, self.corner.swapaxes(1, 2), len(self.columns) - 1
+        S, (_, F), (_, D) = A.swapaxes(1, 2) @ A, self.columns[0], self.columns[-1]
         links = -np.concatenate([S[:, :, :q], A[:, -q:].swapaxes(1, 2)], axis=2)
-        pull, later = back[:-1] @ S[1:, :q], back[:-1] @ links[1:, :q]
-        last = self.own * n
-        out = np.zeros((last + a, last + a))
-        for group in self.groups:
-            around = np.zeros((len(A), 2 * q, self._width(group)))
-            before, after = around[:, :q], around[:, q:]
-            self._before(group, before)
-            self._times(pull, group, slice(1, None), after[:-1])
-            _carried(later[::-1], around[:0:-1], after[-2::-1])
-            for j, beside in zip(group, np.split(around, len(group), axis=2), strict=True):
-                here, rows = slice(j * n, j * n + beside.shape[2]), min(j + 1, self.own)
-                of, each = self._column(j)
-                for part in self.parts:
-                    W = np.concatenate([S[part, :, of], links[part]], axis=2)
-                    W = W.reshape(len(W), -1, self.size, W.shape[2])
-                    W = W[:, :, : None if j == self.own else rows].reshape(len(W), -1, W.shape[3])
-                    Z = W @ np.concatenate([each[part], beside[part]], axis=1)
-                    F, D = self.F[part].reshape(-1, n), self.D[part].reshape(-1, a)
-                    found = (F.T @ Z.reshape(len(F), -1)).reshape(n, -1, Z.shape[2])[:, :rows]
-                    out[: rows * n, here] += found.swapaxes(0, 1).reshape(rows * n, -1)
-                    if j == self.own:
-                        out[here, here] += D.T @ Z.reshape(len(D), a)
+        pull, later = back @ S[1:, :q], back @ links[1:, :q]
+        n, a = F.shape[2], D.shape[2]
+        out = np.zeros((own * n + a,) * 2)
+        for j, (of, each) in enumerate(self.columns):
+            before, after = self._before(j), np.zeros((len(A), q, each.shape[2]))
+            after[:-1] = self._times(pull, j, slice(1, None))
+            around = np.concatenate([each, before, after], axis=1)
+            _carried(later[::-1], around[:0:-1, -2 * q :], around[-2::-1, -q:])
+            W = np.concatenate([S[:, :, of], links], axis=2)
+            W = W.reshape(len(W), -1, self.size, W.shape[2])[:, :, : j + 1 if j < own else None]
+            rows, here = min(j + 1, own) * n, slice(j * n, j * n + each.shape[2])
+            for start in range(0, len(A), AT_ONCE):
+                part = slice(start, start + AT_ONCE)
+                Z = W[part].reshape(len(W[part]), -1, W.shape[3]) @ around[part]
+                found = F[part].reshape(-1, n).T @ Z.reshape(F[part].size // n, -1)
+                found = found.reshape(n, -1, Z.shape[2])[:, :own].swapaxes(0, 1)
+                out[:rows, here] += found.reshape(rows, -1)
+                if j == own:
+                    out[here, here] += D[part].reshape(-1, a).T @ Z.reshape(-1, a)
         return np.triu(out) + np.triu(out, 1).T
 
     def products(self, e: Array) -> Array:
@@ -146,36 +139,23 @@ class WhitenedRegressors:
         weights = np.zeros((count * w, 1))
         weights[: e.size, 0] = e.reshape(-1)
         M = (self.A * weights.reshape(count, w, 1)).reshape(count, -1, self.size, w).sum(axis=2)
-        each = []
-        for group in self.groups:
-            before = np.zeros((count, self.q, self._width(group)))
-            found = np.empty((count, M.shape[1], before.shape[2]))
-            self._before(group, before)
-            self._times(M, group, slice(None), found)
-            found -= M[:, :, : self.q] @ before
-            each.append(found.reshape(-1, before.shape[2])[: len(e)])
-        return np.hstack(each)
+        every = range(len(self.columns))
+        found = [self._times(M, j) - M[:, :, : self.q] @ self._before(j) for j in every]
+        return np.concatenate(found, axis=2).reshape(count * M.shape[1], -1)[: len(e)]
 
-    def _column(self, j: int) -> tuple[slice, Array]:
-        """Which rows of a block the columns of equation j have, or of D, and what."""
-        return (slice(j, None, self.size), self.F) if j < self.own else (slice(None), self.D)
-
-    def _width(self, group: range) -> int:
-        return sum(self._column(j)[1].shape[2] for j in group)
-
-    def _times(self, M: Array, group: range, blocks: slice, out: Array) -> None:
-        """Write M Y (count, .., columns) of some blocks, for M (count, .., w)."""
-        for j, here in zip(group, np.split(out, len(group), axis=2), strict=True):
-            of, each = self._column(j)
-            np.matmul(np.ascontiguousarray(M[:, :, of]), each[blocks], out=here)
-
-    def _before(self, group: range, out: Array) -> None:
-        """Write what the block before adds to the first rows of each (count, q, columns) but the
-        first.
+    def _times(self, M: Array, j: int, blocks: slice = slice(None)) -> Array:
+        """M Y (count, .., n) of some blocks, for M (count, .., w): the columns of an equation, or
+        of D.
         """
-        push = self.corner[:-1] @ self.A[:-1, -self.q :]
-        self._times(push, group, slice(None, -1), out[1:])
-        _carried(-push[:, :, : self.q], out[:-1], out[1:])
+        of, each = self.columns[j]
+        return np.ascontiguousarray(M[:, :, of]) @ each[blocks]
+
+    def _before(self, j: int) -> Array:
+        """What the block before adds to the first rows of each (count, q, n)."""
+        out = np.zeros((len(self.A), self.q, self.columns[j][1].shape[2]))
+        out[1:] = self._times(self.push, j, slice(None, -1))
+        _carried(-self.push[:, :, : self.q], out[:-1], out[1:])
+        return out
 
 
 def _carried(M: Array, of: Array, to: Array) -> None:

@@ -11,6 +11,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg.lapack import dpotri
 from scipy.signal import lfilter
 
 from identification.estimators.block_banded import WhitenedRegressors, Whitening
@@ -48,8 +49,8 @@ LINES_PER_ESTIMATE = 1.0 + 2 * (2 / 3) ** 2 + 2 * (1 / 6) ** 2
 correlated.
 """
 
-LAGS = 25
-"""Number of samples over which scores are taken to be correlated."""
+LAGS, CHUNK = 25, 256
+"""Number of samples over which scores are taken to be correlated, and of those summed at a time."""
 
 SLOWER = 4
 """Factor of the number of steps where a delay or a wind is sought too: they start far off."""
@@ -410,7 +411,8 @@ class Linearized(NamedTuple):
         West).
         """
         each = self.regressors.products(self.whitened())[:, :-1]
-        return long_run_covariance((each,), LAGS)
+        parts = (each[start : start + CHUNK] for start in range(0, len(each), CHUNK))
+        return long_run_covariance(parts, LAGS)
 
 
 class Signals(NamedTuple):
@@ -607,5 +609,6 @@ def _solved(normal: Array, right: Array) -> tuple[Array, Array]:
     scale = np.sqrt(np.diag(normal))
     scale = np.where(scale > 0, scale, 1.0)
     factor = cho_factor(normal / np.outer(scale, scale), lower=True)
-    inverse = cho_solve(factor, np.eye(len(scale))) / np.outer(scale, scale)
+    lower = np.tril(dpotri(*factor)[0])
+    inverse = (lower + np.tril(lower, -1).T) / np.outer(scale, scale)
     return cho_solve(factor, right / scale) / scale, inverse
