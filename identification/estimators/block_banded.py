@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cholesky_banded
-from scipy.linalg.lapack import dtbtrs
+from scipy.linalg.lapack import dtbtrs  # type: ignore[attr-defined]
 
 from symheli.errors import AccuracyError
 from symheli.values.arrays import Array
@@ -76,12 +76,12 @@ class Whitening:
 
 
 class WhitenedRegressors:
-    """X = G^-1 Y for the factor G of a `Whitening` and regressors Y (m, size, own n + a): each of
-    the first `own` equations of a sample has F (m, n) with coefficients of its own, and all
-    equations have D (m, size, a).
+    """Regressors X = G^-1 Y, whitened by the factor G of a `Whitening`.
 
-    In blocks of w rows, after whose end G is the identity. A is the inverse of the diagonal blocks
-    of G, `corner` what is not 0 of those below them: q rows and columns.
+    Y has own n + a columns. Each of the first `own` equations of a sample has the regressors F (m,
+    n) with coefficients of its own, and all equations have D (m, size, a). G is cut into blocks of
+    w rows and continued by the identity. `A` are the inverses of the diagonal blocks; `corner` are
+    the q rows and columns of the blocks below them that are not 0.
     """
 
     def __init__(self, white: Whitening, F: Array, D: Array, own: int) -> None:
@@ -106,8 +106,10 @@ class WhitenedRegressors:
         self.columns = [*each, (slice(None), blocks(D))]
 
     def gram(self) -> Array:
-        """X' X = Y' (G G')^-1 Y: with S = A' A, rows of (G G')^-1 Y are S Y less what the block
-        before adds through the first rows of A, and the one after through the last.
+        """Return X' X = Y' (G G')^-1 Y.
+
+        With S = A' A, the rows of (G G')^-1 Y of a block are S Y, less what the block before adds
+        through the first rows, and what the block after adds through the last rows of A.
         """
         A, q, back, own = self.A, self.q, self.corner.swapaxes(1, 2), len(self.columns) - 1
         S, (_, F), (_, D) = A.swapaxes(1, 2) @ A, self.columns[0], self.columns[-1]
@@ -134,7 +136,7 @@ class WhitenedRegressors:
         return np.triu(out) + np.triu(out, 1).T
 
     def products(self, e: Array) -> Array:
-        """X' e (m, own n + a) of each sample, for e (m, size)."""
+        """Return X' e (m, own n + a) of each sample, for e (m, size)."""
         count, w, _ = self.A.shape
         weights = np.zeros((count * w, 1))
         weights[: e.size, 0] = e.reshape(-1)
@@ -144,14 +146,14 @@ class WhitenedRegressors:
         return np.concatenate(found, axis=2).reshape(count * M.shape[1], -1)[: len(e)]
 
     def _times(self, M: Array, j: int, blocks: slice = slice(None)) -> Array:
-        """M Y (count, .., n) of some blocks, for M (count, .., w): the columns of an equation, or
-        of D.
+        """Return M Y (count, .., n) of some blocks, for M (count, .., w): its columns of equation
+        j, or of D.
         """
         of, each = self.columns[j]
         return np.ascontiguousarray(M[:, :, of]) @ each[blocks]
 
     def _before(self, j: int) -> Array:
-        """What the block before adds to the first rows of each (count, q, n)."""
+        """Return what the block before adds to the first rows of each block (count, q, n)."""
         out = np.zeros((len(self.A), self.q, self.columns[j][1].shape[2]))
         out[1:] = self._times(self.push, j, slice(None, -1))
         _carried(-self.push[:, :, : self.q], out[:-1], out[1:])
@@ -159,13 +161,13 @@ class WhitenedRegressors:
 
 
 def _carried(M: Array, of: Array, to: Array) -> None:
-    """Add M of one to the other, one after the other."""
+    """Add M[b] of[b] to to[b], one b after the other: of[b + 1] may be part of to[b]."""
     for own, known, sought in zip(np.ascontiguousarray(M), of, to, strict=True):
         sought += own @ known
 
 
 def _inverse(G: Array) -> Array:
-    """Inverses of lower triangular matrices (count, w, w), by halves."""
+    """Return the inverses of lower triangular matrices (count, w, w), by halves."""
     h = G.shape[1] // 2
     if h < TOGETHER:
         return np.linalg.inv(G)

@@ -11,7 +11,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.linalg import cho_factor, cho_solve
-from scipy.linalg.lapack import dpotri
+from scipy.linalg.lapack import dpotri  # type: ignore[attr-defined]
 from scipy.signal import lfilter
 
 from identification.estimators.block_banded import WhitenedRegressors, Whitening
@@ -389,12 +389,14 @@ class Linearized(NamedTuple):
     white: Whitening
 
     def whitened(self) -> Array:
-        """What is left (m, 8), white and of variance 1 if the noise is its only cause."""
+        """Return the residuals (m, 8), white and of variance 1 if the noise is their only cause."""
         return self.white.whitened(self.left)
 
     @property
     def regressors(self) -> WhitenedRegressors:
-        """X (.., 6 n + a + 1), white: equation by equation, the unknowns, and last what is left."""
+        """The whitened regressors X: those of each equation, of the unknowns, and the residuals as
+        the last column.
+        """
         return WhitenedRegressors(
             self.white, self.F, np.concatenate([self.D, self.left[:, :, None]], axis=2), 6
         )

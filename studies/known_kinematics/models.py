@@ -74,9 +74,9 @@ def identified(
     turbulent: bool = False,
     kin: KinematicARX | None = None,
 ) -> KinematicModel:
-    """By the filter error method, its instruments flown in `simulator`, or as a source flew them
-    before; the gust a hidden state where the air is `turbulent`. `kin`: another structure than that
-    of `structure`.
+    """By the filter error method, its instruments flown in `simulator`; the gust a hidden state
+    where the air is `turbulent`. `kin`: another structure than that of `structure`. A
+    `SimulatedFlight` keeps its flights for further identifications.
     """
     source = SimulatedFlight(simulator) if isinstance(simulator, Helicopter) else simulator
     method = FilterError(source, gust=GUST if turbulent else 0.0)

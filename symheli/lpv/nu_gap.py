@@ -25,7 +25,7 @@ ROUNDING = 1e-10
 """Largest rounding of norms and their squares, where 1 is the largest."""
 
 STRIDE, STEEPER = 4, 2.0
-"""Two models are compared on every fourth frequency first; between two of these the distance is
+"""Two models are compared on every fourth frequency first. Between two of these the distance is
 taken to rise at most twice as much as it changes about there.
 """
 
@@ -116,7 +116,7 @@ def nu_gap(
     graphs = [_graphs(m.A, m.B, m.C, m.D, su, sy) for m in (first, second)]
     angle = np.append(grid[:-1:STRIDE], grid[-1])
     Q = [own(angle) for own in graphs]
-    more = grid[_between(len(grid), *Q)]
+    more = grid[_between(len(grid), Q[0], Q[1])]
     for left in reversed(range(MAX_REFINEMENTS + 1)):
         if len(more):
             at = np.searchsorted(angle, more)
@@ -134,9 +134,10 @@ def nu_gap(
 
 
 def _between(count: int, Q1: Array, Q2: Array) -> Array:
-    """Which of so many points are needed beside the bases at every `STRIDE`th: where the
-    determinant turns, and where the distance may come to the largest by `STEEPER` times the change
-    it has about there.
+    """Return the indices of the points that are needed besides every `STRIDE`th of `count`.
+
+    They lie where the determinant turns, and where the distance may reach the largest by `STEEPER`
+    times its changes about there. Q1 and Q2 are the bases at every `STRIDE`th point and the last.
     """
     cosines = _cosines(Q1, Q2)
     distance, turns = _norms(_apart(Q1, Q2, cosines)), _turns(cosines)
@@ -348,11 +349,13 @@ def nu_gaps(
 def _graphs(
     A: Array, B: Array, C: Array, D: Array, su: Array, sy: Array
 ) -> Callable[[Array], Array]:
-    """Return the function from angles (n,) of z to orthonormal bases (nu + ny, nu, n) of the pairs
-    (u, G(z) u) in units of the scales: by one Schur form, and a triangular system at each z.
+    """Return the function from angles (n,) of z to orthonormal bases of the pairs (u, G(z) u) in
+    units of the scales (nu + ny, nu, n).
+
+    It takes one Schur form of the balanced A, and solves a triangular system at each z.
     """
     balanced, (scale, _) = matrix_balance(A, permute=False, separate=True)
-    T, Q = schur(balanced, output="complex")
+    T, Q = schur(balanced, output="complex")  # type: ignore[misc]
     B, C, D = (
         Q.conj().T @ (B * su / scale[:, None]),
         (C * scale / sy[:, None]) @ Q,
@@ -373,10 +376,10 @@ def _graphs(
 
 
 def _orthonormal(P: Array) -> Array:
-    """Orthonormal basis (nu + ny, nu, n) of [I; P] for P (ny, nu, n), by Gram and Schmidt; again
-    where much of a column lies along those before.
+    """Return orthonormal bases (nu + ny, nu, n) of [I; P] for P (ny, nu, n), by Gram and Schmidt.
 
-    It forms no square of P, which at the gains near an integrator's pole would lose the identity.
+    A column is projected again where little of it is left. Squares of P would lose the identity at
+    the gains near an integrator's pole.
     """
     _, nu, n = P.shape
     Q = np.concatenate([np.broadcast_to(np.eye(nu)[:, :, None], (nu, nu, n)), P])
@@ -416,21 +419,24 @@ def _winding(turns: Array) -> int:
 
 
 def _apart(Q1: Array, Q2: Array, cosines: Array) -> Array:
-    """Q1 less its projection on Q2 (n, nu + ny, nu): its largest singular value is the chordal
-    distance, that of (I + P2 P2*)^-1/2 (P1 - P2)(I + P1* P1)^-1/2.
+    """Return Q1 less its projection on Q2 (n, nu + ny, nu).
+
+    Its largest singular value is the chordal distance, that of (I + P2 P2*)^-1/2 (P1 - P2)(I + P1*
+    P1)^-1/2.
     """
     return np.moveaxis(Q1 - np.einsum("kin,ijn->kjn", Q2, cosines), 2, 0)
 
 
 def _norms(W: Array) -> Array:
-    """Largest singular value of each W, at most 1."""
+    """Return the largest singular value of each W (n, .., ..), at most 1."""
     square = np.linalg.eigvalsh(W.conj().swapaxes(1, 2) @ W)[:, -1]
     return np.sqrt(np.clip(square, 0.0, 1.0))
 
 
 def _largest(Q1: Array, Q2: Array, cosines: Array) -> tuple[float, int]:
-    """Largest chordal distance, and where: sought only where the sum of the squares of all singular
-    values allows it.
+    """Return the largest chordal distance, and where it is.
+
+    It is computed only where the sum of the squares of all singular values allows it.
     """
     nu = len(cosines)
     squares = nu - np.einsum("ijn,ijn->n", cosines, cosines.conj()).real
