@@ -17,9 +17,6 @@ TOGETHER = 8
 are more.
 """
 
-AT_ONCE = 64
-"""Number of blocks whose rows are formed together."""
-
 
 @dataclass(frozen=True, eq=False)
 class Whitening:
@@ -124,15 +121,11 @@ class WhitenedRegressors:
             _carried(later[::-1], around[:0:-1, -2 * q :], around[-2::-1, -q:])
             W = np.concatenate([S[:, :, of], links], axis=2)
             W = W.reshape(len(W), -1, self.size, W.shape[2])[:, :, : j + 1 if j < own else None]
-            rows, here = min(j + 1, own) * n, slice(j * n, j * n + each.shape[2])
-            for start in range(0, len(A), AT_ONCE):
-                part = slice(start, start + AT_ONCE)
-                Z = W[part].reshape(len(W[part]), -1, W.shape[3]) @ around[part]
-                found = F[part].reshape(-1, n).T @ Z.reshape(F[part].size // n, -1)
-                found = found.reshape(n, -1, Z.shape[2])[:, :own].swapaxes(0, 1)
-                out[:rows, here] += found.reshape(rows, -1)
-                if j == own:
-                    out[here, here] += D[part].reshape(-1, a).T @ Z.reshape(-1, a)
+            here, rows = slice(j * n, j * n + each.shape[2]), min(j + 1, own)
+            Z = W.reshape(len(W), -1, W.shape[3]) @ around
+            found = (F.reshape(-1, n).T @ Z.reshape(F.size // n, -1)).reshape(n, -1, Z.shape[2])
+            out[: rows * n, here] = found[:, :rows].swapaxes(0, 1).reshape(rows * n, -1)
+        out[own * n :, own * n :] = D.reshape(-1, a).T @ Z.reshape(-1, a)
         return np.triu(out) + np.triu(out, 1).T
 
     def products(self, e: Array) -> Array:

@@ -7,8 +7,7 @@ import pytest
 from known_vehicles import STATES, Vehicle
 
 import identification as idn
-from identification.estimators import block_banded
-from identification.estimators.block_banded import Whitening
+from identification.estimators.block_banded import WhitenedRegressors, Whitening
 from identification.estimators.filter_error import (
     Noise,
     SmoothedStretch,
@@ -122,9 +121,8 @@ def test_the_banded_factor_is_that_of_the_dense_covariance():
 
 
 @pytest.mark.parametrize("m", [3, 16, 37])
-def test_whitened_regressors_are_those_of_the_dense_covariance(m, monkeypatch):
-    """Of one block, of whole blocks, and of several parts with a block that is not full."""
-    monkeypatch.setattr(block_banded, "AT_ONCE", 2)
+def test_whitened_regressors_are_those_of_the_dense_covariance(m):
+    """Of one block, of whole blocks, and with a block that is not full."""
     rng, size, own, n, a = np.random.default_rng(2), 3, 2, 4, 2
     terms, S = sums(m, size)
     F, D, e = (rng.normal(size=(m, *shape)) for shape in ((n,), (size, a), (size,)))
@@ -133,7 +131,7 @@ def test_whitened_regressors_are_those_of_the_dense_covariance(m, monkeypatch):
         Y[:, i, i * n : (i + 1) * n] = F
     Y[:, :, own * n :] = D
     X = np.linalg.solve(np.linalg.cholesky(S), Y.reshape(m * size, -1))
-    found = block_banded.WhitenedRegressors(Whitening.of(terms), F, D, own)
+    found = WhitenedRegressors(Whitening.of(terms), F, D, own)
     np.testing.assert_allclose(found.gram(), X.T @ X, rtol=1e-9, atol=1e-10)
     each = np.einsum("kij,ki->kj", X.reshape(m, size, -1), e)
     np.testing.assert_allclose(found.products(e), each, rtol=1e-9, atol=1e-10)
