@@ -17,6 +17,9 @@ TOGETHER = 8
 are more.
 """
 
+AT_ONCE = 64
+"""Number of blocks whose rows are formed together."""
+
 
 @dataclass(frozen=True, eq=False)
 class Whitening:
@@ -112,20 +115,26 @@ class WhitenedRegressors:
         S, (_, F), (_, D) = A.swapaxes(1, 2) @ A, self.columns[0], self.columns[-1]
         links = -np.concatenate([S[:, :, :q], A[:, -q:].swapaxes(1, 2)], axis=2)
         pull, later = back @ S[1:, :q], back @ links[1:, :q]
-        n, a = F.shape[2], D.shape[2]
+        n, a, around = F.shape[2], D.shape[2], np.zeros((len(A), 0, 0))
         out = np.zeros((own * n + a,) * 2)
         for j, (of, each) in enumerate(self.columns):
-            before, after = self._before(j), np.zeros((len(A), q, each.shape[2]))
-            after[:-1] = self._times(pull, j, slice(1, None))
-            around = np.concatenate([each, before, after], axis=1)
+            if j in (0, own):  # else in the memory of the equation before
+                around = np.zeros((len(A), each.shape[1] + 2 * q, each.shape[2]))
+                around[:, : -2 * q] = each
+            self._before(j, around[:, -2 * q : -q])
+            self._times(pull, j, slice(1, None), around[:-1, -q:])
             _carried(later[::-1], around[:0:-1, -2 * q :], around[-2::-1, -q:])
-            W = np.concatenate([S[:, :, of], links], axis=2)
-            W = W.reshape(len(W), -1, self.size, W.shape[2])[:, :, : j + 1 if j < own else None]
             here, rows = slice(j * n, j * n + each.shape[2]), min(j + 1, own)
-            Z = W.reshape(len(W), -1, W.shape[3]) @ around
-            found = (F.reshape(-1, n).T @ Z.reshape(F.size // n, -1)).reshape(n, -1, Z.shape[2])
-            out[: rows * n, here] = found[:, :rows].swapaxes(0, 1).reshape(rows * n, -1)
-        out[own * n :, own * n :] = D.reshape(-1, a).T @ Z.reshape(-1, a)
+            for start in range(0, len(A), AT_ONCE):
+                part = slice(start, start + AT_ONCE)
+                W = np.concatenate([S[part, :, of], links[part]], axis=2)
+                W = W.reshape(len(W), -1, self.size, W.shape[2])[:, :, : j + 1 if j < own else None]
+                Z = W.reshape(len(W), -1, W.shape[3]) @ around[part]
+                found = F[part].reshape(-1, n).T @ Z.reshape(F[part].size // n, -1)
+                found = found.reshape(n, -1, Z.shape[2])[:, :rows].swapaxes(0, 1)
+                out[: rows * n, here] += found.reshape(rows * n, -1)
+                if j == own:
+                    out[here, here] += D[part].reshape(-1, a).T @ Z.reshape(-1, a)
         return np.triu(out) + np.triu(out, 1).T
 
     def products(self, e: Array) -> Array:
@@ -134,23 +143,26 @@ class WhitenedRegressors:
         weights = np.zeros((count * w, 1))
         weights[: e.size, 0] = e.reshape(-1)
         M = (self.A * weights.reshape(count, w, 1)).reshape(count, -1, self.size, w).sum(axis=2)
-        every = range(len(self.columns))
-        found = [self._times(M, j) - M[:, :, : self.q] @ self._before(j) for j in every]
+        found = []
+        for j, (_, each) in enumerate(self.columns):
+            before = np.zeros((count, self.q, each.shape[2]))
+            self._before(j, before)
+            found.append(np.empty((count, M.shape[1], each.shape[2])))
+            self._times(M, j, slice(None), found[-1])
+            found[-1] -= M[:, :, : self.q] @ before
         return np.concatenate(found, axis=2).reshape(count * M.shape[1], -1)[: len(e)]
 
-    def _times(self, M: Array, j: int, blocks: slice = slice(None)) -> Array:
-        """Return M Y (count, .., n) of some blocks, for M (count, .., w): its columns of equation
-        j, or of D.
+    def _times(self, M: Array, j: int, blocks: slice, out: Array) -> None:
+        """Write M Y (count, .., n) of some blocks, for M (count, .., w): its columns of equation j,
+        or of D.
         """
         of, each = self.columns[j]
-        return np.ascontiguousarray(M[:, :, of]) @ each[blocks]
+        np.matmul(np.ascontiguousarray(M[:, :, of]), each[blocks], out=out)
 
-    def _before(self, j: int) -> Array:
-        """Return what the block before adds to the first rows of each block (count, q, n)."""
-        out = np.zeros((len(self.A), self.q, self.columns[j][1].shape[2]))
-        out[1:] = self._times(self.push, j, slice(None, -1))
+    def _before(self, j: int, out: Array) -> None:
+        """Write what the block before adds to the first rows of each block but the first."""
+        self._times(self.push, j, slice(None, -1), out[1:])
         _carried(-self.push[:, :, : self.q], out[:-1], out[1:])
-        return out
 
 
 def _carried(M: Array, of: Array, to: Array) -> None:

@@ -7,6 +7,7 @@ import pytest
 from known_vehicles import STATES, Vehicle
 
 import identification as idn
+from identification.estimators import block_banded
 from identification.estimators.block_banded import WhitenedRegressors, Whitening
 from identification.estimators.filter_error import (
     Noise,
@@ -120,10 +121,12 @@ def test_the_banded_factor_is_that_of_the_dense_covariance():
     )
 
 
+@pytest.mark.parametrize("n", [2, 4])
 @pytest.mark.parametrize("m", [3, 16, 37])
-def test_whitened_regressors_are_those_of_the_dense_covariance(m):
-    """Of one block, of whole blocks, and with a block that is not full."""
-    rng, size, own, n, a = np.random.default_rng(2), 3, 2, 4, 2
+def test_whitened_regressors_are_those_of_the_dense_covariance(m, n, monkeypatch):
+    """Of one block, of whole blocks, and of several parts with a block that is not full."""
+    monkeypatch.setattr(block_banded, "AT_ONCE", 2)
+    rng, size, own, a = np.random.default_rng(2), 3, 2, 2
     terms, S = sums(m, size)
     F, D, e = (rng.normal(size=(m, *shape)) for shape in ((n,), (size, a), (size,)))
     Y = np.zeros((m, size, own * n + a))
