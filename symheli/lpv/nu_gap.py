@@ -130,7 +130,7 @@ def nu_gap(
             break
     if _winding(turns) + unstable[0] - unstable[1] != 0:
         return 1.0
-    return _largest(*Q, cosines)[0]
+    return _largest(Q[0], Q[1], cosines)[0]
 
 
 def _between(count: int, Q1: Array, Q2: Array) -> Array:
