@@ -4,16 +4,17 @@ smoothing.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg.lapack import dpotri  # type: ignore[attr-defined]
 from scipy.signal import lfilter
 
-from identification.estimators.block_banded import Whitening
+from identification.estimators.block_banded import WhitenedRegressors, Whitening
 from identification.estimators.instrumental_variables import instrumental_variables
 from identification.estimators.instruments import FlightSource, flown_rows
 from identification.estimators.least_squares import least_squares
@@ -48,8 +49,8 @@ LINES_PER_ESTIMATE = 1.0 + 2 * (2 / 3) ** 2 + 2 * (1 / 6) ** 2
 correlated.
 """
 
-LAGS = 25
-"""Number of samples over which scores are taken to be correlated."""
+LAGS, CHUNK = 25, 256
+"""Number of samples over which scores are taken to be correlated, and of those summed at a time."""
 
 SLOWER = 4
 """Factor of the number of steps where a delay or a wind is sought too: they start far off."""
@@ -62,9 +63,6 @@ WIND_DETERMINED = 0.5
 
 FARTHEST = 4.0
 """Largest move of late sensors, in their prior deviation."""
-
-CHUNK = 256
-"""Number of samples whitened at a time."""
 
 
 @dataclass(frozen=True)
@@ -208,21 +206,23 @@ class FilterError(Method):
             count += 1
             for s, _ in flights:
                 s.follow(z)
-            parts = [s.normal(theta, noise) for s, noise in flights]
+            each = [s.linearized(theta, noise) for s, noise in flights]
+            parts = [equations.normal() for equations in each]
             normal, right = map(sum, zip(*parts, strict=True))
             at = np.append(theta.T.reshape(-1), z)
             prior.learn(normal, right, at)  # type: ignore[arg-type]
             known = prior.precision()
             step, inverse = _solved(normal + np.diag(known), right + known * (prior.mean - at))  # type: ignore[operator]
             change, later = step[: 6 * n].reshape(6, -1).T, step[6 * n :]
-            for s, noise in flights:
-                s.smooth(theta, change, later, noise)
+            for (s, noise), equations in zip(flights, each, strict=True):
+                s.smooth(equations, change, later, noise)
             theta, z = theta + change, z + later
             spread = np.sqrt(np.diag(inverse))
             settled = bool(np.all(np.abs(step) < 0.1 * spread))
             if settled:
                 break
-        scores = sum(s.scores(theta, noise) for s, noise in flights) + np.diag(known)
+        each = [s.linearized(theta, noise) for s, noise in flights]
+        scores = sum(equations.scores() for equations in each) + np.diag(known)
         covariance = inverse @ scores @ inverse  # type: ignore[operator]
         covariance = 0.5 * (covariance + covariance.T)
         beside = arx.found(z.tolist(), np.sqrt(np.diag(covariance)[6 * n :]).tolist())
@@ -240,7 +240,7 @@ class FilterError(Method):
                 "gust": self.gust,
                 "gust_remains": air[1],
                 "residual_windows": window_powers(
-                    [s.whitened(theta, noise) for s, noise in flights], records[0].dt
+                    [equations.whitened() for equations in each], records[0].dt
                 ).tolist(),
             }
             | beside,
@@ -388,6 +388,34 @@ class Linearized(NamedTuple):
     H: Array
     white: Whitening
 
+    def whitened(self) -> Array:
+        """Return the residuals (m, 8), white and of variance 1 if the noise is their only cause."""
+        return self.white.whitened(self.left)
+
+    @property
+    def regressors(self) -> WhitenedRegressors:
+        """The whitened regressors X: those of each equation, of the unknowns, and the residuals as
+        the last column.
+        """
+        return WhitenedRegressors(
+            self.white, self.F, np.concatenate([self.D, self.left[:, :, None]], axis=2), 6
+        )
+
+    def normal(self) -> tuple[Array, Array]:
+        """X' X and X' e of the whitened regressors X (.., 6 n + a), equation by equation, those of
+        the unknowns last.
+        """
+        whole = self.regressors.gram()
+        return whole[:-1, :-1], whole[:-1, -1]
+
+    def scores(self) -> Array:
+        """Covariance (6 n + a, 6 n + a) of X' e, e correlated over `LAGS` samples (Newey and
+        West).
+        """
+        each = self.regressors.products(self.whitened())[:, :-1]
+        parts = (each[start : start + CHUNK] for start in range(0, len(each), CHUNK))
+        return long_run_covariance(parts, LAGS)
+
 
 class Signals(NamedTuple):
     """What acts on a stretch besides its states: inputs behind the velocities u (n, nu - 6), wind
@@ -499,7 +527,7 @@ class SmoothedStretch:
                 L[e.lag][:, :6, e.channel] -= f @ theta[row * size : (row + 1) * size]
         return L
 
-    def _linearized(self, theta: Array, noise: Noise) -> Linearized:
+    def linearized(self, theta: Array, noise: Noise) -> Linearized:
         """With a gust every equation less what remains of the one before: what is left of the gust
         in that is white.
         """
@@ -529,30 +557,12 @@ class SmoothedStretch:
             terms.append(([H], np.full(3, noise.gust * (1 - noise.remains**2))))
         return Linearized(F, D, left, L, H, Whitening.of(terms))
 
-    def whitened(self, theta: Array, noise: Noise) -> Array:
-        """Return the residuals (m, 8) of the equations, white and of variance 1 if `noise` is their
-        only cause.
+    def smooth(self, found: Linearized, change: Array, later: Array, noise: Noise) -> None:
+        """Adjust the states, and the gust, to fit the equations best with their coefficients moved
+        by `change`, and the unknowns by `later`.
         """
-        _, _, left, _, _, white = self._linearized(theta, noise)
-        return white.whitened(left)
-
-    def normal(self, theta: Array, noise: Noise) -> tuple[Array, Array]:
-        """X' X and X' e of the whitened regressors X (.., 6 n + a), equation by equation, those of
-        the unknowns last.
-        """
-        found = self._linearized(theta, noise)
-        size = 6 * found.F.shape[1] + found.D.shape[2] + 1
-        whole = np.zeros((size, size))
-        for rows in _whitened(found):
-            flat = rows.reshape(-1, size)
-            whole += flat.T @ flat
-        return whole[:-1, :-1], whole[:-1, -1]
-
-    def smooth(self, theta: Array, change: Array, later: Array, noise: Noise) -> None:
-        """Adjust the states, and the gust, to fit the equations best with theta + `change`, and
-        the unknowns moved by `later`.
-        """
-        F, D, left, L, H, white = self._linearized(theta, noise)
+        F, D, left, L, H, white = found
+        left = left.copy()
         left[:, :6] -= F @ change
         left -= D @ later
         pull = white.adjoint(white.whitened(left))
@@ -564,16 +574,6 @@ class SmoothedStretch:
         if noise.gust:
             drive = np.einsum("kij,ki->kj", H, pull) * noise.gust * (1 - noise.remains**2)
             self.gust[first - 1 : -1] = lfilter([1.0], [1.0, -noise.remains], drive, axis=0)
-
-    def scores(self, theta: Array, noise: Noise) -> Array:
-        """Covariance (6 n + a, 6 n + a) of X' e, e correlated over `LAGS` samples (Newey and
-        West).
-        """
-        parts = (
-            np.einsum("kij,ki->kj", rows[:, :, :-1], rows[:, :, -1])
-            for rows in _whitened(self._linearized(theta, noise))
-        )
-        return long_run_covariance(parts, LAGS)
 
     def residual(self, theta: Array) -> Array:
         """Covariance (6, 6) of what one step leaves, measured to measured."""
@@ -606,30 +606,11 @@ def _ahead(x: Array, by: Array, dt: float) -> Array:
     return np.column_stack([CubicSpline(time, c)(at) for c, at in zip(x.T, later, strict=True)])
 
 
-def _whitened(found: Linearized) -> Iterator[Array]:
-    """Yield chunks (k, 8, 6 n + a + 1) of G^-1 [I6 (x) F, D, left]."""
-    F, D, left, _, _, white = found
-    (m, n), before = F.shape, []
-    for start in range(0, m, CHUNK):
-        stop = min(start + CHUNK, m)
-        out = np.empty((stop - start, 8, 6 * n + D.shape[2] + 1))
-        for k in range(start, stop):
-            new = out[k - start]
-            diagonal = white.steps[0][k]
-            coefficients = diagonal[:, :6, None] * F[k]
-            new[:, : 6 * n] = coefficients.reshape(8, -1)
-            new[:, 6 * n : -1] = diagonal @ D[k]
-            new[:, -1] = diagonal @ left[k]
-            for step, past in zip(white.steps[1:], before, strict=False):
-                new -= step[k] @ past
-            before = [new, *before[: len(white.steps) - 2]]
-        yield out
-
-
 def _solved(normal: Array, right: Array) -> tuple[Array, Array]:
     """Return solution and inverse of normal equations, scaled to a unit diagonal."""
     scale = np.sqrt(np.diag(normal))
     scale = np.where(scale > 0, scale, 1.0)
     factor = cho_factor(normal / np.outer(scale, scale), lower=True)
-    inverse = cho_solve(factor, np.eye(len(scale))) / np.outer(scale, scale)
+    lower = np.tril(dpotri(*factor)[0])
+    inverse = (lower + np.tril(lower, -1).T) / np.outer(scale, scale)
     return cho_solve(factor, right / scale) / scale, inverse

@@ -166,14 +166,15 @@ def validate(model: KinematicModel, record: FlightRecord) -> UnseenFlight:
     errors = np.where(told, found.errors, 0.0)
     for part in unbroken(aero, prepared):
         s = SmoothedStretch.of(aero, prepared, part)
-        white = s.whitened(model.theta, noise)
+        equations = s.linearized(model.theta, noise)
+        white = equations.whitened()
         residuals.append(white)
         power += float(np.sum(white**2))
-        known = s.normal(model.theta, noise)[0] @ C  # what errors of the coefficients add
+        known = equations.normal()[0] @ C  # what errors of the coefficients add
         unknown, spread = unknown + np.trace(known), spread + np.sum(known * known.T)
         for i in np.flatnonzero(errors):
             other = Noise.of(R * (1 + errors[i] * (np.arange(len(R)) == i)), left, *air)
-            louder[i] += np.sum(white**2) - np.sum(s.whitened(model.theta, other) ** 2)
+            louder[i] += np.sum(white**2) - np.sum(s.linearized(model.theta, other).whitened() ** 2)
         count, samples = count + white.size, samples + len(white)
     if samples * model.dt < 1.0:
         raise InputError("the record is shorter than 1 s; record longer")

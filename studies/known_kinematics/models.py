@@ -70,12 +70,14 @@ def structures() -> dict[str, KinematicARX]:
 
 def identified(
     records: FlightRecord | list[FlightRecord],
-    simulator: Helicopter,
+    simulator: Helicopter | SimulatedFlight,
     turbulent: bool = False,
     kin: KinematicARX | None = None,
 ) -> KinematicModel:
     """By the filter error method, its instruments flown in `simulator`; the gust a hidden state
-    where the air is `turbulent`. `kin`: another structure than that of `structure`.
+    where the air is `turbulent`. `kin`: another structure than that of `structure`. A
+    `SimulatedFlight` keeps its flights for further identifications.
     """
-    method = FilterError(SimulatedFlight(simulator), gust=GUST if turbulent else 0.0)
+    source = SimulatedFlight(simulator) if isinstance(simulator, Helicopter) else simulator
+    method = FilterError(source, gust=GUST if turbulent else 0.0)
     return fit(kin or structure(turbulent), records, method=method)

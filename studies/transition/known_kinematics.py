@@ -25,6 +25,7 @@ from studies.setup.axes import ALL, LATERAL, LONGITUDINAL, update_time
 from studies.setup.flights import autopilot_for
 from studies.transition.baseline import Baseline
 from symheli import FlightRecord, Helicopter
+from symheli.flight import SimulatedFlight
 from symheli.values.arrays import Array
 
 CUBIC = "baseline over airspeed, cubic (the LFT)"
@@ -82,8 +83,9 @@ def identify_with_known_kinematics(
     found += [
         rival(name, _predicted(arx, test), own) for name, (arx, own) in _arx(training).items()
     ]
+    source = SimulatedFlight(simulator)
     known = {
-        kind: models.identified(training, simulator, kin=kin)
+        kind: models.identified(training, source, kin=kin)
         for kind, kin in models.structures().items()
     }
     found += [

@@ -124,13 +124,13 @@ STAGES = (
         "known_kinematics",
         "Identifying with known kinematics",
         identify_with_known_kinematics,
-        (30, 15),
+        (18, 7),
     ),
     Stage(
         "real_conditions",
         "Identifying through servos, delay and governor",
         identify_under_real_conditions,
-        (14, 8),
+        (5, 3),
     ),
     Stage(
         "robust",

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
+from scipy.linalg import matrix_balance, schur
 
 from symheli.errors import InputError
 from symheli.lpv.linear_model import LinearModel
@@ -15,6 +18,20 @@ ON_THE_CIRCLE = 1e3 * np.finfo(float).eps
 matrix by.
 """
 
+LEAST_LEFT = 1e-2
+"""Fraction of a column that one projection must leave to be enough."""
+
+ROUNDING = 1e-10
+"""Largest rounding of norms and their squares, where 1 is the largest."""
+
+STRIDE, STEEPER = 4, 2.0
+"""Two models are compared on every fourth frequency first. Between two of these the distance is
+taken to rise at most twice as much as it changes about there.
+"""
+
+TURN = np.pi / 4
+"""Largest turn of the determinant between two frequencies, rad."""
+
 MAX_REFINEMENTS = 30
 """Largest number of bisections of a frequency interval until the phase of the determinant changes
 little in it.
@@ -22,9 +39,6 @@ little in it.
 
 SCALE_LIMITS = 1e-60, 1e60
 """Permitted channel scales; their squares neither overflow nor underflow."""
-
-AT_ONCE = 2_000_000
-"""Entries of the pencils zI - A that are solved together."""
 
 FINER = 4
 """How many times more frequencies a model is compared on where the winding number cannot be told on
@@ -49,7 +63,8 @@ def nu_gap(
     1 where the winding-number condition fails: no controller is known to suit both. Continuous
     models are compared after the bilinear transformation of both, which preserves it. Evaluated on
     frequencies up to Nyquist, logarithmic, from a thousandth of the slowest pole, at the poles and
-    around them, and between them where the response turns by more than an eighth of a circle.
+    around them, but only every fourth where the distance stays below the largest, and between them
+    where the response turns by more than an eighth of a circle.
 
     Parameters
     ----------
@@ -97,30 +112,42 @@ def nu_gap(
             raise InputError("nu_gap: a pole lies on the stability boundary")
         unstable.append(int(np.sum(np.abs(found) > 1)))
         poles.append(found)
-    angle = angles(np.concatenate(poles), points)
-
-    def responses(angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        one, two = (
-            m.frequency_response(angle / m.dt) * su[None, None, :] / sy[None, :, None]
-            for m in (first, second)
-        )  # type: ignore[operator]
-        return one, two
-
-    P1, P2 = responses(angle)
-    for _ in range(MAX_REFINEMENTS):
-        coarse = np.flatnonzero(np.abs(_turns(P1, P2)) > np.pi / 4)
-        if not len(coarse):
+    grid = angles(np.concatenate(poles), points)
+    graphs = [_graphs(m.A, m.B, m.C, m.D, su, sy) for m in (first, second)]
+    angle = np.append(grid[:-1:STRIDE], grid[-1])
+    Q = [own(angle) for own in graphs]
+    more = grid[_between(len(grid), Q[0], Q[1])]
+    for left in reversed(range(MAX_REFINEMENTS + 1)):
+        if len(more):
+            at = np.searchsorted(angle, more)
+            angle = np.insert(angle, at, more)
+            Q = [np.insert(Q[i], at, own(more), axis=2) for i, own in enumerate(graphs)]
+        cosines = _cosines(*Q)
+        turns = _turns(cosines)
+        coarse = np.flatnonzero(np.abs(turns) > TURN)
+        more = 0.5 * (angle[coarse] + angle[coarse + 1])
+        if not len(more) or not left:
             break
-        between = 0.5 * (angle[coarse] + angle[coarse + 1])
-        angle = np.concatenate([angle, between])
-        order = np.argsort(angle)
-        angle = angle[order]
-        P1, P2 = (
-            np.concatenate(pair)[order] for pair in zip((P1, P2), responses(between), strict=True)
-        )
-    if _winding(P1, P2) + unstable[0] - unstable[1] != 0:
+    if _winding(turns) + unstable[0] - unstable[1] != 0:
         return 1.0
-    return float(_chordal(P1, P2).max())
+    return _largest(Q[0], Q[1], cosines)[0]
+
+
+def _between(count: int, Q1: Array, Q2: Array) -> Array:
+    """Return the indices of the points that are needed besides every `STRIDE`th of `count`.
+
+    They lie where the determinant turns, and where the distance may reach the largest by `STEEPER`
+    times its changes about there. Q1 and Q2 are the bases at every `STRIDE`th point and the last.
+    """
+    cosines = _cosines(Q1, Q2)
+    distance, turns = _norms(_apart(Q1, Q2, cosines)), _turns(cosines)
+    change = np.pad(np.abs(np.diff(distance)), 1, mode="edge")
+    steepest = np.max([change[:-2], change[1:-1], change[2:]], axis=0)
+    highest = np.maximum(distance[1:], distance[:-1]) + STEEPER * steepest
+    most = max(distance.max(), ROUNDING)
+    wanted = (highest >= most) | (np.abs(turns) > TURN)
+    k = np.arange(count - 1)
+    return np.flatnonzero(wanted[k // STRIDE] & (k % STRIDE > 0))
 
 
 def sampled_alike(*models: LinearModel) -> tuple[LinearModel, ...]:
@@ -205,12 +232,13 @@ def chordal_distance(
     require_same_signals(first, second)
     su = channel_scales(input_scale, "input_scale", len(first.inputs))
     sy = channel_scales(output_scale, "output_scale", len(first.outputs))
-    return _chordal(
-        *(
-            m.frequency_response(omega) * su[None, None, :] / sy[None, :, None]
-            for m in (first, second)
+    Q1, Q2 = (
+        _orthonormal(
+            m.frequency_response(omega).transpose(1, 2, 0) * su[:, None] / sy[:, None, None]
         )
+        for m in (first, second)
     )
+    return _norms(_apart(Q1, Q2, _cosines(Q1, Q2)))
 
 
 def require_same_signals(
@@ -296,72 +324,126 @@ def nu_gaps(
         raise InputError("nu_gaps: a pole lies on the unit circle")
     extra = np.sum(np.abs(poles) > 1) - np.sum(np.abs(many) > 1, axis=1)
     angle = angles(poles, points)
-    one = LinearModels.of([model])
-    P1, out = _responses(one, angle[None], su, sy), np.zeros(len(others))
-    size = others.A.shape[1] ** 2 * len(angle)
-    step = max(AT_ONCE // max(size, 1), 1)
-    for start in range(0, len(others), step):
-        rows = np.arange(start, min(start + step, len(others)))
-        part = others.take(rows)
-        P2 = _responses(part, np.broadcast_to(angle, (len(rows), len(angle))), su, sy)
-        turns = _turns(P1, P2)
-        same = -np.rint(turns.sum(axis=1) / np.pi) + extra[rows] == 0
-        distance = _chordal(P1, P2)
-        peak = distance.argmax(axis=1)
-        low, high = angle[np.maximum(peak - 1, 0)], angle[np.minimum(peak + 1, len(angle) - 1)]
-        near = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, REFINED_FREQUENCIES)
-        closer = _chordal(
-            _responses(one.take(np.zeros(len(rows), int)), near, su, sy),
-            _responses(part, near, su, sy),
-        )
-        largest = np.maximum(distance.max(axis=1), closer.max(axis=1))
-        out[rows] = np.where(same, np.minimum(largest, 1.0), 1.0)
-        for k in np.flatnonzero(np.abs(turns).max(axis=1) > np.pi / 4):
-            out[rows[k]] = nu_gap(
-                model, part[int(k)], input_scale=su, output_scale=sy, points=FINER * points
+    one = _graphs(model.A, model.B, model.C, model.D, su, sy)
+    Q1, out = one(angle), np.zeros(len(others))
+    for k, matrices in enumerate(zip(others.A, others.B, others.C, others.D, strict=True)):
+        two = _graphs(*matrices, su, sy)
+        Q2 = two(angle)
+        cosines = _cosines(Q1, Q2)
+        turns = _turns(cosines)
+        if np.abs(turns).max() > TURN:
+            out[k] = nu_gap(
+                model, others[k], input_scale=su, output_scale=sy, points=FINER * points
             )
+        elif _winding(turns) + extra[k] != 0:
+            out[k] = 1.0
+        else:
+            largest, peak = _largest(Q1, Q2, cosines)
+            ends = angle[max(peak - 1, 0)], angle[min(peak + 1, len(angle) - 1)]
+            near = np.linspace(*ends, REFINED_FREQUENCIES)
+            Q3, Q4 = one(near), two(near)
+            out[k] = max(largest, _largest(Q3, Q4, _cosines(Q3, Q4))[0])
     return out
 
 
-def _responses(models: LinearModels, angle: Array, su: Array, sy: Array) -> Array:
-    """(K, n, ny, nu) at angles (K, n) of z, in units of the scales."""
-    z = np.exp(1j * angle)[:, :, None, None]
-    pencil = z * np.eye(models.A.shape[1]) - models.A[:, None]
-    B = np.broadcast_to(models.B[:, None], (*angle.shape, *models.B.shape[1:]))
-    G = models.C[:, None] @ np.linalg.solve(pencil, B) + models.D[:, None]
-    return G * su / sy[:, None]
+def _graphs(
+    A: Array, B: Array, C: Array, D: Array, su: Array, sy: Array
+) -> Callable[[Array], Array]:
+    """Return the function from angles (n,) of z to orthonormal bases of the pairs (u, G(z) u) in
+    units of the scales (nu + ny, nu, n).
+
+    It takes one Schur form of the balanced A, and solves a triangular system at each z.
+    """
+    balanced, (scale, _) = matrix_balance(A, permute=False, separate=True)
+    T, Q = schur(balanced, output="complex")  # type: ignore[misc]
+    B, C, D = (
+        Q.conj().T @ (B * su / scale[:, None]),
+        (C * scale / sy[:, None]) @ Q,
+        D * su / sy[:, None],
+    )
+    (nx, nu), ny = B.shape, len(C)
+
+    def graphs(angle: Array) -> Array:
+        z = np.exp(1j * angle)
+        X = np.repeat(B, len(z), axis=1)  # (nx, nu n): of each input at every z
+        inverse = 1.0 / (z - T.diagonal()[:, None])
+        for i in reversed(range(nx)):
+            X[i] += T[i, i + 1 :] @ X[i + 1 :]
+            X[i].reshape(nu, len(z))[:] *= inverse[i]
+        return _orthonormal((C @ X).reshape(ny, nu, len(z)) + D[:, :, None])
+
+    return graphs
 
 
-def _turns(P1: Array, P2: Array) -> Array:
-    """Angles (..., n - 1) by which det(I + P2* P1) turns from one frequency to the next."""
-    f = np.linalg.det(np.eye(P1.shape[-1]) + _adjoint(P2) @ P1)
-    return np.angle(f[..., 1:] / f[..., :-1])
+def _orthonormal(P: Array) -> Array:
+    """Return orthonormal bases (nu + ny, nu, n) of [I; P] for P (ny, nu, n), by Gram and Schmidt.
+
+    A column is projected again where little of it is left. Squares of P would lose the identity at
+    the gains near an integrator's pole.
+    """
+    _, nu, n = P.shape
+    Q = np.concatenate([np.broadcast_to(np.eye(nu)[:, :, None], (nu, nu, n)), P])
+    for j in range(nu):
+        v, where = Q[:, j], slice(None)
+        left = size = np.linalg.norm(v, axis=0)
+        for _ in range(2 if j else 0):
+            before, own = Q[:, :j, where], v[:, where]
+            own = own - np.einsum("ikn,kn->in", before, np.einsum("ikn,in->kn", before.conj(), own))
+            v[:, where] = own
+            left = np.linalg.norm(v, axis=0)
+            where = np.flatnonzero(left < LEAST_LEFT * size)
+            if not len(where):
+                break
+        v /= left
+    return Q
 
 
-def _winding(P1: Array, P2: Array) -> int:
+def _cosines(Q1: Array, Q2: Array) -> Array:
+    """Q2* Q1 (nu, nu, n)."""
+    return np.einsum("kin,kjn->ijn", Q2.conj(), Q1)
+
+
+def _turns(cosines: Array) -> Array:
+    """Angles (n - 1,) by which det(Q2* Q1), and with it det(I + P2* P1), turns from one frequency
+    to the next.
+    """
+    f = np.linalg.det(np.moveaxis(cosines, 2, 0))
+    return np.angle(f[1:] / f[:-1])
+
+
+def _winding(turns: Array) -> int:
     """Clockwise turns about 0 of det(I + P2* P1) along the unit circle (upper half, doubled by
     symmetry): zeros less poles outside it.
     """
-    return -round(float(np.sum(_turns(P1, P2)) / np.pi))  # both half circles: 2 x sum / (2 pi)
+    return -round(float(np.sum(turns) / np.pi))  # both half circles: 2 x sum / (2 pi)
 
 
-def _chordal(P1: Array, P2: Array) -> Array:
-    """Largest singular value of (I + P2 P2*)^-1/2 (P1 - P2)(I + P1* P1)^-1/2 at each frequency.
+def _apart(Q1: Array, Q2: Array, cosines: Array) -> Array:
+    """Return Q1 less its projection on Q2 (n, nu + ny, nu).
 
-    A root is any factor: R of the QR decomposition of [I; P2*] has R* R = I + P2 P2*, and forms no
-    square, which at the gains near an integrator's pole would lose the identity.
+    Its largest singular value is the chordal distance, that of (I + P2 P2*)^-1/2 (P1 - P2)(I + P1*
+    P1)^-1/2.
     """
-    left = _adjoint(_root(_adjoint(P2)))
-    right = _adjoint(_root(P1))
-    scaled = np.linalg.solve(right, _adjoint(np.linalg.solve(left, P1 - P2)))
-    return np.linalg.svd(scaled, compute_uv=False)[..., 0]
+    return np.moveaxis(Q1 - np.einsum("kin,ijn->kjn", Q2, cosines), 2, 0)
 
 
-def _root(P: Array) -> Array:
-    """R with R* R = I + P* P."""
-    eye = np.broadcast_to(np.eye(P.shape[-1]), (*P.shape[:-2], P.shape[-1], P.shape[-1]))
-    return np.asarray(np.linalg.qr(np.concatenate([eye, P], axis=-2), mode="r"))
+def _norms(W: Array) -> Array:
+    """Return the largest singular value of each W (n, .., ..), at most 1."""
+    square = np.linalg.eigvalsh(W.conj().swapaxes(1, 2) @ W)[:, -1]
+    return np.sqrt(np.clip(square, 0.0, 1.0))
 
 
-def _adjoint(M: Array) -> Array:
-    return np.conj(np.swapaxes(M, -1, -2))
+def _largest(Q1: Array, Q2: Array, cosines: Array) -> tuple[float, int]:
+    """Return the largest chordal distance, and where it is.
+
+    It is computed only where the sum of the squares of all singular values allows it.
+    """
+    nu = len(cosines)
+    squares = nu - np.einsum("ijn,ijn->n", cosines, cosines.conj()).real
+    near = np.flatnonzero(squares >= squares.max() / nu - ROUNDING)
+    W = _apart(Q1[:, :, near], Q2[:, :, near], cosines[:, :, near])
+    sizes = np.linalg.norm(W, axis=(1, 2))
+    least = _norms(W[[sizes.argmax()]]) * (1 - ROUNDING)
+    large = np.flatnonzero(sizes >= least)
+    found = _norms(W[large])
+    return float(found.max()), int(near[large[found.argmax()]])

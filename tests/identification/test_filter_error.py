@@ -7,7 +7,8 @@ import pytest
 from known_vehicles import STATES, Vehicle
 
 import identification as idn
-from identification.estimators.block_banded import Whitening
+from identification.estimators import block_banded
+from identification.estimators.block_banded import WhitenedRegressors, Whitening
 from identification.estimators.filter_error import (
     Noise,
     SmoothedStretch,
@@ -86,7 +87,7 @@ def test_a_step_is_generalized_least_squares_with_the_dense_covariance(vehicle, 
             H = np.zeros((8, 3))
             H[:6] = -A1[k + 1, :3].T
             S[8 * k : 8 * k + 8, 8 * k : 8 * k + 8] += H @ H.T * gust**2 * (1 - remains**2)
-    normal, right = s.normal(theta, Noise(R, Q, gust**2, remains))
+    normal, right = s.linearized(theta, Noise(R, Q, gust**2, remains)).normal()
     weighed = np.linalg.solve(S, X)
     # differences of 1e-6: eps / h of every slope, and S is conditioned like R / Q
     tolerance = 1e-5 * np.abs(normal).max()
@@ -94,9 +95,9 @@ def test_a_step_is_generalized_least_squares_with_the_dense_covariance(vehicle, 
     np.testing.assert_allclose(right, weighed.T @ e, rtol=1e-4, atol=1e-4 * np.abs(right).max())
 
 
-def test_the_banded_factor_is_that_of_the_dense_covariance():
+def sums(m, size):
+    """Terms of a covariance over two samples, and the dense covariance."""
     rng = np.random.default_rng(0)
-    m, size = 12, 3
     L = [np.eye(size) + 0.3 * rng.normal(size=(m, size, size)) for _ in range(3)]
     v, w = rng.uniform(0.5, 2, size), rng.uniform(0.1, 0.2, size)
     dense = np.zeros((m * size, (m + 2) * size))
@@ -105,8 +106,12 @@ def test_the_banded_factor_is_that_of_the_dense_covariance():
             at = k + 2 - i
             dense[k * size : (k + 1) * size, at * size : (at + 1) * size] = block[k]
     S = dense @ np.diag(np.tile(v, m + 2)) @ dense.T + np.diag(np.tile(w, m))
-    own = [np.broadcast_to(np.eye(size), (m, size, size))]
-    white, e = Whitening.of([(L, v), (own, w)]), rng.normal(size=(m, size))
+    return [(L, v), ([np.broadcast_to(np.eye(size), (m, size, size))], w)], S
+
+
+def test_the_banded_factor_is_that_of_the_dense_covariance():
+    terms, S = sums(12, 3)
+    white, e = Whitening.of(terms), np.random.default_rng(1).normal(size=(12, 3))
     factor = np.linalg.cholesky(S)
     np.testing.assert_allclose(
         white.whitened(e).ravel(), np.linalg.solve(factor, e.ravel()), rtol=1e-11, atol=1e-12
@@ -114,6 +119,25 @@ def test_the_banded_factor_is_that_of_the_dense_covariance():
     np.testing.assert_allclose(
         white.adjoint(e).ravel(), np.linalg.solve(factor.T, e.ravel()), rtol=1e-11, atol=1e-12
     )
+
+
+@pytest.mark.parametrize("n", [2, 4])
+@pytest.mark.parametrize("m", [3, 16, 37])
+def test_whitened_regressors_are_those_of_the_dense_covariance(m, n, monkeypatch):
+    """Of one block, of whole blocks, and of several parts with a block that is not full."""
+    monkeypatch.setattr(block_banded, "AT_ONCE", 2)
+    rng, size, own, a = np.random.default_rng(2), 3, 2, 2
+    terms, S = sums(m, size)
+    F, D, e = (rng.normal(size=(m, *shape)) for shape in ((n,), (size, a), (size,)))
+    Y = np.zeros((m, size, own * n + a))
+    for i in range(own):
+        Y[:, i, i * n : (i + 1) * n] = F
+    Y[:, :, own * n :] = D
+    X = np.linalg.solve(np.linalg.cholesky(S), Y.reshape(m * size, -1))
+    found = WhitenedRegressors(Whitening.of(terms), F, D, own)
+    np.testing.assert_allclose(found.gram(), X.T @ X, rtol=1e-9, atol=1e-10)
+    each = np.einsum("kij,ki->kj", X.reshape(m, size, -1), e)
+    np.testing.assert_allclose(found.products(e), each, rtol=1e-9, atol=1e-10)
 
 
 def test_without_noise_the_coefficients_are_exact(vehicle):

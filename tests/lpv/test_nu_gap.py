@@ -10,6 +10,7 @@ import pytest
 from symheli import LinearModel
 from symheli.errors import InputError
 from symheli.lpv import nu_gap
+from symheli.lpv.nu_gap import STRIDE, _orthonormal, angles
 from symheli.lpv.tools import LinearModels, chordal_distance, nu_gaps
 from symheli.values import signals
 
@@ -136,3 +137,60 @@ def test_turns_at_the_sharpest_resonance_are_counted():
 
 def test_sample_periods_that_are_equal_but_for_rounding_are_equal():
     assert nu_gap(lag(0.02), lag(0.019999999999999574)) == pytest.approx(0, abs=1e-9)
+
+
+def plants(seed, states=6, inputs=2, outputs=3):
+    """A lightly damped plant of random modes, and one near it."""
+    rng = np.random.default_rng(seed)
+    A = np.zeros((states, states))
+    for i in range(0, states, 2):
+        radius, angle = 1 - 10 ** rng.uniform(-5, -0.5), rng.uniform(0.01, 3.0)
+        turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+        A[i : i + 2, i : i + 2] = radius * turn
+    names = [
+        signals([f"{kind}{i}" for i in range(n)])
+        for kind, n in zip("xuy", (states, inputs, outputs), strict=True)
+    ]
+    B, C = rng.standard_normal((states, inputs)), rng.standard_normal((outputs, states))
+    one = LinearModel(A, B, C, 0.1 * rng.standard_normal((outputs, inputs)), *names, dt=0.02)
+    size = 10 ** rng.uniform(-4, -1)
+    return one, replace(one, B=B + size * rng.standard_normal(B.shape))
+
+
+def plain(one, other, points):
+    """Chordal distances at every frequency, by dense solves and matrix square roots."""
+
+    def root(P):
+        values, vectors = np.linalg.eigh(np.eye(P.shape[1]) + P @ P.conj().swapaxes(1, 2))
+        return (vectors / np.sqrt(values)[:, None]) @ vectors.conj().swapaxes(1, 2)
+
+    omega = angles(np.concatenate([one.poles(), other.poles()]), points) / one.dt
+    P1, P2 = (model.frequency_response(omega) for model in (one, other))
+    apart = root(P2) @ (P1 - P2) @ root(P1.conj().swapaxes(1, 2))
+    return np.linalg.norm(apart, ord=2, axis=(1, 2))
+
+
+@pytest.mark.parametrize("shape", [(6, 1, 1), (6, 2, 3), (8, 4, 2)])
+def test_the_gap_is_the_largest_distance_at_all_frequencies(shape):
+    for seed in range(8):
+        one, other = plants(seed, *shape)
+        every = plain(one, other, 200).max()
+        assert nu_gap(one, other, points=200) == pytest.approx(every, rel=1e-9, abs=1e-13)
+
+
+@pytest.mark.parametrize("seed", [7, 9, 17, 24])
+def test_a_peak_between_the_frequencies_that_come_first_is_found(seed):
+    one, other = plants(seed, 6, 1, 1)
+    every = plain(one, other, 200)
+    assert max(every[:-1:STRIDE].max(), every[-1]) < 0.6 * every.max()
+    assert nu_gap(one, other, points=200) == pytest.approx(every.max(), rel=1e-9)
+
+
+@pytest.mark.parametrize("gain", [1.0, 1e4, 1e10])
+def test_bases_are_orthonormal_where_the_gain_is_of_rank_one(gain):
+    """As near an integrator: one projection of 1e10 would leave errors of 1e-6."""
+    rng = np.random.default_rng(0)
+    P = gain * rng.standard_normal((3, 1, 5)) * rng.standard_normal((1, 3, 5))
+    Q = _orthonormal(P + rng.standard_normal((3, 3, 5)) + 0j)
+    for k in range(5):
+        np.testing.assert_allclose(Q[:, :, k].conj().T @ Q[:, :, k], np.eye(3), atol=1e-12)
