@@ -37,8 +37,7 @@ def measure_servo(heli: Helicopter, quick: bool = False) -> list[Bound]:
         LATERAL, plan.gentle(heli, autopilot, Effort().gentle_ramps), "rls", order=2
     )
     aggressive = axes.identify(LATERAL, plan.training(heli, autopilot), "rls")
-    inputs = ("d_lat", "d_ped")
-    family = symheli.sweep(heli, np.linspace(0.0, TOP, 27), inputs=inputs)  # type: ignore[arg-type]
+    family = symheli.sweep(heli, np.linspace(0.0, TOP, 27), inputs=LATERAL.inputs)  # type: ignore[arg-type]
     found: list[Bound] = []
     for name, loop in guarantees.servo_loops(heli, family, gentle, aggressive).items():
         progress(name)

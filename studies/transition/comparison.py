@@ -19,7 +19,6 @@ from studies.setup.axes import (
     LATERAL,
     LATERAL_WITH_COLLECTIVE,
     LONGITUDINAL,
-    SCALES,
     Axis,
     rotor_mode,
 )
@@ -99,7 +98,7 @@ def compare(
                 inputs=axis.inputs,
                 outputs=axis.outputs,
                 mode={v: rotor_mode(model, axis.mode) for v, model in exact.items()},
-                scales=SCALES,
+                scales=axis.sizes,
                 channel=CHANNELS[axis.name],
                 responses_at=RESPONSES_AT,
                 fast=FAST,

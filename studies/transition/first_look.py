@@ -11,14 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from studies.loops.lateral import HOLD
-from studies.loops.margins import (
-    DELAY,
-    LATERAL,
-    LONGITUDINAL,
-    AtAirspeed,
-    over_airspeed,
-)
-from studies.setup.axes import RATES, rotor_mode
+from studies.loops.margins import DELAY, AtAirspeed, over_airspeed
+from studies.setup.axes import LATERAL, LONGITUDINAL, RATES, rotor_mode
 from symheli import LinearFamily
 from symheli.errors import InputError
 from symheli.steady import TrimPoint
@@ -143,14 +137,12 @@ def first_look(family: LinearFamily, travel: dict[str, float]) -> FirstLook:
 
 def _margins(family: LinearFamily, k: int) -> AtAirspeed | None:
     speed = float(family.airspeeds[k])
+    parts = ([family[k].select(one.states, one.inputs)] for one in (LATERAL, LONGITUDINAL))
     try:
-        (found,) = over_airspeed([speed], *([family[k].select(*part)] for part in _PARTS))
+        (found,) = over_airspeed([speed], *parts)
     except (InputError, ValueError):
         return None
     return found
-
-
-_PARTS = (LATERAL, LONGITUDINAL)
 
 
 def _mode(z: complex) -> str:
