@@ -16,9 +16,8 @@ from identification.methods import InstrumentalVariables
 from identification.model import LPVARXModel
 from studies.setup.flights import TOP
 from symheli import FlightRecord, Helicopter, LinearModel
-from symheli.dynamics import INPUTS
 from symheli.errors import DataWarning
-from symheli.values.kinematics import RIGID_BODY
+from symheli.values.kinematics import INPUTS, RIGID_BODY
 
 SCHEDULING = "airspeed_command"
 HORIZON = 1.0
