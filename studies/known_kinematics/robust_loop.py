@@ -8,6 +8,7 @@ import math
 from typing import Literal
 
 from identification.model import KinematicModel
+from studies.loops.lateral import OUTPUTS
 from studies.loops.robust_lateral import FEEDBACK
 from studies.setup.axes import LATERAL
 from studies.setup.bounds import SIZES
@@ -60,8 +61,8 @@ def _loop(
         head_wind=head_wind,
         tight_for=tight_for,
     )
-    loop = every.feedback(FEEDBACK).select(inputs=LATERAL.inputs, outputs=("r", "phi"))
-    return loop.scaled({u: SIZES[u] for u in LATERAL.inputs}, {y: SIZES[y] for y in ("r", "phi")})
+    loop = every.feedback(FEEDBACK).select(inputs=LATERAL.inputs, outputs=OUTPUTS)
+    return loop.scaled({u: SIZES[u] for u in LATERAL.inputs}, {y: SIZES[y] for y in OUTPUTS})
 
 
 def verdict(proven: float, exact: float, flown: float) -> Verdict:

@@ -11,7 +11,7 @@ import symheli
 from identification import compare_frozen
 from identification.judge.frozen_models import FrozenModels
 from identification.model import KinematicModel
-from studies.loops.lateral import HOLD
+from studies.loops.lateral import HOLD, OUTPUTS
 from studies.setup.axes import ALL, LATERAL, LONGITUDINAL, Axis
 from studies.setup.bounds import PERIOD, SIZES
 from studies.setup.flights import TOP
@@ -134,5 +134,5 @@ def static_gain(model: LinearModel, hold: float = HOLD) -> float:
     K[0, 3] = hold
     A = model.A + model.B @ K @ model.C
     G = (model.C @ np.linalg.solve(np.eye(len(A)) - A, model.B))[2:]
-    sizes = [[SIZES[u] / SIZES[y] for u in model.inputs] for y in ("r", "phi")]
+    sizes = [[SIZES[u] / SIZES[y] for u in model.inputs] for y in OUTPUTS]
     return float(np.linalg.norm(G * np.array(sizes), 2))

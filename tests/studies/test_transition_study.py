@@ -12,7 +12,7 @@ import synthesis
 from identification.judge import compare_baseline
 from studies.setup import accelerating_baseline, axes
 from studies.setup.accelerating_baseline import ALONE, BOTH, along_the_command
-from studies.setup.axes import LATERAL, LONGITUDINAL
+from studies.setup.axes import ALL, LATERAL, LONGITUDINAL
 from studies.setup.flights import TransitionPlan, autopilot_for
 from studies.transition import guarantees
 from studies.transition.baseline import build_baseline
@@ -71,6 +71,13 @@ def test_the_papers_experiment_runs_and_a_cubic_is_refused_with_the_reason(basel
     for c in e.channels:
         assert c.parameters.shape[1] == 12
         assert c.fits["one step"] > c.fits["1 s"]  # one step flatters
+
+
+@pytest.mark.parametrize("kind", ["states", "inputs", "outputs"])
+def test_two_axes_share_the_signals_of_a_helicopter(ideal, kind):
+    """The longitudinal and the lateral axis leave out no signal, and name none twice."""
+    every = getattr(ALL, kind) or ideal.states
+    assert sorted(getattr(LONGITUDINAL, kind) + getattr(LATERAL, kind)) == sorted(every)
 
 
 @pytest.mark.parametrize("axis", [LONGITUDINAL, LATERAL], ids=lambda a: a.mode)
