@@ -63,7 +63,7 @@ class Truth:
             name: compare_frozen(
                 {"model": dict(zip(SPEEDS, models[name], strict=True))},
                 dict(zip(SPEEDS, exact, strict=True)),
-                scales=AXES[name].sizes,
+                scales=ALL.sizes,
                 frequencies=frequencies,
             )
             for name, exact in self.models.items()

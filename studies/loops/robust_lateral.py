@@ -24,8 +24,7 @@ SIZES = {"d_lat": 0.01, "d_ped": 0.05, "v": 3.0, "p": 1.0, "r": 1.0, "phi": 0.3}
 
 
 def margin(model: LinearModel, gains: Mapping[tuple[str, str], float] = FEEDBACK) -> float:
-    """b(P, C) of the loop around a discrete lateral model that has the inputs and outputs of the
-    axis."""
+    """b(P, C) of the loop around a discrete model with the inputs and outputs of `LATERAL`."""
     plant = model.select(inputs=LATERAL.inputs, outputs=LATERAL.outputs)
     return stability_margin(
         plant,

@@ -137,8 +137,8 @@ def first_look(family: LinearFamily, travel: dict[str, float]) -> FirstLook:
 
 def _margins(family: LinearFamily, k: int) -> AtAirspeed | None:
     speed = float(family.airspeeds[k])
-    parts = ([family[k].select(one.states, one.inputs)] for one in (LATERAL, LONGITUDINAL))
     try:
+        parts = [[family[k].select(one.states, one.inputs)] for one in (LATERAL, LONGITUDINAL)]
         (found,) = over_airspeed([speed], *parts)
     except (InputError, ValueError):
         return None
