@@ -12,16 +12,8 @@ from identification.judge import compare_baseline
 from identification.judge.beside_baseline import BesideBaseline
 from identification.judge.frozen_models import FrozenModels
 from studies.setup.accelerating_baseline import along_the_command
-from studies.setup.axes import (
-    ALL,
-    AXES,
-    HORIZON,
-    LATERAL,
-    LATERAL_WITH_COLLECTIVE,
-    LONGITUDINAL,
-    Axis,
-    rotor_mode,
-)
+from studies.setup.axes import ALL, AXES, LATERAL, LATERAL_WITH_COLLECTIVE, LONGITUDINAL, Axis
+from studies.setup.axis_models import HORIZON, rotor_mode
 from studies.setup.flights import NOISES, StudyRecords
 from studies.transition.baseline import Baseline
 from studies.transition.identified import Identification

@@ -12,7 +12,8 @@ import numpy as np
 
 from studies.loops.lateral import HOLD
 from studies.loops.margins import DELAY, AtAirspeed, over_airspeed
-from studies.setup.axes import LATERAL, LONGITUDINAL, RATES, rotor_mode
+from studies.setup.axes import LATERAL, LONGITUDINAL
+from studies.setup.axis_models import RATES, rotor_mode
 from symheli import LinearFamily
 from symheli.errors import InputError
 from symheli.steady import TrimPoint

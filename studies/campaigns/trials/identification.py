@@ -8,7 +8,8 @@ from identification import LPVARX, Polynomial, fit, scores
 from identification.judge.against_constant import HORIZONS
 from studies.campaigns.trial import Trial
 from studies.campaigns.trials.vehicle import autopilot, helicopter
-from studies.setup.axes import ALL, CHOICES, SCHEDULING, mode_misses
+from studies.setup.axes import ALL, CHOICES, SCHEDULING
+from studies.setup.axis_models import mode_misses
 from studies.setup.flights import ACCELERATIONS, TOP, TransitionPlan
 from symheli.errors import UnknownNameError
 from symheli.lpv import BSpline, PiecewiseLinear
