@@ -26,10 +26,10 @@ import symheli  # noqa: E402
 from benchmarks.race import Ratio, present, readable, table  # noqa: E402
 from benchmarks.timing import arguments, medians  # noqa: E402
 from symheli.codegen.compile import library  # noqa: E402
-from symheli.dynamics import INPUTS  # noqa: E402
 from symheli.export import write_controller  # noqa: E402
 from symheli.flight.controller import MEASURED, SCHEDULING  # noqa: E402
 from symheli.values import NamedVector, Signal, signals  # noqa: E402
+from symheli.values.kinematics import INPUTS  # noqa: E402
 
 ORDER, KNOTS, DT = 10, 33, 0.02
 LOW, HIGH = 0.0, 13.0

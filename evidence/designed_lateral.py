@@ -10,7 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 import symheli
-from studies.loops.exact_lateral import DEGREE, INPUTS, STATES, ExactLateral
+from studies.loops.exact_lateral import DEGREE, ExactLateral
+from studies.loops.lateral import INPUTS
+from studies.setup.axes import LATERAL
 from symheli import Helicopter, LinearFamily, LinearModel, LPVStateSpace, Scheduling
 from symheli.flight import XCELL_SERVOS
 from symheli.lpv.bases import Patches
@@ -20,8 +22,7 @@ from synthesis import Controller, Plant, output_feedback
 
 Array = np.ndarray
 
-CONTROLS = ("d_lat", "d_ped")
-MEASURED = ("v", "p", "r", "phi")
+CONTROLS, MEASURED = LATERAL.inputs, LATERAL.outputs
 GUST, DRIFT = "v_w", "drift_airspeed"
 BACK_OFF = 1.3
 """Nearer to the least gamma the controller has poles that no sample of `DT` follows."""
@@ -90,7 +91,7 @@ def flying_plant(heli: Helicopter, low: float = 0.0, high: float = 13.0) -> Plan
 
 def _fitted(heli: Helicopter, low: float, high: float) -> Plant:
     family = symheli.sweep(heli, np.linspace(low, high, 27), inputs=INPUTS)  # type: ignore[arg-type]
-    lateral = family.select(STATES, INPUTS).interpolate("polynomial", 3, rate=ACCELERATION)
+    lateral = family.select(LATERAL.states, INPUTS).interpolate("polynomial", 3, rate=ACCELERATION)
     return _plant(lateral.with_trim_drift())
 
 
@@ -143,5 +144,5 @@ def _slopes(exact: ExactLateral, at: Array) -> Array:
     family = exact.between
     basis = Patches(2 * DEGREE, exact.basis.breaks)
     trims = family.known_trims("the drift of the trim")
-    x = np.array([[point.x[s] for s in STATES] for point in trims])
+    x = np.array([[point.x[s] for s in LATERAL.states] for point in trims])
     return basis(at, 1) @ basis.fit(family.airspeeds, x)

@@ -24,6 +24,7 @@ from symheli.environment import Dryden
 from symheli.errors import ValidityWarning
 from symheli.flight import XCELL_SERVOS, ScheduledController
 from symheli.lpv.bases import Polynomial
+from symheli.values.kinematics import VELOCITIES
 from synthesis import Certificate, Plant
 from synthesis.objectives import L2
 from synthesis.structures import TunableController
@@ -50,7 +51,6 @@ LEAD = 0.3
 """First gain of an integral by the proportional one, 1/s."""
 DECAY = 0.05
 """Of every frozen pole, 1/s."""
-VELOCITIES = ("u", "v", "w", "p", "q", "r")
 BOUNDS = (1.0, 4.0)
 """On velocities and rates, and on attitudes and commands: at rest the integrals leave the latter to
 the gusts, whatever the gains.

@@ -17,10 +17,11 @@ import symheli
 from studies.controllers import starting
 from studies.controllers.design_choices import DesignChoices
 from studies.controllers.synthesized import synthesized
+from studies.setup.axes import LONGITUDINAL
 from symheli.errors import SymheliError
 
 SETTINGS = 80
-OUTPUTS, INPUTS = ("u", "w", "q", "theta"), ("d_lon", "d_col")
+OUTPUTS, INPUTS = LONGITUDINAL.outputs, LONGITUDINAL.inputs
 
 
 def flown() -> symheli.FlightRecord:

@@ -15,11 +15,12 @@ from evidence.seeds import over_seeds, parser_of, seeds_of
 from evidence.tables import DOCS, keep, markdown, parsed
 from identification import frequency_response
 from studies.output import as_json
+from studies.setup.axes import ALL
 from studies.setup.flights import NOISE_DB, autopilot_for
 from symheli import AirspeedSchedule, Excitation, FlightRecord, Helicopter
 from symheli.values.arrays import Array
 
-INPUTS = ("d_lon", "d_lat", "d_col", "d_ped")
+INPUTS = ALL.inputs
 OUTPUTS = ("p", "q", "r", "w")
 ON_AXIS = (("q", "d_lon"), ("p", "d_lat"), ("w", "d_col"), ("r", "d_ped"))
 DIAGONAL = np.array([[(y, u) in ON_AXIS for u in INPUTS] for y in OUTPUTS])

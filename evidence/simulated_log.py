@@ -24,6 +24,7 @@ from symheli import AirspeedSchedule, Excitation, FlightRecord, Helicopter, Sens
 from symheli.airframe.written import as_toml
 from symheli.environment import Dryden
 from symheli.flight import HelicopterLoops
+from symheli.values.kinematics import INPUTS
 from symheli.values.whole_files import write_bytes, write_text
 
 AIRSPEEDS = (0.0, 3.0, 6.0, 9.0, 12.0)
@@ -39,7 +40,7 @@ NOISE = (
 )
 """Standard deviation of every sensor, SI; of the airspeed as of a velocity."""
 
-DEFLECTIONS = ("d_lon", "d_lat", "d_col", "d_ped")
+DEFLECTIONS = tuple(map(str, INPUTS))
 LOGGED = (*DEFLECTIONS, *NOISE, "airspeed")
 
 FULL = THROW | {"d_col": 0.3}

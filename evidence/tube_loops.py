@@ -16,11 +16,12 @@ from evidence.tube_flights import WIDTHS, cells_of
 from symheli import Helicopter
 from symheli.dynamics import Governor
 from symheli.flight import XCELL_SERVOS
+from symheli.values.kinematics import RIGID_BODY
 from synthesis.tubes import Tube, tube
 
 Array = np.ndarray
 
-EIGHT = ("u", "v", "w", "p", "q", "r", "phi", "theta")
+EIGHT = tuple(map(str, RIGID_BODY))
 """States that are measured."""
 TEN = (*EIGHT, "a1", "b1")
 TWELVE = (*TEN, "Om", "om_i")

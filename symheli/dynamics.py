@@ -24,14 +24,11 @@ from symheli.physics.rigid_body import (
     rotation,
     translation,
 )
-from symheli.values.kinematics import GRAVITY
+from symheli.values.kinematics import GRAVITY, INPUTS, RIGID_BODY, VELOCITIES
 from symheli.values.signal import Signal, signals
 
-VELOCITY = signals(("u", "v", "w", "p", "q", "r"))
-ATTITUDE = signals(("phi", "theta"))
 QUATERNION = signals(("q0", "q1", "q2", "q3"))
 POSITION = signals(("x_n", "x_e", "x_d"))
-INPUTS = signals(("d_lon", "d_lat", "d_col", "d_ped"))
 
 Governor = Literal["pi", "ideal"]
 Name = Literal["rhs", "flight_rhs", "jacobian", "diagnostics"]
@@ -79,12 +76,12 @@ class Dynamics:
     @property
     def states(self) -> tuple[Signal, ...]:
         """States of the Euler form."""
-        return (*VELOCITY, *ATTITUDE, *self.own_states)
+        return (*RIGID_BODY, *self.own_states)
 
     @property
     def flight_states(self) -> tuple[Signal, ...]:
         """States of the quaternion form."""
-        return (*VELOCITY, *QUATERNION, *POSITION, *self.own_states)
+        return (*VELOCITIES, *QUATERNION, *POSITION, *self.own_states)
 
     @cached_property
     def order(self) -> tuple[InstalledPart, ...]:

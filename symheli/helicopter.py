@@ -16,11 +16,12 @@ from symheli.airframe.vehicle import Vehicle, load_vehicle
 from symheli.codegen.compile import compiled
 from symheli.codegen.numeric import Numeric
 from symheli.codegen.symbolic import SX, Function, column
-from symheli.dynamics import INPUTS, Dynamics, Governor, Name
+from symheli.dynamics import Dynamics, Governor, Name
 from symheli.environment import standard_atmosphere
 from symheli.errors import InputError, UnknownNameError
 from symheli.physics import inflow
 from symheli.values.html_table import as_table
+from symheli.values.kinematics import INPUTS
 from symheli.values.named_vector import NamedVector
 from symheli.values.signal import Signal, signals
 

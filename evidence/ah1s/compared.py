@@ -22,7 +22,7 @@ from identification.judge.frozen_models import continuous_poles
 from identification.methods import FilterError, InstrumentalVariables
 from identification.model import KinematicModel
 from studies.output import as_json
-from studies.setup.axes import SCALES
+from studies.setup.axes import ALL
 from symheli import LinearModel
 from symheli.flight import AirspeedSchedule, Excitation, Servo
 from symheli.lpv import BSpline
@@ -174,7 +174,7 @@ def of_seed(structure: str, ramps: str, knots: int, method: str, seed: int) -> J
     beside = compare_frozen(
         {"model": dict(zip(speeds, held, strict=True))},
         dict(zip(speeds, exact, strict=True)),
-        scales=SCALES | dict.fromkeys(map(str, STICKS), STICK_SCALE),
+        scales=ALL.sizes | dict.fromkeys(map(str, STICKS), STICK_SCALE),
     )
     return Judged(
         seed=seed,

@@ -9,9 +9,10 @@ import numpy as np
 from symheli.extras import extra
 from symheli.values import Signal
 from symheli.values.arrays import Array
+from symheli.values.kinematics import INPUTS, RIGID_BODY
 
-STATES = tuple(Signal(name) for name in ("u", "v", "w", "p", "q", "r", "phi", "theta"))
-STICKS = tuple(Signal(name, "1") for name in ("d_lon", "d_lat", "d_col", "d_ped"))
+STATES = RIGID_BODY
+STICKS = tuple(Signal(name, "1") for name in INPUTS)
 """Longitudinal and lateral stick, collective, pedals, as parts of their travel."""
 
 DEFLECTIONS = tuple(Signal(f"{name}_reached", "rad") for name in STICKS)

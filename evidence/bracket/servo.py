@@ -11,8 +11,8 @@ import numpy as np
 
 import symheli
 from studies.output import progress
-from studies.setup import axes
 from studies.setup.axes import LATERAL
+from studies.setup.axis_models import identify
 from studies.setup.bounds import Bound
 from studies.setup.certificates import bound_to_dict
 from studies.setup.flights import TOP, TransitionPlan, autopilot_for
@@ -33,12 +33,9 @@ def measure_servo(heli: Helicopter, quick: bool = False) -> list[Bound]:
     models, the LFT tests; identified as in the study, seed 0.
     """
     plan, autopilot = TransitionPlan(0, ramps=Effort().ramps), autopilot_for(heli)
-    gentle = axes.identify(
-        LATERAL, plan.gentle(heli, autopilot, Effort().gentle_ramps), "rls", order=2
-    )
-    aggressive = axes.identify(LATERAL, plan.training(heli, autopilot), "rls")
-    inputs = ("d_lat", "d_ped")
-    family = symheli.sweep(heli, np.linspace(0.0, TOP, 27), inputs=inputs)  # type: ignore[arg-type]
+    gentle = identify(LATERAL, plan.gentle(heli, autopilot, Effort().gentle_ramps), "rls", order=2)
+    aggressive = identify(LATERAL, plan.training(heli, autopilot), "rls")
+    family = symheli.sweep(heli, np.linspace(0.0, TOP, 27), inputs=LATERAL.inputs)  # type: ignore[arg-type]
     found: list[Bound] = []
     for name, loop in guarantees.servo_loops(heli, family, gentle, aggressive).items():
         progress(name)

@@ -20,8 +20,8 @@ from identification import fit_for_control as judge
 from identification.judge import structure_bias
 from identification.judge.fit_for_control import FitForControl, added
 from studies.known_kinematics.conditions import ALL, CONDITIONS, Instruments, RealCondition
-from studies.known_kinematics.models import INPUTS, PAIRS, SCHEDULING
-from studies.known_kinematics.truth import SCALES, Truth
+from studies.known_kinematics.models import PAIRS, SCHEDULING
+from studies.known_kinematics.truth import AXES, Truth
 from studies.loops.robust_lateral import FEEDBACK, SIZES
 from studies.output import as_json
 from studies.setup.flights import TOP
@@ -64,12 +64,12 @@ LOOPS = {
             ("d_lon", "theta"): -0.075,
             ("d_col", "w"): -0.0002,
         },
-        SCALES,
+        AXES[ALL].sizes,
     ),
     "all axes, gentle": Loop(
         ALL,
         {**FEEDBACK, ("d_lon", "u"): 0.002, ("d_lon", "theta"): -0.03, ("d_col", "w"): -0.002},
-        SCALES,
+        AXES[ALL].sizes,
     ),
 }
 """Their margins around the exact models are .33 to .45, .15 to .17 and .07 to .09, in sizes of
@@ -93,9 +93,10 @@ class Case:
         if self.flown is self.believed:
             return record
         plan = replace(record.meta["plan"], servos=None, delay=0.0, wind=Wind())
-        if f"{INPUTS[0]}_command" in record.signals:
-            commands = {u: record[f"{u}_command"] for u in INPUTS}
-            record = record.with_signals(dict.fromkeys(INPUTS, "rad"), **commands)
+        inputs = AXES[ALL].inputs
+        if f"{inputs[0]}_command" in record.signals:
+            commands = {u: record[f"{u}_command"] for u in inputs}
+            record = record.with_signals(dict.fromkeys(inputs, "rad"), **commands)
         return replace(record, meta={**record.meta, "plan": plan})
 
 

@@ -29,6 +29,7 @@ from symheli.progress import task
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 from symheli.values.html_table import as_table
+from symheli.values.kinematics import RIGID_BODY
 from symheli.values.numbers import positive, whole
 from symheli.values.signal import Signal, indices
 from symheli.values.summary import summarized
@@ -411,7 +412,7 @@ def _outputs(
         raise InputError("no flights: give at least one FlightRecord")
     if actuators is not None:
         actuators.require(CONTROLS)
-    able = [str(s) for s in heli.states if s in ("u", "v", "w", "p", "q", "r", "phi", "theta")]
+    able = [str(s) for s in heli.states if s in RIGID_BODY]
     if heli.governor == "pi":
         able.append("Om")
     for record in flights:

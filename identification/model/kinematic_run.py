@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from identification.model.prediction import DIVERGED
+from identification.structure.actuators import CONTROLS
 from identification.structure.kinematic_arx import MOVING, STATES, KinematicARX
 from identification.structure.regressors import basis_values, scheduling_values
 from symheli.errors import InputError
@@ -26,9 +27,6 @@ CORRECTIONS = 2
 
 STEEP = np.radians(89.0)
 """Pitch (rad) beyond which the Euler angles are singular."""
-
-CONTROLS = ("d_lon", "d_lat", "d_col", "d_ped")
-"""Controls, in the order of a controller's outputs."""
 
 AIRSPEED = Signal("airspeed", "m/s")
 COMMANDED = (AIRSPEED, Signal("acceleration", "m/s^2"))

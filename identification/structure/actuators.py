@@ -17,8 +17,9 @@ from symheli.flight import Servo
 from symheli.records import FlightRecord
 from symheli.values import Signal
 from symheli.values.arrays import Array
+from symheli.values.kinematics import INPUTS
 
-CONTROLS = ("d_lon", "d_lat", "d_col", "d_ped")
+CONTROLS = tuple(map(str, INPUTS))
 
 SETTLING = 0.5
 """Time that servos need to forget where a record began, s."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from identification.design import Experiment, Plan, compare_experiments
 from studies.campaigns.experiments import CANDIDATES, Candidate, Comparison
-from studies.setup.axes import ALL, LATERAL, LONGITUDINAL, SCHEDULING, Axis
+from studies.setup.axes import CHOICES, SCHEDULING, Axis
 from studies.setup.flights import AMPLITUDE, TOP, autopilot_for
 from symheli import AirspeedSchedule, Excitation, FlightRecord, Helicopter, fly
 from symheli.errors import InputError, SymheliError
@@ -23,8 +23,6 @@ from symheli.flight.excitation import FADE_IN, FADE_OUT
 from symheli.logs.files import text
 from symheli.progress import tracked
 from symheli.values.whole_files import write_text
-
-AXES = {"longitudinal": LONGITUDINAL, "lateral": LATERAL, "all": ALL}
 
 MIXER = {"d_lat": 10, "d_lon": 11, "d_ped": 12, "d_col": 13}
 """SID_AXIS of the mixer's inputs, at which ArduPilot's SystemID mode adds its sweep
@@ -310,7 +308,7 @@ def flown(plan: Path, records: Sequence[FlightRecord], *, sweeps: bool = False) 
     what = "sweeps" if sweeps else "flights"
     try:
         content = json.loads(text(plan))
-        axis = next(a for a in AXES.values() if a.name == content["axis"])
+        axis = next(a for a in CHOICES.values() if a.name == content["axis"])
         step, (low, high) = float(content["step"]), map(float, content["airspeed"])
         if content["schema"] != SCHEMA or content["version"] != 1 or not content[what]:
             raise ValueError(content["schema"])

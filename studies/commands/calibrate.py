@@ -19,7 +19,6 @@ HELP = (
 )
 
 OUTPUTS = ("u", "v", "w", "p", "q", "r", "phi", "theta", "Om")
-INPUTS = ("d_lon", "d_lat", "d_col", "d_ped")
 
 ARGUMENTS = (
     *options.vehicle(None, "packaged vehicle, or a vehicle file", in_place=False),
@@ -94,7 +93,7 @@ def run(arguments: argparse.Namespace) -> Output:
     if arguments.servo:
         servo = symheli.Servo(natural_frequency=arguments.servo, damping=0.7)
         actuators = Actuators(
-            dict.fromkeys(INPUTS, servo),
+            dict.fromkeys(map(str, heli.inputs), servo),
             delay=arguments.delay,
             bandwidth_deviation=0.3,
             delay_deviation=0.02,
@@ -144,12 +143,13 @@ def record_of(arguments: argparse.Namespace, log: Path) -> FlightRecord:
     from studies.log.reading import read
     from symheli import FlightRecord
     from symheli.logs.format import contents_of, format_of
+    from symheli.values.kinematics import INPUTS
 
     if arguments.map is not None:
         record = FlightRecord.from_map(log, arguments.map)
     else:
         kind = format_of(log)
         there = contents_of(log, kind).columns
-        wanted = [*INPUTS, *(name for name in OUTPUTS if name in there)]
+        wanted = [*map(str, INPUTS), *(name for name in OUTPUTS if name in there)]
         record = read(log, wanted, format=kind, dt=None, time=None, units={})
     return record.between(arguments.start, arguments.stop)

@@ -54,12 +54,13 @@ def run(arguments: argparse.Namespace) -> Output:
     import math
 
     from studies.campaigns import experiments
-    from studies.campaigns.flyable import AXES, write
+    from studies.campaigns.flyable import write
+    from studies.setup.axes import CHOICES
 
     if arguments.flown or arguments.plan:
         return _flown(arguments)
     options.refuse(arguments, ("sweeps", "map"), "without --flown")
-    axis = AXES[arguments.axis]
+    axis = CHOICES[arguments.axis]
     attitude = math.radians(arguments.attitude_deg)
     limits = {"phi": attitude, "theta": attitude, "p": arguments.rate, "q": arguments.rate}
     found = experiments.design(arguments.vehicle, axis, arguments.flights, limits)

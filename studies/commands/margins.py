@@ -123,7 +123,8 @@ def _of_vehicle(arguments: argparse.Namespace) -> Output:
     import symheli
     from identification import compare_frozen
     from studies.loops.lateral import HOLD
-    from studies.loops.margins import DELAY, LATERAL, LONGITUDINAL, over_airspeed
+    from studies.loops.margins import DELAY, over_airspeed
+    from studies.setup.axes import LATERAL, LONGITUDINAL
 
     given_model.only_with_a_model(arguments)
     if arguments.controller:
@@ -145,7 +146,7 @@ def _of_vehicle(arguments: argparse.Namespace) -> Output:
         what = f"{arguments.vehicle} without servos and delay, {given_model.words(gains)}"
         speeds = [float(v) for v in family.airspeeds]
         return _of_loop(family, gains, speeds, family.axes[0], what)
-    parts = [family.select(*axis) for axis in (LATERAL, LONGITUDINAL)]
+    parts = [family.select(axis.states, axis.inputs) for axis in (LATERAL, LONGITUDINAL)]
     fitted = [part.interpolate("polynomial", arguments.degree) for part in parts]
     speeds = [float(v) for v in family.airspeeds]
     tables = {
@@ -159,7 +160,7 @@ def _of_vehicle(arguments: argparse.Namespace) -> Output:
     beside = compare_frozen(
         {"interpolated": fitted[0]},
         {v: parts[0][k].discretize(0.02) for k, v in enumerate(speeds)},
-        scales=dict.fromkeys(LATERAL[1], 0.01) | dict.fromkeys(("p", "r", "phi"), 0.1),
+        scales=dict.fromkeys(LATERAL.inputs, 0.01) | dict.fromkeys(("p", "r", "phi"), 0.1),
         outputs=("p", "r", "phi"),
     )
     gaps = beside["interpolated"].gap.tolist()

@@ -45,9 +45,6 @@ after a step of the command: by how much it is exceeded, from 10 to 90 %, until 
 DECIMALS = {"dB": 1, "%": 0}
 """Shown, by unit; else two."""
 
-THROWN = ("d_lat", "d_lon", "d_ped")
-"""Controls of which --throw states the deflection at full output."""
-
 ARGUMENTS = (
     *options.vehicle(None, "vehicle file that is calibrated from the log"),
     positional("log", "flight log of deflections and motion", type=Path, metavar="LOG"),
@@ -293,8 +290,10 @@ def _verdict(rows: list[LoopMargins]) -> str:
 
 def _assumed(arguments: argparse.Namespace) -> list[str]:
     """The deflections that are assumed, said before the numbers that rest on them."""
+    from studies.autopilot.tuned import CONTROLS
+
     given = dict(arguments.throw)
-    assumed = [u for u in THROWN if u not in given]
+    assumed = [u for u in CONTROLS if u not in given]
     if not assumed:
         return []
     return [

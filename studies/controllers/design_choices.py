@@ -20,6 +20,7 @@ from studies.choices import (
     sentence,
     toml,
 )
+from studies.setup.axes import ALL
 from symheli import Servo
 from symheli.errors import InputError
 from symheli.flight import XCELL_SERVOS
@@ -33,9 +34,9 @@ TOP, RATE = 13.0, 3.0
 PERIOD, DELAY = 0.02, 0.02
 """Sample period of the controller, and delay from a command to its servo, s."""
 
-CONTROLS = ("d_lon", "d_lat", "d_col", "d_ped")
+CONTROLS = ALL.inputs
 GUSTS = ("u_w", "v_w", "w_w")
-MEASUREMENTS = ("u", "v", "w", "p", "q", "r", "phi", "theta")
+MEASUREMENTS = ALL.outputs
 
 SIZES = {
     **dict.fromkeys(("u", "v", "w"), 2.0),

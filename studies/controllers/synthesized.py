@@ -51,7 +51,6 @@ from symheli import (
     TableController,
     Wind,
 )
-from symheli.dynamics import INPUTS
 from symheli.environment import Dryden
 from symheli.errors import CompilerWarning, InputError, SynthesisError, ValidityWarning
 from symheli.flight import ScheduledController, TableState, fly_batch
@@ -59,6 +58,7 @@ from symheli.flight.controller import Entered
 from symheli.flight.flight_data import FlightData
 from symheli.progress import Progress, Task, task, watched
 from symheli.values.arrays import Array
+from symheli.values.kinematics import INPUTS
 from symheli.values.named_vector import NamedVector
 from symheli.values.signal import indices
 from symheli.values.units import ratio

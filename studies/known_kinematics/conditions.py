@@ -18,7 +18,7 @@ from identification.model import KinematicModel
 from identification.structure import LateSensors, SteadyWind
 from identification.structure.kinematic_arx import STATES
 from studies.known_kinematics.flights import aggressive
-from studies.known_kinematics.models import FASTEST, GUST, INPUTS, SCHEDULING, structure
+from studies.known_kinematics.models import FASTEST, GUST, SCHEDULING, structure
 from studies.known_kinematics.truth import AXES, SPEEDS, FrozenAxes, Truth, frozen
 from studies.setup.bounds import PERIOD
 from studies.setup.flights import NOISE_DB, TOP, autopilot_for, light_turbulence
@@ -155,8 +155,9 @@ class RealCondition:
         """
         if self.turbulent:
             return structure(turbulent=True)
-        commanded = self.actuators is not None and f"{INPUTS[0]}_command" in record.signals
-        names = {u: f"{u}_command" if commanded else u for u in INPUTS}
+        inputs = AXES[ALL].inputs
+        commanded = self.actuators is not None and f"{inputs[0]}_command" in record.signals
+        names = {u: f"{u}_command" if commanded else u for u in inputs}
         ground = OVER_GROUND if self.headings and self.over_ground else None
         first = SCHEDULING[0] if ground is None else ground
         low, high = (0.0, TOP) if ground is None else (-AROUND, TOP + AROUND)

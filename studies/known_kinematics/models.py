@@ -9,12 +9,12 @@ from dataclasses import replace
 from identification import KinematicARX, Polynomial, fit
 from identification.methods import FilterError
 from identification.model import KinematicModel
+from studies.setup.axes import ALL
 from studies.setup.flights import TOP
 from symheli import FlightRecord, Helicopter
 from symheli.flight import SimulatedFlight
 from symheli.lpv import Product
 
-INPUTS = ("d_lon", "d_lat", "d_col", "d_ped")
 SCHEDULING = ("airspeed_command", "acceleration_command")
 FASTEST = 4.0
 """Largest commanded acceleration, m/s^2."""
@@ -51,12 +51,12 @@ def structure(turbulent: bool = False) -> KinematicARX:
     less can be determined, quadratic in airspeed alone.
     """
     if turbulent:
-        return KinematicARX(INPUTS, SCHEDULING[0], basis=Polynomial(2, 0.0, TOP))
+        return KinematicARX(ALL.inputs, SCHEDULING[0], basis=Polynomial(2, 0.0, TOP))
     basis = Product(
         (Polynomial(3, 0.0, TOP), Polynomial(2, -FASTEST, FASTEST)),
         total_degree=3,
     )
-    return KinematicARX(INPUTS, SCHEDULING, basis=basis, nb=2, offset_rate=False)
+    return KinematicARX(ALL.inputs, SCHEDULING, basis=basis, nb=2, offset_rate=False)
 
 
 def structures() -> dict[str, KinematicARX]:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import symheli
 from identification.judge import fit_percent
+from studies.setup.axes import ALL
 from symheli import FlightRecord, Helicopter
 from symheli.values.arrays import Array
 
-OUTPUTS = ("u", "v", "w", "p", "q", "r", "phi", "theta")
+OUTPUTS = ALL.outputs
 HORIZON = 50
 """Samples ahead: one second."""
 

@@ -8,12 +8,12 @@ import math
 from typing import Literal
 
 from identification.model import KinematicModel
+from studies.loops.lateral import OUTPUTS
 from studies.loops.robust_lateral import FEEDBACK
+from studies.setup.axes import LATERAL
 from studies.setup.bounds import SIZES
 from symheli import UncertainStateSpace
 from synthesis.forms import Spline
-
-OUTPUTS, INPUTS = ("v", "p", "r", "phi"), ("d_lat", "d_ped")
 
 PROBABILITY = 0.95
 DRAWS = 20_000
@@ -52,8 +52,8 @@ def _loop(
     held = {"acceleration_command": 0.0} if len(model.parameters) == 2 else None
     every = model.uncertain(
         PROBABILITY,
-        OUTPUTS,
-        INPUTS,
+        LATERAL.outputs,
+        LATERAL.inputs,
         held=held,
         degree=DEGREE,
         draws=DRAWS,
@@ -61,8 +61,8 @@ def _loop(
         head_wind=head_wind,
         tight_for=tight_for,
     )
-    loop = every.feedback(FEEDBACK).select(inputs=INPUTS, outputs=("r", "phi"))
-    return loop.scaled({u: SIZES[u] for u in INPUTS}, {y: SIZES[y] for y in ("r", "phi")})
+    loop = every.feedback(FEEDBACK).select(inputs=LATERAL.inputs, outputs=OUTPUTS)
+    return loop.scaled({u: SIZES[u] for u in LATERAL.inputs}, {y: SIZES[y] for y in OUTPUTS})
 
 
 def verdict(proven: float, exact: float, flown: float) -> Verdict:

@@ -11,9 +11,8 @@ import symheli
 from identification import compare_frozen
 from identification.judge.frozen_models import FrozenModels
 from identification.model import KinematicModel
-from studies.known_kinematics.models import INPUTS
-from studies.loops.lateral import HOLD
-from studies.setup.axes import SCALES
+from studies.loops.lateral import HOLD, OUTPUTS
+from studies.setup.axes import ALL, LATERAL, LONGITUDINAL, Axis
 from studies.setup.bounds import PERIOD, SIZES
 from studies.setup.flights import TOP
 from symheli import Helicopter, LinearModel
@@ -24,23 +23,7 @@ SPEEDS = np.linspace(0.0, TOP, 27)
 """m/s."""
 
 
-@dataclass(frozen=True)
-class TruthAxis:
-    """Outputs, inputs, and the states of the truth that belong to them (None: all)."""
-
-    outputs: tuple[str, ...]
-    inputs: tuple[str, ...]
-    states: tuple[str, ...] | None
-
-
-AXES: Mapping[str, TruthAxis] = {
-    "lateral": TruthAxis(("v", "p", "r", "phi"), ("d_lat", "d_ped"), ("v", "p", "r", "phi", "b1")),
-    "longitudinal": TruthAxis(
-        ("u", "w", "q", "theta"), ("d_lon", "d_col"), ("u", "w", "q", "theta", "a1")
-    ),
-    "all axes": TruthAxis(("u", "v", "w", "p", "q", "r", "phi", "theta"), INPUTS, None),
-}
-
+AXES: Mapping[str, Axis] = {"lateral": LATERAL, "longitudinal": LONGITUDINAL, "all axes": ALL}
 
 FrozenAxes = Mapping[str, Sequence[LinearModel]]
 """Models at `SPEEDS` by axis."""
@@ -56,7 +39,7 @@ class Truth:
     def of(
         cls,
         heli: Helicopter,
-        axes: Mapping[str, TruthAxis] = AXES,
+        axes: Mapping[str, Axis] = AXES,
         *,
         period: float = PERIOD,
         servos: Mapping[str, Servo] | None = None,
@@ -80,7 +63,7 @@ class Truth:
             name: compare_frozen(
                 {"model": dict(zip(SPEEDS, models[name], strict=True))},
                 dict(zip(SPEEDS, exact, strict=True)),
-                scales=SCALES,
+                scales=ALL.sizes,
                 frequencies=frequencies,
             )
             for name, exact in self.models.items()
@@ -97,7 +80,7 @@ class Truth:
 
 def sampled(
     model: LinearModel,
-    axis: TruthAxis,
+    axis: Axis,
     period: float = PERIOD,
     servos: Mapping[str, Servo] | None = None,
     late: int = 0,
@@ -105,7 +88,7 @@ def sampled(
     """The part of a continuous model that is an axis, sampled, behind `servos` and `late` samples
     of delay.
     """
-    kept = model if axis.states is None else model.select(states=axis.states)
+    kept = model.select(states=axis.states) if axis.states else model
     kept = kept.select(inputs=axis.inputs, outputs=axis.outputs)
     if servos is not None:
         kept = kept.driven_by({u: servos[u].linear(u) for u in axis.inputs})
@@ -134,7 +117,7 @@ def frozen_axes(model: KinematicModel, truth: Truth) -> FrozenAxes:
     }
 
 
-def frozen(model: KinematicModel, axis: TruthAxis, airspeed: float) -> LinearModel:
+def frozen(model: KinematicModel, axis: Axis, airspeed: float) -> LinearModel:
     """Return an identified model of an axis in level flight, with the names of the exact model."""
     p = (airspeed, 0.0) if len(model.parameters) == 2 else (airspeed,)
     commands = {u.removesuffix("_command"): u for u in map(str, model.inputs)}
@@ -151,5 +134,5 @@ def static_gain(model: LinearModel, hold: float = HOLD) -> float:
     K[0, 3] = hold
     A = model.A + model.B @ K @ model.C
     G = (model.C @ np.linalg.solve(np.eye(len(A)) - A, model.B))[2:]
-    sizes = [[SIZES[u] / SIZES[y] for u in model.inputs] for y in ("r", "phi")]
+    sizes = [[SIZES[u] / SIZES[y] for u in model.inputs] for y in OUTPUTS]
     return float(np.linalg.norm(G * np.array(sizes), 2))

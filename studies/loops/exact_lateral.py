@@ -17,14 +17,13 @@ from typing import Literal
 import numpy as np
 
 import symheli
-from studies.loops.lateral import ATTITUDE_HOLD, CHANNELS, STATES, close
+from studies.loops.lateral import ATTITUDE_HOLD, INPUTS, close
+from studies.setup.axes import LATERAL
 from symheli import Helicopter, LinearFamily, LPVStateSpace, Scheduling
 from symheli.lpv.bases import Patches
 
 Array = np.ndarray
 Channel = Literal["gust", "inputs"]
-
-INPUTS = ("d_lat", "d_ped", *CHANNELS["gust"])
 
 DEGREE = 4
 LONGEST = 3.0
@@ -99,4 +98,4 @@ class ExactLateral:
 
 def _family(heli: Helicopter, airspeeds: Sequence[float] | Array, head_wind: float) -> LinearFamily:
     wind = (-head_wind, 0.0, 0.0)
-    return symheli.sweep(heli, airspeeds, wind=wind, inputs=INPUTS).select(STATES, INPUTS)  # type: ignore[arg-type]
+    return symheli.sweep(heli, airspeeds, wind=wind, inputs=INPUTS).select(LATERAL.states, INPUTS)  # type: ignore[arg-type]

@@ -8,11 +8,12 @@ from typing import Literal
 import numpy as np
 
 import symheli
+from studies.setup.axes import LATERAL
 from symheli import Helicopter, LPVStateSpace
 
-STATES = ("v", "p", "r", "phi", "b1")
 OUTPUTS = ("r", "phi")
-CHANNELS = {"gust": ("v_w",), "inputs": ("d_lat", "d_ped")}
+CHANNELS = {"gust": ("v_w",), "inputs": LATERAL.inputs}
+INPUTS = (*CHANNELS["inputs"], *CHANNELS["gust"])
 HOLD = -0.02
 """Attitude hold d_lat = HOLD phi, rad per rad."""
 
@@ -34,9 +35,9 @@ def lateral_loop(
     channel "gust": lateral gust v_w (m/s) -> r (rad/s), phi (rad); "inputs": disturbances added to
     d_lat, d_ped (rad) -> the same.
     """
-    family = symheli.sweep(heli, np.linspace(low, high, points), inputs=("d_lat", "d_ped", "v_w"))  # type: ignore[arg-type]
+    family = symheli.sweep(heli, np.linspace(low, high, points), inputs=INPUTS)  # type: ignore[arg-type]
     return close(
-        family.select(STATES, ("d_lat", "d_ped", "v_w")).interpolate("polynomial", degree),
+        family.select(LATERAL.states, INPUTS).interpolate("polynomial", degree),
         channel,
         gains,
     )

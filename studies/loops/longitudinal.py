@@ -6,9 +6,9 @@ import numpy as np
 
 import symheli
 from studies.loops.lateral import HOLD
+from studies.setup.axes import LONGITUDINAL
 from symheli import Helicopter, LPVStateSpace
 
-STATES = ("u", "w", "q", "theta", "a1")
 GUSTS = ("u_w", "w_w")
 OUTPUTS = ("q", "theta")
 
@@ -21,5 +21,5 @@ def longitudinal_loop(
     """
     inputs = ("d_lon", *GUSTS)
     family = symheli.sweep(heli, np.linspace(low, high, points), inputs=inputs)  # type: ignore[arg-type]
-    longitudinal = family.select(STATES, inputs).interpolate("polynomial", degree)
+    longitudinal = family.select(LONGITUDINAL.states, inputs).interpolate("polynomial", degree)
     return longitudinal.feedback({("d_lon", "theta"): HOLD}).select(inputs=GUSTS, outputs=OUTPUTS)

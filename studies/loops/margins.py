@@ -18,8 +18,6 @@ from synthesis.design.loops.margins import Margins
 
 DELAY = 0.02
 """From measurement to command, s."""
-LATERAL = (("v", "p", "r", "phi", "b1"), ("d_lat", "d_ped"))
-LONGITUDINAL = (("u", "w", "q", "theta", "a1"), ("d_lon", "d_col"))
 
 
 @dataclass(frozen=True)

@@ -12,11 +12,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from studies.setup.axes import LATERAL
 from symheli import LinearModel
 from symheli.lpv import stability_margin
-
-OUTPUTS = ("v", "p", "r", "phi")
-INPUTS = ("d_lat", "d_ped")
 
 FEEDBACK = {("d_lat", "v"): -0.002, ("d_lat", "phi"): -0.03, ("d_ped", "r"): -0.04}
 """rad per m/s, rad per rad, rad per rad/s; the same at every airspeed."""
@@ -26,11 +24,11 @@ SIZES = {"d_lat": 0.01, "d_ped": 0.05, "v": 3.0, "p": 1.0, "r": 1.0, "phi": 0.3}
 
 
 def margin(model: LinearModel, gains: Mapping[tuple[str, str], float] = FEEDBACK) -> float:
-    """b(P, C) of the loop around a discrete lateral model that has `INPUTS` and `OUTPUTS`."""
-    plant = model.select(inputs=INPUTS, outputs=OUTPUTS)
+    """b(P, C) of the loop around a discrete model with the inputs and outputs of `LATERAL`."""
+    plant = model.select(inputs=LATERAL.inputs, outputs=LATERAL.outputs)
     return stability_margin(
         plant,
         gains,
-        input_scale=np.array([SIZES[u] for u in INPUTS]),
-        output_scale=np.array([SIZES[y] for y in OUTPUTS]),
+        input_scale=np.array([SIZES[u] for u in LATERAL.inputs]),
+        output_scale=np.array([SIZES[y] for y in LATERAL.outputs]),
     )

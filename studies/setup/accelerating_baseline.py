@@ -6,10 +6,8 @@ import numpy as np
 
 import symheli
 from identification.judge import BaselineModel, compare_baseline
-from studies.setup.axes import (
-    HORIZON,
-    SCHEDULING,
-)
+from studies.setup.axes import SCHEDULING
+from studies.setup.axis_models import HORIZON
 from studies.setup.flights import TOP
 from symheli import FlightRecord, Helicopter, LPVStateSpace
 

@@ -1,45 +1,44 @@
-"""Two-input identification of the longitudinal-vertical and the lateral-directional motion."""
+"""The axes of a helicopter, each with its signals."""
 
 from __future__ import annotations
 
-import time
-import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-import numpy as np
-
-import symheli
-from identification import LPVARX, Polynomial, RecursiveLeastSquares, fit, scores
-from identification.judge import Scores, pole_distance
-from identification.methods import InstrumentalVariables
-from identification.model import LPVARXModel
+from identification import LPVARX, Polynomial
 from studies.setup.flights import TOP
-from symheli import FlightRecord, Helicopter, LinearModel
-from symheli.errors import DataWarning
+from symheli.values.kinematics import INPUTS, RIGID_BODY
 
 SCHEDULING = "airspeed_command"
-HORIZON = 1.0
-"""Seconds ahead at which predictions are judged."""
 
-FROZEN_SPEEDS = (2.0, 7.0, 12.0)
-
-RATES = {"pitch/flap": "q", "roll/flap": "p"}
-"""The angular rate of each rotor mode."""
+_SIZES = {
+    **dict.fromkeys(("u", "v", "w"), 2.0),
+    **dict.fromkeys(("p", "q", "r"), 1.0),
+    **dict.fromkeys(("phi", "theta"), 0.3),
+    **dict.fromkeys(("d_lon", "d_lat", "d_col"), 0.05),
+    "d_ped": 0.1,
+}
 
 
 @dataclass(frozen=True)
 class Axis:
-    """An axis to identify: outputs from inputs; `mode` names the rotor mode to reproduce and the
-    outputs with an acceptance threshold.
+    """An axis names the signals that belong to it. Empty `states` mean all that a model has.
+
+    `mode` names the rotor mode that an identified model has to reproduce.
     """
 
     name: str
-    outputs: tuple[str, ...]
+    states: tuple[str, ...]
     inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
     mode: str
     marks: Mapping[str, tuple[float, float]]
-    """{output: (noise-free, 30 dB)} fit in percent, 1 s ahead."""
+    """{output: (noise-free, 30 dB)} fit in percent, 1 s ahead, that is accepted."""
+
+    @property
+    def sizes(self) -> dict[str, float]:
+        """Changes of the inputs and outputs (SI) that count as 1 in a nu-gap."""
+        return {name: _SIZES[name] for name in (*self.inputs, *self.outputs)}
 
     def structure(self, order: int = 3, degree: int = 2, offset: bool = True) -> LPVARX:
         """LPV-ARX of this axis at 50 Hz: `order` lags of everything, polynomial of `degree` in the
@@ -61,122 +60,33 @@ class Axis:
 
 LONGITUDINAL = Axis(
     "longitudinal-vertical",
-    ("u", "w", "q", "theta"),
+    ("u", "w", "q", "theta", "a1"),
     ("d_lon", "d_col"),
+    ("u", "w", "q", "theta"),
     "pitch/flap",
     {"q": (90.0, 80.0), "theta": (90.0, 80.0)},
 )
 LATERAL = Axis(
     "lateral-directional",
-    ("v", "p", "r", "phi"),
+    ("v", "p", "r", "phi", "b1"),
     ("d_lat", "d_ped"),
+    ("v", "p", "r", "phi"),
     "roll/flap",
     {"p": (85.0, 80.0)},
 )
-LATERAL_WITH_COLLECTIVE = Axis(
-    "lateral-directional, other inputs measured",
-    LATERAL.outputs,
-    ("d_lat", "d_ped", "d_lon", "d_col"),
-    "roll/flap",
-    LATERAL.marks,
+LATERAL_WITH_COLLECTIVE = replace(
+    LATERAL,
+    name="lateral-directional, other inputs measured",
+    inputs=("d_lat", "d_ped", "d_lon", "d_col"),
 )
 ALL = Axis(
     "all axes (MIMO)",
-    ("u", "v", "w", "p", "q", "r", "phi", "theta"),
-    ("d_lon", "d_lat", "d_col", "d_ped"),
+    (),
+    tuple(map(str, INPUTS)),
+    tuple(map(str, RIGID_BODY)),
     "roll/flap",
-    {"q": (90.0, 80.0), "theta": (90.0, 80.0), "p": (85.0, 80.0)},
+    {**LONGITUDINAL.marks, **LATERAL.marks},
 )
 AXES = (LONGITUDINAL, LATERAL)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Judged:
-    """Scores of an identified model, and the miss of the frozen rotor mode (percent of its
-    magnitude) at each of `FROZEN_SPEEDS`.
-    """
-
-    scores: Scores
-    mode_miss: Mapping[float, float]
-
-
-def rotor_mode(model: LinearModel, name: str) -> complex:
-    """The eigenvalue (rad/s) of the pitch/flap or roll/flap mode of the exact linear model: the one
-    in which the rate of pitch or roll participates most.
-
-    With a stabiliser bar it is an oscillation, of which this is the half with positive frequency.
-    A rotor that flaps fast (no bar) follows, and the mode is the damping of that rate: real.
-    """
-    values, right = np.linalg.eig(model.A)
-    rate = [str(s) for s in model.states].index(RATES[name])
-    share = np.abs(right[rate] * np.linalg.pinv(right)[:, rate])  # its participation factors
-    foremost = values[int(np.argmax(share))]
-    return complex(foremost.real, abs(foremost.imag))
-
-
-def mode_misses(heli: Helicopter, model: LPVARXModel, mode: str) -> dict[float, float]:
-    """Distance of the identified model's nearest eigenvalue to the exact rotor mode, percent of its
-    magnitude, at frozen airspeeds.
-    """
-    exact = {v: symheli.linearize(heli, symheli.trim(heli, v)) for v in FROZEN_SPEEDS}
-    return {v: pole_distance(model.at(v), rotor_mode(exact[v], mode)) for v in FROZEN_SPEEDS}
-
-
-def judged(heli: Helicopter, axis: Axis, model: LPVARXModel, test: FlightRecord) -> Judged:
-    """Validate `model` on a record that is not in the fit."""
-    return Judged(
-        scores=scores(model, test, horizon=HORIZON), mode_miss=mode_misses(heli, model, axis.mode)
-    )
-
-
-def instruments(axis: Axis) -> tuple[str, ...]:
-    """The excitation signals of the axis's inputs, as a record names them."""
-    return tuple(f"e_{name}" for name in axis.inputs)
-
-
-def identify(
-    axis: Axis, training: FlightRecord, method: str = "rls", order: int = 3, degree: int = 2
-) -> LPVARXModel:
-    """Fit `axis` to a training flight; "iv" takes the excitation of its inputs as instruments.
-
-    What is added to the inputs is weak along the slow modes: the report says so where it shows what
-    instruments find.
-    """
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "the instruments are weak", DataWarning)
-        return fit(
-            axis.structure(order, degree),
-            training,
-            InstrumentalVariables(instruments(axis)) if method == "iv" else method,
-        )
-
-
-def update_time(structure: LPVARX, flight: FlightRecord) -> float:
-    """Processor time (s) of one recursive update of all coefficients along a flight, lags and basis
-    included.
-    """
-    online = RecursiveLeastSquares(structure).online()
-    rows = structure.prepared(flight).columns(
-        (*structure.outputs, *structure.inputs, *structure.parameters)
-    )
-    online.run(rows, history=False)
-    begin = time.thread_time()
-    online.run(rows, history=False)
-    return (time.thread_time() - begin) / len(rows)
-
-
-SCALES = {
-    "d_lon": 0.05,
-    "d_lat": 0.05,
-    "d_col": 0.05,
-    "d_ped": 0.1,
-    "u": 2.0,
-    "v": 2.0,
-    "w": 2.0,
-    "p": 1.0,
-    "q": 1.0,
-    "r": 1.0,
-    "phi": 0.3,
-    "theta": 0.3,
-}
-"""Sizes (SI) by which channels are scaled before a nu-gap is taken."""
+CHOICES = {"longitudinal": LONGITUDINAL, "lateral": LATERAL, "all": ALL}
+"""Axes by their names in commands and campaign files."""

@@ -15,7 +15,8 @@ from studies.campaigns.runners import Runner
 from studies.campaigns.trials import marks
 from studies.output import columns
 from studies.setup.accelerating_baseline import ALONE, BOTH, MARKS, SCATTER
-from studies.setup.axes import AXES, FROZEN_SPEEDS
+from studies.setup.axes import AXES
+from studies.setup.axis_models import FROZEN_SPEEDS
 from studies.setup.flights import NOISES
 from studies.setup.quantities import value
 

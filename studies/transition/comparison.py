@@ -12,17 +12,8 @@ from identification.judge import compare_baseline
 from identification.judge.beside_baseline import BesideBaseline
 from identification.judge.frozen_models import FrozenModels
 from studies.setup.accelerating_baseline import along_the_command
-from studies.setup.axes import (
-    ALL,
-    AXES,
-    HORIZON,
-    LATERAL,
-    LATERAL_WITH_COLLECTIVE,
-    LONGITUDINAL,
-    SCALES,
-    Axis,
-    rotor_mode,
-)
+from studies.setup.axes import ALL, AXES, LATERAL, LATERAL_WITH_COLLECTIVE, LONGITUDINAL, Axis
+from studies.setup.axis_models import HORIZON, rotor_mode
 from studies.setup.flights import NOISES, StudyRecords
 from studies.transition.baseline import Baseline
 from studies.transition.identified import Identification
@@ -99,7 +90,7 @@ def compare(
                 inputs=axis.inputs,
                 outputs=axis.outputs,
                 mode={v: rotor_mode(model, axis.mode) for v, model in exact.items()},
-                scales=SCALES,
+                scales=axis.sizes,
                 channel=CHANNELS[axis.name],
                 responses_at=RESPONSES_AT,
                 fast=FAST,

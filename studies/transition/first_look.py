@@ -11,14 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from studies.loops.lateral import HOLD
-from studies.loops.margins import (
-    DELAY,
-    LATERAL,
-    LONGITUDINAL,
-    AtAirspeed,
-    over_airspeed,
-)
-from studies.setup.axes import RATES, rotor_mode
+from studies.loops.margins import DELAY, AtAirspeed, over_airspeed
+from studies.setup.axes import LATERAL, LONGITUDINAL
+from studies.setup.axis_models import RATES, rotor_mode
 from symheli import LinearFamily
 from symheli.errors import InputError
 from symheli.steady import TrimPoint
@@ -144,13 +139,11 @@ def first_look(family: LinearFamily, travel: dict[str, float]) -> FirstLook:
 def _margins(family: LinearFamily, k: int) -> AtAirspeed | None:
     speed = float(family.airspeeds[k])
     try:
-        (found,) = over_airspeed([speed], *([family[k].select(*part)] for part in _PARTS))
+        parts = [[family[k].select(one.states, one.inputs)] for one in (LATERAL, LONGITUDINAL)]
+        (found,) = over_airspeed([speed], *parts)
     except (InputError, ValueError):
         return None
     return found
-
-
-_PARTS = (LATERAL, LONGITUDINAL)
 
 
 def _mode(z: complex) -> str:

@@ -11,7 +11,8 @@ from functools import partial
 import synthesis
 from identification.model import LPVARXModel
 from studies.loops.exact_lateral import ExactLateral
-from studies.loops.lateral import ATTITUDE_HOLD, STATES, close
+from studies.loops.lateral import ATTITUDE_HOLD, close
+from studies.setup.axes import LATERAL
 from studies.setup.bounds import (
     CONSTANT,
     COPIES,
@@ -64,7 +65,8 @@ def gust_loop(family: LinearFamily, degree: int = 3) -> LPVStateSpace:
     """Return the closed loop from a lateral gust v_w (m/s) to r (rad/s) and phi (rad), continuous,
     cubic element-wise fit.
     """
-    return close(family.select(STATES, ["d_lat", "v_w"]).interpolate("polynomial", degree), "gust")
+    lateral = family.select(LATERAL.states, ["d_lat", "v_w"])
+    return close(lateral.interpolate("polynomial", degree), "gust")
 
 
 def servo_loop(
@@ -102,7 +104,7 @@ def has_lft(loop: LPVStateSpace) -> bool:
 def sampled_baseline(family: LinearFamily, degree: int = 3) -> LPVStateSpace:
     """The lateral baseline at 50 Hz with the two lateral inputs."""
     return (
-        family.select(STATES, ["d_lat", "d_ped"])
+        family.select(LATERAL.states, LATERAL.inputs)
         .interpolate("polynomial", degree)
         .discretize(PERIOD, degree=degree)
     )
@@ -127,7 +129,7 @@ def exact_frozen_gain(family: LinearFamily, sampled: bool) -> float:
         )
         return servo_loop(one) if sampled else close(one, "gust")
 
-    lateral = family.select(STATES, ["d_lat", "d_ped"] if sampled else ["d_lat", "v_w"])
+    lateral = family.select(LATERAL.states, LATERAL.inputs if sampled else ["d_lat", "v_w"])
     loops = [
         closed(lateral[k].discretize(PERIOD) if sampled else lateral[k])
         for k in range(len(lateral))

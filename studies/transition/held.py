@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification.judge.frozen_models import continuous_poles
-from studies.known_kinematics.truth import AXES, frozen, sampled
+from studies.known_kinematics.truth import frozen, sampled
 from studies.setup.axes import LATERAL, LONGITUDINAL
 from studies.setup.flights import NOISES, TOP
 from studies.setup.quantities import values
@@ -85,17 +85,16 @@ def axes(study: Outcome) -> list[AxisModels]:
     nodes, cubic = study.baseline.nodes, study.baseline.lpv["polynomial 3"]
     out = []
     for name, axis in (("longitudinal", LONGITUDINAL), ("lateral", LATERAL)):
-        part = AXES[name]
         models = {
-            EXACT: [sampled(_at(nodes, v), part) for v in SPEEDS],
-            LFT: [sampled(cubic.at(float(v)), part) for v in SPEEDS],
+            EXACT: [sampled(_at(nodes, v), axis) for v in SPEEDS],
+            LFT: [sampled(cubic.at(float(v)), axis) for v in SPEEDS],
         }
         if study.identification is not None:
             arx = study.identification.of(axis, NOISES[0]).model
             models[ARX] = [arx.at(float(v)) for v in SPEEDS]
         if study.known_kinematics is not None:
             known = study.known_kinematics.model
-            models[KNOWN] = [frozen(known, part, float(v)) for v in SPEEDS]
+            models[KNOWN] = [frozen(known, axis, float(v)) for v in SPEEDS]
         out.append(AxisModels(name=name, channel=CHANNELS[axis.name], models=models))
     return out
 

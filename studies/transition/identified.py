@@ -7,18 +7,8 @@ from dataclasses import dataclass
 
 from identification.judge import Scores
 from identification.model import LPVARXModel
-from studies.setup.axes import (
-    ALL,
-    AXES,
-    LATERAL,
-    LATERAL_WITH_COLLECTIVE,
-    LONGITUDINAL,
-    Axis,
-    identify,
-    judged,
-    mode_misses,
-    update_time,
-)
+from studies.setup.axes import ALL, AXES, LATERAL, LATERAL_WITH_COLLECTIVE, LONGITUDINAL, Axis
+from studies.setup.axis_models import identify, judged, mode_misses, update_time
 from studies.setup.flights import NOISES, StudyRecords
 from symheli import Helicopter
 

@@ -21,7 +21,8 @@ from studies.loops.lateral import ATTITUDE_HOLD
 from studies.loops.robust_lateral import FEEDBACK, margin
 from studies.setup import accelerating_baseline
 from studies.setup.accelerating_baseline import along_the_command
-from studies.setup.axes import ALL, LATERAL, LONGITUDINAL, update_time
+from studies.setup.axes import ALL, LATERAL, LONGITUDINAL
+from studies.setup.axis_models import update_time
 from studies.setup.flights import autopilot_for
 from studies.transition.baseline import Baseline
 from symheli import FlightRecord, Helicopter

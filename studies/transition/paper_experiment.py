@@ -11,6 +11,7 @@ from scipy.linalg import solve_discrete_are
 
 from identification import LPVARX, Polynomial, RecursiveLeastSquares, excitation_report
 from identification.model import LPVARXModel
+from studies.setup.axes import LONGITUDINAL
 from studies.setup.flights import TOP
 from symheli import FlightRecord, LinearFamily, LPVStateSpace
 from symheli.errors import ExcitationError
@@ -19,7 +20,6 @@ PERIOD = 0.11408
 """Sample period, s (Budiyono & Sutarto)."""
 SAMPLES = 600
 OUTPUTS = ("theta", "w", "u")
-STATES = ("u", "w", "q", "theta", "a1")
 UNITS = {
     "theta": "rad",
     "w": "m/s",
@@ -89,7 +89,7 @@ def discretized_baseline(family: LinearFamily, degree: int = 2) -> LPVStateSpace
     period.
     """
     return (
-        family.select(STATES, ["d_lon"], ["theta", "w", "u"])
+        family.select(LONGITUDINAL.states, ["d_lon"], OUTPUTS)
         .interpolate("polynomial", degree)
         .discretize(PERIOD, degree=degree)
     )

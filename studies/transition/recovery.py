@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from identification import LPVARX, Polynomial, fit
+from studies.setup.axes import LONGITUDINAL
 from studies.setup.flights import TOP
 from symheli import FlightRecord, LinearFamily
 from symheli.lpv.tools import simulate
 from symheli.values.signal import UNITS
 
-STATES = ("u", "w", "q", "theta", "a1")
-INPUTS = ("d_lon", "d_col")
+STATES, INPUTS = LONGITUDINAL.states, LONGITUDINAL.inputs
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from studies.known_kinematics.truth import SPEEDS
 from studies.output import plain
 from studies.report.provenance import provenance
-from studies.setup.axes import HORIZON
+from studies.setup.axis_models import HORIZON
 from studies.setup.bounds import unit_of
 from studies.setup.certificates import bound_to_dict
 from studies.setup.quantities import named, value, values

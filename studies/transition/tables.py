@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from studies.known_kinematics import models
 from studies.known_kinematics.truth import SPEEDS
-from studies.setup.axes import ALL, AXES, FROZEN_SPEEDS, LATERAL, LATERAL_WITH_COLLECTIVE, RATES
+from studies.setup.axes import ALL, AXES, LATERAL, LATERAL_WITH_COLLECTIVE
+from studies.setup.axis_models import FROZEN_SPEEDS, RATES
 from studies.setup.flights import NOISES
 from studies.transition.campaign import MODE_MARK
 from studies.transition.comparison import DRIFT_LEFT_OUT

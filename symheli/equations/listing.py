@@ -16,6 +16,7 @@ from symheli.airframe.sections import FIXED
 from symheli.components import AirMotion, Component, Effect, Flow
 from symheli.equations.notation import dot, printed, real, symbol_of, upright
 from symheli.physics import inflow, rigid_body
+from symheli.values.kinematics import RIGID_BODY
 
 if TYPE_CHECKING:
     from symheli.equations.described import Described
@@ -200,7 +201,7 @@ def _rigid_body(heli: Described, s: SimpleNamespace, effects: Mapping[str, Effec
     angular = rigid_body.rotation(*rates, (L, M, N - Q_e), body.Ixx, body.Iyy, body.Izz, added)
     attitude = rigid_body.euler_rates(s.phi, s.theta, *rates)
     for name, value in zip(
-        ("u", "v", "w", "p", "q", "r", "phi", "theta", "psi"),
+        (*map(str, RIGID_BODY), "psi"),
         (*linear, *angular, *attitude),
         strict=True,
     ):

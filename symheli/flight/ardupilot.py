@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.signal import butter
 
-from symheli.dynamics import INPUTS
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.linear_model import LinearModel
 from symheli.values.arrays import Array
+from symheli.values.kinematics import INPUTS
 from symheli.values.named_vector import NamedVector
 from symheli.values.numbers import positive
 from symheli.values.signal import signals

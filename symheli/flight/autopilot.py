@@ -9,7 +9,6 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import solve_discrete_are
 
-from symheli.dynamics import INPUTS
 from symheli.errors import InputError, UnknownNameError
 from symheli.flight.controller import ScheduledController
 from symheli.flight.servo import Servo
@@ -20,6 +19,7 @@ from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.lpv.scheduling import Scheduling
 from symheli.steady.airspeed_sweep import design_family
 from symheli.values.arrays import frozen
+from symheli.values.kinematics import INPUTS
 from symheli.values.numbers import positive, whole
 from symheli.values.signal import Signal, signals
 from symheli.values.summary import summarized

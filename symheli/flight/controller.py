@@ -12,7 +12,6 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from symheli.dynamics import INPUTS
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.linear_model import LinearModel, is_control_system
 from symheli.lpv.lpv_state_space import LPVStateSpace
@@ -20,12 +19,13 @@ from symheli.lpv.mixing import ERROR, turned
 from symheli.lpv.scheduling import UNSCHEDULED, Scheduling
 from symheli.values.arrays import Array, frozen
 from symheli.values.controllers import PureController, StatefulController
+from symheli.values.kinematics import INPUTS, RIGID_BODY
 from symheli.values.named_vector import NamedVector
 from symheli.values.numbers import positive
 from symheli.values.signal import Signal, indices, signals
 from symheli.values.summary import summarized
 
-MEASURED = signals(("u", "v", "w", "p", "q", "r", "phi", "theta"))
+MEASURED = RIGID_BODY
 """Measured states: a controller receives the readings of their sensors."""
 ROTOR = signals(("Om", "om_i"))
 """Rotor states, passed on without sensor errors; present with the PI governor."""

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from symheli.dynamics import INPUTS
 from symheli.flight.course import Course
 from symheli.flight.equipment import Readings
 from symheli.flight.plan import FlightPlan
 from symheli.values.arrays import Array
+from symheli.values.kinematics import INPUTS
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symheli.dynamics import INPUTS
 from symheli.flight.course import Clock
 from symheli.flight.plan import READ
 from symheli.flight.sensor import Sensor
@@ -18,6 +17,7 @@ from symheli.flight.servo import Servo, ServoBank
 from symheli.helicopter import Helicopter
 from symheli.values.arrays import Array
 from symheli.values.controllers import PureController, StatefulController
+from symheli.values.kinematics import INPUTS
 
 MAX_STEPS = 2**40
 """Number of steps that no flight reaches."""

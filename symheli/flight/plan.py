@@ -10,7 +10,6 @@ from typing import Any, Literal, TypedDict, TypeVar, get_args
 
 import numpy as np
 
-from symheli.dynamics import INPUTS
 from symheli.environment import Wind
 from symheli.errors import InputError, UnknownNameError
 from symheli.flight.controller import MEASURED
@@ -18,6 +17,7 @@ from symheli.flight.excitation import Excitation
 from symheli.flight.schedule import AirspeedSchedule
 from symheli.flight.sensor import Sensor
 from symheli.flight.servo import Servo, one_each
+from symheli.values.kinematics import INPUTS
 from symheli.values.numbers import whole
 
 F = TypeVar("F", bound=Callable[..., Any])

@@ -16,10 +16,10 @@ from symheli.lpv.bases import CubicSpline, PiecewiseLinear
 from symheli.lpv.linear_family import LinearFamily
 from symheli.physics.rigid_body import euler_rates, gravity_euler, rotation, translation
 from symheli.values.arrays import Array, frozen
+from symheli.values.kinematics import RIGID_BODY
 from symheli.values.signal import Signal, signals
 from symheli.values.summary import summarized
 
-BODY_STATES = ("u", "v", "w", "p", "q", "r", "phi", "theta")
 STEP = 0.005
 """Longest integration step, s: that of the flights of the nonlinear model."""
 _TABLES = {"linear": PiecewiseLinear, "spline": CubicSpline}
@@ -117,9 +117,9 @@ class StitchedModel:
         speeds = family.over_airspeed("a stitched model")
         if family.dt is not None:
             raise InputError(f"stitch continuous models; these are sampled at {family.dt} s")
-        if family.states[:8] != BODY_STATES:
+        if family.states[:8] != RIGID_BODY:
             raise InputError(
-                f"a stitched model needs the states {' '.join(BODY_STATES)} first, got"
+                f"a stitched model needs the states {' '.join(RIGID_BODY)} first, got"
                 f" {' '.join(family.states)}"
             )
         if len(family) < 2:

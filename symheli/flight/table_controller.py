@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from symheli.dynamics import INPUTS
 from symheli.errors import InputError, UnknownNameError
 from symheli.flight.controller import (
     COMMAND,
@@ -46,6 +45,7 @@ from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.lpv.scheduling import UNSCHEDULED, Scheduling
 from symheli.values.arrays import Array
 from symheli.values.html_table import as_table
+from symheli.values.kinematics import INPUTS
 from symheli.values.named_vector import NamedVector
 from symheli.values.signal import Signal, indices, signals
 from symheli.values.summary import summarized

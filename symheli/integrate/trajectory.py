@@ -12,12 +12,10 @@ from symheli.physics.attitude import euler_state
 from symheli.records.flight_record import FlightRecord
 from symheli.values.arrays import Array, frozen
 from symheli.values.html_table import as_table
+from symheli.values.kinematics import INPUTS, RIGID_BODY
 from symheli.values.named_vector import NamedVector
 from symheli.values.signal import Signal, indices, signals
 from symheli.values.summary import summarized
-
-EULER = ("u", "v", "w", "p", "q", "r", "phi", "theta")
-INPUTS = ("d_lon", "d_lat", "d_col", "d_ped")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -97,10 +95,11 @@ class Trajectory:
         inputs (the last one repeated at the end).
         """
         euler, own = euler_state(self.states), self.signals[13:]
-        columns = {str(name): euler[:, i] for i, name in enumerate((*EULER, *own))}
+        columns = {str(name): euler[:, i] for i, name in enumerate((*RIGID_BODY, *own))}
         columns |= {str(name): self[name] for name in ("x_n", "x_e", "x_d")}
         columns |= {
-            name: self.inputs[[*range(len(self.inputs)), -1], i] for i, name in enumerate(INPUTS)
+            str(name): self.inputs[[*range(len(self.inputs)), -1], i]
+            for i, name in enumerate(INPUTS)
         }
         return FlightRecord.from_arrays(
             self.times, {name: Signal(name).unit for name in columns}, repr(self.method), **columns

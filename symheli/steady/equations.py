@@ -16,9 +16,10 @@ from symheli.codegen import Layout, ScalarProgram, c_function, program
 from symheli.codegen.compile import library, loaded
 from symheli.codegen.numeric import Numeric
 from symheli.codegen.symbolic import SX, Function, column, cos, dense, jacobian, sin
-from symheli.dynamics import INPUTS, Dynamics, Sum
+from symheli.dynamics import Dynamics, Sum
 from symheli.helicopter import Helicopter
 from symheli.steady.flight_condition import DEMAND
+from symheli.values.kinematics import INPUTS
 from symheli.values.signal import Signal, signals
 
 SIDE_BY_SIDE = Layout(width=8)

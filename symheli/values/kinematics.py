@@ -19,6 +19,9 @@ VELOCITIES: tuple[Signal, ...] = signals(("u", "v", "w", "p", "q", "r"))
 RIGID_BODY: tuple[Signal, ...] = signals((*VELOCITIES, "phi", "theta"))
 """With roll and pitch (rad): what the equations below take, in this order."""
 
+INPUTS: tuple[Signal, ...] = signals(("d_lon", "d_lat", "d_col", "d_ped"))
+"""Longitudinal and lateral cyclic, collective and tail rotor of a helicopter (rad)."""
+
 
 def kinematic_rates(y: Array) -> Array:
     """Return the rates (..., 8) of `RIGID_BODY` of a rigid body without aerodynamic forces and

@@ -12,11 +12,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symheli.dynamics import INPUTS
 from symheli.errors import InputError
 from symheli.flight import Servo
 from symheli.flight.servo import one_each
 from symheli.lpv import append
+from symheli.values.kinematics import INPUTS
 from symheli.values.numbers import whole
 from symheli.values.summary import summarized
 

@@ -11,11 +11,18 @@ import symheli
 from studies import cli
 from studies.campaigns import flyable
 from studies.campaigns.experiments import Candidate, design
-from studies.setup.axes import LONGITUDINAL
+from studies.commands import experiment
+from studies.setup.axes import CHOICES, LONGITUDINAL
 from studies.setup.flights import autopilot_for
 from symheli.errors import InputError
 
 SMALL, LARGE = Candidate("prbs", (0.1, 5.0), 0.25, 3.0), Candidate("prbs", (0.1, 5.0), 0.75, 3.0)
+
+
+def test_the_command_offers_every_axis():
+    """The command line lists the axes without loading them."""
+    (axis,) = (one for one in experiment.ARGUMENTS if one.name == "--axis")
+    assert axis.settings["choices"] == tuple(CHOICES)
 
 
 @pytest.mark.slow

@@ -10,9 +10,9 @@ import pytest
 import symheli
 import synthesis
 from identification.judge import compare_baseline
-from studies.setup import accelerating_baseline, axes
+from studies.setup import accelerating_baseline, axis_models
 from studies.setup.accelerating_baseline import ALONE, BOTH, along_the_command
-from studies.setup.axes import LATERAL, LONGITUDINAL
+from studies.setup.axes import ALL, LATERAL, LONGITUDINAL
 from studies.setup.flights import TransitionPlan, autopilot_for
 from studies.transition import guarantees
 from studies.transition.baseline import build_baseline
@@ -73,13 +73,20 @@ def test_the_papers_experiment_runs_and_a_cubic_is_refused_with_the_reason(basel
         assert c.fits["one step"] > c.fits["1 s"]  # one step flatters
 
 
+@pytest.mark.parametrize("kind", ["states", "inputs", "outputs"])
+def test_two_axes_share_the_signals_of_a_helicopter(ideal, kind):
+    """The longitudinal and the lateral axis leave out no signal, and name none twice."""
+    every = getattr(ALL, kind) or ideal.states
+    assert sorted(getattr(LONGITUDINAL, kind) + getattr(LATERAL, kind)) == sorted(every)
+
+
 @pytest.mark.parametrize("axis", [LONGITUDINAL, LATERAL], ids=lambda a: a.mode)
 @pytest.mark.parametrize("noise", ["noise-free", "30 dB"])
 def test_identified_models_meet_their_marks_on_a_transition_they_have_not_seen(
     ideal, flown, axis, noise
 ):
     training, test = flown[noise]
-    result = axes.judged(ideal, axis, axes.identify(axis, training, "ls"), test)
+    result = axis_models.judged(ideal, axis, axis_models.identify(axis, training, "ls"), test)
     for output, marks in axis.marks.items():
         assert result.scores.ahead[output] >= marks[noise != "noise-free"]
     if noise == "noise-free":
@@ -96,7 +103,7 @@ def test_rotor_modes_are_found_whether_they_oscillate_or_not(ideal, lock):
     for mode, rate, angle in (("pitch/flap", "q", "a1"), ("roll/flap", "p", "b1")):
         own = exact.select((rate, angle)).poles()
         slow = own[np.argmin(abs(own))]
-        found = axes.rotor_mode(exact, mode)
+        found = axis_models.rotor_mode(exact, mode)
         assert min(abs(exact.poles() - found)) < 1e-9
         assert (found.imag > 8) == (slow.imag != 0) == (lock < (3.0 if rate == "q" else 5.0))
         # the other axes and, where it is slow, gravity move it
@@ -106,8 +113,8 @@ def test_rotor_modes_are_found_whether_they_oscillate_or_not(ideal, lock):
 def test_instruments_find_the_modes_that_noise_hides_from_least_squares(ideal, flown):
     training = flown["30 dB"][0]
     ls, iv = (
-        axes.mode_misses(
-            ideal, axes.identify(LONGITUDINAL, training, m, order=2), LONGITUDINAL.mode
+        axis_models.mode_misses(
+            ideal, axis_models.identify(LONGITUDINAL, training, m, order=2), LONGITUDINAL.mode
         )
         for m in ("ls", "iv")
     )
@@ -117,7 +124,7 @@ def test_instruments_find_the_modes_that_noise_hides_from_least_squares(ideal, f
 
 def test_recursion_and_batch_give_the_same_model(flown):
     training, test = flown["noise-free"]
-    rls, ls = (axes.identify(LONGITUDINAL, training, m) for m in ("rls", "ls"))
+    rls, ls = (axis_models.identify(LONGITUDINAL, training, m) for m in ("rls", "ls"))
     # condition number 1e5 of the regressors times rounding, on predictions
     np.testing.assert_allclose(
         rls.predict(test, 1)[10:], ls.predict(test, 1)[10:], rtol=1e-8, atol=1e-9

@@ -5,10 +5,10 @@ from __future__ import annotations
 import synthesis
 from studies.campaigns.trial import Trial
 from studies.campaigns.trials.vehicle import scattered
-from studies.loops.lateral import ATTITUDE_HOLD, HOLD, STATES, close
+from studies.loops.lateral import ATTITUDE_HOLD, HOLD, INPUTS, close
+from studies.setup.axes import LATERAL
 from symheli import sweep
 
-INPUTS = ("d_lat", "d_ped", "v_w")
 POINTS = 27
 
 
@@ -30,7 +30,7 @@ def gain(
     """
     heli = scattered(vehicle, mass, inertia)
     speeds = [low + (high - low) * k / (POINTS - 1) for k in range(POINTS)]
-    family = sweep(heli, speeds, inputs=INPUTS).select(STATES, INPUTS)
+    family = sweep(heli, speeds, inputs=INPUTS).select(LATERAL.states, INPUTS)
     gains = {name: hold for name in ATTITUDE_HOLD}
     loop = close(family.interpolate("polynomial", degree), "gust", gains)
     form = synthesis.forms.Spline(segments=segments)

@@ -8,12 +8,12 @@ from identification import LPVARX, Polynomial, fit, scores
 from identification.judge.against_constant import HORIZONS
 from studies.campaigns.trial import Trial
 from studies.campaigns.trials.vehicle import autopilot, helicopter
-from studies.setup.axes import ALL, LATERAL, LONGITUDINAL, SCHEDULING, Axis, mode_misses
+from studies.setup.axes import ALL, CHOICES, SCHEDULING
+from studies.setup.axis_models import mode_misses
 from studies.setup.flights import ACCELERATIONS, TOP, TransitionPlan
 from symheli.errors import UnknownNameError
 from symheli.lpv import BSpline, PiecewiseLinear
 
-AXES: dict[str, Axis] = {"longitudinal": LONGITUDINAL, "lateral": LATERAL, "all": ALL}
 BASES = {
     "polynomial": lambda degree: Polynomial(degree, 0.0, TOP),
     "linear": lambda degree: PiecewiseLinear(tuple(np.linspace(0.0, TOP, degree + 1))),
@@ -52,17 +52,17 @@ def identification(
     model = fit(structure(axis, order, basis, degree), training, method)
     judged = scores(model, test).by_horizon
     row = {f"{y}, {h}": float(fits[y]) for h, fits in judged.items() for y in fits}
-    return row | {MODE_MISS: max(mode_misses(heli, model, AXES[axis].mode).values())}
+    return row | {MODE_MISS: max(mode_misses(heli, model, CHOICES[axis].mode).values())}
 
 
 def structure(axis: str, order: int, basis: str, degree: int) -> LPVARX:
     """LPV-ARX of an axis, with the offset and its rate, in a basis of degree + 1 functions."""
-    for kind, name, known in (("axis", axis, AXES), ("basis", basis, BASES)):
+    for kind, name, known in (("axis", axis, CHOICES), ("basis", basis, BASES)):
         if name not in known:
             raise UnknownNameError(kind, name, known)
     return LPVARX(
-        AXES[axis].outputs,
-        AXES[axis].inputs,
+        CHOICES[axis].outputs,
+        CHOICES[axis].inputs,
         SCHEDULING,
         na=order,
         nb=order,

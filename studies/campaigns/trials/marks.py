@@ -7,9 +7,10 @@ from typing import Any
 
 from studies.campaigns.trial import Trial
 from studies.campaigns.trials.vehicle import autopilot, helicopter
-from studies.setup import accelerating_baseline, axes
+from studies.setup import accelerating_baseline
 from studies.setup.accelerating_baseline import ALONE, BOTH, MARKS
-from studies.setup.axes import AXES, FROZEN_SPEEDS, Axis
+from studies.setup.axes import AXES, Axis
+from studies.setup.axis_models import FROZEN_SPEEDS, identify, judged
 from studies.setup.flights import NOISE_DB, NOISES, TransitionPlan
 
 DECIBELS = dict(zip(NOISES, (None, NOISE_DB), strict=True))
@@ -27,7 +28,7 @@ def marks(*, vehicle: str = "xcell60", seed: int = 0) -> dict[str, float]:
             fits = accelerating_baseline.fits(_baselines(vehicle), test)
             row |= {of_baseline(model, y): fit for (model, y), fit in fits.items()}
         for axis in AXES:
-            result = axes.judged(heli, axis, axes.identify(axis, training, "ls"), test)
+            result = judged(heli, axis, identify(axis, training, "ls"), test)
             row |= {ahead(axis, y, noise): result.scores.ahead[y] for y in axis.marks}
             if decibels is None:
                 row |= {of_mode(axis, v): miss for v, miss in result.mode_miss.items()}

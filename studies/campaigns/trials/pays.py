@@ -8,10 +8,10 @@ from identification.judge import compare_constant
 from identification.judge.against_constant import HORIZONS
 from studies.campaigns.trial import Trial
 from studies.campaigns.trials.vehicle import autopilot, helicopter
-from studies.setup.axes import ALL, LATERAL, LONGITUDINAL, Axis
+from studies.setup.axes import CHOICES, Axis
 from studies.setup.flights import ACCELERATIONS, TransitionPlan
 
-AXES = (LONGITUDINAL, LATERAL, ALL)
+AXES = tuple(CHOICES.values())
 MODELS = ("LPV", "LTI")
 
 
