@@ -10,12 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from identification.design.criterion import Criterion, Verdict, table, together
 from identification.judge.coefficient_covariance import drawn
 from identification.judge.criteria import (
     SET,
     SHARE_OF_MARGIN,
-    Criterion,
-    Verdict,
     certainty,
     feedback,
     predictions,
@@ -23,7 +22,6 @@ from identification.judge.criteria import (
     responses,
     stability,
     static_gain,
-    together,
 )
 from identification.judge.frozen_plant import AtPoint, FrozenPlant, Model, Point
 from identification.judge.response_regions import StructureBias, with_neighbours
@@ -108,25 +106,7 @@ class FitForControl:
         raise KeyError(name)
 
     def __str__(self) -> str:
-        head = ("criterion", "value", "at most", "truth", "verdict", "where", "source")
-        rows = [
-            (
-                row.name,
-                _number(row.value),
-                _number(row.threshold),
-                "" if row.truth is None else _number(row.truth),
-                row.verdict if row.decides else f"({row.verdict})",
-                row.where,
-                row.source,
-            )
-            for row in self.criteria
-        ]
-        widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
-        lines = [
-            "  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip()
-            for row in (head, *rows)
-        ]
-        return "\n".join([*lines, f"verdict: {self.verdict}"])
+        return f"{table(self.criteria)}\nverdict: {self.verdict}"
 
 
 def added(noise: Array, structure: Array, correlation: float = CORRELATION) -> Array:
@@ -366,10 +346,6 @@ def _discrete(model: LinearModel, plant: FrozenPlant) -> LinearModel:
     return sampled.select(inputs=plant.inputs, outputs=plant.outputs)
 
 
-def _number(value: float) -> str:
-    return "-" if np.isnan(value) else f"{value:.3g}"
-
-
 def design_model(
     model: KinematicModel,
     judged: FitForControl,
@@ -427,13 +403,7 @@ def design_model(
             f"judged: expected what fit_for_control found, got {type(judged).__name__}"
         )
     if judged.verdict != "fit" and not force:
-        reasons = tuple(
-            f"{row.name} is {row.value:.3g}, at most {row.threshold:.3g}"
-            + (f" ({row.where})" if row.where else "")
-            + f": {row.verdict}"
-            for row in judged.criteria
-            if row.decides and row.verdict != "fit"
-        )
+        reasons = tuple(str(row) for row in judged.criteria if row.decides and row.verdict != "fit")
         known = "not known to be" if judged.verdict == "not known" else "not"
         raise NotFitError(f"the model is {known} fit for control", reasons)
     if probability is None:

@@ -12,8 +12,8 @@ from scipy.signal import butter, sosfilt
 from scipy.stats import chi2
 
 import identification as idn
+from identification.design.criterion import together
 from identification.judge.coefficient_covariance import drawn
-from identification.judge.criteria import together
 from identification.judge.derivatives import Certainty, Derivatives
 from identification.judge.fit_for_control import added
 from identification.judge.frozen_plant import FrozenPlant
