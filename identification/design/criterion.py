@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
@@ -79,7 +80,7 @@ def together(verdicts: Iterable[Verdict]) -> Verdict:
     return "not fit" if "not fit" in found else "not known" if "not known" in found else "fit"
 
 
-def table(criteria: Iterable[Criterion]) -> str:
+def table(criteria: Iterable[Criterion], indent: str = "") -> str:
     """One line a criterion, under a head; columns without an entry are left out, and a verdict that
     only informs stands in brackets.
     """
@@ -96,7 +97,8 @@ def table(criteria: Iterable[Criterion]) -> str:
         for row in criteria
     ]
     head = [name for name in cells[0] if any(row[name] for row in cells)] if cells else []
-    return columns([head, *([row[name] for name in head] for row in cells)], left=len(head))
+    rows = columns([head, *([row[name] for name in head] for row in cells)], left=len(head))
+    return textwrap.indent(rows, indent)
 
 
 def _number(value: float) -> str:
