@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -69,9 +69,15 @@ class Criterion:
         return f"{self.name} {value}, {self.limit}{where}: {self.verdict}"
 
 
-def judged(value: float, threshold: float, otherwise: Verdict) -> Verdict:
-    """ "fit" up to the threshold, `otherwise` above, "not known" for NaN."""
-    return "not known" if np.isnan(value) else "fit" if value <= threshold else otherwise
+def judged(
+    name: str, value: float, threshold: float, otherwise: Verdict = "not fit", **more: Any
+) -> Criterion:
+    """The criterion that is "fit" on its side of the threshold, `otherwise` beyond, and "not known"
+    for NaN; `more`: its other fields.
+    """
+    met = value >= threshold if more.get("sense") == "at least" else value <= threshold
+    verdict: Verdict = "not known" if np.isnan(value) else "fit" if met else otherwise
+    return Criterion(name=name, value=value, threshold=threshold, verdict=verdict, **more)
 
 
 def together(verdicts: Iterable[Verdict]) -> Verdict:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.design.criterion import Criterion, table
+from identification.design.criterion import Criterion, judged, table
 from identification.design.determined import determined_columns
 from identification.design.never_determined import never_determined
 from identification.design.tall_factors import triangular
@@ -96,16 +96,7 @@ class ExcitationReport:
         found = [("samples", self.samples, n), ("rank of the regressors", self.rank, n)]
         if self.needed > 1:
             found.append((f"distinct values of {self.scheduling}", self.distinct, self.needed))
-        return tuple(
-            Criterion(
-                name=name,
-                value=value,
-                threshold=least,
-                verdict="fit" if value >= least else "not fit",
-                sense="at least",
-            )
-            for name, value, least in found
-        )
+        return tuple(judged(*row, sense="at least") for row in found)
 
     @property
     def worst_direction(self) -> str:

@@ -5,6 +5,7 @@ that matter to the loop, and beside a record.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -57,17 +58,20 @@ def stability(at: Sequence[AtPoint], true: Sequence[LinearModel | None]) -> Crit
     """The share of the draws whose loop is unstable; none may be, nor the estimate's own."""
     alone = [a.margin > 0 for a in at]
     lost, where = worst(np.array([a.lost for a in at]), at)
-    verdict: Verdict = judged(lost, 0.0, "not known")
+    otherwise: Verdict = "not known"
+    if np.isnan(lost):
+        where = NO_COVARIANCE
     if not all(alone):
-        verdict, where = "not fit", f"p = {text(at[alone.index(False)].p)}: the estimate itself"
+        lost, otherwise = 1.0, "not fit"
+        where = f"p = {text(at[alone.index(False)].p)}: the estimate itself"
     known = [(a, t) for a, t in zip(at, true, strict=True) if t is not None]
-    return Criterion(
-        name="unstable loops",
-        value=lost if all(alone) else 1.0,
-        threshold=0.0,
-        verdict=verdict,
+    return judged(
+        "unstable loops",
+        lost,
+        0.0,
+        otherwise,
         source=HERE,
-        where=NO_COVARIANCE if np.isnan(lost) and all(alone) else where,
+        where=where,
         truth=float(np.mean([not a.stable(t) for a, t in known])) if known else None,
     )
 
@@ -85,20 +89,19 @@ def feedback(
         value, where = worst(bound / margin, at)
         truth = None if true_gap is None else float((true_gap / margin).max())
         apart = np.any(second_gap / margin > threshold)
-    verdict = judged(value, threshold, "not known")
-    if at[0].thetas is None:
-        verdict, where = "not known", NO_COVARIANCE
-    elif apart:
+    if apart:
         where = f"{where}; another estimate is as far"
-    return Criterion(
-        name="nu-gap over margin",
-        value=value,
-        threshold=threshold,
-        verdict=verdict,
+    row = judged(
+        "nu-gap over margin",
+        value,
+        threshold,
+        "not known",
         source=VINNICOMBE,
         where=where,
         truth=truth,
     )
+    sampled = at[0].thetas is not None
+    return row if sampled else replace(row, verdict="not known", where=NO_COVARIANCE)
 
 
 def static_gain(
@@ -113,11 +116,11 @@ def static_gain(
     ]
     value, where = worst(np.array(errors), at)
     known = [a.gain_errors([t], in_loop)[0] for a, t in zip(at, true, strict=True) if t is not None]
-    return Criterion(
-        name="static gain in the loop" if in_loop else "static gain, open",
-        value=value,
-        threshold=GAIN,
-        verdict=judged(value, GAIN, "not known"),
+    return judged(
+        "static gain in the loop" if in_loop else "static gain, open",
+        value,
+        GAIN,
+        "not known",
         source=HERE,
         where=NO_COVARIANCE if np.isnan(value) else where,
         truth=float(max(known)) if known else None,
@@ -158,14 +161,7 @@ def certainty(at: Sequence[AtPoint]) -> tuple[Criterion, ...]:
             if values.max() >= before:
                 largest[name] = float(values.max()), threshold, f"{which}, p = {text(a.p)}"
     return tuple(
-        Criterion(
-            name=name,
-            value=value,
-            threshold=threshold,
-            verdict=judged(value, threshold, "not known"),
-            source=GUIDELINE,
-            where=where,
-        )
+        judged(name, value, threshold, "not known", source=GUIDELINE, where=where)
         for name, (value, threshold, where) in largest.items()
     )
 
@@ -226,16 +222,8 @@ def residual_power(model: Model, records: Sequence[FlightRecord]) -> tuple[Crite
         return ()
     powers = [validate(model, record).power for record in records]
     value = float(max(powers))
-    return (
-        Criterion(
-            name="residual power",
-            value=value,
-            threshold=EXPLAINED,
-            verdict=judged(value, EXPLAINED, "not known"),
-            source=HERE,
-            where=f"flight {powers.index(value) + 1} of {len(powers)}",
-        ),
-    )
+    where = f"flight {powers.index(value) + 1} of {len(powers)}"
+    return (judged("residual power", value, EXPLAINED, "not known", source=HERE, where=where),)
 
 
 def predictions(
