@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -80,9 +80,14 @@ def judged(
     return Criterion(name=name, value=value, threshold=threshold, verdict=verdict, **more)
 
 
-def together(verdicts: Iterable[Verdict]) -> Verdict:
-    """The worst: one "not fit" decides, then one "not known"."""
-    found = set(verdicts)
+def missed(criteria: Iterable[Criterion]) -> tuple[str, ...]:
+    """A sentence for each criterion that decides and is not "fit"."""
+    return tuple(str(row) for row in criteria if row.decides and row.verdict != "fit")
+
+
+def verdict_of(criteria: Iterable[Criterion]) -> Verdict:
+    """The worst of those that decide: one "not fit", then one "not known"."""
+    found = {row.verdict for row in criteria if row.decides}
     return "not fit" if "not fit" in found else "not known" if "not known" in found else "fit"
 
 
@@ -105,6 +110,11 @@ def table(criteria: Iterable[Criterion], indent: str = "") -> str:
     head = [name for name in cells[0] if any(row[name] for row in cells)] if cells else []
     rows = columns([head, *([row[name] for name in head] for row in cells)], left=len(head))
     return textwrap.indent(rows, indent)
+
+
+def concluded(criteria: Sequence[Criterion]) -> str:
+    """The table, and the verdict of the whole below it."""
+    return f"{table(criteria)}\nverdict: {verdict_of(criteria)}"
 
 
 def _number(value: float) -> str:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.design.criterion import Criterion, Verdict, table, together
+from identification.design.criterion import Criterion, Verdict, concluded, missed, verdict_of
 from identification.judge.coefficient_covariance import drawn
 from identification.judge.criteria import (
     SET,
@@ -96,7 +96,7 @@ class FitForControl:
     @property
     def verdict(self) -> Verdict:
         """The worst of the rows that decide: one "not fit", then one "not known"."""
-        return together(row.verdict for row in self.criteria if row.decides)
+        return verdict_of(self.criteria)
 
     def __getitem__(self, name: str) -> Criterion:
         """The row of this name."""
@@ -106,7 +106,7 @@ class FitForControl:
         raise KeyError(name)
 
     def __str__(self) -> str:
-        return f"{table(self.criteria)}\nverdict: {self.verdict}"
+        return concluded(self.criteria)
 
 
 def added(noise: Array, structure: Array, correlation: float = CORRELATION) -> Array:
@@ -403,9 +403,8 @@ def design_model(
             f"judged: expected what fit_for_control found, got {type(judged).__name__}"
         )
     if judged.verdict != "fit" and not force:
-        reasons = tuple(str(row) for row in judged.criteria if row.decides and row.verdict != "fit")
         known = "not known to be" if judged.verdict == "not known" else "not"
-        raise NotFitError(f"the model is {known} fit for control", reasons)
+        raise NotFitError(f"the model is {known} fit for control", missed(judged.criteria))
     if probability is None:
         return model.to_state_space(outputs, inputs, held=held, degree=degree)
     return model.uncertain(probability, outputs, inputs, held=held, degree=degree)

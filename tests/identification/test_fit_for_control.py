@@ -12,7 +12,7 @@ from scipy.signal import butter, sosfilt
 from scipy.stats import chi2
 
 import identification as idn
-from identification.design.criterion import together
+from identification.design.criterion import judged, verdict_of
 from identification.judge.coefficient_covariance import drawn
 from identification.judge.derivatives import Certainty, Derivatives
 from identification.judge.fit_for_control import added
@@ -316,9 +316,11 @@ def test_draws_that_the_loop_loses_are_not_known():
 
 
 def test_one_bad_row_decides():
-    assert together(["fit", "not known", "fit"]) == "not known"
-    assert together(["fit", "not known", "not fit"]) == "not fit"
-    assert together(["fit"]) == "fit"
+    met, violated, unknown = (judged("row", v, 1.0) for v in (0.5, 2.0, np.nan))
+    assert verdict_of([met, unknown, met]) == "not known"
+    assert verdict_of([met, unknown, violated]) == "not fit"
+    assert verdict_of([met]) == "fit"
+    assert verdict_of([met, judged("informs", 2.0, 1.0, decides=False)]) == "fit"
 
 
 @pytest.mark.slow
