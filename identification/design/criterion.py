@@ -13,6 +13,9 @@ from symheli.values.aligned import columns
 
 Verdict = Literal["fit", "not fit", "not known"]
 
+PRINTED: dict[Verdict, str] = {"fit": "met", "not fit": "violated", "not known": "not known"}
+"""The verdict on one criterion as it is printed."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Criterion:
@@ -45,7 +48,7 @@ class Criterion:
     >>> row.verdict
     'fit'
     >>> print(row)
-    TIC is 0.1, at most 0.25: fit
+    TIC is 0.1, at most 0.25: met
     """
 
     name: str
@@ -66,7 +69,7 @@ class Criterion:
     def __str__(self) -> str:
         value = "has no value" if np.isnan(self.value) else f"is {_number(self.value)}"
         where = f" ({self.where})" if self.where else ""
-        return f"{self.name} {value}, {self.limit}{where}: {self.verdict}"
+        return f"{self.name} {value}, {self.limit}{where}: {PRINTED[self.verdict]}"
 
 
 def judged(
@@ -101,7 +104,7 @@ def table(criteria: Iterable[Criterion], indent: str = "") -> str:
             "value": _number(row.value),
             "threshold": row.limit,
             "truth": "" if row.truth is None else _number(row.truth),
-            "verdict": row.verdict if row.decides else f"({row.verdict})",
+            "verdict": PRINTED[row.verdict] if row.decides else f"({PRINTED[row.verdict]})",
             "where": row.where,
             "source": row.source,
         }

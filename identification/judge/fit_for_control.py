@@ -396,7 +396,7 @@ def design_model(
     ...     idn.design.design_model(None, poor)
     ... except NotFitError as error:
     ...     print(error.reasons[0])
-    nu-gap over margin is 1.4, at most 1 (hover): not fit
+    nu-gap over margin is 1.4, at most 1 (hover): violated
     """
     if not isinstance(judged, FitForControl):
         raise InputError(

@@ -76,8 +76,8 @@ class SlowMode:
             self.error,
             LOST * abs(self.s.real),
             "not known",
-            where=f"two standard errors {2 * self.standard_error:.2g}, shift by noise of the sensors"
-            f" {self.shift:.2g}",
+            where=f"two standard errors {2 * self.standard_error:.2g}, shift by noise of the"
+            f" sensors {self.shift:.2g}",
         )
 
     @property

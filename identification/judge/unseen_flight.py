@@ -65,7 +65,7 @@ class UnseenFlight:
     >>> from identification.judge.unseen_flight import UnseenFlight
     >>> print(UnseenFlight(power=1.4, largest=1.05, samples=2000))
     criterion       value  threshold     verdict
-    residual power  1.4    at most 1.05  not fit
+    residual power  1.4    at most 1.05  violated
     verdict: not fit
     """
 

@@ -62,7 +62,7 @@ def test_report_of_a_good_record_says_so():
     assert report.occupancy.sum() == report.samples == 398
     assert {row.verdict for row in report.criteria} == {"fit"}
     text = str(report)
-    assert re.search(r"excitation: sufficient\n.*\n  samples +398 +at least 12 +fit\n", text)
+    assert re.search(r"excitation: sufficient\n.*\n  samples +398 +at least 12 +met\n", text)
     assert "worst determined" in text
 
 
