@@ -132,11 +132,8 @@ def certainty(at: Sequence[AtPoint]) -> tuple[Criterion, ...]:
     """Three rows over the derivatives that matter to the loop."""
     none = NO_COVARIANCE if at[0].covariance is None else "none matters to this loop"
     value = float("nan") if at[0].covariance is None else 0.0
-    largest = {
-        "Cramer-Rao bound": (value, BOUND, none),
-        "insensitivity": (value, INSENSITIVITY, none),
-        "correlation": (value, CORRELATION, none),
-    }
+    limits = {"Cramer-Rao bound": BOUND, "insensitivity": INSENSITIVITY, "correlation": CORRELATION}
+    largest: dict[str, tuple[float, str]] = {name: (value, none) for name in limits}
     for a in at:
         if a.covariance is None:
             continue
@@ -157,12 +154,11 @@ def certainty(at: Sequence[AtPoint]) -> tuple[Criterion, ...]:
             ("insensitivity", sure.insensitivity, names[int(np.argmax(sure.insensitivity))]),
             ("correlation", np.abs(sure.correlation), f"{names[pair[0]]}, {names[pair[1]]}"),
         ):
-            before, threshold, _ = largest[name]
-            if values.max() >= before:
-                largest[name] = float(values.max()), threshold, f"{which}, p = {text(a.p)}"
+            if values.max() >= largest[name][0]:
+                largest[name] = float(values.max()), f"{which}, p = {text(a.p)}"
     return tuple(
-        judged(name, value, threshold, "not known", source=GUIDELINE, where=where)
-        for name, (value, threshold, where) in largest.items()
+        judged(name, value, limits[name], "not known", source=GUIDELINE, where=where)
+        for name, (value, where) in largest.items()
     )
 
 
