@@ -69,22 +69,18 @@ class DependenceReport:
     def criteria(self) -> tuple[Criterion, ...]:
         """Percent of the residual of each output that p at other instants explains."""
         other = {"lag": "p(k - lag)", "now": "p(k)"}[self.other]
-        rows = []
-        for output, residual, share, chance in zip(
-            self.outputs, self.residual, self.explained, self.chance, strict=True
-        ):
-            nothing = residual <= ROUNDING
-            rows.append(
-                judged(
-                    f"{output}: residual explained by {other}, %",
-                    100 * float(share),
-                    100 * max(WORTH, float(chance)),
-                    "fit" if nothing else "not fit",
-                    where=f"residual {100 * residual:.3g} % of the output"
-                    + ": nothing left to explain" * bool(nothing),
-                )
+        rows = zip(self.outputs, self.residual, self.explained, self.chance, strict=True)
+        return tuple(
+            judged(
+                f"{output}: residual explained by {other}, %",
+                100 * float(share),
+                100 * max(WORTH, float(chance)),
+                "fit" if residual <= ROUNDING else "not fit",
+                where=f"residual {100 * residual:.3g} % of the output"
+                + (": nothing left to explain" if residual <= ROUNDING else ""),
             )
-        return tuple(rows)
+            for output, residual, share, chance in rows
+        )
 
     @property
     def dynamic(self) -> tuple[bool, ...]:
