@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from identification.design.criterion import Criterion, judged, table
 from identification.design.determined import determined_columns
 from identification.design.never_determined import never_determined
 from identification.design.tall_factors import triangular
@@ -89,6 +90,15 @@ class ExcitationReport:
         return not self.reason
 
     @property
+    def criteria(self) -> tuple[Criterion, ...]:
+        """Samples, rank, and scheduling values that differ, beside what the structure needs."""
+        n = len(self.names)
+        found = [("samples", self.samples, n), ("rank of the regressors", self.rank, n)]
+        if self.needed > 1:
+            found.append((f"distinct values of {self.scheduling}", self.distinct, self.needed))
+        return tuple(judged(*row, sense="at least") for row in found)
+
+    @property
     def worst_direction(self) -> str:
         """The combination of scaled regressors the data determine worst, its largest parts
         first.
@@ -101,21 +111,14 @@ class ExcitationReport:
             raise ExcitationError(self.reason, self)
 
     def __str__(self) -> str:
-        scheduled = self.needed > 1
-        distinct = f"  distinct values of {self.scheduling}: {self.distinct}, needed {self.needed}"
+        verdict = "sufficient" if self.sufficient else f"NOT sufficient: {self.reason}"
         return "\n".join(
             [
-                (
-                    "excitation:"
-                    f" {'sufficient' if self.sufficient else 'NOT sufficient: ' + self.reason}"
-                ),
-                (
-                    f"  regressors {len(self.names)}, samples {self.samples}, rank {self.rank},"
-                    f" scaled condition {self.condition:.3g}"
-                ),
-                *([distinct] if scheduled else []),
+                f"excitation: {verdict}",
+                table(self.criteria, "  "),
+                f"  scaled condition: {self.condition:.3g}",
                 f"  worst determined: {self.worst_direction}",
-                *(self._bars() if scheduled else []),
+                *(self._bars() if self.needed > 1 else []),
             ]
         )
 

@@ -1,8 +1,8 @@
+from identification.design.criterion import Criterion as Criterion
 from identification.judge.against_constant import compare_constant as compare_constant
 from identification.judge.beside_baseline import BaselineModel as BaselineModel
 from identification.judge.beside_baseline import BaselinePredictor as BaselinePredictor
 from identification.judge.beside_baseline import compare_baseline as compare_baseline
-from identification.judge.criteria import Criterion as Criterion
 from identification.judge.dependence import dependence_report as dependence_report
 from identification.judge.frozen_models import pole_distance as pole_distance
 from identification.judge.frozen_stability import frozen_stability as frozen_stability

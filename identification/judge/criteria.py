@@ -4,12 +4,12 @@ that matter to the loop, and beside a record.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from identification.design.criterion import Criterion, Verdict, judged
 from identification.estimators.filter_error import noise_variance
 from identification.judge.derivatives import Certainty, Derivatives
 from identification.judge.frozen_plant import AtPoint, FrozenPlant, Model, text, worst
@@ -24,8 +24,6 @@ from symheli.lpv.tools import nu_gaps
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 from symheli.values.signal import Signal
-
-Verdict = Literal["fit", "not fit", "not known"]
 
 SET = 0.95
 """Share of the distribution of the estimate inside the ellipsoid whose boundary is drawn from."""
@@ -56,71 +54,24 @@ predictions.
 """
 
 
-@dataclass(frozen=True, kw_only=True)
-class Criterion:
-    """One criterion of `FitForControl`, a row of its table.
-
-    Parameters
-    ----------
-    name : str
-        What is judged.
-    value, threshold : float
-        In the unit of the name; NaN where the data give no value.
-    verdict : {"fit", "not fit", "not known"}
-        "not known" where the data say too little for either.
-    source : str
-        Of the threshold.
-    where : str
-        At which point or signal the value was found, or why there is none.
-    truth : float, optional
-        The same against the true models, where they were given.
-    decides : bool
-        Whether the verdict of the whole asks for it; otherwise it informs.
-
-    Examples
-    --------
-    >>> row = idn.judge.Criterion(
-    ...     name="TIC", value=0.1, threshold=0.25, verdict="fit", source="book")
-    >>> row.verdict
-    'fit'
-    """
-
-    name: str
-    value: float
-    threshold: float
-    verdict: Verdict
-    source: str
-    where: str = ""
-    truth: float | None = None
-    decides: bool = True
-
-
-def judged(value: float, threshold: float, otherwise: Verdict) -> Verdict:
-    """ "fit" up to the threshold, `otherwise` above, "not known" for NaN."""
-    return "not known" if np.isnan(value) else "fit" if value <= threshold else otherwise
-
-
-def together(verdicts: Iterable[Verdict]) -> Verdict:
-    """The worst: one "not fit" decides, then one "not known"."""
-    found = set(verdicts)
-    return "not fit" if "not fit" in found else "not known" if "not known" in found else "fit"
-
-
 def stability(at: Sequence[AtPoint], true: Sequence[LinearModel | None]) -> Criterion:
     """The share of the draws whose loop is unstable; none may be, nor the estimate's own."""
     alone = [a.margin > 0 for a in at]
     lost, where = worst(np.array([a.lost for a in at]), at)
-    verdict: Verdict = judged(lost, 0.0, "not known")
+    otherwise: Verdict = "not known"
+    if np.isnan(lost):
+        where = NO_COVARIANCE
     if not all(alone):
-        verdict, where = "not fit", f"p = {text(at[alone.index(False)].p)}: the estimate itself"
+        lost, otherwise = 1.0, "not fit"
+        where = f"p = {text(at[alone.index(False)].p)}: the estimate itself"
     known = [(a, t) for a, t in zip(at, true, strict=True) if t is not None]
-    return Criterion(
-        name="unstable loops",
-        value=lost if all(alone) else 1.0,
-        threshold=0.0,
-        verdict=verdict,
+    return judged(
+        "unstable loops",
+        lost,
+        0.0,
+        otherwise,
         source=HERE,
-        where=NO_COVARIANCE if np.isnan(lost) and all(alone) else where,
+        where=where,
         truth=float(np.mean([not a.stable(t) for a, t in known])) if known else None,
     )
 
@@ -138,20 +89,19 @@ def feedback(
         value, where = worst(bound / margin, at)
         truth = None if true_gap is None else float((true_gap / margin).max())
         apart = np.any(second_gap / margin > threshold)
-    verdict = judged(value, threshold, "not known")
-    if at[0].thetas is None:
-        verdict, where = "not known", NO_COVARIANCE
-    elif apart:
+    if apart:
         where = f"{where}; another estimate is as far"
-    return Criterion(
-        name="nu-gap over margin",
-        value=value,
-        threshold=threshold,
-        verdict=verdict,
+    row = judged(
+        "nu-gap over margin",
+        value,
+        threshold,
+        "not known",
         source=VINNICOMBE,
         where=where,
         truth=truth,
     )
+    sampled = at[0].thetas is not None
+    return row if sampled else replace(row, verdict="not known", where=NO_COVARIANCE)
 
 
 def static_gain(
@@ -166,11 +116,11 @@ def static_gain(
     ]
     value, where = worst(np.array(errors), at)
     known = [a.gain_errors([t], in_loop)[0] for a, t in zip(at, true, strict=True) if t is not None]
-    return Criterion(
-        name="static gain in the loop" if in_loop else "static gain, open",
-        value=value,
-        threshold=GAIN,
-        verdict=judged(value, GAIN, "not known"),
+    return judged(
+        "static gain in the loop" if in_loop else "static gain, open",
+        value,
+        GAIN,
+        "not known",
         source=HERE,
         where=NO_COVARIANCE if np.isnan(value) else where,
         truth=float(max(known)) if known else None,
@@ -182,11 +132,8 @@ def certainty(at: Sequence[AtPoint]) -> tuple[Criterion, ...]:
     """Three rows over the derivatives that matter to the loop."""
     none = NO_COVARIANCE if at[0].covariance is None else "none matters to this loop"
     value = float("nan") if at[0].covariance is None else 0.0
-    largest = {
-        "Cramer-Rao bound": (value, BOUND, none),
-        "insensitivity": (value, INSENSITIVITY, none),
-        "correlation": (value, CORRELATION, none),
-    }
+    limits = {"Cramer-Rao bound": BOUND, "insensitivity": INSENSITIVITY, "correlation": CORRELATION}
+    largest: dict[str, tuple[float, str]] = {name: (value, none) for name in limits}
     for a in at:
         if a.covariance is None:
             continue
@@ -207,19 +154,11 @@ def certainty(at: Sequence[AtPoint]) -> tuple[Criterion, ...]:
             ("insensitivity", sure.insensitivity, names[int(np.argmax(sure.insensitivity))]),
             ("correlation", np.abs(sure.correlation), f"{names[pair[0]]}, {names[pair[1]]}"),
         ):
-            before, threshold, _ = largest[name]
-            if values.max() >= before:
-                largest[name] = float(values.max()), threshold, f"{which}, p = {text(a.p)}"
+            if values.max() >= largest[name][0]:
+                largest[name] = float(values.max()), f"{which}, p = {text(a.p)}"
     return tuple(
-        Criterion(
-            name=name,
-            value=value,
-            threshold=threshold,
-            verdict=judged(value, threshold, "not known"),
-            source=GUIDELINE,
-            where=where,
-        )
-        for name, (value, threshold, where) in largest.items()
+        judged(name, value, limits[name], "not known", source=GUIDELINE, where=where)
+        for name, (value, where) in largest.items()
     )
 
 
@@ -279,16 +218,8 @@ def residual_power(model: Model, records: Sequence[FlightRecord]) -> tuple[Crite
         return ()
     powers = [validate(model, record).power for record in records]
     value = float(max(powers))
-    return (
-        Criterion(
-            name="residual power",
-            value=value,
-            threshold=EXPLAINED,
-            verdict=judged(value, EXPLAINED, "not known"),
-            source=HERE,
-            where=f"flight {powers.index(value) + 1} of {len(powers)}",
-        ),
-    )
+    where = f"flight {powers.index(value) + 1} of {len(powers)}"
+    return (judged("residual power", value, EXPLAINED, "not known", source=HERE, where=where),)
 
 
 def predictions(

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import f as fisher
 
+from identification.design.criterion import Criterion, concluded, judged
 from identification.design.excitation import RANK_TOLERANCE, column_scale
 from identification.model.lpvarx_model import LPVARXModel
 from identification.structure.regressors import as_records, stacked
@@ -44,6 +45,8 @@ class DependenceReport:
         Share of the squared residual in [0, 1].
     probability : array (ny,)
         That chance explains as much (F test, white residuals assumed).
+    chance : array (ny,)
+        Share that chance explains with probability 1e-3.
 
     Examples
     --------
@@ -58,45 +61,46 @@ class DependenceReport:
     residual: Array
     explained: Array
     probability: Array
+    chance: Array
 
     __repr__ = summarized
 
     @property
-    def dynamic(self) -> tuple[bool, ...]:
-        """For which outputs the dependence on p is not the one of the structure."""
+    def criteria(self) -> tuple[Criterion, ...]:
+        """Percent of the residual of each output that p at other instants explains."""
+        other = {"lag": "p(k - lag)", "now": "p(k)"}[self.other]
+        rows = zip(self.outputs, self.residual, self.explained, self.chance, strict=True)
         return tuple(
-            (
-                (self.probability < SIGNIFICANT)
-                & (self.explained > WORTH)
-                & (self.residual > ROUNDING)
-            ).tolist()
+            judged(
+                f"{output}: residual explained by {other}, %",
+                100 * float(share),
+                100 * max(WORTH, float(chance)),
+                "fit" if residual <= ROUNDING else "not fit",
+                where=f"residual {100 * residual:.3g} % of the output"
+                + (": nothing left to explain" if residual <= ROUNDING else ""),
+            )
+            for output, residual, share, chance in rows
         )
 
+    @property
+    def dynamic(self) -> tuple[bool, ...]:
+        """For which outputs the dependence on p is not the one of the structure."""
+        return tuple(row.verdict == "not fit" for row in self.criteria)
+
     def __str__(self) -> str:
-        other = {"lag": "p(k - lag)", "now": "p(k)"}[self.other]
-        lines = []
-        for y, output in enumerate(self.outputs):
-            what = f"residual {100 * self.residual[y]:.3g} % of the output"
-            if self.residual[y] <= ROUNDING:
-                verdict = "nothing left to explain"
-            elif self.dynamic[y]:
-                verdict = (
-                    f"{other} explains {100 * self.explained[y]:.3g} % of it: the coefficients do"
-                    " NOT depend on p as the structure says; "
-                    f'try scheduling_at="{self.other}"'
-                )
-                if self.explained[y] < MOST:
-                    verdict += (
-                        "; the rest is noise, or dependence on several instants at once, which"
-                        " higher orders come nearer to"
-                    )
-            else:
-                verdict = (
-                    f"{other} explains {100 * self.explained[y]:.2g} % of it: no sign of another"
-                    " dependence on p"
-                )
-            lines.append(f"{output}: {what}; {verdict}")
-        return "\n".join(lines)
+        rest = (
+            "; the rest is noise, or dependence on several instants at once, which higher orders"
+            " come nearer to"
+        )
+        advice = [
+            f"{output}: the coefficients do NOT depend on p as the structure says; try"
+            f' scheduling_at="{self.other}"{rest if explained < MOST else ""}'
+            for output, explained, dynamic in zip(
+                self.outputs, self.explained, self.dynamic, strict=True
+            )
+            if dynamic
+        ]
+        return "\n".join([concluded(self.criteria), *advice])
 
 
 def dependence_report(
@@ -119,7 +123,7 @@ def dependence_report(
     Returns
     -------
     DependenceReport
-        `str()` of it says it in a line an output.
+        `str()` of it is a table, one row an output.
 
     Raises
     ------
@@ -139,7 +143,7 @@ def dependence_report(
     common, of_data, theirs = np.intersect1d(data.rows, extra.rows, return_indices=True)
     phi, y, psi = data.phi[of_data], data.y[of_data], extra.phi[theirs]
     error, m = data.residuals(model.theta)[of_data], len(common)
-    explained, probability = np.zeros(arx.ny), np.ones(arx.ny)
+    explained, probability, chance = np.zeros(arx.ny), np.ones(arx.ny), np.ones(arx.ny)
     for group in arx.groups:
         regressors = arx.regressors(group)
         Q = _range(phi[:, regressors])
@@ -157,6 +161,8 @@ def dependence_report(
                     (total - gained) / left, np.finfo(float).tiny
                 )
                 probability[output] = fisher.sf(statistic, P.shape[1], left)
+                likely = P.shape[1] * fisher.isf(SIGNIFICANT, P.shape[1], left)
+                chance[output] = likely / (likely + left)
     size = np.sqrt(np.mean(y**2, axis=0))
     residual = np.sqrt(np.mean(error**2, axis=0)) / np.where(size > 0, size, 1.0)
     return DependenceReport(
@@ -166,6 +172,7 @@ def dependence_report(
         residual=residual,
         explained=explained,
         probability=probability,
+        chance=chance,
     )
 
 

@@ -10,12 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from identification.design.criterion import Criterion, Verdict, concluded, missed, verdict_of
 from identification.judge.coefficient_covariance import drawn
 from identification.judge.criteria import (
     SET,
     SHARE_OF_MARGIN,
-    Criterion,
-    Verdict,
     certainty,
     feedback,
     predictions,
@@ -23,7 +22,6 @@ from identification.judge.criteria import (
     responses,
     stability,
     static_gain,
-    together,
 )
 from identification.judge.frozen_plant import AtPoint, FrozenPlant, Model, Point
 from identification.judge.response_regions import StructureBias, with_neighbours
@@ -98,7 +96,7 @@ class FitForControl:
     @property
     def verdict(self) -> Verdict:
         """The worst of the rows that decide: one "not fit", then one "not known"."""
-        return together(row.verdict for row in self.criteria if row.decides)
+        return verdict_of(self.criteria)
 
     def __getitem__(self, name: str) -> Criterion:
         """The row of this name."""
@@ -108,25 +106,7 @@ class FitForControl:
         raise KeyError(name)
 
     def __str__(self) -> str:
-        head = ("criterion", "value", "at most", "truth", "verdict", "where", "source")
-        rows = [
-            (
-                row.name,
-                _number(row.value),
-                _number(row.threshold),
-                "" if row.truth is None else _number(row.truth),
-                row.verdict if row.decides else f"({row.verdict})",
-                row.where,
-                row.source,
-            )
-            for row in self.criteria
-        ]
-        widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
-        lines = [
-            "  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip()
-            for row in (head, *rows)
-        ]
-        return "\n".join([*lines, f"verdict: {self.verdict}"])
+        return concluded(self.criteria)
 
 
 def added(noise: Array, structure: Array, correlation: float = CORRELATION) -> Array:
@@ -366,10 +346,6 @@ def _discrete(model: LinearModel, plant: FrozenPlant) -> LinearModel:
     return sampled.select(inputs=plant.inputs, outputs=plant.outputs)
 
 
-def _number(value: float) -> str:
-    return "-" if np.isnan(value) else f"{value:.3g}"
-
-
 def design_model(
     model: KinematicModel,
     judged: FitForControl,
@@ -420,22 +396,15 @@ def design_model(
     ...     idn.design.design_model(None, poor)
     ... except NotFitError as error:
     ...     print(error.reasons[0])
-    nu-gap over margin is 1.4, at most 1 (hover): not fit
+    nu-gap over margin is 1.4, at most 1 (hover): violated
     """
     if not isinstance(judged, FitForControl):
         raise InputError(
             f"judged: expected what fit_for_control found, got {type(judged).__name__}"
         )
     if judged.verdict != "fit" and not force:
-        reasons = tuple(
-            f"{row.name} is {row.value:.3g}, at most {row.threshold:.3g}"
-            + (f" ({row.where})" if row.where else "")
-            + f": {row.verdict}"
-            for row in judged.criteria
-            if row.decides and row.verdict != "fit"
-        )
         known = "not known to be" if judged.verdict == "not known" else "not"
-        raise NotFitError(f"the model is {known} fit for control", reasons)
+        raise NotFitError(f"the model is {known} fit for control", missed(judged.criteria))
     if probability is None:
         return model.to_state_space(outputs, inputs, held=held, degree=degree)
     return model.uncertain(probability, outputs, inputs, held=held, degree=degree)

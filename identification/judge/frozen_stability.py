@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
+from identification.design.criterion import Criterion, Verdict, table
 from identification.judge.coefficient_covariance import drawn
 from identification.judge.frozen_plant import FrozenPlant, Model, Point, text
 from symheli.errors import InputError
@@ -66,14 +67,27 @@ class FrozenStability:
             for low, high in zip(self.low, self.high, strict=True)
         )
 
-    def __str__(self) -> str:
-        calls = self.calls
-        open_ = [text(p) for p, call in zip(self.points, calls, strict=True) if call == "not known"]
-        return (
-            f"with the scheduling held: stable at {calls.count('stable')}, unstable at"
-            f" {calls.count('unstable')} of {len(calls)} points; not known at"
-            f" {len(open_)}" + (f": p = {'; '.join(open_)}" if open_ else "")
+    @property
+    def criteria(self) -> tuple[Criterion, ...]:
+        """The growth rate at each point, 1/s; met where the whole band is below 0."""
+        verdicts: dict[Call, Verdict] = {"stable": "fit", "unstable": "not fit"}
+        return tuple(
+            Criterion(
+                name=f"growth rate at p = {text(p)}, 1/s",
+                value=float(growth),
+                threshold=0.0,
+                verdict=verdicts.get(call, "not known"),
+                where=f"95 % band {low:.3g} to {high:.3g}",
+            )
+            for p, growth, low, high, call in zip(
+                self.points, self.growth, self.low, self.high, self.calls, strict=True
+            )
         )
+
+    def __str__(self) -> str:
+        counts = (f"{call} at {self.calls.count(call)}" for call in get_args(Call))
+        of = f"of {len(self.points)} points"
+        return f"with the scheduling held: {', '.join(counts)} {of}\n{table(self.criteria, '  ')}"
 
 
 def frozen_stability(
@@ -100,7 +114,7 @@ def frozen_stability(
     Returns
     -------
     FrozenStability
-        `.calls`, and `str()` that counts them.
+        `.calls`, and `str()` that counts and shows them.
 
     Raises
     ------
@@ -109,8 +123,10 @@ def frozen_stability(
 
     Examples
     --------
-    >>> print(idn.judge.frozen_stability(model, [-0.5, 0.0, 0.5]))
-    with the scheduling held: stable at 3, unstable at 0 of 3 points; not known at 0
+    >>> print(idn.judge.frozen_stability(model, [0.0]))
+    with the scheduling held: stable at 1, unstable at 0, not known at 0 of 1 points
+      criterion                  value  threshold  verdict  where
+      growth rate at p = 0, 1/s  -6.93  at most 0  met      95 % band -6.94 to -6.91
     """
     covariance = model.covariance if covariance is None else covariance
     if covariance is None:

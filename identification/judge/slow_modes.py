@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import nnls
 
+from identification.design.criterion import Criterion, judged, table
 from identification.design.excitation import column_scale
 from identification.judge.uncertainty import uncertainty
 from identification.model.lpvarx_model import LPVARXModel
@@ -67,9 +68,22 @@ class SlowMode:
         return max(2 * self.standard_error, self.shift)
 
     @property
+    def criterion(self) -> Criterion:
+        """The error, at most a quarter of the rate of decay or growth, 1/s."""
+        at = ", ".join(f"{value:.3g}" for value in self.p)
+        return judged(
+            f"error of the pole {self.s:.2g} at p = {at}, 1/s",
+            self.error,
+            LOST * abs(self.s.real),
+            "not known",
+            where=f"two standard errors {2 * self.standard_error:.2g}, shift by noise of the"
+            f" sensors {self.shift:.2g}",
+        )
+
+    @property
     def lost(self) -> bool:
         """Whether noise leaves open how fast the mode decays or grows, to a quarter."""
-        return self.error > LOST * abs(self.s.real)
+        return self.criterion.verdict == "not known"
 
     @property
     def period(self) -> float:
@@ -115,24 +129,23 @@ class SlowModes:
         return max(self.lost, key=lambda m: m.error / abs(m.s))
 
     @property
+    def criteria(self) -> tuple[Criterion, ...]:
+        """The error of each mode."""
+        return tuple(mode.criterion for mode in self.modes)
+
+    @property
     def statement(self) -> str:
         """The text without advice."""
-        if not self.lost:
-            known = f"{len(self.modes)}, decay or growth of each known to a quarter"
-            return f"slow modes: {known if self.modes else 'none'}"
-        worst = self._worst
-        at = ", ".join(f"{value:.3g}" for value in worst.p)
-        return (
-            f"slow modes: NOT known at {1 / self.dt:.3g} Hz: the pole {worst.s:.2g} 1/s at p = {at}"
-            f" is uncertain by {2 * worst.standard_error:.2g} (two standard errors) and moves by"
-            f" {worst.shift:.2g} where the residuals are taken for noise of the sensors"
-        )
+        if not self.modes:
+            return "slow modes: none"
+        known = "NOT known" if self.lost else "known"
+        return f"slow modes: {known} at {1 / self.dt:.3g} Hz\n{table(self.criteria, '  ')}"
 
     def __str__(self) -> str:
         if not self.lost:
             return self.statement
         return (
-            f"{self.statement}; for this mode identify at about"
+            f"{self.statement}\n  for the pole {self._worst.s:.2g} 1/s identify at about"
             f" {1 / (self.dt * self.together):.2g} Hz (means of {self.together} samples, delay 0),"
             " or by instruments"
         )

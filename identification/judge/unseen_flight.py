@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import t as student
 
+from identification.design.criterion import Criterion, concluded, judged, missed
 from identification.estimators.filter_error import Noise, SmoothedStretch, noise_of_flight, unbroken
 from identification.estimators.residual_power import BANDS, WINDOW, window_powers
 from identification.model.kinematic_model import KinematicModel
@@ -40,7 +41,7 @@ class ResidualBand(NamedTuple):
     --------
     >>> from identification.judge.unseen_flight import ResidualBand
     >>> print(ResidualBand("w", 0.0, 1.0, 640.0))
-    w, 0 to 1 Hz: 640 times
+    w, 0 to 1 Hz
     """
 
     equation: str
@@ -49,7 +50,7 @@ class ResidualBand(NamedTuple):
     ratio: float
 
     def __str__(self) -> str:
-        return f"{self.equation}, {self.low:g} to {self.high:g} Hz: {self.ratio:.3g} times"
+        return f"{self.equation}, {self.low:g} to {self.high:g} Hz"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,8 +63,10 @@ class UnseenFlight:
     --------
     >>> import identification as idn
     >>> from identification.judge.unseen_flight import UnseenFlight
-    >>> UnseenFlight(power=1.4, largest=1.05, samples=2000).explained
-    False
+    >>> print(UnseenFlight(power=1.4, largest=1.05, samples=2000))
+    criterion       value  threshold     verdict
+    residual power  1.4    at most 1.05  violated
+    verdict: not fit
     """
 
     power: float
@@ -72,21 +75,26 @@ class UnseenFlight:
     bands: tuple[ResidualBand, ...] = ()
 
     @property
+    def criteria(self) -> tuple[Criterion, ...]:
+        """The residual power, then the bands."""
+        bands = (judged(str(band), band.ratio, 1.0) for band in self.bands)
+        return judged("residual power", self.power, self.largest), *bands
+
+    @property
     def explained(self) -> bool:
         """Whether the residual power is within the acceptance threshold, in every band too."""
-        return self.power <= self.largest and not self.bands
+        return not missed(self.criteria)
+
+    def __str__(self) -> str:
+        return concluded(self.criteria)
 
     def require(self) -> None:
         """Raise `InputError` if the model does not explain the flight."""
         if not self.explained:
-            where = "; ".join(map(str, self.bands[:3]))
             raise InputError(
-                f"the residual power on this flight is {self.power:.2f} of what the noise model"
-                f" explains, {self.largest:.2f} is allowed"
-                + f", and in bands more than the flights used to identify allow ({where})"
-                * bool(where)
-                + ": no certificate about it holds for this vehicle as it flew; identify"
-                " from this flight too, or find out what has changed"
+                f"the model does not explain this flight ({'; '.join(missed(self.criteria)[:4])}):"
+                " no certificate about it holds for this vehicle as it flew; identify from this"
+                " flight too, or find out what has changed"
             )
 
 

@@ -75,9 +75,9 @@ def seen_slowly(found: SlowModes, given: Flags, again: Again) -> str:
             except SymheliError:
                 continue
         if not seen.lost:
-            return f"{found.statement}; tried: {_typed(flags)} leaves no mode unknown"
+            return f"{found.statement}\n  tried: {_typed(flags)} leaves no mode unknown"
     return (
-        f"{found.statement}; tried: --decimate {', '.join(map(str, tried))} show it no better:"
+        f"{found.statement}\n  tried: --decimate {', '.join(map(str, tried))} show it no better:"
         " record longer, or with the external excitation logged, --method iv --instruments NAME"
     )
 

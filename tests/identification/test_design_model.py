@@ -38,11 +38,13 @@ def test_a_fit_model_is_handed_out_as_its_estimate_or_its_set():
     assert idn.design.design_model(Spy(), judged("fit"), probability=0.9) == ("set", 0.9)
 
 
-@pytest.mark.parametrize("verdict", ["not fit", "not known"])
-def test_any_other_is_refused_with_every_criterion_that_decides(verdict):
+@pytest.mark.parametrize(
+    ("verdict", "printed"), [("not fit", "violated"), ("not known", "not known")]
+)
+def test_any_other_is_refused_with_every_criterion_that_decides(verdict, printed):
     with pytest.raises(NotFitError, match="force=True") as caught:
         idn.design.design_model(Spy(), judged("fit", verdict))
-    assert caught.value.reasons == (f"row 1 is 1.4, at most 1: {verdict}",)
+    assert caught.value.reasons == (f"row 1 is 1.4, at most 1: {printed}",)
     assert idn.design.design_model(Spy(), judged(verdict), force=True)[0] == "estimate"
 
 

@@ -1,5 +1,7 @@
 """What the data cannot determine is refused, in words."""
 
+import re
+
 import numpy as np
 import pytest
 from known_systems import Truth, moving, structure
@@ -36,6 +38,9 @@ def test_two_inputs_that_move_together_are_named():
     together = record.with_signals({"col": "1"}, col=0.7 * record["lat"])
     report = idn.excitation_report(arx, together)
     assert report.rank == 6
+    assert [(row.value, row.threshold) for row in report.criteria if row.verdict == "not fit"] == [
+        (6, 9)
+    ]
     assert "lat(k-1)" in report.worst_direction
     assert "col(k-1)" in report.worst_direction
 
@@ -55,8 +60,9 @@ def test_report_of_a_good_record_says_so():
     # columns of length 1: the squares of the singular values add up to their number
     assert np.sum(report.singular_values**2) == pytest.approx(12)
     assert report.occupancy.sum() == report.samples == 398
+    assert {row.verdict for row in report.criteria} == {"fit"}
     text = str(report)
-    assert "sufficient" in text
+    assert re.search(r"excitation: sufficient\n.*\n  samples +398 +at least 12 +met\n", text)
     assert "worst determined" in text
 
 

@@ -12,8 +12,8 @@ from scipy.signal import butter, sosfilt
 from scipy.stats import chi2
 
 import identification as idn
+from identification.design.criterion import judged, table, verdict_of
 from identification.judge.coefficient_covariance import drawn
-from identification.judge.criteria import together
 from identification.judge.derivatives import Certainty, Derivatives
 from identification.judge.fit_for_control import added
 from identification.judge.frozen_plant import FrozenPlant
@@ -316,9 +316,23 @@ def test_draws_that_the_loop_loses_are_not_known():
 
 
 def test_one_bad_row_decides():
-    assert together(["fit", "not known", "fit"]) == "not known"
-    assert together(["fit", "not known", "not fit"]) == "not fit"
-    assert together(["fit"]) == "fit"
+    met, violated, unknown = (judged("row", v, 1.0) for v in (0.5, 2.0, np.nan))
+    assert verdict_of([met, unknown, met]) == "not known"
+    assert verdict_of([met, unknown, violated]) == "not fit"
+    assert verdict_of([met]) == "fit"
+    assert verdict_of([met, judged("informs", 2.0, 1.0, decides=False)]) == "fit"
+
+
+def test_a_table_has_no_column_that_is_empty_in_every_row():
+    unknown = judged("TIC", np.nan, 0.25, where="no stretch so long")
+    rows = unknown, judged("rank", 3, 4, sense="at least", decides=False)
+    assert table(rows, "  ").splitlines() == [
+        "  criterion  value  threshold     verdict     where",
+        "  TIC        -      at most 0.25  not known   no stretch so long",
+        "  rank       3      at least 4    (violated)",
+    ]
+    assert str(unknown) == "TIC has no value, at most 0.25 (no stretch so long): not known"
+    assert str(judged("rank", 4, 4, sense="at least")) == "rank is 4, at least 4: met"
 
 
 @pytest.mark.slow

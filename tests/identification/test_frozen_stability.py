@@ -1,5 +1,7 @@
 """Stability with the scheduling held, as far as the coefficients are known."""
 
+import re
+
 import numpy as np
 import pytest
 from known_systems import flown
@@ -45,7 +47,9 @@ def test_the_band_is_that_of_the_coefficient(model):
 def test_where_the_band_crosses_the_axis_nothing_is_known(model):
     found = idn.judge.frozen_stability(model, [-0.9, 0.0, 0.9])
     assert found.calls == ("stable", "not known", "unstable")
-    assert "not known at 1: p = 0" in str(found)
+    assert [row.verdict for row in found.criteria] == ["fit", "not known", "not fit"]
+    assert "not known at 1 of 3 points" in str(found)
+    assert re.search(r"p = 0, 1/s .* at most 0  not known  95 % band -", str(found))
 
 
 def test_a_model_without_covariance_is_refused(model):

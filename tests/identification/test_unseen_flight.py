@@ -45,7 +45,7 @@ def test_louder_sensors_and_another_vehicle_are_not(vehicle, model):
     other = Vehicle(na=1, nb=1)
     other.theta = vehicle.theta * 1.3
     found = idn.judge.validate(model, other.record(300, seed=5, sensors=SENSORS))
-    with pytest.raises(InputError, match="no certificate about it holds"):
+    with pytest.raises(InputError, match=r"\(residual power is .* no certificate about it holds"):
         found.require()
 
 
@@ -113,7 +113,14 @@ def test_bands_refuse_one_flight_of_a_hundred_and_find_what_is_slow():
     slow[:, 3] += 1.3 * np.sin(2 * np.pi * 0.5 * DT * np.arange(LONG) + 0.2)
     (worst, *_) = judge._unlikely(known, [slow], DT, np.zeros(8))
     assert (worst.equation, worst.low, worst.high) == ("p", 0.0, 1.0)
-    assert "p, 0 to 1 Hz" in str(worst)
+    assert str(worst) == "p, 0 to 1 Hz"
+    found = judge.UnseenFlight(power=1.0, largest=1.1, samples=1, bands=(worst,))
+    assert [(row.name, row.verdict) for row in found.criteria] == [
+        ("residual power", "fit"),
+        ("p, 0 to 1 Hz", "not fit"),
+    ]
+    assert not found.explained
+    assert judge.UnseenFlight(power=1.0, largest=1.1, samples=1).explained
     # too few windows, or too short a flight, are not judged by bands
     assert judge._unlikely(known[:3], [slow], DT, np.zeros(8)) == ()
     assert judge._unlikely(known, [slow[:200]], DT, np.zeros(8)) == ()
