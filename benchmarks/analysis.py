@@ -30,7 +30,8 @@ import symheli  # noqa: E402
 from benchmarks.memory import alone, peak  # noqa: E402
 from benchmarks.opponents import gridded_lmi  # noqa: E402
 from benchmarks.timing import arguments, keep  # noqa: E402
-from studies.loops.lateral import HOLD, OUTPUTS, STATES, lateral_loop  # noqa: E402
+from studies.loops.lateral import HOLD, OUTPUTS, lateral_loop  # noqa: E402
+from studies.setup.axes import LATERAL  # noqa: E402
 from symheli import LFT, LPVStateSpace, Scheduling  # noqa: E402
 from symheli.flight import XCELL_SERVOS  # noqa: E402
 from symheli.lpv.tools import pade_delay  # noqa: E402
@@ -64,7 +65,7 @@ def behind_servo(heli: symheli.Helicopter, delay: int) -> LPVStateSpace:
     """
     airspeeds = np.linspace(0.0, 13.0, 27)
     family = symheli.sweep(heli, airspeeds, inputs=("d_lat", "v_w")).select(
-        STATES, ("d_lat", "v_w")
+        LATERAL.states, ("d_lat", "v_w")
     )  # type: ignore[arg-type]
     models = []
     for k in range(len(family)):

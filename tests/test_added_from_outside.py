@@ -25,6 +25,7 @@ from symheli.errors import InputError, UnknownNameError
 from symheli.logs.column import Column
 from symheli.logs.format import LogFormat, contents_of, format_of
 from symheli.values import plain_file
+from symheli.values.kinematics import INPUTS
 from symheli.values.named_subclasses import named_subclasses
 from synthesis.certify.questions.certificate import Certificate
 from synthesis.certify.questions.certify import certify
@@ -253,7 +254,7 @@ def test_identify_takes_a_log_of_ones_own(record, tmp_path, capsys, name):
 
 def test_commands_that_fly_take_a_log_of_ones_own(record, tmp_path, capsys):
     """The records of calibrate and tune; experiment asks for a map, and takes it."""
-    names = dict.fromkeys(calibrate.INPUTS, "rad") | {"q": "rad/s"}
+    names = dict.fromkeys(INPUTS, "rad") | {"q": "rad/s"}
     flight = record.with_signals(names, **dict.fromkeys(names, record["u"]))
     asked = argparse.Namespace(map=None, start=None, stop=5.0)
     found = calibrate.record_of(asked, written(flight, tmp_path / "log", "toy lines"))
