@@ -12,7 +12,7 @@ from identification.design.excitation import excitation_of
 from identification.design.leakage import warn_of_leakage
 from identification.estimators.filter_error import FilterError
 from identification.estimators.least_squares import residual_covariance
-from identification.estimators.method import Method, known_methods, method_of
+from identification.estimators.method import Method, exported_methods, method_of
 from identification.estimators.prediction_error import OutputError
 from identification.estimators.state_space_search import state_space_of
 from identification.model.flown_in import flown_in
@@ -140,13 +140,12 @@ def _with_methods(text: str | None) -> str:
     """Return the docstring of `fit` with the estimators that the package has."""
     lines = [
         textwrap.fill(
-            f'- `{method.__name__}`, "{name}": {_first(method)}',
+            f'- `{method.__name__}`, "{method.shorthand}": {_first(method)}',
             width=100,
             initial_indent=8 * " ",
             subsequent_indent=10 * " ",
         )
-        for name, method in known_methods().items()
-        if method.__module__.startswith(str(__package__))
+        for method in exported_methods()
     ]
     before, all_of, after = (text or "").partition("biases all of least squares:\n")
     return "\n".join([before + all_of, *lines, after])

@@ -104,11 +104,16 @@ def known_methods() -> dict[str, type[Method]]:
 
     Raises `InputError` where two of them have one shorthand.
     """
+    return named_subclasses(Method, "shorthand", "symheli.methods", exported_methods())
+
+
+def exported_methods() -> list[type[Method]]:
+    """Return the estimators that `identification.methods` exports; loads none from elsewhere."""
     from identification import methods
 
     exports = [getattr(methods, name) for name in dir(methods)]
-    own = [each for each in exports if isinstance(each, type) and issubclass(each, Method)]
-    return named_subclasses(Method, "shorthand", "symheli.methods", own)
+    known = [each for each in exports if isinstance(each, type) and issubclass(each, Method)]
+    return [each for each in known if "shorthand" in vars(each)]
 
 
 def method_of(value: Method | str) -> Method:
