@@ -206,7 +206,9 @@ _CLARABEL = {
         Answer.FAILED,
     ),
 }
-"""Answers by the status of Clarabel: that something almost has no solution says nothing."""
+"""Answers by the status of Clarabel, FAILED for others: that something almost has no solution says
+nothing.
+"""
 _SCS = {
     **dict.fromkeys((-7, -6, -5, -4, -3, -1, 0), Answer.FAILED),
     **{-2: Answer.INFEASIBLE, 1: Answer.SOLVED, 2: Answer.SOLVED},
@@ -399,7 +401,7 @@ def _clarabel(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
     except SolverError as error:
         return Answer.FAILED, None, str(error)
     word = str(solution.status)
-    answer = _CLARABEL[word]
+    answer = _CLARABEL.get(word, Answer.FAILED)
     # a point that ran out of iterations or progress may still pass the verification
     return answer, None if "PrimalInfeasible" in word else solution.x, word
 
@@ -420,7 +422,7 @@ def _scs(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
     word = str(solution["info"]["status"])
     if word == "interrupted":  # SCS handles the interrupt itself
         raise KeyboardInterrupt
-    answer = _SCS[solution["info"]["status_val"]]
+    answer = _SCS.get(solution["info"]["status_val"], Answer.FAILED)
     return answer, None if answer is Answer.INFEASIBLE else solution["x"], word
 
 
@@ -444,5 +446,5 @@ def _cvxpy(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
         )
     except CvxpyError as error:
         return Answer.FAILED, None, str(error)
-    answer = _CVXPY[problem.status]
+    answer = _CVXPY.get(problem.status, Answer.FAILED)
     return answer, None if answer is Answer.INFEASIBLE else x.value, str(problem.status)
