@@ -1,7 +1,7 @@
 """Every design with every certificate over three plants: a helicopter's lateral axis, a missile and
 a crane. A cell is a number, or why there is none.
 
-    python -m evidence.every_pair            the tables; --write keeps them in docs/checks.md
+    python -m evidence.every_pair            the tables
     python -m evidence.every_pair missile    of one plant
 """
 
@@ -25,13 +25,11 @@ import numpy as np
 
 import symheli
 import synthesis
-from evidence.tables import keep, markdown, parsed
+from evidence.tables import markdown
 from symheli import LPVStateSpace, Scheduling
 from symheli.errors import SymheliError, SynthesisError
 from synthesis import Certificate, Plant, analysis, designs, objectives, robust, structures
 
-PAGE = Path(__file__).resolve().parents[1] / "docs" / "checks.md"
-SECTION = "every pair"
 MOST = 60.0
 """Seconds after which a cell is given up."""
 CRASHED = "TRACEBACK"
@@ -305,11 +303,8 @@ def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("plants", nargs="*", default=[*PLANTS], choices=PLANTS, metavar="plant")
-    given = parsed(parser, str(PAGE))
-    text = "\n\n".join(f"**{name}**\n\n{table(name)}" for name in given.plants)
-    print(text)
-    if given.write:
-        keep(PAGE, SECTION, text)
+    for name in parser.parse_args().plants:
+        print(f"**{name}**\n\n{table(name)}\n")
 
 
 if __name__ == "__main__":
