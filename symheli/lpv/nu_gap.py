@@ -63,8 +63,8 @@ def nu_gap(
     1 where the winding-number condition fails: no controller is known to suit both. Continuous
     models are compared after the bilinear transformation of both, which preserves it. Evaluated on
     frequencies up to Nyquist, logarithmic, from a thousandth of the slowest pole, at the poles and
-    around them, but only every fourth where the distance stays below the largest, and between them
-    where the response turns by more than an eighth of a circle.
+    around them: every fourth first, then the others where the distance may reach the largest, and
+    points between them where the response turns by more than an eighth of a circle.
 
     Parameters
     ----------

@@ -80,7 +80,7 @@ class StructuredController(Controller):
     reached : tuple of float
         The largest frozen gain of each, as a ratio to its bound.
     stationarity : Stationarity
-        How nearly the gains are a local minimum.
+        How nearly the largest gain was at a local minimum, before the mean gain was lowered.
     starts : tuple of float
         Largest ratio reached from every start in its first steps; inf where none stabilised.
 
@@ -175,8 +175,9 @@ def structured(
     From every start the largest real part of a pole is lowered until every loop is stable, then the
     largest gain, by BFGS along the slope of the peak that decides; the best are continued, and the
     best of those by gradient sampling, whose measure says how nearly it is a local minimum. Where
-    the gain between the conditions is larger, conditions are added. A local minimum is not the
-    least gain of the structure: more `starts` may find less.
+    the gain between the conditions is larger, conditions are added. Of several conditions the mean
+    gain is lowered at last, with the largest within .2 % of that minimum. A local minimum is not
+    the least gain of the structure: more `starts` may find less.
 
     Ctrl-C ends the search; where some loop was stable by then the best is returned, and a note says
     so.

@@ -25,7 +25,7 @@ from synthesis.certify.questions.finer import (
     ABOVE_FROZEN,
     by_coefficients,
     finer,
-    long,
+    jumps_left_out,
     over_jumps,
 )
 from synthesis.certify.questions.general_search import General
@@ -112,7 +112,7 @@ def certify(problem: BoundProblem) -> Certificate:
         beaten = beaten._replace(seconds=beaten.seconds + time.perf_counter() - start)
         if worst is not None:
             return report.nothing(Status.GROWING, beaten._replace(worst=worst), ladder)
-    if long(problem):
+    if jumps_left_out(problem) and not ladder.next_to(best, level):
         ladder.attempts.append(Attempt("P on both sides of a jump", 0.0, "left out", math.inf))
         if best.answer is Answer.INFEASIBLE:  # that no constant P exists says less
             best = best._replace(answer=Answer.UNTRIED)

@@ -36,12 +36,12 @@ def finer(problem: BoundProblem) -> BoundProblem | None:
 
 def over_jumps(problem: BoundProblem) -> BoundProblem | None:
     """Return the problem of a sampled model with P(p) on both sides of a jump of p, as the general
-    search has it; None where p does not jump, that was asked already, or it takes too `long`.
+    search has it; None where p does not jump, that was asked already, or it is left out.
     """
-    return problem._replace(general=True) if problem.jumps and not long(problem) else None
+    return problem._replace(general=True) if problem.jumps and not jumps_left_out(problem) else None
 
 
-def long(problem: BoundProblem) -> bool:
+def jumps_left_out(problem: BoundProblem) -> bool:
     """Whether P(p) on both sides of a jump is left out: for a gain of many states its programs take
     minutes to hours.
     """
