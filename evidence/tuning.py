@@ -16,11 +16,12 @@ from evidence.marks.calibrated import start_of
 from evidence.seeds import over_seeds, parser_of, seeds_of
 from evidence.tables import DOCS, keep, markdown, parsed
 from identification import calibrate
-from studies.autopilot.tuned import QUANTITIES, LoopMargins, loop_margins
+from studies.autopilot.tuned import LEAST, LoopAt, loop_margins
 from studies.known_kinematics.models import PAIRS
 from studies.output import as_json
 from symheli import AirspeedSchedule, Excitation, Helicopter
 from symheli.flight import HelicopterLoops
+from synthesis.design.loops.loop_measures import MEASURES
 
 TRUTH = "xcell60"
 AIRSPEEDS = (0.0, 4.0, 8.0, 12.0)
@@ -72,11 +73,11 @@ class Prediction:
 
     seed: int
     change: dict[str, float]
-    predicted: list[LoopMargins]
-    true: list[LoopMargins]
+    predicted: list[LoopAt]
+    true: list[LoopAt]
 
     @property
-    def pairs(self) -> list[tuple[LoopMargins, LoopMargins]]:
+    def pairs(self) -> list[tuple[LoopAt, LoopAt]]:
         """Predicted and true margins of each loop at each airspeed."""
         return list(zip(self.predicted, self.true, strict=True))
 
@@ -97,20 +98,22 @@ class Prediction:
         return all(self.held("gain")) and all(self.held("phase"))
 
     def held(self, name: str) -> list[bool]:
-        """Of one of `QUANTITIES`, whether each true value of a loop that is stable, and called so,
+        """Of one of `LEAST`, whether each true value of a loop that is stable, and called so,
         lies in its band.
         """
         found = []
         for predicted, true in self.pairs:
             if predicted.stable and true.stable:
-                value, band = predicted.banded(name)
-                found.append(abs(value - true.banded(name)[0]) <= band)
+                value, band = predicted.measures.banded(name)
+                found.append(abs(value - true.measures.banded(name)[0]) <= band)
         return found
 
     @property
     def enough(self) -> bool:
         """Whether the true loops keep 6 dB and 45 degrees everywhere."""
-        return self.stable and all(t.gain >= ENOUGH[0] and t.phase >= ENOUGH[1] for t in self.true)
+        return self.stable and all(
+            t.measures["gain"] >= ENOUGH[0] and t.measures["phase"] >= ENOUGH[1] for t in self.true
+        )
 
 
 def of_seed(seed: int) -> Prediction:
@@ -145,7 +148,14 @@ def table(found: Sequence[Prediction]) -> str:
     """How often predictions held."""
     unstable = [p for p in found if not p.stable]
     enough = [p for p in found if p.enough]
-    bands = np.array([(r.gain_band, r.phase_band) for p in found for r in p.predicted if r.stable])
+    bands = np.array(
+        [
+            [r.measures.bands[name] for name in ("gain", "phase")]
+            for p in found
+            for r in p.predicted
+            if r.stable
+        ]
+    )
     inside = sum(p.inside for p in found)
     called = sum(p.called is False for p in unstable)
     said = sum(p.called is True for p in enough)
@@ -177,11 +187,11 @@ def table(found: Sequence[Prediction]) -> str:
     ]
     head = ("", "measured", "mark", "")
     pooled = []
-    for name, quantity in QUANTITIES.items():
+    for name in LEAST:
         held = [h for p in found for h in p.held(name)]
-        half = np.median([r.banded(name)[1] for p in found for r in p.predicted if r.stable])
-        words = f"{half:.2g} {quantity.unit}"
-        pooled.append((name.replace("_", " "), f"{sum(held)} of {len(held)}", words))
+        half = np.median([r.measures.bands[name] for p in found for r in p.predicted if r.stable])
+        words = f"{half:.2g} {MEASURES[name].unit}"
+        pooled.append((MEASURES[name].words, f"{sum(held)} of {len(held)}", words))
     return "\n".join(
         [
             f"Flights of {TRUTH} under loops as ArduPilot's, start of the calibration"

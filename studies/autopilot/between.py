@@ -10,7 +10,7 @@ import numpy as np
 
 import symheli
 import synthesis
-from studies.autopilot.responses import closed_loops
+from studies.autopilot.tuned import closed_loops
 from symheli import Helicopter, LinearFamily, LPVStateSpace, Servo
 from symheli.errors import InputError, TrimError
 from symheli.flight import HelicopterLoops

@@ -6,52 +6,42 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 import symheli
-from studies.autopilot.responses import Responses, closed_loops, responses
-from symheli import Helicopter, Servo
+from symheli import Helicopter, LinearModel, Servo
 from symheli.errors import InputError, TrimError
 from symheli.flight import HelicopterLoops
-from symheli.flight.ardupilot import AXES, COMMANDS
+from symheli.flight.ardupilot import AXES, COMMANDS, MEASURED
+from symheli.lpv import connect
 from symheli.progress import tracked
-from symheli.values.arrays import Array
 from synthesis.design.loops.actuated import actuated
+from synthesis.design.loops.loop_measures import LoopMeasures
 from synthesis.design.loops.margins import margins, open_loop
+from synthesis.design.loops.responses import Responses, responses
 
 CONTROLS = tuple(control for _, _, control in AXES.values())
-
-LARGEST = 40.0
-"""Margin, dB, above which a loop has as much as anyone asks for: larger ones are shown as this."""
 
 DEVIATIONS = 3.0
 """Half width of a band in standard deviations of the drawn helicopters."""
 
 
-class QuantityBand(NamedTuple):
-    """Unit of a quantity, and the smallest half width of its band: what rounding, trims and a
-    period of the loops leave.
-    """
-
-    unit: str
-    least: float
-
-
-QUANTITIES = {
-    "gain": QuantityBand("dB", 0.1),
-    "phase": QuantityBand("deg", 0.5),
-    "bandwidth": QuantityBand("rad/s", 0.02),
-    "peak": QuantityBand("dB", 0.1),
-    "rejection": QuantityBand("rad/s", 0.02),
-    "rejection_peak": QuantityBand("dB", 0.1),
-    "overshoot": QuantityBand("%", 1.0),
-    "rise": QuantityBand("s", 0.02),
-    "settling": QuantityBand("s", 0.02),
+LEAST = {
+    "gain": 0.1,
+    "phase": 0.5,
+    "bandwidth_3db": 0.02,
+    "peak": 0.1,
+    "rejection": 0.02,
+    "rejection_peak": 0.1,
+    "overshoot": 1.0,
+    "rise": 0.02,
+    "settling": 0.02,
 }
-"""Quantities with a band: two margins, then `Responses`."""
+"""Smallest half width of the band of each quantity, in its unit: what rounding, trims and a period
+of the loops leave. Two margins, then `Responses`.
+"""
 
 RESPOND = {
     control: (attitude or rate, command, f"{attitude or rate}_disturbance")
@@ -61,39 +51,44 @@ RESPOND = {
 
 
 @dataclass(frozen=True)
-class LoopMargins:
-    """The loop of `control` at `airspeed` (m/s), the others closed: margins of the loop broken at
-    the control (dB, deg), `Responses` to the command of its attitude (of d_ped: of the yaw rate),
-    and half widths of their bands. `stable`: of all drawn helicopters; None: of some. Responses of
-    an unstable loop are NaN.
+class LoopAt:
+    """The loop of `control` at `airspeed` (m/s), the others closed: margins where it is broken at
+    the control, `Responses` to the command of its attitude (of d_ped: of the yaw rate), and their
+    bands. Stable means: of all drawn helicopters; None: of some.
     """
 
     airspeed: float
     control: str
-    stable: bool | None
-    crossover: float
-    gain: float
-    gain_band: float
-    phase: float
-    phase_band: float
-    bandwidth: float
-    bandwidth_band: float
-    peak: float
-    peak_band: float
-    rejection: float
-    rejection_band: float
-    rejection_peak: float
-    rejection_peak_band: float
-    overshoot: float
-    overshoot_band: float
-    rise: float
-    rise_band: float
-    settling: float
-    settling_band: float
+    measures: LoopMeasures
 
-    def banded(self, name: str) -> tuple[float, float]:
-        """Value and half width of the band of one of `QUANTITIES`."""
-        return getattr(self, name), getattr(self, f"{name}_band")
+    @property
+    def stable(self) -> bool | None:
+        """Whether the loops are stable; None where that is not known."""
+        return self.measures.stable
+
+    def as_dict(self) -> dict[str, object]:
+        """Every number by name, the half width of its band as `<name>_band`."""
+        out: dict[str, object] = {"airspeed": self.airspeed, "control": self.control}
+        out |= {"stable": self.stable, "crossover": self.measures["crossover"]}
+        for name in LEAST:
+            out[name], out[f"{name}_band"] = self.measures.banded(name)
+        return out
+
+
+def closed_loops(plant: LinearModel, loops: HelicopterLoops) -> LinearModel:
+    """The plant, sampled at the period of the loops, under them: phi, theta (rad) and r (rad/s) by
+    their commands and by disturbances of the same, in that order.
+    """
+    K = loops.commanded
+    outputs = [attitude or rate for rate, attitude, _ in AXES.values()]
+    disturbances = {y: f"{y}_disturbance" for y in outputs}
+    return connect(
+        plant.select(inputs=K.outputs, outputs=MEASURED),
+        K,
+        inputs=(*COMMANDS, *disturbances.values()),
+        outputs=outputs,
+        sums={y: {y: 1.0, d: 1.0} for y, d in disturbances.items()},
+    )
 
 
 def loop_margins(
@@ -103,7 +98,7 @@ def loop_margins(
     *,
     servos: Mapping[str, Servo] | None = None,
     delay: float = 0.0,
-) -> list[LoopMargins]:
+) -> list[LoopAt]:
     """Return margins and responses of every loop at every airspeed: those of the first helicopter,
     with bands from the others, which are drawn from its uncertainty; without others the bands are
     their least. A drawn helicopter without a trim is left out: the one that flew has one.
@@ -120,9 +115,9 @@ def loop_margins(
             raise InputError(
                 f"the helicopter has no trim at {airspeed:g} m/s: leave this airspeed out"
             )
-        found = np.array([one for one in each if one is not None])
-        for k, control in enumerate(CONTROLS):
-            rows.append(_row(float(airspeed), control, found[:, k]))
+        found = zip(*(one for one in each if one is not None), strict=True)
+        for control, own in zip(CONTROLS, found, strict=True):
+            rows.append(LoopAt(float(airspeed), control, _banded(own)))
     return rows
 
 
@@ -132,10 +127,8 @@ def _at(
     airspeed: float,
     servos: Mapping[str, Servo] | None,
     delay: float,
-) -> list[list[float]] | None:
-    """Of each control: 1 where stable, crossover (rad/s), then `QUANTITIES`; None without a
-    trim.
-    """
+) -> list[LoopMeasures] | None:
+    """Numbers of the loop of each control; None without a trim."""
     try:
         model = symheli.linearize(heli, symheli.trim(heli, airspeed=float(airspeed)))
     except TrimError:
@@ -144,23 +137,18 @@ def _at(
     closed = closed_loops(plant, loops)
     unknown = Responses(*[math.nan] * len(Responses._fields))
     reached = responses(closed, RESPOND) if closed.is_stable() else dict.fromkeys(CONTROLS, unknown)
-    out = []
-    for control in CONTROLS:
-        found = margins(open_loop(plant, loops.linear, control))
-        decibels = [abs(20 * math.log10(g)) if g > 0 else math.inf for g in found.gain]
-        gain = min(*decibels, LARGEST) if found.stable else 0.0
-        phase = min(math.degrees(found.phase), 180.0)
-        crossover = max(found.crossover, default=0.0)
-        out.append([float(found.stable), crossover, gain, phase, *reached[control]])
-    return out
+    return [
+        LoopMeasures.of(margins(open_loop(plant, loops.linear, control)), reached[control])
+        for control in CONTROLS
+    ]
 
 
-def _row(airspeed: float, control: str, found: Array) -> LoopMargins:
-    """`found` (helicopters, 11): stable, crossover, quantities."""
-    stable = bool(found[0, 0]) if np.all(found[:, 0] == found[0, 0]) else None
-    spread = found[1:, 2:].std(axis=0) if len(found) > 1 else np.zeros(len(QUANTITIES))
-    banded: dict[str, float] = {}
-    for name, value, sd in zip(QUANTITIES, found[0, 2:], spread, strict=True):
-        banded[name] = float(value)
-        banded[f"{name}_band"] = max(DEVIATIONS * float(sd), QUANTITIES[name].least)
-    return LoopMargins(airspeed, control, stable, float(found[0, 1]), **banded)
+def _banded(found: Sequence[LoopMeasures]) -> LoopMeasures:
+    """Numbers of the first helicopter with bands from the others."""
+    first, *drawn = found
+    bands = {}
+    for name, least in LEAST.items():
+        spread = float(np.std([one[name] for one in drawn])) if drawn else 0.0
+        bands[name] = max(DEVIATIONS * spread, least)
+    alike = all(one.stable == first.stable for one in drawn)
+    return replace(first, stable=first.stable if alike else None, bands=bands)

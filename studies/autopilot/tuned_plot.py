@@ -3,30 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from studies.autopilot.tuned import CONTROLS, QUANTITIES, LoopMargins
+from studies.autopilot.tuned import CONTROLS, LoopAt
 from symheli.values.drawing import plain
+from synthesis.design.loops.loop_measures import MEASURES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-DRAWN = ("gain", "phase", "bandwidth", "rejection", "rejection_peak", "overshoot")
+DRAWN = ("gain", "phase", "bandwidth_3db", "rejection", "rejection_peak", "overshoot")
 
 
-def csv(before: Sequence[LoopMargins], after: Sequence[LoopMargins]) -> str:
+def csv(before: Sequence[LoopAt], after: Sequence[LoopAt]) -> str:
     """Every number, a row a loop and airspeed, before and after."""
-    names = [f.name for f in fields(LoopMargins)]
-    lines = [",".join(["change", *names])]
+    lines = [",".join(["change", *before[0].as_dict()])]
     for change, rows in (("before", before), ("after", after)):
-        lines += [",".join([change, *(str(v) for v in asdict(row).values())]) for row in rows]
+        lines += [",".join([change, *map(str, row.as_dict().values())]) for row in rows]
     return "\n".join(lines) + "\n"
 
 
-def plot(before: Sequence[LoopMargins], after: Sequence[LoopMargins]) -> Axes:
+def plot(before: Sequence[LoopAt], after: Sequence[LoopAt]) -> Axes:
     """A row a quantity, a column a loop: lines over airspeed with their bands, before in grey and
     after in blue; where a loop is not known to be stable there is no line.
     """
@@ -40,13 +39,12 @@ def plot(before: Sequence[LoopMargins], after: Sequence[LoopMargins]) -> Axes:
             for rows, color, word in ((before, "0.5", "before"), (after, "C0", "after")):
                 own = [row for row in rows if row.control == control]
                 V = np.array([row.airspeed for row in own])
-                value, band = np.array([row.banded(name) for row in own]).T
+                value, band = np.array([row.measures.banded(name) for row in own]).T
                 value = np.where([row.stable is True for row in own], value, np.nan)
                 ax.plot(V, value, color=color, marker=".", label=word)
                 ax.fill_between(V, value - band, value + band, color=color, alpha=0.25, lw=0)
             plain(ax)
-        unit = QUANTITIES[name].unit
-        axes[0].set_ylabel(f"{name.replace('_', ' ')}, {unit}")
+        axes[0].set_ylabel(f"{MEASURES[name].words}, {MEASURES[name].unit}")
     for ax, control in zip(grid[0], CONTROLS, strict=True):
         ax.set_title(control)
     for ax in grid[-1]:

@@ -5,7 +5,6 @@ airspeed.
 from __future__ import annotations
 
 import argparse
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,19 +14,24 @@ from studies.output import Output, columns, progress
 from symheli.errors import InputError
 
 if TYPE_CHECKING:
-    from studies.loops.given import Loop
+    from studies.loops.margins import AtAirspeed
     from symheli import LinearFamily, LPVStateSpace
     from symheli.values import Signal
+    from synthesis.design.loops.loop_measures import LoopMeasures
+    from synthesis.design.loops.margin_table import MarginTable
     from synthesis.design.loops.margins import Margins
 
+    Loop = dict[tuple[str, str], float] | LPVStateSpace
+    """Feedback gains {(input, output): gain}, or a controller over the parameter."""
+
 HELP = "gain, phase, delay and disk margins and attitude bandwidths over airspeed"
-MARGINS, UNITS = ("gain", "phase", "delay", "disk"), ("x", "deg", "ms", "")
-RESPONSE, RESPONSE_UNITS = ("roll BW", "lag", "pitch BW"), ("rad/s", "ms", "rad/s")
+MARGINS = ("gain", "phase", "delay", "disk_gain", "disk_phase")
+HEADS = ("gain", "phase", "delay", "disk", "disk")
+RESPONSE = ("roll BW", "lag", "pitch BW"), ("rad/s", "ms", "rad/s")
 LEGEND = """\
-gain, phase, delay: by how much the loop gain may grow, how much lag and how much more delay the
-  loop bears, each alone, before it is unstable
-disk: largest disk of changes of gain and phase together that leaves it stable; 0.5: a gain of 0.6
-  to 1.67 and a phase of 28 deg, 2: any gain and 90 deg"""
+gain, phase, delay: by how much the loop gain may change in either direction, how much lag and how
+  much more delay the loop bears, each alone, before it is unstable; 40.0: 40 dB or more
+disk: by how much gain and phase may change together, at any frequency"""
 VEHICLE_LEGEND = """\
 roll BW, pitch BW: ADS-33 bandwidth, up to which the attitude follows the stick with 45 deg of phase
   and 6 dB of gain in reserve; lag: phase delay of the roll above it
@@ -92,18 +96,22 @@ def _of_loop(
     model: LPVStateSpace | LinearFamily, loop: Loop, values: list[float], s: Signal, what: str
 ) -> Output:
     """The margins of a loop at values of the parameter `s`, as a table."""
-    from studies.loops.given import over_parameter
+    import synthesis
+    from synthesis.design.loops.loop_measures import MEASURES, LoopMeasures
 
-    rows = list(over_parameter(model, loop, values))
+    broken = [u for u, _ in loop] if isinstance(loop, dict) else loop.outputs
+    tables: dict[str, MarginTable] = {
+        str(u): synthesis.margin_table(model, loop, str(u), values) for u in dict.fromkeys(broken)
+    }
+    rows = {u: [found for _, found in table.rows] for u, table in tables.items()}
     head = f"{what}: the loop broken at each input"
-    names = list(rows[0].margins)
     table = [
-        ["", *(cell for u in names for cell in (u, *[""] * (len(MARGINS) - 1)))],
-        [f"{s}, {s.unit}", *MARGINS * len(names)],
-        ["", *UNITS * len(names)],
+        ["", *(cell for u in rows for cell in (u, *[""] * (len(MARGINS) - 1)))],
+        [f"{s}, {s.unit}", *HEADS * len(rows)],
+        ["", *(MEASURES[name].unit for _ in rows for name in MARGINS)],
         *(
-            [f"{row.p:.4g}", *(cell for u in names for cell in _margins(row.margins[u]))]
-            for row in rows
+            [f"{p:.4g}", *(cell for own in found for cell in _cells(LoopMeasures.of(own)))]
+            for p, *found in zip(values, *rows.values(), strict=True)
         ),
     ]
     lines = [head, "", columns(table, left=0), "", LEGEND]
@@ -111,7 +119,7 @@ def _of_loop(
         "loop": head,
         "parameter": str(s),
         "values": values,
-        "margins": {u: [_margin_entry(row.margins[u]) for row in rows] for u in names},
+        "margins": {u: [_margin_entry(found) for found in own] for u, own in rows.items()},
         "units": {"parameter": s.unit, "phase": "rad", "delay": "s"},
     }
     return Output("\n".join(lines), data)
@@ -125,6 +133,7 @@ def _of_vehicle(arguments: argparse.Namespace) -> Output:
     from studies.loops.lateral import HOLD
     from studies.loops.margins import DELAY, over_airspeed
     from studies.setup.axes import LATERAL, LONGITUDINAL
+    from synthesis.design.loops.loop_measures import MEASURES
 
     given_model.only_with_a_model(arguments)
     if arguments.controller:
@@ -169,11 +178,12 @@ def _of_vehicle(arguments: argparse.Namespace) -> Output:
         " delay; roll (held) and pitch (free) response to the stick; gap: nu-gap at 50 Hz of exact"
         " and interpolated lateral model (input / 0.01 rad, output / 0.1 SI)"
     )
-    width = len(MARGINS) + len(RESPONSE) - 1
+    width = len(MARGINS) + len(RESPONSE[0]) - 1
+    units = (*(MEASURES[name].unit for name in MARGINS), *RESPONSE[1])
     table = [
         ["", *(cell for name in tables for cell in (name, *[""] * width)), ""],
-        ["V, m/s", *(*MARGINS, *RESPONSE) * 2, "gap"],
-        ["", *(*UNITS, *RESPONSE_UNITS) * 2, ""],
+        ["V, m/s", *(*HEADS, *RESPONSE[0]) * 2, "gap"],
+        ["", *units * 2, ""],
         *(
             [f"{exact.airspeed:.2f}", *_row(exact), *_row(near), f"{gap:.3f}"]
             for exact, near, gap in zip(*tables.values(), gaps, strict=True)
@@ -188,17 +198,16 @@ def _of_vehicle(arguments: argparse.Namespace) -> Output:
     return Output("\n".join(lines), data)
 
 
-def _row(row) -> list[str]:
-    lag = f"{1000 * row.roll.phase_delay:.0f}"
-    response = f"{row.roll.rate_response:.2f}", lag, f"{row.pitch.rate_response:.2f}"
-    return [*_margins(row.hold), *response]
+def _row(row: AtAirspeed) -> list[str]:
+    roll, pitch = row.held, row.free
+    response = (roll.cell("bandwidth_ads33"), roll.cell("phase_delay"))
+    return [*_cells(roll), *response, pitch.cell("bandwidth_ads33")]
 
 
-def _margins(hold: Margins) -> list[str]:
-    if not hold.stable:
-        return ["unstable", *[""] * (len(MARGINS) - 1)]
-    phase, delay = math.degrees(hold.phase), 1000 * hold.delay
-    return [f"{hold.gain[1]:.2f}", f"{phase:.1f}", f"{delay:.0f}", f"{hold.disk:.2f}"]
+def _cells(measures: LoopMeasures) -> list[str]:
+    if not measures.stable:
+        return [measures.cell("gain"), *[""] * (len(MARGINS) - 1)]
+    return [measures.cell(name) for name in MARGINS]
 
 
 def _margin_entry(hold: Margins) -> dict[str, object]:
@@ -213,7 +222,7 @@ def _margin_entry(hold: Margins) -> dict[str, object]:
     }
 
 
-def _entry(row) -> dict[str, object]:
+def _entry(row: AtAirspeed) -> dict[str, object]:
     unit = {"phase": "rad", "delay": "s", "bandwidth": "rad/s", "phase_delay": "s"}
     return {
         "airspeed": row.airspeed,

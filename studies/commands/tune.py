@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from studies.autopilot.between import Between
-    from studies.autopilot.tuned import LoopMargins
+    from studies.autopilot.tuned import LoopAt
 
 HELP = (
     "margins and responses of an ArduPilot helicopter's loops before and after a change of gains,"
@@ -31,19 +31,16 @@ gain (dB), phase (deg): by how much the loop broken at this control may change, 
   before it is unstable, and half the width of the band that the flight's uncertainty leaves;
   40.0: 40 dB or more; crossover: largest frequency of unit gain, rad/s"""
 
-RESPONSES = ("bandwidth", "peak", "rejection", "rejection_peak")
+RESPONSES = ("bandwidth_3db", "peak", "rejection", "rejection_peak")
 RESPONSE_LEGEND = """\
-bandwidth, peak: of the attitude (d_ped: the yaw rate) after its command: up to where it follows
-  within -3 dB, and its largest gain; rejection, rejection peak: up to where a disturbance of it is
-  attenuated by 3 dB, and by how much one is amplified at most; from 0.1 rad/s on"""
+bandwidth (3 dB), peak: of the attitude (d_ped: the yaw rate) after its command: up to where it
+  follows within -3 dB, and its largest gain; rejection, rejection peak: up to where a disturbance
+  of it is attenuated by 3 dB, and by how much one is amplified at most; from 0.1 rad/s on"""
 
 STEP = ("overshoot", "rise", "settling")
 STEP_LEGEND = """\
 after a step of the command: by how much it is exceeded, from 10 to 90 %, until 5 % is not left any
   more; 10.00 s: 10 s or more"""
-
-DECIMALS = {"dB": 1, "%": 0}
-"""Shown, by unit; else two."""
 
 ARGUMENTS = (
     *options.vehicle(None, "vehicle file that is calibrated from the log"),
@@ -115,9 +112,10 @@ def run(arguments: argparse.Namespace) -> Output:
     """Calibrate, compute the margins before and after, and say what the change does."""
     import symheli
     from identification import calibrate
-    from studies.autopilot.tuned import CONTROLS, QUANTITIES, loop_margins
+    from studies.autopilot.tuned import CONTROLS, LEAST, loop_margins
     from symheli.flight import HelicopterLoops
     from symheli.logs.parameters import read_parameters
+    from synthesis.design.loops.loop_measures import MEASURES
 
     if not arguments.set:
         raise InputError("nothing is changed: give --set NAME=VALUE, such as ATC_RAT_RLL_P=0.15")
@@ -192,14 +190,14 @@ def run(arguments: argparse.Namespace) -> Output:
     data: dict[str, Any] = {
         "change": change,
         "controls": list(CONTROLS),
-        "before": [vars(row) for row in both[0]],
-        "after": [vars(row) for row in both[1]],
+        "before": [row.as_dict() for row in both[0]],
+        "after": [row.as_dict() for row in both[1]],
         "verdict": verdict,
         "hypotheses": hypotheses,
         "units": {
             "airspeed": "m/s",
             "crossover": "rad/s",
-            **{name: quantity.unit for name, quantity in QUANTITIES.items()},
+            **{name: MEASURES[name].unit for name in LEAST},
         },
     }
     if between is not None:
@@ -228,48 +226,28 @@ def run(arguments: argparse.Namespace) -> Output:
     return Output("\n".join(lines), data)
 
 
-def _row(old: LoopMargins, new: LoopMargins) -> list[str]:
-    def cells(row: LoopMargins) -> tuple[str, str]:
-        if row.stable is False:
-            return "unstable", "unstable"
-        return f"{row.gain:.1f} +-{row.gain_band:.1f}", f"{row.phase:.0f} +-{row.phase_band:.1f}"
-
-    (gain, phase), (gain_after, phase_after) = cells(old), cells(new)
+def _row(old: LoopAt, new: LoopAt) -> list[str]:
+    cells = [one.measures.cell(name) for name in ("gain", "phase") for one in (old, new)]
     word = {True: "", False: "unstable", None: "not known"}[new.stable]
-    return [
-        f"{new.airspeed:g}",
-        new.control,
-        gain,
-        gain_after,
-        phase,
-        phase_after,
-        f"{new.crossover:.2g}",
-        word,
-    ]
+    crossover = new.measures["crossover"]
+    return [f"{new.airspeed:g}", new.control, *cells, f"{crossover:.2g}", word]
 
 
-def _quantities(before: list[LoopMargins], after: list[LoopMargins], names: Sequence[str]) -> str:
+def _quantities(before: list[LoopAt], after: list[LoopAt], names: Sequence[str]) -> str:
     """A table of quantities before and after the change."""
-    from studies.autopilot.tuned import QUANTITIES
-
-    def cell(row: LoopMargins, name: str) -> str:
-        value, band = row.banded(name)
-        if row.stable is not True:
-            return "unstable" if row.stable is False else "not known"
-        digits = DECIMALS.get(QUANTITIES[name].unit, 2)
-        return f"{value:.{digits}f} +-{band:.{digits}f}"
+    from synthesis.design.loops.loop_measures import MEASURES
 
     table = [
-        ["V", "loop", *(word for name in names for word in (name.replace("_", " "), "after"))],
-        ["m/s", "", *(QUANTITIES[name].unit for name in names for _ in range(2))],
+        ["V", "loop", *(word for name in names for word in (MEASURES[name].words, "after"))],
+        ["m/s", "", *(MEASURES[name].unit for name in names for _ in range(2))],
     ]
     for old, new in zip(before, after, strict=True):
-        cells = [cell(row, name) for name in names for row in (old, new)]
+        cells = [one.measures.cell(name) for name in names for one in (old, new)]
         table.append([f"{new.airspeed:g}", new.control, *cells])
     return columns(table, left=2)
 
 
-def _verdict(rows: list[LoopMargins]) -> str:
+def _verdict(rows: list[LoopAt]) -> str:
     unstable = sorted({row.airspeed for row in rows if row.stable is False})
     unknown = sorted({row.airspeed for row in rows if row.stable is None})
     if unstable:
@@ -279,12 +257,19 @@ def _verdict(rows: list[LoopMargins]) -> str:
             f"Whether the changed loops are stable at {_listed(unknown)} m/s is not known: the"
             " flight leaves both possible."
         )
-    gain = min(rows, key=lambda row: row.gain - row.gain_band)
-    phase = min(rows, key=lambda row: row.phase - row.phase_band)
+
+    def least(name: str) -> tuple[float, str]:
+        def low(row: LoopAt) -> float:
+            value, band = row.measures.banded(name)
+            return value - band
+
+        row = min(rows, key=low)
+        return low(row), f"{row.control}, {row.airspeed:g} m/s"
+
+    (gain, at), (phase, there) = least("gain"), least("phase")
     return (
         f"After the change all loops are stable; the least margins are"
-        f" {gain.gain - gain.gain_band:.1f} dB ({gain.control}, {gain.airspeed:g} m/s) and"
-        f" {phase.phase - phase.phase_band:.0f} deg ({phase.control}, {phase.airspeed:g} m/s)."
+        f" {gain:.1f} dB ({at}) and {phase:.0f} deg ({there})."
     )
 
 

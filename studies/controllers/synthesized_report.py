@@ -15,6 +15,7 @@ from studies.report.pages import FOLDER, environment
 from symheli import LPVStateSpace
 from symheli.values.drawing import BLUE, GREY, ORANGE
 from symheli.values.whole_files import write_text
+from synthesis.design.loops.loop_measures import MEASURES
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -39,12 +40,12 @@ FIRST = 3
 WINDOW = 6.0
 """Length of a response to a gust, s."""
 MARGINS = {
-    "gain_margin": "gain margin, dB",
-    "phase_margin": "phase margin, deg",
-    "crossover": "crossover, rad/s",
-    "bandwidth": "bandwidth, rad/s",
+    "gain_margin": MEASURES["gain"],
+    "phase_margin": MEASURES["phase"],
+    "crossover": MEASURES["crossover"],
+    "bandwidth": MEASURES["bandwidth_ads33"],
 }
-"""Measures of the sheet in the table of margins."""
+"""Measures of the sheet in the table of margins, and how their columns are headed."""
 SHEET = (
     "Design margins of the loops broken at each servo, a mark an airspeed: 0 % is the boundary of"
     " Level 1, -100 % that of Levels 2 and 3."
@@ -178,7 +179,7 @@ def margins(found: Synthesized) -> list[list[str]]:
             text = worst(r) + (f" ({level})" if not math.isnan(r.margin) else "")
             cells.setdefault(spec.axis, {}).setdefault(spec.measure, text)
     return [
-        ["axis", *MARGINS.values()],
+        ["axis", *(f"{m.words}, {m.unit}" for m in MARGINS.values())],
         *([axis, *(own.get(m, "-") for m in MARGINS)] for axis, own in cells.items()),
     ]
 

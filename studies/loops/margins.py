@@ -14,6 +14,7 @@ from symheli.flight import XCELL_SERVOS
 from symheli.lpv.tools import pade_delay
 from symheli.progress import tracked
 from synthesis.design.loops.handling_qualities import Bandwidth
+from synthesis.design.loops.loop_measures import LoopMeasures
 from synthesis.design.loops.margins import Margins
 
 DELAY = 0.02
@@ -30,6 +31,16 @@ class AtAirspeed:
     hold: Margins
     roll: Bandwidth
     pitch: Bandwidth
+
+    @property
+    def held(self) -> LoopMeasures:
+        """Numbers of the roll hold and of its response to the stick."""
+        return LoopMeasures.of(self.hold, attitude=self.roll)
+
+    @property
+    def free(self) -> LoopMeasures:
+        """Numbers of the pitch response to the stick, without feedback."""
+        return LoopMeasures.of(attitude=self.pitch)
 
 
 def behind_servo(model: LinearModel, name: str) -> LinearModel:

@@ -14,20 +14,18 @@ from studies.setup.flights import NOISES
 from studies.transition.campaign import MODE_MARK
 from studies.transition.comparison import DRIFT_LEFT_OUT
 from studies.transition.known_kinematics import KNOWN, SPLINE
+from synthesis.design.loops.loop_measures import MEASURES
 
 LEVEL = 3.0
 """Points between fits that are called level: what another seed changes."""
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from studies.known_kinematics.rivals import KnownKinematics
     from studies.transition.comparison import ComparedAxis
     from studies.transition.first_look import FirstLook
     from studies.transition.identified import Identification
     from studies.transition.outcome import Outcome
     from studies.transition.real_conditions import RealConditions
-    from synthesis.design.loops.margins import Margins
 
 
 @dataclass
@@ -99,22 +97,15 @@ def first_look(look: FirstLook) -> Table:
     table.rows.append(["least stable pole (rad/s)", *(_pole(one.least_stable) for one in shown)])
     for name in RATES:
         table.rows.append([f"{name} (rad/s)", *(_pole(one.modes[name]) for one in shown)])
-    for name, of in (
-        ("gain margin", lambda hold: hold.gain[1]),
-        ("phase margin (deg)", lambda hold: math.degrees(hold.phase)),
-        ("delay margin (ms)", lambda hold: 1000 * hold.delay),
-    ):
-        cells = ["" if one.margins is None else _margin(one.margins.hold, of) for one in shown]
-        table.rows.append([f"roll hold: {name}", *cells])
+    for name in ("gain", "phase", "delay"):
+        cells = ["" if one.margins is None else one.margins.held.cell(name) for one in shown]
+        words, unit, _ = MEASURES[name]
+        table.rows.append([f"roll hold: {words} ({unit})", *cells])
     table.remarks.append(
         "Pole: real part, imaginary part; a positive real part grows. The margins of the roll hold"
         " are each alone."
     )
     return table
-
-
-def _margin(hold: Margins, of: Callable[[Margins], float]) -> str:
-    return f"{of(hold):.3g}" if hold.stable else "unstable"
 
 
 def _pole(z: complex) -> str:

@@ -20,7 +20,7 @@ from symheli.lpv import connect
 from symheli.values.arrays import Array
 from symheli.values.signal import indices, signals
 from synthesis.design.loops.handling_qualities import Bandwidth, attitude_bandwidth
-from synthesis.design.loops.margins import Margins, margins, open_loop
+from synthesis.design.loops.margins import Margins, decibels, margins, open_loop
 from synthesis.numerics.linear.norm import crossings, norm, to_continuous
 from synthesis.sheet.sheet import ControlAxis, Specification
 
@@ -257,15 +257,6 @@ def first_order_fit(y: Array, t: Array) -> tuple[float, float]:
     return float(found.x[0]), float(found.x[1])
 
 
-def _decibels(gain: float) -> float:
-    return 20 * math.log10(gain) if gain > 0 else -math.inf
-
-
-def _gain_margin(at: AxisLoop, _: Specification) -> float:
-    less, more = at.margins.gain
-    return min(_decibels(more), -_decibels(less))
-
-
 def _inverse_time_constant(at: AxisLoop, spec: Specification) -> float:
     return at.first_order(spec.window)[0]
 
@@ -321,7 +312,7 @@ def _olop(at: AxisLoop) -> complex:
 
 
 def _peak(model: LinearModel) -> float:
-    return _decibels(norm(model.A, model.B, model.C, model.D, model.dt)[0])
+    return decibels(norm(model.A, model.B, model.C, model.D, model.dt)[0])
 
 
 def _bandwidth(at: AxisLoop, spec: Specification) -> float:
@@ -331,13 +322,13 @@ def _bandwidth(at: AxisLoop, spec: Specification) -> float:
 
 
 MEASURES: dict[str, Callable[[AxisLoop, Specification], float]] = {
-    "gain_margin": _gain_margin,
-    "phase_margin": lambda at, _: math.degrees(at.margins.phase),
+    "gain_margin": lambda at, _: at.margins.gain_margin,
+    "phase_margin": lambda at, _: at.margins.phase_margin,
     "delay_margin": lambda at, _: 1e3 * at.margins.delay,
-    "disk_gain": lambda at, _: _decibels(at.margins.disk_gain[1]),
+    "disk_gain": lambda at, _: decibels(at.margins.disk_gain[1]),
     "disk_phase": lambda at, _: math.degrees(at.margins.disk_phase),
     "input_peak": lambda at, _: _peak(at.sensitivity),
-    "crossover": lambda at, _: max(at.margins.crossover, default=0.0),
+    "crossover": lambda at, _: at.margins.highest_crossover,
     "damping": lambda at, spec: mode_damping(at.closed.select(outputs=["response"]), spec.band),
     "bandwidth": _bandwidth,
     "gain_bandwidth": lambda at, spec: at.attitude(spec.band).gain_bandwidth,
@@ -352,7 +343,7 @@ MEASURES: dict[str, Callable[[AxisLoop, Specification], float]] = {
     "rejection_peak": lambda at, _: _peak(at.rejection),
     "effort": _effort,
     "servo_rate": _servo_rate,
-    "olop_gain": lambda at, _: _decibels(abs(_olop(at))) if _olop(at) == _olop(at) else math.nan,
+    "olop_gain": lambda at, _: decibels(abs(_olop(at))) if _olop(at) == _olop(at) else math.nan,
     "olop_phase": lambda at, _: math.degrees(np.angle(_olop(at))),
 }
 """By the name that a sheet uses, with the units of the packaged sheet: dB, deg, ms, rad/s, 1/s,

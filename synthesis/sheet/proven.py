@@ -17,7 +17,7 @@ from symheli.errors import InputError
 from symheli.values.summary import summarized
 from synthesis.certify.questions.certificate import Certificate
 from synthesis.certify.questions.questions import l2_gain
-from synthesis.design.loops.margins import Margins
+from synthesis.design.loops.margins import Margins, decibels
 from synthesis.design.plant.parts import DISTURBANCE
 from synthesis.design.plant.plant import Plant
 from synthesis.sheet.sheet import ControlAxis, Sheet, Specification
@@ -111,13 +111,9 @@ def peak_loop(
 def in_unit(measure: str, gain: float) -> float:
     """Return the value of a measure, in dB or deg, from the gain of its `peak_loop`."""
     if PROVABLE[measure][1] == 1.0:
-        return 20 * math.log10(gain)
+        return decibels(gain)
     disk = Margins(True, (0.0, math.inf), math.inf, math.inf, 1 / gain, ())
-    return (
-        math.degrees(disk.disk_phase)
-        if measure == "disk_phase"
-        else 20 * math.log10(disk.disk_gain[1])
-    )
+    return math.degrees(disk.disk_phase) if measure == "disk_phase" else decibels(disk.disk_gain[1])
 
 
 def prove(

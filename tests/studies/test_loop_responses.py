@@ -6,11 +6,11 @@ import pytest
 import symheli
 from evidence.tuning import THROW, parameters
 from studies.autopilot.between import stable_between
-from studies.autopilot.responses import DURATION, LOWEST, closed_loops, responses
-from studies.autopilot.tuned import QUANTITIES, RESPOND, loop_margins
+from studies.autopilot.tuned import LEAST, RESPOND, closed_loops, loop_margins
 from symheli import LinearModel
 from symheli.errors import InputError
 from symheli.flight import HelicopterLoops
+from synthesis.design.loops.responses import DURATION, LOWEST, responses
 
 SISO = {"loop": ("y", "command", "disturbance")}
 
@@ -31,7 +31,7 @@ def closed(A, B, C, dt=None):
 def test_a_loop_that_integrates_has_its_closed_form(k):
     """L = k/s: k/(s + k) and s/(s + k), -3 dB at k; rise ln 9 / k, 5 % left after ln 20 / k."""
     found = responses(closed([[-k]], [k], [1.0]), SISO)["loop"]
-    assert found.bandwidth == pytest.approx(k, rel=1e-4)  # lines between frequencies 1 % apart
+    assert found.bandwidth_3db == pytest.approx(k, rel=1e-4)  # lines between frequencies 1 % apart
     assert found.rejection == pytest.approx(k, rel=1e-4)
     assert found.peak == pytest.approx(-10 * np.log10(1 + (LOWEST / k) ** 2), abs=1e-9)
     assert found.rejection_peak == pytest.approx(-10 * np.log10(1 + (k / 100.0) ** 2), abs=1e-9)
@@ -50,13 +50,13 @@ def test_a_loop_with_little_damping_has_its_closed_form():
     assert found.overshoot == pytest.approx(exact, abs=0.01)  # samples beside the top
     assert found.peak == pytest.approx(-20 * np.log10(2 * z * np.sqrt(1 - z**2)), abs=1e-3)
     power = 1 - 2 * z**2 + np.sqrt((1 - 2 * z**2) ** 2 + 1)
-    assert found.bandwidth == pytest.approx(w * np.sqrt(power), rel=1e-4)
+    assert found.bandwidth_3db == pytest.approx(w * np.sqrt(power), rel=1e-4)
 
 
 def test_a_loop_that_follows_too_little_has_the_ends_of_the_range():
     """y = .5 of the command: it never follows within 3 dB, and never settles."""
     found = responses(closed([[-4.0]], [2.0], [1.0]), SISO)["loop"]
-    assert (found.bandwidth, found.rise, found.settling) == (LOWEST, DURATION, DURATION)
+    assert (found.bandwidth_3db, found.rise, found.settling) == (LOWEST, DURATION, DURATION)
 
 
 def test_the_closed_loops_are_those_of_a_simulation(ideal, loops):
@@ -96,9 +96,9 @@ def test_bands_shrink_with_the_spread_of_the_helicopters(ideal, loops):
         return loop_margins([ideal, *drawn], loops, [6.0])[0]
 
     wide, narrow = bands(0.1), bands(0.01)
-    for name in ("gain", "bandwidth", "rejection"):
-        ratio = narrow.banded(name)[1] / wide.banded(name)[1]
-        at_least = QUANTITIES[name].least / wide.banded(name)[1]
+    for name in ("gain", "bandwidth_3db", "rejection"):
+        ratio = narrow.measures.banded(name)[1] / wide.measures.banded(name)[1]
+        at_least = LEAST[name] / wide.measures.banded(name)[1]
         # a tenth, up to the curvature over +-20 %, or the least band
         assert max(0.07, at_least) * 0.99 <= ratio <= max(0.13, at_least) * 1.01, name
         assert ratio < 1.0, name
@@ -109,8 +109,8 @@ def test_a_higher_attitude_gain_raises_bandwidth_and_rejection(ideal, loops):
         loop_margins([ideal], one, [6.0])
         for one in (loops, loops.with_parameters({"ATC_ANG_RLL_P": 6.0}))
     )
-    assert after.bandwidth > 1.1 * before.bandwidth
-    assert after.rejection > 1.1 * before.rejection
+    for name in ("bandwidth_3db", "rejection"):
+        assert after.measures[name] > 1.1 * before.measures[name]
     assert set(RESPOND) == {"d_lat", "d_lon", "d_ped"}
 
 

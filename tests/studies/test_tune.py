@@ -5,12 +5,13 @@ import pytest
 
 import symheli
 from evidence.tuning import THROW, parameters
-from studies.autopilot.tuned import QUANTITIES, loop_margins
+from studies.autopilot.tuned import LEAST, loop_margins
 from symheli import AirspeedSchedule, Excitation
 from symheli.airframe.written import as_toml
 from symheli.errors import InputError
 from symheli.flight import HelicopterLoops
 from symheli.logs.parameters import read_parameters
+from synthesis.design.loops.loop_measures import MEASURES
 
 KEPT = ["d_lon", "d_lat", "d_col", "d_ped", "u", "v", "w", "p", "q", "r", "phi", "theta"]
 THROWS = ("--throw", *(f"{u}={v}" for u, v in THROW.items()))
@@ -97,7 +98,8 @@ def test_a_change_that_keeps_the_loops_stable_is_shown_before_and_after(tune, id
     assert "all loops are stable" in found["verdict"]
     by = {(row["airspeed"], row["control"]): row for row in found["before"]}
     (lateral,) = (row for row in loop_margins([ideal], loops, [6.0]) if row.control == "d_lat")
-    assert by[6.0, "d_lat"]["gain"] == pytest.approx(lateral.gain, rel=1e-6)  # file of 9 digits
+    own = lateral.measures["gain"]
+    assert by[6.0, "d_lat"]["gain"] == pytest.approx(own, rel=1e-6)  # file of 9 digits
     after = {(row["airspeed"], row["control"]): row for row in found["after"]}
     assert after[6.0, "d_lat"]["gain"] < by[6.0, "d_lat"]["gain"] - 1.0
     assert abs(after[6.0, "d_ped"]["gain"] - by[6.0, "d_ped"]["gain"]) < 0.5
@@ -108,7 +110,7 @@ def test_margins_are_where_the_loops_become_unstable(ideal, loops):
     """All loops closed: the roll's output times the gain margin, just below and just above."""
     (row,) = (r for r in loop_margins([ideal], loops, [6.0]) if r.control == "d_lat")
     for factor, stable in ((0.999, True), (1.001, False)):
-        more = THROW | {"d_lat": THROW["d_lat"] * factor * 10 ** (row.gain / 20)}
+        more = THROW | {"d_lat": THROW["d_lat"] * factor * 10 ** (row.measures["gain"] / 20)}
         worst = eigenvalues(ideal, HelicopterLoops(loops.axes, loops.dt, loops.gyro, None, more), 6)
         assert bool(worst.max() < 1) is stable
 
@@ -116,7 +118,7 @@ def test_margins_are_where_the_loops_become_unstable(ideal, loops):
 def test_delay_and_servos_cost_phase(ideal, loops):
     def phase(**given):
         (row,) = (r for r in loop_margins([ideal], loops, [4.0], **given) if r.control == "d_lat")
-        return row.phase, row.crossover
+        return row.measures["phase"], row.measures["crossover"]
 
     alone, late = phase(), phase(delay=0.04)
     lost = np.degrees(0.04 * alone[1])  # at the crossover, and coupling moves that
@@ -149,10 +151,10 @@ def test_responses_are_shown_before_and_after_and_written_with_a_figure(tune, id
     lateral = next(row for row in found["after"] if row["airspeed"] == 6.0)
     changed = loops.with_parameters({"ATC_RAT_RLL_P": 0.04})
     (true, *_) = loop_margins([ideal], changed, [6.0])
-    for name in QUANTITIES:
-        assert lateral[name] == pytest.approx(getattr(true, name), rel=1e-5, abs=1e-6), name
-        assert lateral[f"{name}_band"] == QUANTITIES[name].least  # one helicopter: no spread
-        assert found["units"][name] == QUANTITIES[name].unit
+    for name in LEAST:
+        assert lateral[name] == pytest.approx(true.measures[name], rel=1e-5, abs=1e-6), name
+        assert lateral[f"{name}_band"] == LEAST[name]  # one helicopter: no spread
+        assert found["units"][name] == MEASURES[name].unit
     rows = np.genfromtxt(out / "tune.csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
     assert rows["change"].tolist() == ["before"] * 6 + ["after"] * 6
     assert rows["rejection"][9] == pytest.approx(lateral["rejection"])
@@ -222,6 +224,6 @@ def test_a_calibrated_flight_leaves_the_true_margins_in_the_bands(tune, ideal, l
     true = loop_margins([ideal], loops.with_parameters({"ATC_RAT_RLL_P": 0.04}), [2.0, 6.0])
     for row, truth in zip(found["after"], true, strict=True):
         assert row["stable"] is truth.stable is True
-        assert abs(row["gain"] - truth.gain) <= row["gain_band"]
-        assert abs(row["phase"] - truth.phase) <= row["phase_band"]
+        assert abs(row["gain"] - truth.measures["gain"]) <= row["gain_band"]
+        assert abs(row["phase"] - truth.measures["phase"]) <= row["phase_band"]
         assert row["gain_band"] < 3.0

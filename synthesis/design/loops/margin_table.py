@@ -15,7 +15,7 @@ from symheli.values.drawing import BLUE, GREY, ORANGE, axes_of, label
 from symheli.values.html_table import as_table
 from symheli.values.labelled import frame
 from symheli.values.signal import Signal
-from synthesis.design.loops.margins import Margins, margins, open_loop
+from synthesis.design.loops.margins import Margins, decibels, margins, open_loop
 from synthesis.design.plant.as_controller import as_controller
 from synthesis.design.plant.plant import Plant
 
@@ -156,8 +156,6 @@ def margin_table(
 def _numbers(found: Margins) -> list[float]:
     if not found.stable:
         return [math.nan] * len(COLUMNS)
-    with np.errstate(divide="ignore"):
-        down, up, disk = 20 * np.log10([*found.gain, found.disk_gain[1]])
-    angles = np.degrees([found.phase, found.disk_phase])
     crossover = max(found.crossover, default=math.nan)
-    return [down, up, angles[0], found.delay, disk, angles[1], crossover]
+    disk = decibels(found.disk_gain[1]), math.degrees(found.disk_phase)
+    return [*found.decibels, found.phase_margin, found.delay, *disk, crossover]

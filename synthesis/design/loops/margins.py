@@ -51,6 +51,33 @@ class Margins:
         """Phase (rad) inside the disk margin."""
         return 2 * math.atan(self.disk / 2)
 
+    @property
+    def decibels(self) -> tuple[float, float]:
+        """Gain factors in dB: negative, by which the gain may fall, and positive."""
+        less, more = self.gain
+        return decibels(less), decibels(more)
+
+    @property
+    def gain_margin(self) -> float:
+        """Smallest change of the gain in either direction, dB."""
+        less, more = self.decibels
+        return min(more, -less)
+
+    @property
+    def phase_margin(self) -> float:
+        """Phase that may be lost or gained, deg."""
+        return math.degrees(self.phase)
+
+    @property
+    def highest_crossover(self) -> float:
+        """Highest frequency of unit gain, rad/s; 0 where there is none."""
+        return max(self.crossover, default=0.0)
+
+
+def decibels(gain: float) -> float:
+    """Return the gain in dB; -inf of 0."""
+    return 20 * math.log10(gain) if gain > 0 else -math.inf
+
 
 UNSTABLE = Margins(False, (1.0, 1.0), 0.0, 0.0, 0.0, ())
 

@@ -1,4 +1,4 @@
-"""Closed loops as a pilot feels them: response to commands, rejection of disturbances, step."""
+"""Responses of a closed loop: to a command, to a disturbance, to a step, each as a number."""
 
 from __future__ import annotations
 
@@ -8,9 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from symheli import LinearModel
-from symheli.flight import HelicopterLoops
-from symheli.flight.ardupilot import AXES, COMMANDS, MEASURED
-from symheli.lpv import connect
 from symheli.values.arrays import Array
 from symheli.values.signal import indices
 
@@ -33,35 +30,20 @@ SETTLED = 0.05
 
 
 class Responses(NamedTuple):
-    """Of one closed loop: `bandwidth` (rad/s), up to which the response to the command follows
-    within -3 dB, and its `peak` (dB); `rejection` (rad/s), up to which the output's sensitivity to
-    a disturbance of it is below -3 dB, and `rejection_peak`, the largest sensitivity (dB);
-    `overshoot` (% of the command), `rise` from 10 to 90 % and `settling` to 5 % (s) after a step.
+    """Numbers of one closed loop: `bandwidth_3db` (rad/s), up to which the response to the command
+    follows within -3 dB, and its `peak` (dB); `rejection` (rad/s), up to which the output's
+    sensitivity to a disturbance of it is below -3 dB, and `rejection_peak`, the largest sensitivity
+    (dB); `overshoot` (% of the command), `rise` from 10 to 90 % and `settling` to 5 % (s) after a
+    step.
     """
 
-    bandwidth: float
+    bandwidth_3db: float
     peak: float
     rejection: float
     rejection_peak: float
     overshoot: float
     rise: float
     settling: float
-
-
-def closed_loops(plant: LinearModel, loops: HelicopterLoops) -> LinearModel:
-    """The plant, sampled at the period of the loops, under them: phi, theta (rad) and r (rad/s) by
-    their commands and by disturbances of the same, in that order.
-    """
-    K = loops.commanded
-    outputs = [attitude or rate for rate, attitude, _ in AXES.values()]
-    disturbances = {y: f"{y}_disturbance" for y in outputs}
-    return connect(
-        plant.select(inputs=K.outputs, outputs=MEASURED),
-        K,
-        inputs=(*COMMANDS, *disturbances.values()),
-        outputs=outputs,
-        sums={y: {y: 1.0, d: 1.0} for y, d in disturbances.items()},
-    )
 
 
 def responses(
