@@ -1,8 +1,8 @@
 """Every design with every certificate over three plants: a helicopter's lateral axis, a missile and
 a crane. A cell is a number, or why there is none.
 
-    python -m evidence.every_pair            the tables
-    python -m evidence.every_pair missile    of one plant
+    python -m evidence.every_pair                          the tables
+    python -m evidence.every_pair missile --seconds 20     of one plant, each cell given up sooner
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from symheli.errors import SymheliError, SynthesisError
 from synthesis import Certificate, Plant, analysis, designs, objectives, robust, structures
 
 MOST = 60.0
-"""Seconds after which a cell is given up."""
+"""Seconds of processor after which a cell is given up."""
 CRASHED = "TRACEBACK"
 """Cell of what ended in another error than a refusal."""
 PERIOD = 0.02
@@ -228,32 +228,36 @@ def kept(found: Any) -> bool:
 
 @contextmanager
 def limited(seconds: float) -> Iterator[Event]:
-    """Interrupt the work as Ctrl-C does after so many seconds; the event says that it was this."""
+    """Interrupt the work as Ctrl-C does after so many seconds of processor; the event says that it
+    was this.
+    """
     over = Event()
 
     def ended(*_: object) -> None:
         over.set()
         raise KeyboardInterrupt
 
-    before = signal.signal(signal.SIGALRM, ended)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    before = signal.signal(signal.SIGPROF, ended)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
     try:
         yield over
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
 
 
-def cell(work: Callable[[], object], reasons: dict[str, str]) -> tuple[str, Any]:
+def cell(
+    work: Callable[[], object], reasons: dict[str, str], seconds: float = MOST
+) -> tuple[str, Any]:
     """Return what a cell says, and the result; a reason is entered under its letter."""
     over = Event()
     try:
-        with limited(MOST) as over:
+        with limited(seconds) as over:
             found = work()
     except KeyboardInterrupt:
         if not over.is_set():
             raise
-        return f"over {MOST:.0f} s", None
+        return f"over {seconds:g} s", None
     except SymheliError as error:
         return f"[{entered(str(error), reasons)}]", None
     except Exception:
@@ -283,15 +287,15 @@ def entered(reason: str, reasons: dict[str, str]) -> str:
     return reasons.setdefault(first, chr(ord("a") + len(reasons)))
 
 
-def table(name: str) -> str:
+def table(name: str, seconds: float = MOST) -> str:
     """The table of a plant, with the reasons below it."""
     plant, reasons = PLANTS[name](), dict[str, str]()
     rows = []
     for design, make in DESIGNS.items():
-        begin, made = cell(partial(make, plant), reasons)
+        begin, made = cell(partial(make, plant), reasons, seconds)
         row = [design, begin]
         for question, ask in CERTIFICATES.items():
-            text = "" if made is None else cell(partial(ask, made, plant), reasons)[0]
+            text = "" if made is None else cell(partial(ask, made, plant), reasons, seconds)[0]
             row.append(text)
             print(name, design, question, text, file=sys.stderr, flush=True)
         rows.append(row)
@@ -303,8 +307,10 @@ def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("plants", nargs="*", default=[*PLANTS], choices=PLANTS, metavar="plant")
-    for name in parser.parse_args().plants:
-        print(f"**{name}**\n\n{table(name)}\n")
+    parser.add_argument("--seconds", type=float, default=MOST, help="of processor, for each cell")
+    options = parser.parse_args()
+    for name in options.plants:
+        print(f"**{name}**\n\n{table(name, options.seconds)}\n")
 
 
 if __name__ == "__main__":

@@ -11,9 +11,8 @@ def test_every_cell_is_a_number_or_a_reason(monkeypatch, capfd):
     quick = ("stability", "l2_gain", "passivity_index", "certify", "saved", "margins")
     chosen = {name: every_pair.CERTIFICATES[name] for name in quick}
     monkeypatch.setattr(every_pair, "CERTIFICATES", chosen)
-    monkeypatch.setattr(every_pair, "MOST", 15.0)
     monkeypatch.setitem(every_pair.PLANTS, "spring", spring)
-    found = every_pair.table("spring")
+    found = every_pair.table("spring", 15.0)
     assert every_pair.CRASHED not in found
     rows = [row.split("|")[2:-1] for row in found.splitlines() if row.startswith("|")][2:]
     assert len(rows) == len(every_pair.DESIGNS)
