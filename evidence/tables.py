@@ -18,6 +18,8 @@ from studies.report.provenance import processor
 from symheli.errors import InputError
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
+APPENDIX = "appendix"
+"""Folder of the long tables, beside the pages that refer to them."""
 QUIET = 0.2
 """Processors that other programs may keep busy while a table is measured for keeping."""
 
@@ -33,14 +35,31 @@ def four_digits(value: float) -> str:
     return f"{value:#.4g}".rstrip(".")
 
 
+def marks(section: str) -> tuple[str, str]:
+    """Return the lines between which the tables of a section stand."""
+    return f"<!-- {section}: written by its command -->", f"<!-- {section}: end -->"
+
+
+def marked(page: Path, section: str) -> tuple[Path, str]:
+    """Return the page that has the marks of a section, and its text: the page itself, or the one of
+    the same name in the folder `appendix` beside it, which has the long tables.
+    """
+    begin, _ = marks(section)
+    for one in (page, page.parent / APPENDIX / page.name):
+        text = one.read_text(encoding="utf-8") if one.is_file() else ""
+        if begin in text:
+            return one, text
+    return page, ""
+
+
 def keep(page: Path, section: str, text: str, machine: str = "", command: str = "") -> None:
-    """Put `text` between the marks of `section` on the page, under `command` (default: this
-    process's), date and `machine` (default: its processor).
+    """Put `text` between the marks of `section` on the page, or on its page of tables, under
+    `command` (default: this process's), date and `machine` (default: its processor).
 
     Raises `InputError` where the page or its marks are not there.
     """
-    begin, end = f"<!-- {section}: written by its command -->", f"<!-- {section}: end -->"
-    document = page.read_text(encoding="utf-8") if page.is_file() else ""
+    begin, end = marks(section)
+    page, document = marked(page, section)
     if begin not in document or end not in document:
         raise InputError(
             f"{page} does not exist, or lacks the marks {begin} ... {end}: tables are kept in a"
@@ -57,8 +76,8 @@ def kept_rows(page: Path, section: str) -> list[list[str]]:
     """The cells of each row of the table that stands between the marks of `section`, without its
     head; none where there is no table.
     """
-    begin, end = f"<!-- {section}: written by its command -->", f"<!-- {section}: end -->"
-    document = page.read_text(encoding="utf-8") if page.is_file() else ""
+    begin, end = marks(section)
+    _, document = marked(page, section)
     _, _, rest = document.partition(begin)
     lines = [line for line in rest.partition(end)[0].splitlines() if line.startswith("|")]
     return [[cell.strip() for cell in line.strip().strip("|").split("|")] for line in lines[2:]]
@@ -114,7 +133,7 @@ def parsed(parser: argparse.ArgumentParser, page: str, *, timed: bool = True) ->
     parser.add_argument(
         "--write",
         action="store_true",
-        help=f"keep the tables in docs/{page}" + ("; refused on a busy machine" if timed else ""),
+        help=f"keep the tables of docs/{page}" + ("; refused on a busy machine" if timed else ""),
     )
     options = parser.parse_args()
     if options.write and timed:

@@ -14,7 +14,7 @@ import numpy as np
 
 import symheli
 from evidence import gain_table
-from evidence.tables import DOCS
+from evidence.tables import DOCS, marked
 from studies.campaigns.trials.control import identified
 from studies.controllers.design_choices import (
     CONTROLS,
@@ -127,10 +127,10 @@ def pd() -> LPVStateSpace:
 
 
 def structured(plant: Plant) -> LPVStateSpace:
-    """The gain table as docs/structured.md has it: three values of a gain are its parabola."""
+    """The gain table of docs/appendix/structured.md: three values of a gain are its parabola."""
     free = gain_table.structure(plant)
     assert free.basis is not None
-    text = (DOCS / "structured.md").read_text(encoding="utf-8")
+    _, text = marked(DOCS / "structured.md", "gain table")
     cells = {row[0]: row[1:] for row in re.findall(GAINS, text)}
     values = {gain.name: np.array(cells[gain.name], float) for gain in free.gains}
     V = np.linspace(0.0, TOP, gain_table.DEGREE + 1)

@@ -96,10 +96,21 @@ def test_the_bracket_as_a_table():
 
 
 def test_the_page_has_the_marks_of_every_table_that_is_written():
-    page = (tables.DOCS / "gains.md").read_text(encoding="utf-8")
-    for model in ("interpolated", "exact", "identified"):
+    for model in ("interpolated", "exact", "identified", "lateral"):
+        _, page = tables.marked(tables.DOCS / "gains.md", model)
         assert (
             page.count(f"<!-- {model}: written by its command -->")
             == page.count(f"<!-- {model}: end -->")
             == 1
         )
+
+
+def test_a_long_table_is_kept_on_the_page_of_tables(tmp_path):
+    page = tmp_path / "gains.md"
+    page.write_text("prose\n")
+    long = tmp_path / tables.APPENDIX / "gains.md"
+    long.parent.mkdir()
+    long.write_text(PAGE)
+    tables.keep(page, "gains", tables.markdown(["a"], [["1"]]))
+    assert page.read_text() == "prose\n"
+    assert tables.kept_rows(page, "gains") == [["1"]]

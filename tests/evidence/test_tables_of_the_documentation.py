@@ -28,13 +28,11 @@ from evidence import (
 from evidence.flown import campaign, designs
 from evidence.flown import tuning as sizes
 from evidence.jerk.measured import TransitionPlan, fastest
-from evidence.marks import (
-    conditions,
-)
+from evidence.marks import conditions, summary
 from evidence.planar_vtol import tubes as planar_vtol
 from evidence.public_files import fetched
 from evidence.reach.measured import gains
-from evidence.tables import DOCS
+from evidence.tables import APPENDIX, DOCS
 from studies.controllers.designs import LQR, design, lqr_schedule
 from studies.controllers.flown import WINDS
 from studies.controllers.plant import baseline, flown_plant
@@ -74,7 +72,7 @@ def kept():
     """{(page, section): what is kept there} of the whole documentation."""
     return {
         (page.name, found["name"]): Kept(found["command"], found["text"])
-        for page in sorted(DOCS.glob("*.md"))
+        for page in sorted([*DOCS.glob("*.md"), *(DOCS / APPENDIX).glob("*.md")])
         for found in MARKED.finditer(page.read_text(encoding="utf-8"))
     }
 
@@ -100,6 +98,10 @@ def flight_with_servos_of_the_worst_seed():
     about = conditions.CONDITIONS[name].about
     shown, seed = worst(KEPT["identified.md", "xcell60 under real conditions"].cells(about)[2])
     assert same(shown, conditions.of_seed(name, seed).gap)
+
+
+def nu_gaps_by_flight():
+    assert KEPT["identified.md", summary.SECTION].text == summary.table()
 
 
 def coefficient_of_the_box_jenkins_system():
@@ -296,6 +298,7 @@ def the_lqr_in_still_air():
 
 
 ROWS = {
+    ("identified.md", "nu-gaps"): nu_gaps_by_flight,
     ("flown.md", "tuning"): first_sizes_of_the_lqr,
     ("flown.md", "energy ratios"): ratio_of_the_lqr_in_light_turbulence,
     ("flown.md", "controllers"): frozen_gain_of_the_retuned_lqr,
@@ -351,7 +354,8 @@ TIMED = {key for key in KEPT if key[0] == "benchmarks.md"}
 def test_every_table_that_a_command_wrote_is_checked():
     marked = {
         (page.name, name)
-        for page in DOCS.glob("*.md")
+        for page in DOCS.rglob("*.md")
+        if page.parent.name != "howto"
         for name in re.findall(
             r"^<!-- (.+): written by its command -->$", page.read_text(encoding="utf-8"), re.M
         )

@@ -1,5 +1,5 @@
-"""docs/tolerances.md lists every number by which something counts as small, equal or of no rank: a
-new one is argued there, or this fails.
+"""docs/appendix/tolerances.md lists every number by which something counts as small, equal or of no
+rank: a new one is argued there, or this fails.
 """
 
 import ast
@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[3]
-PAGE = ROOT / "docs" / "tolerances.md"
+PAGE = ROOT / "docs" / "appendix" / "tolerances.md"
 ROOMS = ("synthesis", "symheli/lpv")
 SMALL, LARGE = 0.01, 1e4
 """Numbers up to the one, 0 left out, and from the other on; between are shares, steps, counts."""
