@@ -4,6 +4,7 @@ from symheli import environment as environment
 from symheli import errors as errors
 from symheli import flight as flight
 from symheli import integrate as integrate
+from symheli import lpv as lpv
 from symheli import progress as progress
 from symheli import steady as steady
 from symheli import values as values

@@ -13,4 +13,6 @@ from synthesis.design.loops.handling_qualities import attitude_bandwidth as atti
 from synthesis.design.loops.margins import open_loop as open_loop
 from synthesis.design.loops.wrong_parameter import with_scheduling_error as with_scheduling_error
 from synthesis.numerics.polynomial.matrix import PolynomialMatrix as PolynomialMatrix
+from synthesis.numerics.program.affine_program import AffineProgram as AffineProgram
 from synthesis.numerics.program.cone_program import installed_solvers as installed_solvers
+from synthesis.numerics.program.expression import block as block

@@ -45,6 +45,12 @@ def test_the_face_of_a_package_is_one_screen(package):
     assert len(names) == FACES[package]
 
 
+def test_the_modules_of_names_need_no_import_of_their_own():
+    for module, name in {"symheli": "lpv.tools.pade_delay", "synthesis": "designs.ncfsyn"}.items():
+        run = f"import {module}; {module}.{name}"
+        subprocess.run([sys.executable, "-c", run], check=True)
+
+
 @pytest.mark.parametrize("package", PACKAGES)
 def test_every_public_name_exists_and_is_documented(package):
     own = importlib.import_module(package)

@@ -70,9 +70,9 @@ def test_nothing_false_is_proven(question, lie, monkeypatch):
     honest, rng = cone_program._interruptible, np.random.default_rng(0)
 
     def liar(method, program, solver):
-        _, x, word = honest(method, program, solver)
+        _, x, word, dual = honest(method, program, solver)
         x = np.zeros(len(program.c)) if x is None else np.asarray(x)
-        return Answer.SOLVED, LIES[lie](x, rng), word
+        return Answer.SOLVED, LIES[lie](x, rng), word, dual
 
     monkeypatch.setattr(cone_program, "_interruptible", liar)
     try:

@@ -267,11 +267,12 @@ class _Problem:
             square = program.value(v)
             program.nonnegative(cell, square)
             if o.bound is not None:
-                program.nonnegative(cell, program.known((o.bound * unit) ** 2 * ONE) - square)
+                bound = program.known((o.bound * unit) ** 2 * ONE)
+                program.nonnegative(cell, bound - square, f"the bound of {_words(o)}")
             cost[column] = o.soft / unit**2
         found = program.minimise(cost, solver)
         value = math.inf if found.x is None else float(cost @ found.x)
-        attempts.append(Attempt("least sum of gains", 0.0, found.message, value))
+        attempts.append(Attempt("least sum of gains", 0.0, program.said(found), value))
         if found.x is None or found.answer is not Answer.SOLVED:
             return None
         values = np.sqrt(np.maximum(found.x[squares], 0.0)) / self.units
@@ -335,9 +336,10 @@ class _Problem:
         one = np.eye(n)
         for cell in self.cells:
             loop = self._loop(program, self.scaled.at(cell.nodes), unknowns)
-            program.positive(cell, from_lower([[Y], [apart * one, X]]))
+            program.positive(cell, from_lower([[Y], [apart * one, X]]), name="Y >= X^-1")
             for M in (X, Y):
-                program.positive(cell, program.known(widest * one) - M)
+                size = program.known(widest * one) - M
+                program.positive(cell, size, name="largest X and Y")
             for o, (columns, rows), bound, slack, size in zip(
                 self.objectives, self.channels, bounds, slacks, self.sizes, strict=True
             ):
@@ -349,11 +351,11 @@ class _Problem:
                 top = bound * np.eye(len(rows)) if slack is None else program.value(slack)
                 self._objective(program, cell, o, part, unknowns, top)
             for F in () if self.region is None else _region(self.region, loop):
-                program.positive(cell, -F)
+                program.positive(cell, -F, name="the region of poles")
         for slack, bound in zip(slacks, bounds, strict=True):
             if slack is not None:
                 trace = np.trace(program.value(slack), axis1=-2, axis2=-1)[..., None, None]
-                program.nonnegative(self.cells[0], bound - trace)
+                program.nonnegative(self.cells[0], bound - trace, "the trace of a variance")
         return program, unknowns
 
     def _objective(
@@ -372,17 +374,18 @@ class _Problem:
         if sampled:
             F = [[-loop.P], [_t(loop.A), -loop.P], [_t(loop.B), None, -one]]
             rows = [*F, [None, loop.C, loop.D, -top]] if gain else F
-            program.positive(cell, -from_lower(rows))
+            program.positive(cell, -from_lower(rows), name=_words(o))
         else:
             zero = np.zeros((program.values, 1, *unknowns.X.entries.shape[1:]))
             drift = from_lower([[-program.slope(unknowns.Y)], [zero, program.slope(unknowns.X)]])
             F = [[loop.A + _t(loop.A) + drift], [_t(loop.B), -one]]
             rows = [*F, [loop.C, loop.D, -top]] if gain else F
             for motion in self.scaled.motions(cell.nodes, self.moving):
-                program.positive(cell, -from_lower(rows), motion)
+                program.positive(cell, -from_lower(rows), motion, _words(o))
         if not gain:
             seen = [[loop.P], [None, one], [loop.C, loop.D, top]]
-            program.positive(cell, from_lower(seen if sampled else [[loop.P], [loop.C, top]]))
+            outputs = from_lower(seen if sampled else [[loop.P], [loop.C, top]])
+            program.positive(cell, outputs, name=_words(o))
             if not sampled:
                 program.zero(cell, loop.D)
 
@@ -414,6 +417,12 @@ def _region(region: PoleRegion, loop: _LoopInNewVariables) -> Iterator[Array]:
         s, c = region.damping, math.sqrt(1 - region.damping**2)
         along, across = c * (A + _t(A)), s * (A - _t(A))
         yield from_lower([[along], [_t(across), along]])
+
+
+def _words(o: Objective) -> str:
+    """Name of an objective in messages."""
+    between = f" of {', '.join(o.performance)}" if o.performance else ""
+    return f"{type(o).__name__}{between}"
 
 
 def _places(given: Sequence[str] | None, known: Sequence[str], kind: str) -> list[int]:

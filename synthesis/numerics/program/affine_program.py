@@ -17,13 +17,16 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
+from symheli.errors import InputError
 from symheli.lpv.bases import FunctionSpace
 from symheli.lpv.bases.function_space import tensor_grid
 from symheli.lpv.bases.polynomials import interpolation_points
 from synthesis.numerics.polynomial.bernstein import blossom
+from synthesis.numerics.polynomial.matrix import Box
 from synthesis.numerics.polynomial.symmetric import basis as symmetric_basis
-from synthesis.numerics.polynomial.symmetric import svec, symmetrized
+from synthesis.numerics.polynomial.symmetric import length, svec, symmetrized
 from synthesis.numerics.program.cone_program import ConeProgram, Solver, SolverPoint, solve
+from synthesis.numerics.program.expression import AffineMatrix, Inequality
 from synthesis.numerics.program.unknown import UnknownFunction
 
 Array = np.ndarray
@@ -82,13 +85,53 @@ class MatrixVariable:
         """Return the values (K, a, b) at p (K, m)."""
         return self.unknown.at(self.coefficients(x), p)
 
+    def on(self, box: Box) -> AffineMatrix:
+        """Return the variable on a box of p on which its functions are polynomials: its range, or a
+        piece of it.
+        """
+        basis = self.unknown.basis
+        degrees = basis.degrees or (basis.pieces()[0].bernstein.shape[1] - 1,)
+        if basis.size == 1:  # the same for all p, on a box of any dimension
+            degrees = (0,) * len(box)
+        (cell,) = cells(box, degrees)
+        values = cell.to_bernstein @ self.unknown.values(cell.nodes)
+        factors = np.einsum("qk,eab->qkeab", values, self.entries)
+        c = np.zeros((len(values), 2 + int(self.columns.max()), *self.entries.shape[1:]))
+        c[:, 1 + self.columns.ravel()] = factors.reshape(len(values), -1, *c.shape[2:])
+        return AffineMatrix(box, c.reshape(*(d + 1 for d in degrees), *c.shape[1:]))
+
 
 class AffineProgram:
-    """minimise c' x subject to inequalities in the values of variables, which are all declared
-    before the first of these.
+    """A semidefinite program in matrices that are unknown functions of p.
+
+    It minimises c' x under inequalities that hold for all p of a box, by their Bernstein
+    coefficients. `require` takes them as one writes them; each has a name, and `deciding` tells
+    which ones the optimum rests on. What a solver returns is a candidate: verify it.
+
+    Raises
+    ------
+    InputError
+        For a product of two unknowns, or matrices of different shapes.
+
+    See Also
+    --------
+    synthesis.analysis.PolynomialMatrix : known matrices, and exact verification
+    synthesis.Solver : solvers, tolerances
+
+    Examples
+    --------
+    >>> from symheli.lpv import Polynomial
+    >>> A = PolynomialMatrix.from_monomials({(0,): [[-1.0]], (1,): [[-1.0]]}, [(0.0, 1.0)])
+    >>> program = AffineProgram()
+    >>> decay = program.full(1, 1, Polynomial(0, 0.0, 1.0)).on(A.box)
+    >>> program.require(-2 * A - 2 * decay >> 0, "decay")
+    >>> found = program.minimise(-decay, Solver())  # x' = -(1 + p) x: 1 at worst
+    >>> print(f"{decay.at(found.x)([0.5]).item():.4f}, {program.deciding(found)[0][0]}")
+    1.0000, decay
     """
 
     def __init__(self) -> None:
+        self._names: dict[int, str] = {}
         self.variables: list[MatrixVariable] = []
         self.count, self.values = 0, 1
         self._zero: list[tuple[sparse.csr_matrix, Array]] = []
@@ -135,15 +178,55 @@ class AffineProgram:
         out[where, 0] = entries
         return out
 
-    def positive(self, cell: BernsteinCell, F: Array, motion: Array | None = None) -> None:
+    def positive(
+        self, cell: BernsteinCell, F: Array, motion: Array | None = None, name: str = ""
+    ) -> None:
         """Impose F(p) >= `MARGIN` on the cell, by its Bernstein coefficients, for the motion dp/dt
-        (K, m) at its nodes.
+        (K, m) at its nodes; `name` is what messages call it.
         """
         v = svec(symmetrized(np.broadcast_to(F, (len(F), len(cell.nodes), *F.shape[-2:]))))
         v[0] -= MARGIN * svec(np.eye(F.shape[-1]))
         for weights in cell.to_bernstein:
+            self._names[len(self._positive)] = name
             self._positive.append(self._row(weights, v, cell, motion))
             self._sizes.append(F.shape[-1])
+
+    def require(self, inequality: Inequality, name: str, *, margin: float = 0.0) -> None:
+        """Impose F >> G for all p of its box: every Bernstein coefficient of F - G is at least
+        `margin` times the identity. `name` is what messages call it.
+        """
+        F = inequality.positive
+        rows = F.coefficients.reshape(-1, F.unknowns + 1, *F.shape)
+        for each in svec(symmetrized(rows)):
+            self._names[len(self._positive)] = name
+            constant = each[0] - margin * svec(np.eye(F.shape[0]))
+            self._positive.append((sparse.csr_matrix(each[1:].T), constant))
+            self._sizes.append(F.shape[0])
+
+    def deciding(self, found: SolverPoint) -> list[tuple[str, float]]:
+        """Return the names of inequalities with the share that each has in the multipliers of the
+        solver's answer, the largest first: those with no share could be left out. Where there is no
+        solution the shares are those of the contradiction. Empty for a solver without multipliers.
+        """
+        if found.dual is None:
+            return []
+        shares: dict[str, float] = {}
+        start = sum(len(b) for _, b in self._zero)
+        for k, n in enumerate(self._sizes):
+            trace = float(svec(np.eye(n)) @ found.dual[start : start + length(n)])
+            name = self._names[k] or "another inequality"
+            shares[name] = shares.get(name, 0.0) + max(trace, 0.0)
+            start += length(n)
+        total = sum(shares.values()) or 1.0
+        ranked = sorted(shares.items(), key=lambda item: -item[1])
+        return [(name, share / total) for name, share in ranked]
+
+    def said(self, found: SolverPoint) -> str:
+        """Return the solver's message with the inequalities that decide, the first of those with
+        at least a tenth.
+        """
+        first = [name for name, share in self.deciding(found) if share > 0.1]
+        return f"{found.message}; it rests on {', '.join(first)}" if first else found.message
 
     def zero(self, cell: BernsteinCell, F: Array) -> None:
         """Impose F(p) = 0 at the nodes of the cell."""
@@ -154,8 +237,9 @@ class AffineProgram:
             there = np.diff(A.indptr) + (b != 0) > 0
             self._zero.append((A[there], b[there]))
 
-    def nonnegative(self, cell: BernsteinCell, F: Array) -> None:
+    def nonnegative(self, cell: BernsteinCell, F: Array, name: str = "") -> None:
         """Impose F >= 0 for a number F, which is the same all over the cell."""
+        self._names[len(self._positive)] = name
         v = np.broadcast_to(F[..., 0], (len(F), len(cell.nodes), 1))
         self._positive.append(self._row(cell.to_bernstein[0], v, cell, None))
         self._sizes.append(1)
@@ -184,7 +268,7 @@ class AffineProgram:
         to = sparse.csr_matrix(
             (np.ones(self.count), (range(self.count), columns)), (self.count, count)
         )
-        A = sparse.vstack([A for A, _ in self._positive])
+        A = self._stacked(self._positive)
         return sparse.csr_matrix(A @ to), np.concatenate([b for _, b in self._positive])
 
     @property
@@ -192,17 +276,38 @@ class AffineProgram:
         """Numbers of rows of the matrices that are positive semidefinite."""
         return tuple(self._sizes)
 
-    def minimise(self, cost: Array, solver: Solver) -> SolverPoint:
-        """Return the solver's candidate for the least cost' x."""
+    def minimise(self, cost: Array | AffineMatrix, solver: Solver) -> SolverPoint:
+        """Return the solver's candidate for the least cost' x, or of a number (1, 1) that does not
+        depend on p.
+        """
         return solve(self.cone_program(cost), solver)
 
-    def cone_program(self, cost: Array) -> ConeProgram:
-        """Return the program of the least cost' x, whose `to_cvxpy` hands it to other solvers."""
+    def cone_program(self, cost: Array | AffineMatrix) -> ConeProgram:
+        """Return the program of that cost, whose `to_cvxpy` hands it to other solvers."""
+        if isinstance(cost, AffineMatrix):
+            cost = self._factors(cost)
         rows = [*self._zero, *self._positive]
-        A = sparse.csc_matrix(sparse.vstack([-A for A, _ in rows]))
+        A = sparse.csc_matrix(-self._stacked(rows))
         b = np.concatenate([b for _, b in rows])
         equalities = sum(len(b) for _, b in self._zero)
         return ConeProgram(cost, A, b, tuple(self._sizes), equalities)
+
+    def _stacked(self, rows: Sequence[tuple[sparse.csr_matrix, Array]]) -> sparse.csr_matrix:
+        """The rows below one another, those from before a variable with zeros for it."""
+        for A, _ in rows:
+            A.resize(A.shape[0], self.count)
+        return sparse.csr_matrix(sparse.vstack([A for A, _ in rows]))
+
+    def _factors(self, number: AffineMatrix) -> Array:
+        """The factor of each unknown in a number."""
+        if number.shape != (1, 1) or any(number.degrees):
+            raise InputError(
+                "the cost is a number that does not depend on p: expected shape (1, 1) and degree"
+                f" 0, got {number.shape} and {number.degrees}"
+            )
+        out = np.zeros(self.count)
+        out[: number.unknowns] = number.coefficients.ravel()[1:]
+        return out
 
 
 def from_lower(rows: Sequence[Sequence[Array | None]]) -> Array:

@@ -15,7 +15,7 @@ import importlib.metadata
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import groupby
 from threading import Event
@@ -308,28 +308,33 @@ class ConeProgram:
 @dataclass(frozen=True, eq=False)
 class SolverPoint:
     """A solver's answer and point `x`, None without one; `seconds` of solving, `message` of the
-    solver.
+    solver, multipliers `dual` of the rows, None from solvers that are asked through cvxpy.
     """
 
     answer: Answer
     x: Array | None
     seconds: float
     message: str
+    dual: Array | None = field(default=None, kw_only=True)
 
 
 def solve(program: ConeProgram, solver: Solver) -> SolverPoint:
     """Return the solver's candidate. Never raises for a failed solve: that is an answer."""
-    method: Callable[[ConeProgram, Solver], tuple[Answer, Any, str]] = {
+    method: Callable[[ConeProgram, Solver], Found] = {
         "CLARABEL": _clarabel,
         "SCS": _scs,
     }.get(solver.name, _cvxpy)
     start = time.perf_counter()
-    answer, x, message = _interruptible(method, program, solver)
+    answer, x, message, dual = _interruptible(method, program, solver)
     x = None if x is None else np.asarray(x, dtype=float)
     if x is not None and (x.size != len(program.c) or not np.all(np.isfinite(x))):
         x = None
-    return SolverPoint(answer, x, time.perf_counter() - start, message)
+    dual = None if dual is None else np.asarray(dual, dtype=float)
+    return SolverPoint(answer, x, time.perf_counter() - start, message, dual=dual)
 
+
+Found = tuple[Answer, Any, str, Any]
+"""Answer, point, message and multipliers."""
 
 SHORT_ITERATION = 3e8
 """Operations of an iteration that takes some tenths of a second: below it Clarabel and SCS can be
@@ -339,7 +344,7 @@ interrupted between two iterations.
 
 def _interruptible(
     method: Callable[[ConeProgram, Solver], Any], program: ConeProgram, solver: Solver
-) -> tuple[Answer, Any, str]:
+) -> Found:
     """Solve here if the solver can be interrupted often enough, else in a process that an interrupt
     can end: starting it takes half a second.
     """
@@ -349,7 +354,7 @@ def _interruptible(
     try:
         return in_process(method, program, solver)
     except SolverError as error:
-        return Answer.FAILED, None, str(error)
+        return Answer.FAILED, None, str(error), None
 
 
 MAX_BYTES = 4e9
@@ -365,7 +370,7 @@ def _bytes(program: ConeProgram) -> float:
     return 8.0 * sum(length(n) ** 2 for n in program.sizes)
 
 
-def _clarabel(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
+def _clarabel(program: ConeProgram, solver: Solver) -> Found:
     if _bytes(program) > MAX_BYTES / 4:
         words = (
             f"not tried: cones of size {max(program.sizes)} would need several times"
@@ -375,6 +380,7 @@ def _clarabel(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
             Answer.UNTRIED,
             None,
             f"{words}; a lower degree, fewer segments, Bernstein coefficients or SCS need less",
+            None,
         )
     clarabel: Any = importlib.import_module("clarabel")  # its stubs hide the classes
     settings = clarabel.DefaultSettings()
@@ -399,14 +405,14 @@ def _clarabel(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
                 settings.equilibrate_enable = False
                 solution = in_thread(work)
     except SolverError as error:
-        return Answer.FAILED, None, str(error)
+        return Answer.FAILED, None, str(error), None
     word = str(solution.status)
     answer = _CLARABEL.get(word, Answer.FAILED)
     # a point that ran out of iterations or progress may still pass the verification
-    return answer, None if "PrimalInfeasible" in word else solution.x, word
+    return answer, None if "PrimalInfeasible" in word else solution.x, word, solution.z
 
 
-def _scs(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
+def _scs(program: ConeProgram, solver: Solver) -> Found:
     import scs
 
     # the same vectors: SCS stacks the lower triangle by columns, which is the upper one by rows;
@@ -423,7 +429,9 @@ def _scs(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
     if word == "interrupted":  # SCS handles the interrupt itself
         raise KeyboardInterrupt
     answer = _SCS.get(solution["info"]["status_val"], Answer.FAILED)
-    return answer, None if answer is Answer.INFEASIBLE else solution["x"], word
+    dual = np.empty(len(program.b))
+    dual[order] = solution["y"]
+    return answer, None if answer is Answer.INFEASIBLE else solution["x"], word, dual
 
 
 @lru_cache(maxsize=32)
@@ -434,7 +442,7 @@ def _scs_order(n: int) -> Array:
     return np.concatenate([place[j:, j] for j in range(n)])
 
 
-def _cvxpy(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
+def _cvxpy(program: ConeProgram, solver: Solver) -> Found:
     from cvxpy.error import SolverError as CvxpyError
 
     problem, x = program.to_cvxpy()
@@ -445,6 +453,6 @@ def _cvxpy(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
             **({"mosek_params": solver.options} if solver.name == "MOSEK" else solver.options),
         )
     except CvxpyError as error:
-        return Answer.FAILED, None, str(error)
+        return Answer.FAILED, None, str(error), None
     answer = _CVXPY.get(problem.status, Answer.FAILED)
-    return answer, None if answer is Answer.INFEASIBLE else x.value, str(problem.status)
+    return answer, None if answer is Answer.INFEASIBLE else x.value, str(problem.status), None

@@ -20,10 +20,10 @@ def test_cvxpy_has_the_same_optimum(question, monkeypatch):
     honest = cone_program._interruptible
 
     def kept(method, program, solver):
-        answer, x, word = honest(method, program, solver)
+        answer, x, word, dual = honest(method, program, solver)
         if word == "Solved" and len(program.c) < 200:
             posed.append((program, x))
-        return answer, x, word
+        return answer, x, word, dual
 
     monkeypatch.setattr(cone_program, "_interruptible", kept)
     QUESTIONS[question]()
