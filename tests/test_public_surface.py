@@ -46,8 +46,11 @@ def test_the_face_of_a_package_is_one_screen(package):
 
 
 def test_the_modules_of_names_need_no_import_of_their_own():
-    for module, name in {"symheli": "lpv.tools.pade_delay", "synthesis": "designs.ncfsyn"}.items():
-        run = f"import {module}; {module}.{name}"
+    for package, name in {
+        "symheli": "lpv.tools.pade_delay",
+        "synthesis": "designs.ncfsyn",
+    }.items():
+        run = f"import {package}; {package}.{name}"
         subprocess.run([sys.executable, "-c", run], check=True)
 
 

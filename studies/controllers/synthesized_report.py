@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import datetime
 import json
 import math
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from studies.output import columns, plain
-from studies.report.pages import FOLDER, environment
+from studies.report.pages import rendered
 from symheli import LPVStateSpace
 from symheli.values.drawing import BLUE, GREY, ORANGE
 from symheli.values.whole_files import write_text
@@ -275,21 +274,16 @@ def _sheet(found: Synthesized) -> dict[str, Any] | None:
 
 def page(found: Synthesized) -> str:
     """The report as HTML."""
-    from markupsafe import Markup
-
     from studies.report.drawn import drawn
-    from symheli import Helicopter, __version__
+    from symheli import Helicopter
 
-    templates = environment()
     a = found.choices
     pictures = drawn(list(_figures(found)), a.out / "figures")
     sheet = [("margins", SHEET, "", _of_margins(found))] if found.judged is not None else []
     name = Helicopter.load(a.vehicle).vehicle.title if a.vehicle else a.model
-    text = templates.get_template("controller.html.j2").render(
-        style=Markup((FOLDER / "page.css").read_text(encoding="utf-8")),
+    return rendered(
+        "controller.html.j2",
         title=f"A controller for {name}",
-        date=datetime.date.today().isoformat(),
-        version=__version__,
         answer=answer(found),
         sentences=sentences(found),
         gains=gains(found),
@@ -302,7 +296,6 @@ def page(found: Synthesized) -> str:
         choices=a.text(a.out),
         seconds=found.seconds,
     )
-    return text.replace("m/s^2", "m/s²")
 
 
 def _missed(found: Synthesized) -> list[list[str]]:

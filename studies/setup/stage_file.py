@@ -148,8 +148,13 @@ class _TreeReader:
             return kind[node["member"]]
         if "tuple" in node:
             return tuple.__new__(kind, (self.value(each) for each in node["tuple"]))
-        found = str.__new__(kind, node["text"]) if "text" in node else object.__new__(kind)
         state = {name: self.value(each) for name, each in node["state"].items()}
+        fields = getattr(kind, "__dataclass_fields__", {})
+        if fields and kind.__init__ is not object.__init__:
+            given = {name for name, field in fields.items() if field.init}
+            found = kind(**{name: state.pop(name) for name in given & state.keys()})
+        else:
+            found = str.__new__(kind, node["text"]) if "text" in node else object.__new__(kind)
         for name, each in state.items():
             object.__setattr__(found, name, each)
         return found

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import datetime
 import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from studies.report.pages import FOLDER, environment
+from studies.report.pages import rendered
 from symheli.values.whole_files import write_text
 from synthesis.sheet.evaluation import Reached, boundary, margin, worst
 from synthesis.sheet.picture import figure_of
@@ -31,10 +30,7 @@ def write(
     """Write the page, and its figures into a folder `figures` beside it; `of`: what the proofs are
     about.
     """
-    from markupsafe import Markup
-
     from studies.report.drawn import drawn
-    from symheli import __version__
 
     count = len(table.controllers)
     axes = dict.fromkeys(s.axis for s in table.frozen if s.sense)
@@ -46,29 +42,23 @@ def write(
         ],
         path.parent / "figures",
     )
-    text = (
-        environment()
-        .get_template("specs.html.j2")
-        .render(
-            style=Markup((FOLDER / "page.css").read_text(encoding="utf-8")),
-            title=title,
-            lead=lead,
-            date=datetime.date.today().isoformat(),
-            version=__version__,
-            verdicts=[(name, table.verdict(name)) for name in table.controllers],
-            missing=missing,
-            pictures=pictures,
-            width=380 + 190 * count,
-            least=170 + 90 * count,
-            controllers=table.controllers,
-            margins=_margins(table),
-            proofs=proofs(table),
-            proofs_of=of,
-            sources=_sources(table),
-            seconds=table.seconds,
-        )
+    text = rendered(
+        "specs.html.j2",
+        title=title,
+        lead=lead,
+        verdicts=[(name, table.verdict(name)) for name in table.controllers],
+        missing=missing,
+        pictures=pictures,
+        width=380 + 190 * count,
+        least=170 + 90 * count,
+        controllers=table.controllers,
+        margins=_margins(table),
+        proofs=proofs(table),
+        proofs_of=of,
+        sources=_sources(table),
+        seconds=table.seconds,
     )
-    return write_text(path, text.replace("m/s^2", "m/s²"))
+    return write_text(path, text)
 
 
 def proofs(table: SpecificationTable) -> list[list[str]]:

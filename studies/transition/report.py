@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from studies.report.drawn import Drawn
 from studies.report.equations import EQUATIONS
 from studies.report.labels import Labels
-from studies.report.pages import FOLDER, environment
+from studies.report.pages import environment, source, superscript
 from studies.report.references import REFERENCES
 from studies.setup.axes import AXES
 from studies.transition import controller_tables as controllers
@@ -116,8 +116,8 @@ def page(
         "results": results,
         "equations": EQUATIONS,
         "references": REFERENCES,
-        "style": Markup((FOLDER / STYLE).read_text(encoding="utf-8")),
-        "scripts": [Markup((FOLDER / name).read_text(encoding="utf-8")) for name in SCRIPTS],
+        "style": source(STYLE),
+        "scripts": [source(name) for name in SCRIPTS],
         "held": Markup(compact(results["held"])),
         "under_way": under_way,
         **_headline(study),
@@ -128,7 +128,7 @@ def page(
     template.render(labels=first, contents=[], **texts)
     labels = Labels(first.given, "not reached" if under_way is None else under_way.missing)
     text = template.render(labels=labels, contents=first.contents, **texts)
-    return text.replace("m/s^2", "m/s²")
+    return superscript(text)
 
 
 def whole(cell: str) -> str:
