@@ -28,9 +28,9 @@ LONG = 40
 
 def prose(text: str) -> str:
     """Return a page without code, tables, links' addresses and comments."""
-    text = re.sub(r"```.*?```|<!--.*?-->", "", text, flags=re.S)
-    lines = (line for line in text.splitlines() if not line.lstrip().startswith("|"))
-    return re.sub(r"\]\([^)]*\)|`[^`]*`|\$[^$]*\$", "x", "\n".join(lines))
+    text = re.sub(r"```.*?```|\$\$.*?\$\$|<!--.*?-->", "", text, flags=re.S)
+    lines = (line for line in text.splitlines() if not re.match(r" {4}|\s*\|", line))
+    return re.sub(r"\]\([^)]*\)|`[^`]*`|\$[^$]*\$", "X", "\n".join(lines))
 
 
 def sentences(text: str) -> list[str]:
