@@ -37,6 +37,8 @@ VERBS = (
     "campaign",
     "compare",
     "experiment",
+    "live",
+    "serve",
     "doctor",
     "completion",
 )

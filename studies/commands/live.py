@@ -1,0 +1,148 @@
+"""symheli live SOURCE: identify while the vehicle flies, and record what comes."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from studies.commands import options
+from studies.commands.arguments import option, positional, several
+from studies.output import Output, columns, progress
+from symheli.errors import InputError
+
+if TYPE_CHECKING:
+    from studies.live.sample import Source
+    from studies.live.watch import Watch
+
+HELP = "identify while a vehicle flies: X-Plane, MAVLink, or a record that comes again"
+STICKS = ("stick_lon", "stick_lat", "stick_col", "stick_ped")
+LEGEND = """\
+motion: standard deviation of each input about its slow mean, as a fraction of its largest value;
+  missing: inputs that have not moved enough there, or all where too few samples came"""
+
+ARGUMENTS = (
+    positional(
+        "source",
+        "xplane[:HOST[:PORT]], mavlink[:ADDRESS] as pymavlink writes it (udpin:127.0.0.1:14550),"
+        " or a CSV file with units in its header",
+        metavar="SOURCE",
+    ),
+    option("--inputs", "A,B", "controls as the source names them", options.names, STICKS),
+    several(
+        "--airspeeds",
+        ("LOW", "HIGH"),
+        "range of the coefficients, m/s (default: 0 13); samples outside teach nothing",
+        type=options.number,
+        default=(0.0, 13.0),
+    ),
+    option("--rate", "HZ", "samples a second", options.at_least_one, 50),
+    option("--degree", "N", "of the coefficients in airspeed", options.count, 2),
+    option(
+        "--forgetting",
+        "L",
+        "factor a sample in the direction of each new regressor",
+        options.fraction,
+        1.0,
+    ),
+    option("--duration", "S", "stop after so long (default: at Ctrl-C)", options.positive),
+    option("--record", "FILE", "write every sample as it comes, as CSV", Path),
+    option("--speed", "X", "times its own pace, of a file", options.positive, 1.0),
+    option("--save", "FILE", "write the model at the end", options.model_file),
+)
+
+
+def run(arguments: argparse.Namespace) -> Output:
+    """Watch until the source ends, --duration is over, or Ctrl-C; say what is known."""
+    from studies.live.identifier import LiveIdentifier
+    from studies.live.recorder import Recorder
+    from studies.live.stream import Stream
+    from studies.live.watch import SIGNALS, Watch
+
+    low, high = arguments.airspeeds
+    if not 0 <= low < high:
+        raise InputError(f"--airspeeds: expected 0 <= LOW < HIGH, got {low:g} and {high:g}")
+    dt = 1.0 / arguments.rate
+    identifier = LiveIdentifier(
+        arguments.inputs, low, high, dt, arguments.degree, arguments.forgetting
+    )
+    recorder = None
+    if arguments.record is not None:
+        recorder = Recorder(arguments.record, (*SIGNALS, *arguments.inputs))
+    watch = Watch(source(arguments), identifier, Stream(identifier.signals, dt), recorder)
+    progress(f"listening to {watch.source.name}; Ctrl-C ends")
+    watch.run(arguments.duration or math.inf, progress)
+    if not watch.received:
+        raise InputError(
+            f"nothing came from {watch.source.name}: check that it sends, its address and port"
+        )
+    data = dict(watch.data())
+    lines = [*_report(watch)]
+    if arguments.save is not None:
+        model = identifier.model()
+        if model is None:
+            raise InputError(
+                "there is no model to save: the data do not determine every coefficient; "
+                + identifier.next_to_fly()
+            )
+        data["written"] = model.save(arguments.save)
+        lines.append(f"wrote {arguments.save}")
+    return Output("\n".join(lines), data)
+
+
+def source(arguments: argparse.Namespace) -> Source:
+    """Return the source that is named. Raises `InputError` for one that is not known."""
+    kind, _, address = arguments.source.partition(":")
+    if kind == "xplane":
+        from studies.live.xplane import PORT, XPlaneSource
+
+        host, _, port = address.partition(":")
+        if port and not port.isdecimal():
+            raise InputError(f"expected xplane:HOST:PORT, got {arguments.source!r}")
+        return XPlaneSource(host or "127.0.0.1", int(port or PORT), arguments.rate)
+    if kind == "mavlink":
+        from studies.live.mavlink import PORT, MavlinkSource
+
+        return MavlinkSource(address or f"udpin:127.0.0.1:{PORT}")
+    path = Path(arguments.source)
+    if not path.is_file():
+        raise InputError(
+            f"{arguments.source!r} is no file; sources are xplane, mavlink and a CSV file"
+        )
+    from studies.live.replay import RecordSource
+    from symheli import FlightRecord
+
+    return RecordSource(FlightRecord.from_csv(path), path.name, arguments.speed)
+
+
+def _report(watch: Watch) -> list[str]:
+    """Return what came, what is covered, and what is known, for a reader."""
+    found = watch.identifier
+    counts = ", ".join(f"{state.name} {n}" for state, n in watch.stream.counts.items())
+    table = [["m/s", "samples", *(f"motion of {u}" for u in found.inputs), "missing"]]
+    for cell in found.coverage():
+        motion = [f"{cell.motion[u] / max(found.largest[u], 1e-9):.2f}" for u in found.inputs]
+        missing = ", ".join(cell.missing(found.largest))
+        table.append([f"{cell.low:g}", f"{cell.samples}", *motion, missing])
+    powers = [["control power", "m/s", "value", "standard error"]]
+    for p in found.control_powers([cell.low for cell in found.coverage()][1::3]):
+        powers.append(
+            [f"{p.output} by {p.control}", f"{p.airspeed:g}", f"{p.value:.4g}", f"{p.error:.2g}"]
+        )
+    lines = [
+        f"{watch.received} samples from {watch.source.name}: {counts}",
+        f"{found.learnt} of them taught; {found.outside} were outside the range of airspeeds",
+        "",
+        columns(table),
+        LEGEND,
+        "",
+        columns(powers) if len(powers) > 1 else "no model yet: not every coefficient is determined",
+    ]
+    if watch.prediction is not None:
+        fits = ", ".join(f"{y} {fit:.0f}" for y, fit in watch.prediction.fit.items())
+        lines += ["", f"1 s ahead over the last seconds, % of what each varies: {fits}"]
+    lines += ["", found.next_to_fly()]
+    if watch.recorder is not None:
+        lines.append(f"wrote {watch.recorder.path}")
+    return lines

@@ -1,0 +1,26 @@
+"""Velocities between body and earth axes."""
+
+from __future__ import annotations
+
+import math
+
+
+def earth_velocity(
+    u: float, v: float, w: float, phi: float, theta: float, psi: float
+) -> tuple[float, float, float]:
+    """Return north, east, down (m/s) of a velocity in body axes (m/s), by the Euler angles psi,
+    theta, phi (rad) in that order: the inverse of `symheli.logs.xplane.body_velocity`.
+    """
+    right, below = (
+        math.cos(phi) * v - math.sin(phi) * w,
+        math.sin(phi) * v + math.cos(phi) * w,
+    )
+    ahead, down = (
+        math.cos(theta) * u + math.sin(theta) * below,
+        -math.sin(theta) * u + math.cos(theta) * below,
+    )
+    return (
+        math.cos(psi) * ahead - math.sin(psi) * right,
+        math.sin(psi) * ahead + math.cos(psi) * right,
+        down,
+    )

@@ -1,0 +1,278 @@
+"""What is known of the vehicle while it flies: coefficients by the recursion, which airspeeds and
+inputs have been excited, how certain the control powers are, whether 1 s predictions hold.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from identification import KinematicARX, Polynomial, RecursiveLeastSquares
+from identification.forgetting import Directional
+from identification.model import KinematicModel, LPVARXModel
+from identification.structure.kinematic_arx import INCREMENTS
+from studies.live.stream import Row
+from symheli import FlightRecord
+from symheli.values.arrays import Array
+from symheli.values.kinematics import RIGID_BODY
+from symheli.values.signal import Signal
+
+STATES = tuple(map(str, RIGID_BODY))
+SLOW_AIRSPEED = Signal("airspeed_slow", "m/s")
+"""Airspeed behind a lag, by which coefficients move: one that is measured at each instant would
+know u.
+"""
+LAG = 1.0
+"""Time constant of that lag, s."""
+BIN = 1.0
+"""Width of a cell of airspeed, m/s."""
+ENOUGH_SAMPLES = 250
+"""Samples of a cell that count as covered: 5 s at 50 Hz."""
+ENOUGH_MOTION = 0.02
+"""Standard deviation of an input, as a fraction of its largest value, that counts as excitation."""
+SLOW = 2.0
+"""Time constant over which the mean of an input is taken, s."""
+KEPT = 6.0
+"""Seconds of samples that are kept for predictions."""
+HORIZON = 1.0
+"""Seconds ahead of the predictions."""
+POWERS = {"p": "lat", "q": "lon", "w": "col", "r": "ped"}
+"""Control power of each axis: the increment of this velocity by the input whose name ends so."""
+TERM = re.compile(r"(?P<signal>\w+)\(k-(?P<lag>\d+)\)(?: f(?P<function>\d+)\(.*)?$")
+
+
+class ControlPower(NamedTuple):
+    """Increment of a velocity by its control, summed over the lags, at an airspeed (m/s), with its
+    standard error: per second and unit of the control.
+    """
+
+    output: str
+    control: str
+    airspeed: float
+    value: float
+    error: float
+
+
+class Cell(NamedTuple):
+    """A cell of airspeed from `low` (m/s): samples learnt there, standard deviation of each input
+    about its slow mean.
+    """
+
+    low: float
+    samples: int
+    motion: dict[str, float]
+
+    def missing(self, largest: dict[str, float]) -> list[str]:
+        """Return the inputs that have not moved enough there; all where there are few samples."""
+        if self.samples < ENOUGH_SAMPLES:
+            return list(self.motion)
+        return [u for u, sd in self.motion.items() if sd < ENOUGH_MOTION * max(largest[u], 1e-9)]
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """1 s predictions over the last seconds: 100 % less their error as a share of what each state
+    varies over the flight, and the number of samples.
+    """
+
+    fit: dict[str, float]
+    samples: int
+
+
+class LiveIdentifier:
+    """Recursive least squares of all axes with known kinematics over the airspeed, sample by
+    sample.
+
+    Parameters
+    ----------
+    inputs : sequence of str
+        Controls, as the rows name them.
+    low, high : float
+        Range of airspeed, m/s; samples outside teach nothing.
+    dt : float
+        Period of the rows, s.
+    degree : int
+        Of the coefficients in airspeed.
+    forgetting : float
+        Factor a sample in the direction of each new regressor, in (0, 1]; 1 forgets nothing.
+
+    Raises
+    ------
+    InputError
+        An option out of range.
+    """
+
+    def __init__(
+        self,
+        inputs: Sequence[str],
+        low: float,
+        high: float,
+        dt: float = 0.02,
+        degree: int = 2,
+        forgetting: float = 1.0,
+    ):
+        self.inputs, self.dt, self.low, self.high = tuple(inputs), dt, low, high
+        self.structure = KinematicARX(
+            self.inputs, str(SLOW_AIRSPEED), basis=Polynomial(degree, low, high)
+        )
+        way = Directional(forgetting) if forgetting < 1.0 else 1.0
+        self.estimator = RecursiveLeastSquares(self.structure, way)
+        self.online = self.estimator.online(dt=dt)
+        self.signals = (*STATES, *self.inputs, "airspeed")
+        self.learnt, self.outside = 0, 0
+        self.largest = dict.fromkeys(self.inputs, 0.0)
+        count = max(math.ceil((high - low) / BIN), 1)
+        self._samples = np.zeros(count, int)
+        self._squares = np.zeros((count, len(self.inputs)))
+        self._slow, self._means = math.nan, np.zeros(len(self.inputs))
+        self._recent: deque[Array] = deque(maxlen=round(KEPT / dt))
+        self._seen = np.zeros((3, len(STATES)))  # number, sum and sum of squares
+
+    def take(self, row: Row) -> bool:
+        """Take in a row of `signals`; return whether it taught something."""
+        y, u, V = np.split(row.values, [len(STATES), len(STATES) + len(self.inputs)])
+        p = self._lagged(float(V[0]))
+        inside = self.low <= p <= self.high
+        if not np.isfinite(row.values).all():
+            y = np.full(len(y), math.nan)
+        if not inside:
+            self.outside += math.isfinite(p)
+            self.online.forget_past()
+            self._recent.clear()
+            return False
+        learnt = self.online.update(y, u, p)
+        if learnt:
+            self._seen += np.array([np.ones(len(y)), y, y**2])
+        self._recent.append(np.array([row.time, *y, *u, p]))
+        if learnt:
+            self._count(u, p)
+        return learnt
+
+    def _lagged(self, V: float) -> float:
+        """Airspeed behind its lag; NaN where it is not known."""
+        if math.isnan(V) or math.isnan(self._slow):
+            self._slow = V
+        else:
+            self._slow += (1.0 - math.exp(-self.dt / LAG)) * (V - self._slow)
+        return self._slow
+
+    def _count(self, u: Array, p: float) -> None:
+        if self.learnt == 0:
+            self._means = u.copy()
+        self.learnt += 1
+        self._means += (1.0 - math.exp(-self.dt / SLOW)) * (u - self._means)
+        cell = min(int((p - self.low) / BIN), len(self._samples) - 1)
+        self._samples[cell] += 1
+        self._squares[cell] += (u - self._means) ** 2
+        for name, value in zip(self.inputs, np.abs(u), strict=True):
+            self.largest[name] = max(self.largest[name], float(value))
+
+    # --- what is known ----------------------------------------------------------------------------
+
+    def coverage(self) -> list[Cell]:
+        """Return every cell of airspeed, from the lowest."""
+        out = []
+        for k, n in enumerate(self._samples):
+            sd = np.sqrt(self._squares[k] / max(n, 1))
+            motion = dict(zip(self.inputs, map(float, sd), strict=True))
+            out.append(Cell(self.low + k * BIN, int(n), motion))
+        return out
+
+    def next_to_fly(self) -> str:
+        """Return what would teach most: the airspeed that has been flown least, and the inputs that
+        have not moved there.
+        """
+        open_cells = [(cell, cell.missing(self.largest)) for cell in self.coverage()]
+        left = [(cell, names) for cell, names in open_cells if names]
+        if not left:
+            return "every airspeed is covered"
+        cell, names = min(left, key=lambda one: one[0].samples)
+        what = "all inputs" if len(names) == len(self.inputs) else ", ".join(names)
+        return f"fly at {cell.low:g} to {cell.low + BIN:g} m/s and move {what}"
+
+    def model(self) -> KinematicModel | None:
+        """The model as it is now; None while the data do not determine every coefficient."""
+        state = self.online.state
+        if not state.determined:
+            return None
+        regression = self.structure.aerodynamics
+        aerodynamics = LPVARXModel(
+            structure=regression,
+            theta=state.solve(),
+            dt=self.dt,
+            outputs=INCREMENTS,
+            inputs=tuple(map(Signal, regression.inputs)),
+            scheduling=SLOW_AIRSPEED,
+            residual_covariance=state.residual_covariance,
+            rows_used=state.count,
+            rows_dropped=0,
+            method="rls",
+        )
+        trim = np.zeros((self.structure.basis.size, len(STATES)))
+        return KinematicModel(structure=self.structure, aerodynamics=aerodynamics, trim=trim)
+
+    def control_powers(self, airspeeds: Sequence[float]) -> list[ControlPower]:
+        """Return the control power of each axis at airspeeds (m/s), with standard errors; none
+        while the data do not determine every coefficient.
+        """
+        state = self.online.state
+        if not state.determined:
+            return []
+        regression = self.structure.aerodynamics
+        theta, n = state.solve(), regression.n_regressors
+        R = state.factor[:n, :n]
+        noise = np.sqrt(np.diag(state.residual_covariance))
+        outputs = [str(name) for name in regression.outputs]
+        out = []
+        for velocity, ending in POWERS.items():
+            control = next((u for u in self.inputs if u.endswith(ending)), None)
+            column = next((k for k, y in enumerate(outputs) if y.split("_")[0] == velocity), None)
+            if control is None or column is None:
+                continue
+            for V in airspeeds:
+                g = self._functional(regression.regressor_names, control, V) / self.dt
+                spread = solve_triangular(R.T, g, lower=True)
+                error = float(np.linalg.norm(spread) * noise[column])
+                out.append(ControlPower(velocity, control, V, float(g @ theta[:, column]), error))
+        return out
+
+    def _functional(self, names: Sequence[str], control: str, V: float) -> Array:
+        """Factors of the regressors that sum the lags of a control at an airspeed."""
+        values = np.atleast_1d(self.structure.basis(V))
+        g = np.zeros(len(names))
+        for k, name in enumerate(names):
+            found = TERM.match(name)
+            if found and found["signal"] == control:
+                g[k] = values[int(found["function"] or 0)]
+        return g
+
+    def prediction(self) -> Prediction | None:
+        """How well states are predicted 1 s ahead over the last seconds; None where there are too
+        few samples without a gap, or no model yet.
+        """
+        horizon = round(HORIZON / self.dt)
+        rows = np.array(self._recent) if self._recent else np.zeros((0, 1))
+        model = self.model() if len(rows) > 2 * horizon else None
+        if model is None or not np.isfinite(rows).all():
+            return None
+        if np.abs(np.diff(rows[:, 0]) - self.dt).max() > 0.01 * self.dt:
+            return None
+        signals = (*RIGID_BODY, *map(Signal, self.inputs), SLOW_AIRSPEED)
+        time = rows[0, 0] + self.dt * np.arange(len(rows))
+        found = model.predict(FlightRecord(time, rows[:, 1:], signals), horizon)
+        there = np.isfinite(found).all(axis=1)
+        if there.sum() < horizon:
+            return None
+        measured = rows[there, 1 : 1 + len(STATES)]
+        miss = np.sqrt(np.mean((measured - found[there]) ** 2, axis=0))
+        n, total, squares = self._seen
+        varies = np.sqrt(np.maximum(squares / n - (total / n) ** 2, 1e-18))
+        fit = dict(zip(STATES, (100.0 * (1.0 - miss / varies)).tolist(), strict=True))
+        return Prediction(fit, int(there.sum()))

@@ -1,0 +1,141 @@
+"""MAVLink over UDP or a serial line: a vehicle's stream, and what a simulated vehicle sends.
+
+A sample is made at each ATTITUDE, with the latest velocity (LOCAL_POSITION_NED), servo outputs
+(SERVO_OUTPUT_RAW) and airspeed (VFR_HUD); all come at the rate of the stream. A servo output of
+1000 to 2000 us is a stick from -1 to 1.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from studies.live.earth import earth_velocity
+from studies.live.sample import Sample
+from symheli.errors import InputError
+from symheli.extras import extra
+from symheli.logs.xplane import body_velocity
+
+PORT = 14550
+"""UDP port on which ground stations listen."""
+CENTRE, TRAVEL = 1500.0, 500.0
+"""Servo output in the middle, and from there to a stop, us."""
+STICKS = ("stick_lon", "stick_lat", "stick_col", "stick_ped")
+OLD = 0.5
+"""Seconds on the sender's clock after which the last velocity or servo output is too old."""
+SYSTEM, COMPONENT = 1, 1
+
+
+def library() -> Any:
+    """Return pymavlink's utilities. Raises `InputError` where it is not installed."""
+    with extra("logs", "MAVLink"):
+        from pymavlink import mavutil
+    return mavutil
+
+
+class MavlinkSource:
+    """A vehicle that speaks MAVLink.
+
+    Parameters
+    ----------
+    address : str
+        As pymavlink writes it: "udpin:127.0.0.1:14550", "/dev/ttyUSB0".
+    baud : int
+        Of a serial line.
+
+    Raises
+    ------
+    InputError
+        Without pymavlink, and for an address that cannot be opened.
+    """
+
+    def __init__(self, address: str = f"udpin:127.0.0.1:{PORT}", baud: int = 57600):
+        self.name = f"MAVLink at {address}"
+        try:
+            self._link = library().mavlink_connection(address, baud=baud, robust_parsing=True)
+        except (OSError, ValueError) as error:
+            raise InputError(f"{self.name} cannot be opened: {error}") from error
+        self._latest: dict[tuple[int, str], tuple[float, dict[str, float]]] = {}
+        self._clock: dict[int, float] = {}
+
+    def receive(self, timeout: float) -> Sequence[Sample]:
+        """Return a sample for each ATTITUDE that has come."""
+        found: list[Sample] = []
+        message = self._link.recv_match(blocking=True, timeout=timeout)
+        while message is not None:
+            found += self._taken(message)
+            message = self._link.recv_match(blocking=False)
+        return found
+
+    def _taken(self, message: Any) -> list[Sample]:
+        kind, system = message.get_type(), message.get_srcSystem()
+        if kind == "ATTITUDE":
+            return [self._sample(message, system)]
+        read = READ.get(kind)
+        if read is not None:
+            self._latest[system, kind] = self._time(message, system), read(message)
+        return []
+
+    def _time(self, message: Any, system: int) -> float:
+        """Time of a message, s; of one without a clock that of the last one that has it."""
+        for field, unit in (("time_boot_ms", 1e-3), ("time_usec", 1e-6)):
+            if hasattr(message, field):
+                self._clock[system] = unit * getattr(message, field)
+        return self._clock.get(system, -math.inf)
+
+    def _sample(self, attitude: Any, system: int) -> Sample:
+        time = self._time(attitude, system)
+        values = {
+            "phi": attitude.roll,
+            "theta": attitude.pitch,
+            "psi": attitude.yaw,
+            "p": attitude.rollspeed,
+            "q": attitude.pitchspeed,
+            "r": attitude.yawspeed,
+        }
+        for kind in READ:
+            at, found = self._latest.get((system, kind), (-math.inf, {}))
+            if abs(time - at) <= OLD:
+                values |= found
+        if "north" in values:
+            earth = [values.pop(name) for name in ("north", "east", "down")]
+            angles = (values[name] for name in ("phi", "theta", "psi"))
+            body = body_velocity(*earth, *angles)  # type: ignore[arg-type]
+            values |= dict(zip("uvw", map(float, body), strict=True))
+        return Sample(time, values, f"system {system}")
+
+    def close(self) -> None:
+        """Close the line."""
+        self._link.close()
+
+
+def _velocity(message: Any) -> dict[str, float]:
+    return {"north": message.vx, "east": message.vy, "down": message.vz}
+
+
+def _servos(message: Any) -> dict[str, float]:
+    raw = [getattr(message, f"servo{k + 1}_raw") for k in range(len(STICKS))]
+    return {name: (us - CENTRE) / TRAVEL for name, us in zip(STICKS, raw, strict=True)}
+
+
+READ = {
+    "LOCAL_POSITION_NED": _velocity,
+    "SERVO_OUTPUT_RAW": _servos,
+    "VFR_HUD": lambda message: {"airspeed": message.airspeed},
+}
+"""Readers of the messages beside the attitude."""
+
+
+def sent(link: Any, time: float, values: Mapping[str, float]) -> None:
+    """Send one set of values of a vehicle, the attitude last."""
+    ms = round(1e3 * time) % 2**32
+    angles = [values[name] for name in ("phi", "theta", "psi")]
+    velocity = earth_velocity(*(values[name] for name in "uvw"), *angles)
+    link.local_position_ned_send(ms, 0.0, 0.0, 0.0, *velocity)
+    servos = [round(CENTRE + TRAVEL * min(max(values[name], -1.0), 1.0)) for name in STICKS]
+    link.servo_output_raw_send(round(1e6 * time) % 2**32, 0, *servos, *[0] * 4)
+    heading = round(math.degrees(angles[2])) % 360
+    link.vfr_hud_send(values["airspeed"], math.hypot(*velocity[:2]), heading, 0, 0.0, -velocity[2])
+    rates = (values[name] for name in "pqr")
+    link.attitude_send(ms, *angles, *rates)

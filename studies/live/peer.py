@@ -1,0 +1,246 @@
+"""A simulated vehicle in real time: a flight whose controller sends its samples over the wire and
+takes commands from there.
+"""
+
+from __future__ import annotations
+
+import math
+import select
+import socket
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+
+from studies.live import mavlink, xplane
+from studies.live.earth import earth_velocity
+from symheli.errors import InputError
+from symheli.values.arrays import Array
+from symheli.values.kinematics import INPUTS
+from symheli.values.named_vector import NamedVector
+
+STICKS = mavlink.STICKS
+FRESH = 0.5
+"""Seconds after which a command from the wire is too old, and the autopilot has the stick again."""
+MEASURED = ("u", "v", "w", "p", "q", "r", "phi", "theta", "airspeed")
+
+
+class Line(Protocol):
+    """A protocol that a simulated vehicle speaks."""
+
+    def send(self, at: float, values: Mapping[str, float]) -> None:
+        """Send the values of the vehicle at `at` (s), to whom asked for them."""
+
+    def wait(self, timeout: float) -> Mapping[str, float]:
+        """Serve requests for so long (s); return the sticks that were set meanwhile."""
+        ...
+
+    def close(self) -> None:
+        """Close its sockets."""
+
+
+class XPlaneLine:
+    """X-Plane's UDP from its side: answers requests for datarefs, and takes datarefs that are set.
+
+    Raises `InputError` where the port is taken.
+    """
+
+    def __init__(self, host: str = "127.0.0.1", port: int = xplane.PORT):
+        self._socket = bound(host, port)
+        self.port = self._socket.getsockname()[1]
+        self._asked: dict[Any, dict[int, xplane.Request]] = {}
+        self._due: dict[Any, float] = {}
+        self._factors = dict(xplane.DATAREFS.values())
+        self._names = {dataref: name for name, (dataref, _) in xplane.DATAREFS.items()}
+
+    def send(self, at: float, values: Mapping[str, float]) -> None:
+        """Send each client what it asked for, at the rate of its fastest request."""
+        shown = self._shown(at, values)
+        for client, requests in list(self._asked.items()):
+            if at < self._due.get(client, -math.inf) - 1e-9:
+                continue
+            frequency = max(one.frequency for one in requests.values())
+            self._due[client] = at + 1.0 / frequency
+            found = {k: shown.get(one.dataref, 0.0) for k, one in requests.items()}
+            self._socket.sendto(xplane.answer(found), client)
+
+    def _shown(self, at: float, values: Mapping[str, float]) -> dict[str, float]:
+        """Datarefs by name, in X-Plane's units."""
+        angles = [values[name] for name in ("phi", "theta", "psi")]
+        north, east, down = earth_velocity(*(values[name] for name in "uvw"), *angles)
+        raw = {**values, "time": at, "east": east, "up": -down, "south": -north}
+        return {
+            dataref: raw[name] / factor
+            for name, (dataref, factor) in xplane.DATAREFS.items()
+            if name in raw
+        }
+
+    def wait(self, timeout: float) -> dict[str, float]:
+        """Serve requests for so long (s); return the sticks that were set."""
+        sticks: dict[str, float] = {}
+        end = time.monotonic() + timeout
+        while select.select([self._socket], [], [], max(end - time.monotonic(), 0.0))[0]:
+            try:
+                datagram, client = self._socket.recvfrom(xplane.LARGEST)
+            except ConnectionError:  # a client that has gone
+                continue
+            request, setting = xplane.requested(datagram), xplane.set_by(datagram)
+            if request is not None:
+                self._take(client, request)
+            elif setting is not None and (name := self._names.get(setting[0])) in STICKS:
+                sticks[str(name)] = setting[1]
+        return sticks
+
+    def _take(self, client: Any, request: xplane.Request) -> None:
+        requests = self._asked.setdefault(client, {})
+        if request.frequency > 0:
+            requests[request.number] = request
+        else:
+            requests.pop(request.number, None)
+        if not requests:
+            del self._asked[client]
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close()
+
+
+class MavlinkLine:
+    """A vehicle's side of MAVLink over UDP: a heartbeat a second, and the messages of a sample.
+
+    Takes RC_CHANNELS_OVERRIDE: channels 1 to 4 are the sticks, 1000 to 2000 us.
+    """
+
+    def __init__(self, address: str = f"udpout:127.0.0.1:{mavlink.PORT}"):
+        self._library = mavlink.library()
+        self._link = self._library.mavlink_connection(
+            address, source_system=mavlink.SYSTEM, source_component=mavlink.COMPONENT
+        )
+        self._beat = -math.inf
+
+    def send(self, at: float, values: Mapping[str, float]) -> None:
+        """Send the messages of a sample."""
+        link = self._link.mav
+        try:
+            if at - self._beat >= 1.0:
+                self._beat = at
+                m = self._library.mavlink
+                link.heartbeat_send(m.MAV_TYPE_HELICOPTER, m.MAV_AUTOPILOT_GENERIC, 0, 0, 0)
+            mavlink.sent(link, at, values)
+        except OSError:  # nobody listens
+            pass
+
+    def wait(self, timeout: float) -> dict[str, float]:
+        """Take messages for so long (s); return the sticks that were set."""
+        sticks: dict[str, float] = {}
+        end = time.monotonic() + timeout
+        while True:
+            left = end - time.monotonic()
+            message = self._link.recv_match(
+                type="RC_CHANNELS_OVERRIDE", blocking=left > 0, timeout=max(left, 0.0)
+            )
+            if message is None:
+                return sticks
+            for k, name in enumerate(STICKS):
+                us = getattr(message, f"chan{k + 1}_raw")
+                if 0 < us < 2**16 - 1:
+                    sticks[name] = (us - mavlink.CENTRE) / mavlink.TRAVEL
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._link.close()
+
+
+def bound(host: str, port: int) -> socket.socket:
+    """Return a UDP socket at this address. Raises `InputError` where it is taken."""
+    made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        made.bind((host, port))
+    except OSError as error:
+        made.close()
+        raise InputError(f"port {port} of {host} cannot be had ({error}): give another") from error
+    return made
+
+
+class OnTheWire:
+    """A controller that flies as `inner` does, in real time, while each sample goes over lines.
+
+    Sticks that are set from there, as fractions of the travel of each control, replace the command
+    of `inner` until they are older than `FRESH`.
+
+    Parameters
+    ----------
+    inner
+        Controller with `init()` and `step(state, measured, reference, p)`.
+    lines : sequence of Line
+        Protocols.
+    travel : array (4,)
+        Of each control to either side, rad.
+    speed : float
+        Times real time; inf as fast as it goes.
+    added : array (samples, 4), optional
+        Excitation on top of the commands, rad.
+    """
+
+    def __init__(
+        self,
+        inner: Any,
+        lines: Sequence[Line],
+        travel: Array,
+        speed: float = 1.0,
+        added: Array | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ):
+        self.inner, self.lines, self.travel, self.speed = inner, lines, np.asarray(travel), speed
+        self._added = np.zeros((0, len(STICKS))) if added is None else added
+        self.dt, self._clock = inner.dt, clock
+        self.late = 0
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin a flight."""
+        self._state, self.samples, self._psi = self.inner.init(), 0, 0.0
+        self._begun = self._clock()
+        self._set: dict[str, tuple[float, float]] = {}
+        self._turned = math.nan
+
+    def step(self, measured: NamedVector, reference: NamedVector, p: NamedVector) -> Array:
+        """Return the commands; send the sample and wait until it is due."""
+        at = self.samples * self.dt
+        u, self._state = self.inner.step(self._state, measured, reference, p)
+        u = np.array(u, float)
+        if self.samples < len(self._added):
+            u += self._added[self.samples]
+        u = np.clip(u, -self.travel, self.travel)
+        for k, name in enumerate(STICKS):
+            value, when = self._set.get(name, (0.0, -math.inf))
+            if at - when <= FRESH:
+                u[k] = value * self.travel[k]
+        values = {name: float(measured[name]) for name in MEASURED}
+        values["psi"] = self._heading(values)
+        values |= dict(zip(STICKS, (u / self.travel).tolist(), strict=True))
+        values |= dict(zip(map(str, INPUTS), u.tolist(), strict=True))
+        for line in self.lines:
+            line.send(at, values)
+        self.samples += 1
+        self._wait(self._begun + self.samples * self.dt / self.speed, at + self.dt)
+        return u
+
+    def _wait(self, due: float, at: float) -> None:
+        left = due - self._clock()
+        self.late += left < 0
+        for k, line in enumerate(self.lines):
+            last = k == len(self.lines) - 1
+            sticks = line.wait(max(due - self._clock(), 0.0) if last else 0.0)
+            self._set |= {name: (float(v), at) for name, v in sticks.items() if math.isfinite(v)}
+
+    def _heading(self, values: Mapping[str, float]) -> float:
+        """Heading, rad, as the rates turn it."""
+        turned = (
+            values["q"] * math.sin(values["phi"]) + values["r"] * math.cos(values["phi"])
+        ) / math.cos(values["theta"])
+        if self.samples:
+            self._psi += 0.5 * self.dt * (turned + self._turned)
+        self._turned = turned
+        return self._psi

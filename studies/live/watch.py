@@ -1,0 +1,124 @@
+"""The loop of `symheli live`: receive, record, align, identify, say once a second what is known."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from studies.live.identifier import LiveIdentifier, Prediction
+from studies.live.recorder import Recorder
+from studies.live.sample import Sample, Source
+from studies.live.stream import Stream, StreamState
+
+SIGNALS = ("u", "v", "w", "p", "q", "r", "phi", "theta", "psi", "airspeed")
+"""Signals that are recorded of every vehicle, beside its controls."""
+PATIENCE = 0.05
+"""Longest time without a look at the clock, s."""
+EVERY = 1.0
+"""Seconds between two lines."""
+
+
+@dataclass
+class Watch:
+    """A source that is watched: samples that came, and the model they give."""
+
+    source: Source
+    identifier: LiveIdentifier
+    stream: Stream
+    recorder: Recorder | None = None
+    prediction: Prediction | None = None
+    received: int = 0
+    last: float = math.nan
+    airspeed: float = math.nan
+
+    def run(
+        self,
+        seconds: float,
+        say: Callable[[str], None],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """Watch for so long (s), or until nothing more can come or Ctrl-C; everything that came
+        is recorded and identified from then.
+        """
+        begun = said = clock()
+        try:
+            while (now := clock()) - begun < seconds:
+                for sample in self.source.receive(PATIENCE):
+                    self.take(sample, clock())
+                self.stream.idle(now)
+                if now - said >= EVERY:
+                    said = now
+                    self.prediction = self.identifier.prediction()
+                    say(self.line())
+        except (EOFError, KeyboardInterrupt):
+            pass
+        finally:
+            self.prediction = self.identifier.prediction() or self.prediction
+            self.source.close()
+            if self.recorder is not None:
+                self.recorder.close()
+
+    def take(self, sample: Sample, now: float) -> None:
+        """Record a sample and identify from it; `now` (s) is when it came."""
+        self.received += 1
+        if self.recorder is not None:
+            self.recorder.add(sample, now)
+        for row in self.stream.take(sample, now):
+            self.identifier.take(row)
+        self.last = sample.time
+        self.airspeed = float(sample.values.get("airspeed", math.nan))
+
+    def line(self) -> str:
+        """One line: time, airspeed, state of the stream, what is known, what to fly next."""
+        if not self.received:
+            return f"waiting: nothing has come from {self.source.name} yet"
+        cells = self.identifier.coverage()
+        whole = sum(not cell.missing(self.identifier.largest) for cell in cells)
+        parts = [
+            f"{self.last:8.1f} s",
+            f"{self.airspeed:5.1f} m/s",
+            f"learnt {self.identifier.learnt}",
+            f"covered {whole} of {len(cells)}",
+            *self._predicted(),
+            self.identifier.next_to_fly(),
+        ]
+        if self.stream.state is not StreamState.GOOD:
+            parts.append(f"{self.stream.state.name}: {self.stream.state.value}")
+        if self.recorder is not None and self.recorder.problem:
+            parts.append(f"RECORD: {self.recorder.problem}")
+        return "; ".join(parts)
+
+    def _predicted(self) -> list[str]:
+        if self.prediction is None:
+            return []
+        worst, fit = min(self.prediction.fit.items(), key=lambda item: item[1])
+        return [f"1 s ahead: worst {worst} {fit:.0f} %"]
+
+    def data(self) -> Mapping[str, Any]:
+        """Return the numbers for a program."""
+        identifier = self.identifier
+        middles = [cell.low for cell in identifier.coverage()][1::3]
+        return {
+            "source": self.source.name,
+            "samples": self.received,
+            "states": {state.name: count for state, count in self.stream.counts.items()},
+            "learnt": identifier.learnt,
+            "outside_the_range": identifier.outside,
+            "coverage": [
+                {
+                    "airspeed": cell.low,
+                    "samples": cell.samples,
+                    "motion": cell.motion,
+                    "missing": cell.missing(identifier.largest),
+                }
+                for cell in identifier.coverage()
+            ],
+            "next": identifier.next_to_fly(),
+            "prediction": None if self.prediction is None else self.prediction.fit,
+            "control_power": [p._asdict() for p in identifier.control_powers(middles)],
+            "record": None if self.recorder is None else self.recorder.path,
+            "units": {"airspeed": "m/s", "prediction": "%"},
+        }
