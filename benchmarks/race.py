@@ -58,7 +58,7 @@ def present(
     compared = [table("### Ratios", rows, ("", "x", "goal"))] if rows else []
     text = "\n\n".join([*tables, *compared, *(f"- {note}" for note in notes)])
     print(json.dumps({r.name: r.value for r in ratios}, indent=1) if options.json else text)
-    if options.write:
+    if getattr(options, "write", False):
         keep(section, text)
 
 
