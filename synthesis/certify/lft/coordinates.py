@@ -96,13 +96,14 @@ def coordinates(lft: LFT, gain: float, *, one: bool = False) -> Coordinates:
         _spread(G[:, :n, n:], G[:, :n, :n]),
         _spread(_adjoint(G[:, n:, :n]), _adjoint(G[:, :n, :n])),
     )
-    right = np.zeros((n, n))
+    left, right = np.zeros((2, n, n))
     if one and np.trace(reach) > 0 and np.trace(seen) > 0:
-        right = float(np.trace(reach) / np.trace(seen)) ** 0.25 * np.eye(n)
+        unit = float(np.trace(reach) / np.trace(seen)) ** 0.25
+        left, right = np.eye(n) / unit, unit * np.eye(n)
     else:
         for part in parts(lft.sizes):
-            right[part, part] = _balancing(reach[part, part], seen[part, part])
-    return Coordinates(plain.units, linalg.inv(right), right)
+            left[part, part], right[part, part] = _balancing(reach[part, part], seen[part, part])
+    return Coordinates(plain.units, left, right)
 
 
 def _frequencies(A: Array, continuous: bool) -> Array:
@@ -127,12 +128,12 @@ def _spread(direct: Array, around: Array) -> Array:
     return np.real(once + around @ once @ _adjoint(around)).sum(axis=0)
 
 
-def _balancing(reach: Array, seen: Array) -> Array:
-    """Return the diagonal T with T^-1 reach T^-T = T' seen T; directions that hardly matter are
-    bounded from below.
+def _balancing(reach: Array, seen: Array) -> tuple[Array, Array]:
+    """Return T^-1 and T with T^-1 reach T^-T = T' seen T, diagonal; directions that hardly matter
+    are bounded from below.
     """
     if not len(reach):
-        return reach
+        return reach, reach
     # each copy in a unit of its own first: those it came with may differ by any number
     a, b = np.diag(reach), np.diag(seen)
     both = (a > 0) & (b > 0)
@@ -143,10 +144,13 @@ def _balancing(reach: Array, seen: Array) -> Array:
     )
     size, directions = linalg.eigh(reach)
     # a loop on the border of stability leaves negative ones by rounding
-    root = directions * np.sqrt(np.maximum(size, 1e-12 * float(size.max())))
+    sizes = np.sqrt(np.maximum(size, 1e-12 * float(size.max())))
+    root = directions * sizes
     values, V = linalg.eigh(root.T @ seen @ root)
     least = max(1e-24 * float(values.max()), 1e-300)
-    return unit[:, None] * root @ V / np.maximum(values, least) ** 0.25
+    level = np.maximum(values, least) ** 0.25
+    inverse = level[:, None] * (V.T @ (directions / sizes).T) / unit
+    return inverse, unit[:, None] * root @ V / level
 
 
 def _adjoint(G: Array) -> Array:
