@@ -17,9 +17,9 @@ from symheli import Helicopter, Servo
 from symheli.errors import InputError, TrimError
 from symheli.flight import HelicopterLoops
 from symheli.flight.ardupilot import AXES, COMMANDS
+from symheli.lpv.tools import Actuation
 from symheli.progress import tracked
 from symheli.values.arrays import Array
-from synthesis.design.loops.actuated import actuated
 from synthesis.design.loops.margins import margins, open_loop
 
 CONTROLS = tuple(control for _, _, control in AXES.values())
@@ -101,7 +101,7 @@ def loop_margins(
     loops: HelicopterLoops,
     airspeeds: Sequence[float],
     *,
-    servos: Mapping[str, Servo] | None = None,
+    servos: Mapping[str, Servo] | Actuation | None = None,
     delay: float = 0.0,
 ) -> list[LoopMargins]:
     """Return margins and responses of every loop at every airspeed: those of the first helicopter,
@@ -111,11 +111,9 @@ def loop_margins(
     `delay` (s) is from command to servo, in whole periods of the loops. Raises `InputError` where
     it is not.
     """
-    if not (math.isfinite(delay) and delay >= 0):
-        raise InputError(f"delay: expected seconds >= 0, got {delay:g}")
-    rows = []
+    actuation, rows = Actuation.of(servos, delay, loops.dt), []
     for airspeed in tracked("margins", airspeeds):
-        each = [_at(h, loops, airspeed, servos, delay) for h in helicopters]
+        each = [_at(h, loops, airspeed, actuation) for h in helicopters]
         if each[0] is None:
             raise InputError(
                 f"the helicopter has no trim at {airspeed:g} m/s: leave this airspeed out"
@@ -127,11 +125,7 @@ def loop_margins(
 
 
 def _at(
-    heli: Helicopter,
-    loops: HelicopterLoops,
-    airspeed: float,
-    servos: Mapping[str, Servo] | None,
-    delay: float,
+    heli: Helicopter, loops: HelicopterLoops, airspeed: float, actuation: Actuation
 ) -> list[list[float]] | None:
     """Of each control: 1 where stable, crossover (rad/s), then `QUANTITIES`; None without a
     trim.
@@ -140,7 +134,7 @@ def _at(
         model = symheli.linearize(heli, symheli.trim(heli, airspeed=float(airspeed)))
     except TrimError:
         return None
-    plant = actuated(model, servos, delay, loops.dt)
+    plant = actuation.discretize(model)
     closed = closed_loops(plant, loops)
     unknown = Responses(*[math.nan] * len(Responses._fields))
     reached = responses(closed, RESPOND) if closed.is_stable() else dict.fromkeys(CONTROLS, unknown)

@@ -5,7 +5,7 @@ the study.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +25,7 @@ from symheli import Servo
 from symheli.errors import InputError
 from symheli.flight import XCELL_SERVOS
 from symheli.lpv.mixing import ERROR
+from symheli.lpv.tools import Actuation
 from symheli.values.whole_files import write_text
 from synthesis.design.plant.parts import DISTURBANCE
 
@@ -266,15 +267,17 @@ class DesignChoices:
         """
         return f"{name}{DISTURBANCE}" if name in self.controls else name
 
-    def servo(self, control: str) -> Servo | None:
-        """Return the given servo with the rate limit of the simulation; None where there is
-        none.
+    @property
+    def actuation(self) -> Actuation:
+        """Servos of the controls that have one, with the rate limit of the simulation, behind the
+        delay of a sampled command.
         """
-        if control not in self.servos:
-            return None
-        return replace(
-            Servo(**dict(zip(_OF_A_SERVO, self.servos[control], strict=False))), rate=SERVO_RATE
-        )
+        servos = {
+            u: Servo(**dict(zip(_OF_A_SERVO, self.servos[u], strict=False)), rate=SERVO_RATE)
+            for u in (*self.controls, *self.servos)
+            if u in self.servos
+        }
+        return Actuation(servos, self.delay, self.period)
 
 
 _OF_A_SERVO = ("natural_frequency", "damping", "zero", "pole")

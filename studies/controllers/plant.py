@@ -115,10 +115,9 @@ def design_plant(
     """Return the plant of the design: continuous, with actuators of low order behind the delay and
     the half sample that a command is `held` for, where the model does not have that already.
     """
-    servos = {u: choices.servo(u) for u in choices.controls}
-    late = choices.delay + held
-    actuators = {u: actuator(servo, u, late) for u, servo in servos.items() if servo is not None}
-    bare = [u for u, servo in servos.items() if servo is None]
+    late, servos = choices.delay + held, choices.actuation.servos or {}
+    actuators = {u: actuator(servos[u], u, late) for u in choices.controls if u in servos}
+    bare = [u for u in choices.controls if u not in servos]
     columns = indices(bare, model.inputs, "input")
     for u, i in zip(bare, columns, strict=True):
         if np.abs(model.D[1:, :, i]).max(initial=0) > ROUNDING * np.abs(model.D[:, :, i]).max():
@@ -136,13 +135,8 @@ def flown_plant(model: LPVStateSpace, choices: DesignChoices = STUDY) -> Plant:
 
 def behind_servos(model: LPVStateSpace, choices: DesignChoices = STUDY) -> Plant:
     """Return that plant without sizes and noise."""
-    servos = {u: choices.servo(u) for u in choices.controls}
-    behind = unweighted(model, choices).with_servo(
-        {u: s for u, s in servos.items() if s is not None}
-    )
-    if model.dt is None:
-        behind = behind.sampled(choices.period, degree=SAMPLED_DEGREE)
-    return behind.with_delay(choices.delay) if choices.delay else behind
+    actuation = choices.actuation.select(choices.controls)
+    return unweighted(model, choices).behind(actuation, SAMPLED_DEGREE)
 
 
 def closed(plant: Plant, controller: object) -> LPVStateSpace:
