@@ -16,6 +16,7 @@ from identification import Actuators, KinematicARX, Polynomial, fit
 from identification.methods import FilterError
 from identification.model import KinematicModel
 from identification.structure import LateSensors, SteadyWind
+from identification.structure.actuators import faster
 from identification.structure.kinematic_arx import STATES
 from studies.known_kinematics.flights import aggressive
 from studies.known_kinematics.models import FASTEST, GUST, SCHEDULING, structure
@@ -25,6 +26,7 @@ from studies.setup.flights import NOISE_DB, TOP, autopilot_for, light_turbulence
 from symheli import FlightPlan, FlightRecord, Helicopter, Sensor, Wind
 from symheli.flight import XCELL_SERVOS, SimulatedFlight, gain_scheduled_lqr
 from symheli.lpv import Product
+from symheli.lpv.tools import Actuation
 from symheli.values.arrays import Array
 
 ALL = "all axes"
@@ -187,9 +189,9 @@ class RealCondition:
         default of all axes.
         """
         servos = XCELL_SERVOS if self.servos else None
-        late = self.late // self.decimated
+        delay = self.late // self.decimated * self.period
         chosen = {name: AXES[name] for name in axes or (ALL,)}
-        return Truth.of(heli, chosen, period=self.period, servos=servos, late=late)
+        return Truth.of(heli, chosen, actuation=Actuation(servos, delay, self.period))
 
 
 WIND, ANOTHER = 5.0, 50_000
@@ -248,15 +250,7 @@ FASTER = 1.2
 where it is to find it.
 """
 
-WRONG_SERVOS = {
-    u: replace(
-        s,
-        natural_frequency=FASTER * s.natural_frequency,
-        zero=s.zero and FASTER * s.zero,
-        pole=s.pole and FASTER * s.pole,
-    )
-    for u, s in XCELL_SERVOS.items()
-}
+WRONG_SERVOS = {u: faster(servo, FASTER) for u, servo in XCELL_SERVOS.items()}
 NOT_QUITE = partial(Actuators, delay=ASSUMED, delay_deviation=UNSURE)
 
 CONDITIONS: Mapping[str, RealCondition] = {
