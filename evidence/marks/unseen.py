@@ -52,9 +52,8 @@ def governed(heli: Helicopter, plan: FlightPlan) -> tuple[Helicopter, FlightPlan
 
 def sticking(heli: Helicopter, plan: FlightPlan, name: str, steps: int) -> Any:
     """A servo that moves in so many jumps from stop to stop."""
-    assert plan.servos is not None
-    servo = replace(plan.servos[name], steps=steps)
-    return heli, replace(plan, servos={**plan.servos, name: servo})
+    servos = plan.actuation.servos or {}
+    return heli, replace(plan, servos={**servos, name: replace(servos[name], steps=steps)})
 
 
 def wind(speed: float) -> Change:
