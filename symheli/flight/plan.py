@@ -19,7 +19,7 @@ from symheli.flight.sensor import Sensor
 from symheli.flight.servo import Servo, one_each
 from symheli.lpv.actuation import Actuation
 from symheli.values.kinematics import INPUTS
-from symheli.values.numbers import whole
+from symheli.values.numbers import by_name, whole
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -152,13 +152,12 @@ class FlightPlan:
         object.__setattr__(self, "seed", whole(self.seed, "seed"))
         object.__setattr__(self, "wind", _wind(self.wind))
         given = self.servos.servos if isinstance(self.servos, Actuation) else self.servos
-        _each("servos", given, Servo, INPUTS)
+        if given is not None:
+            one_each(given, INPUTS)
         actuation = Actuation.of(self.actuation, period=self.control_period)
         object.__setattr__(self, "servos", actuation.servos)
         object.__setattr__(self, "delay", actuation.delay)
-        _each("sensors", self.sensors, Sensor, READ)
-        if actuation.servos is not None:
-            one_each(actuation.servos, INPUTS)
+        _sensors(self.sensors)
         if self.delay > LONGEST_DELAY:
             raise InputError(
                 f"delay: {self.delay:g} s is implausibly long; delay is in seconds: {self.delay:g}"
@@ -243,14 +242,9 @@ def _wind(wind: Any) -> Wind:
     return Wind((north, east, down))
 
 
-def _each(name: str, given: Any, kind: type, known: Sequence[str]) -> None:
-    """Raises where this is no mapping from known names to things of one kind."""
-    if given is None:
-        return
-    if not isinstance(given, Mapping):
-        raise InputError(f"{name}: expected {{signal: {kind.__name__}}}, got {given!r:.80}")
-    for key, value in given.items():
-        if key not in known:
-            what = "measured signal" if kind is Sensor else "input"
-            raise UnknownNameError(what, key, known)
-        _expect(f"{name}[{key!r}]", value, kind)
+def _sensors(given: Mapping[str, Sensor] | None) -> None:
+    """Raises where these are no sensors by name of what is read."""
+    for name, sensor in by_name(given or {}, "sensors", "{signal: Sensor}").items():
+        if name not in READ:
+            raise UnknownNameError("measured signal", name, READ)
+        _expect(f"sensors[{name!r}]", sensor, Sensor)
