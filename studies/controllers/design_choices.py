@@ -5,7 +5,7 @@ the study.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -77,6 +77,11 @@ GAIN = 7.0
 
 SERVO_RATE = 3.0
 """Rate limit of every servo, rad/s of blade pitch; assumed, the source of the servos gives none."""
+
+LIMITED = Actuation(
+    {u: replace(servo, rate=SERVO_RATE) for u, servo in XCELL_SERVOS.items()}, DELAY, PERIOD
+)
+"""Servos so limited, as controllers are flown."""
 
 TURBULENCE = 3.9
 """Turbulence that is flown, m/s: half of light, in which flights keep to the certificate."""

@@ -73,21 +73,6 @@ def actuator(servo: Servo, name: str, late: float) -> LinearModel:
     )
 
 
-def lag(name: str, corner: float) -> LinearModel:
-    """Return the lag that keeps a control from acting on an output directly by D(p), as it does
-    in the continuous model of a sampled one; at 2/dt rad/s it is half a sample late.
-    """
-    return LinearModel(
-        np.array([[-corner]]),
-        np.array([[corner]]),
-        np.array([[1.0]]),
-        np.zeros((1, 1)),
-        (Signal(f"{name}_hold", "rad"),),
-        (Signal(f"{name}_command", "rad"),),
-        (Signal(name, "rad"),),
-    )
-
-
 def unweighted(model: LPVStateSpace, choices: DesignChoices = STUDY) -> Plant:
     """Return the plant with gusts, controls, and the measured states and commands as
     performance; what follows a command has its reference.
@@ -121,7 +106,9 @@ def design_plant(
     columns = indices(bare, model.inputs, "input")
     for u, i in zip(bare, columns, strict=True):
         if np.abs(model.D[1:, :, i]).max(initial=0) > ROUNDING * np.abs(model.D[:, :, i]).max():
-            actuators[u] = lag(u, 2 / choices.period)
+            # no feedthrough, which the continuous model of a sampled one has; half a sample late
+            corner = 2 / choices.period
+            actuators[u] = parts.first_order(-corner, corner, f"{u}_hold", u, None)
     behind = unweighted(model, choices).with_servo(actuators)
     return weighted(behind.with_delay(late, bare, order=1) if bare and late else behind, choices)
 

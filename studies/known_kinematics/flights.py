@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from studies.setup.flights import ACTUATION, NOISE_DB, TOP
 from studies.setup.flights import AMPLITUDE as STUDY_AMPLITUDE
-from studies.setup.flights import NOISE_DB, TOP
 from symheli import AirspeedSchedule, Excitation, FlightPlan, Wind
-from symheli.flight import XCELL_SERVOS, Autopilot
+from symheli.flight import Autopilot
 
 TARGETS = (
     *(13.0, 0.0, 6.5, 13.0, 3.0, 10.0, 0.0, 13.0, 5.0, 0.0),
@@ -45,9 +45,6 @@ hover.
 TEST_LINES = (0.1, 5.0)
 TEST_AMPLITUDE = STUDY_AMPLITUDE
 """Amplitudes of the flight that judges: those of the study."""
-
-DELAY = 0.02
-"""From command to servo, s, where servos fly."""
 
 
 def aggressive(
@@ -126,6 +123,5 @@ def _plan(
         seed=seed,
         controller=autopilot,
         wind=wind or Wind(),
-        servos=XCELL_SERVOS if servos else None,
-        delay=DELAY if servos else 0.0,
+        servos=ACTUATION if servos else None,
     )

@@ -9,17 +9,11 @@ from dataclasses import dataclass
 
 import synthesis
 from studies.loops.lateral import HOLD
+from studies.setup.flights import ACTUATION
 from symheli import LinearModel
-from symheli.flight import XCELL_SERVOS
-from symheli.lpv.tools import Actuation
 from symheli.progress import tracked
 from synthesis.design.loops.handling_qualities import Bandwidth
 from synthesis.design.loops.margins import Margins
-
-DELAY = 0.02
-"""From measurement to command, s."""
-
-ACTUATION = Actuation(XCELL_SERVOS, DELAY)
 
 
 @dataclass(frozen=True)

@@ -168,7 +168,7 @@ class FlightPlan:
 
     @property
     def actuation(self) -> Actuation:
-        """What stands between the commands and the blade pitch."""
+        """Servos and delay between the commands and the blade pitch."""
         return Actuation.of(self.servos, self.delay)
 
     @property

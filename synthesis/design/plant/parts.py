@@ -44,7 +44,7 @@ def sensor_filter(given: object, name: str, dt: float | None) -> Part:
     """
     if _is_number(given):
         omega = positive(given, f"the bandwidth of the filter of {name}")
-        given = _first_order(-omega, omega, f"{name}_filter", name, None)
+        given = first_order(-omega, omega, f"{name}_filter", name, None)
     return as_part(given, f"the filter of {name}", "a bandwidth in rad/s", dt, "tustin")
 
 
@@ -53,7 +53,7 @@ def integrator(name: str, dt: float | None) -> LinearModel:
     sampled plant.
     """
     A, B = (0.0, 1.0) if dt is None else (1.0, dt)
-    return _first_order(A, B, f"{name}_command", name, dt)
+    return first_order(A, B, f"{name}_command", name, dt)
 
 
 def on(model: Model, change: Callable[[LPVStateSpace], LPVStateSpace]) -> Model:
@@ -120,7 +120,7 @@ def new_name(
     return {name: of or {}}
 
 
-def _first_order(A: float, B: float, state: str, name: str, dt: float | None) -> LinearModel:
+def first_order(A: float, B: float, state: str, name: str, dt: float | None) -> LinearModel:
     """Return a first-order lag with the state as its output, in the unit of the signal."""
     a, b, c, d = (np.array([[entry]]) for entry in (A, B, 1.0, 0.0))
     signal = Signal(name)
