@@ -76,17 +76,12 @@ class LoopEquipment:
     def __post_init__(self) -> None:
         whole(self.parts, "parts", 1)
         self.actuation.samples  # noqa: B018 - raises for a delay of a part of a period
-        if self.servos is not None:
-            one_each(self.servos, [str(name) for name in INPUTS])
-            if self.period and any(math.isfinite(s.rate) for s in self.servos.values()):
+        if self.actuation.servos is not None:
+            one_each(self.actuation.servos, [str(name) for name in INPUTS])
+            if self.period and any(math.isfinite(s.rate) for s in self.actuation.servos.values()):
                 raise InputError(
                     "a sampled command jumps: servos with a rate limit need continuous time"
                 )
-
-    @property
-    def servos(self) -> Mapping[str, Servo] | None:
-        """The servos, one for each control."""
-        return self.actuation.servos
 
     @property
     def period(self) -> float:
@@ -107,9 +102,9 @@ class LoopEquipment:
     @cached_property
     def bank(self) -> Bank | None:
         """The servos' linear parts."""
-        if self.servos is None:
+        if self.actuation.servos is None:
             return None
-        made = append(*(self.servos[str(u)].linear(str(u)) for u in INPUTS))
+        made = append(*(self.actuation.servos[str(u)].linear(str(u)) for u in INPUTS))
         settled = -np.linalg.solve(made.A, made.B)
         units = tuple(s.unit == "rad/s" for s in made.states)
         return Bank(made.A, made.B, made.C, settled, tuple(map(str, made.states)), units)
@@ -199,10 +194,10 @@ class LoopEquipment:
         """Rates of the further states (m, q), each times a number within [-1, 1], by the steps in
         which servos resolve their commands.
         """
-        if self.servos is None or self.bank is None:
+        if self.actuation.servos is None or self.bank is None:
             return np.zeros((self.count, 0))
         half = [
-            t / s.steps if (s := self.servos[str(u)]).steps else 0.0
+            t / s.steps if (s := self.actuation.servos[str(u)]).steps else 0.0
             for u, t in zip(INPUTS, travel, strict=True)
         ]
         out = np.zeros((self.count, 4))
@@ -224,19 +219,19 @@ class LoopEquipment:
                 " the sample"
             )
         servos = "no servos: blade pitch follows its command at once"
-        if self.servos is not None:
-            each = ", ".join(f"{u} {_words(self.servos[str(u)])}" for u in INPUTS)
+        if self.actuation.servos is not None:
+            each = ", ".join(f"{u} {_words(self.actuation.servos[str(u)])}" for u in INPUTS)
             servos = f"servos {each}; they resolve their commands in the steps given, or better"
         return (f"a controller of {' '.join(known)}{own}, {clock}", servos)
 
     def written(self) -> dict[str, Any]:
         """As JSON holds it."""
         servos = None
-        if self.servos is not None:
+        if self.actuation.servos is not None:
             servos = {
                 str(u): {
                     name: value
-                    for name, value in asdict(self.servos[str(u)]).items()
+                    for name, value in asdict(self.actuation.servos[str(u)]).items()
                     if value is not None and math.isfinite(value)
                 }
                 for u in INPUTS

@@ -172,6 +172,22 @@ def test_a_tube_that_reaches_the_travel_or_a_rate_limit_is_refused(enclosed):
     assert "faster" in why_not_free(limited, [cell], P, [(over, factor)])
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("share", [0.99, 1.01])
+def test_a_rate_limit_is_that_of_its_control_in_any_order(enclosed, share):
+    """Every control at its own bound, which differ; the servos in another order."""
+    loop, cell, over, factor = enclosed
+    P = np.linalg.inv(factor @ factor.T)[None]
+    own = loop.reference.equipment
+    for u, row in zip(FINE, own.commands(loop.reference.gain)[0], strict=True):
+        limit = replace(FINE[u], rate=share * fastest(row, over, factor))
+        servos = {**dict(reversed(FINE.items())), u: limit}
+        equipment = replace(own, actuation=Actuation(servos))
+        limited = replace(loop, reference=replace(loop.reference, equipment=equipment))
+        why = why_not_free(limited, [cell], P, [(over, factor)])
+        assert why == ("" if share > 1 else f"{u}_command may change faster than its servo follows")
+
+
 def test_equipment_is_the_same_when_read_again():
     for own in (
         LoopEquipment(),
