@@ -20,7 +20,7 @@ from studies.known_kinematics.conditions import CONDITIONS, Instruments
 from studies.known_kinematics.flights import aggressive, transition
 from studies.known_kinematics.models import PAIRS, identified
 from studies.setup.bounds import PERIOD
-from studies.setup.flights import TOP, autopilot_for
+from studies.setup.flights import ACTUATION, TOP, autopilot_for
 from symheli import FlightPlan, Helicopter, Wind
 from symheli.errors import DataWarning
 from symheli.flight import XCELL_SERVOS, Autopilot, SimulatedFlight, gain_scheduled_lqr
@@ -140,7 +140,7 @@ def _identified(kind: str, seed: int, truth: str) -> tuple[Helicopter, Autopilot
 
 
 def _plan(kind: str, seed: int, autopilot: Autopilot, excited: bool) -> FlightPlan:
-    plan = transition(seed, autopilot, servos=kind == "commands")
+    plan = transition(seed, autopilot, servos=ACTUATION if kind == "commands" else None)
     return plan if excited else replace(plan, excitation=None)
 
 
