@@ -91,7 +91,7 @@ class Actuation:
         if period and servos.period and not same_period(period, servos.period):
             raise InputError(
                 f"period: {period:g} s, and the Actuation given as servos holds commands for"
-                f" {servos.period:g} s: give one of the two"
+                f" {servos.period:g} s: they must agree"
             )
         return replace(servos, delay=delay or servos.delay, period=period or servos.period)
 

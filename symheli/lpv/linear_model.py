@@ -192,6 +192,11 @@ class LinearModel(Operators):
         """
         at = indices(actuators, self.inputs, "input")
         for name, part in actuators.items():
+            if not isinstance(part, LinearModel):
+                raise InputError(
+                    f"the actuator of {name}: expected a LinearModel, got {type(part).__name__}; at"
+                    " fixed parameters an LPVStateSpace is one, .at(...)"
+                )
             if not same_period(part.dt, self.dt) or len(part.inputs) != 1 or len(part.outputs) != 1:
                 raise InputError(
                     f"the actuator of {name} needs one input, one output and dt = {self.dt}; "
