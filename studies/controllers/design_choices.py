@@ -278,9 +278,8 @@ class DesignChoices:
         delay of a sampled command.
         """
         servos = {
-            u: Servo(**dict(zip(_OF_A_SERVO, self.servos[u], strict=False)), rate=SERVO_RATE)
-            for u in (*self.controls, *self.servos)
-            if u in self.servos
+            u: Servo(**dict(zip(_OF_A_SERVO, numbers, strict=False)), rate=SERVO_RATE)
+            for u, numbers in self.servos.items()
         }
         return Actuation(servos, self.delay, self.period)
 

@@ -9,7 +9,7 @@ from typing import Any, Protocol, TypeVar, runtime_checkable
 from symheli.errors import InputError
 from symheli.lpv.delay import delay_of, whole_samples
 from symheli.lpv.in_series import Part, as_part
-from symheli.lpv.linear_model import LinearModel, is_control_system
+from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.values.numbers import by_name, finite, positive
 from symheli.values.sample_period import same_period
@@ -68,9 +68,10 @@ class Actuation:
     period: float | None = None
 
     def __post_init__(self) -> None:
-        for name, servo in by_name(self.servos or {}, "servos", "{input: servo}").items():
-            if not (isinstance(servo, Actuator) or is_control_system(servo)):
-                as_part(servo, f"the actuator of {name}", "a Servo", None, "hold")
+        given = {} if self.servos is None else self.servos
+        for name, servo in by_name(given, "servos", "{input: servo}").items():
+            if not isinstance(servo, Actuator):
+                _part(servo, name, None)
         if isinstance(self.delay, bool) or not finite(self.delay, "delay", "seconds") >= 0:
             raise InputError(f"delay: expected a number of seconds >= 0, got {self.delay!r:.80}")
         if self.period is not None:
@@ -109,16 +110,7 @@ class Actuation:
 
     def parts(self, dt: float | None = None) -> dict[str, Part]:
         """Return the servos as systems by input: continuous, or with commands held for `dt` s."""
-        return {
-            name: as_part(
-                servo.linear(name) if isinstance(servo, Actuator) else servo,
-                f"the actuator of {name}",
-                "a Servo",
-                dt,
-                "hold",
-            )
-            for name, servo in (self.servos or {}).items()
-        }
+        return {name: _part(servo, name, dt) for name, servo in (self.servos or {}).items()}
 
     def behind(self, model: M, inputs: Sequence[str] | None = None) -> M:
         """Return a continuous model behind servos and Pade's delay, without the hold; a sampled
@@ -152,3 +144,8 @@ class Actuation:
                 f" got {self.period}, and its servos belong in front of the sampling"
             )
         return replace(self, servos=None).behind(model, inputs)
+
+
+def _part(servo: Any, name: str, dt: float | None) -> Part:
+    given = servo.linear(name) if isinstance(servo, Actuator) else servo
+    return as_part(given, f"the actuator of {name}", "a Servo", dt, "hold")
