@@ -86,6 +86,8 @@ def test_only_the_controls_that_are_named_are_behind_it():
     own = {"d_lat": SERVOS["d_lat"].linear("d_lat")}
     expected = model.driven_by(own).driven_by({"d_lat": pade_delay("d_lat", 0.03)})
     same(actuation.behind(model, ["d_lat"]), expected)
+    held = model.driven_by(own).discretize(DT).driven_by({"d_lat": sample_delay("d_lat", 2, DT)})
+    same(Actuation(SERVOS, delay=0.04, period=DT).discretize(model, ["d_lat"]), held)
     straight = actuation.behind(model, ["d_lat"]).select(inputs=["gust"]).frequency_response([5.0])
     np.testing.assert_allclose(straight, model.select(inputs=["gust"]).frequency_response([5.0]))
     assert set(actuation.select(["d_ped", "gust"]).servos) == {"d_ped"}
@@ -133,6 +135,7 @@ def test_python_control_and_scheduled_servos_are_taken():
         (lambda: Actuation(delay=True), "delay: expected a number of seconds >= 0, got True"),
         (lambda: Actuation(delay=np.nan), "delay: expected a finite number of seconds"),
         (lambda: Actuation(period=0.0), "period: expected a number > 0, got 0.0"),
+        (lambda: Actuation(period=True), "period: expected a number > 0, got True"),
         (lambda: Actuation([SERVO]), "servos: expected {input: servo}"),
         (lambda: Actuation({"d_lat": 33.0}), "the actuator of d_lat: expected a Servo"),
         (lambda: Actuation(delay=0.03, period=DT).samples, "the nearest are 0.02 s and 0.04 s"),

@@ -4,10 +4,8 @@ with one input and one output.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -15,18 +13,12 @@ from symheli import LinearModel, LPVStateSpace, UncertainStateSpace
 from symheli.errors import InputError
 from symheli.lpv.in_series import Part, as_part
 from symheli.lpv.mixing import itself, mixed
+from symheli.values.numbers import positive
 from symheli.values.signal import Signal
 
 Model = LPVStateSpace | UncertainStateSpace
 DISTURBANCE = "_disturbance"
 """Suffix of the name of a disturbance added to a control."""
-
-
-def positive(given: Any, what: str) -> float:
-    """Return the number; raise `InputError` unless it is a finite number > 0."""
-    if not (_is_number(given) and 0 < float(given) < math.inf):
-        raise InputError(f"{what}: expected a number > 0, got {given!r:.60}")
-    return float(given)
 
 
 def weight(given: object, name: str, dt: float | None) -> Part:
