@@ -19,10 +19,11 @@ from studies.controllers.designs import lqr_schedule
 from studies.controllers.flown import transition
 from studies.controllers.measures import Measures, measured
 from studies.controllers.plant import baseline, closed, flown_plant
+from studies.setup.flights import ACTUATION
 from symheli import FlightPlan, Helicopter, LPVStateSpace, Wind
 from symheli.environment import Dryden
 from symheli.errors import ValidityWarning
-from symheli.flight import XCELL_SERVOS, ScheduledController
+from symheli.flight import ScheduledController
 from symheli.lpv.bases import Polynomial
 from symheli.values.kinematics import VELOCITIES
 from synthesis import Certificate, Plant
@@ -126,8 +127,7 @@ def flight(heli: Helicopter, model: LPVStateSpace) -> Measures:
     plan = FlightPlan(
         transition(),
         controller=ScheduledController(model),
-        servos=XCELL_SERVOS,
-        delay=0.02,
+        servos=ACTUATION,
         wind=wind,
         seed=SEED,
     )

@@ -105,8 +105,7 @@ class Trial:
             controllers,
             self.sheet,
             at=at,
-            servos={u: servo for u in a.controls if (servo := a.servo(u)) is not None},
-            delay=a.delay,
+            servos=a.actuation,
             travel=travel_of(a),
             rate_limit=dict.fromkeys(a.controls, SERVO_RATE),
         )

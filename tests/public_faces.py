@@ -27,7 +27,7 @@ def names(face):
     module below a package those that stood at the top.
     """
     house = tomllib.loads((ROOT / "evidence" / "house.toml").read_text(encoding="utf-8"))
-    if face in (*TOP, "symheli.lpv", *house["faces"]):
+    if face in (*TOP, "symheli.lpv", "symheli.lpv.tools", *house["faces"]):
         return list(module(face).__all__)
     packages = [package for package in (*TOP, "symheli.lpv") if face.startswith(f"{package}.")]
     return sorted({name for p in packages for m, name in moved(p) if m == face})

@@ -25,7 +25,6 @@ from studies.known_kinematics.conditions import (
 from studies.known_kinematics.models import PAIRS
 from studies.known_kinematics.truth import SPEEDS
 from studies.output import as_json
-from studies.setup.bounds import PERIOD
 from symheli.errors import DataWarning
 from symheli.flight import SimulatedFlight
 
@@ -84,7 +83,7 @@ def row(name: str, marks: Sequence[Marks]) -> tuple[str, ...]:
 
 def _found(condition: RealCondition, marks: Sequence[Marks]) -> str:
     """How far the delays, and the winds, that were found are from the true ones."""
-    late = SENSORS_LATE if condition.sensors else condition.late * PERIOD
+    late = SENSORS_LATE if condition.sensors else condition.flown.delay
     delays = [m.found[part]["delay"][0] for m in marks for part in PARTS[:2] if part in m.found]
     if delays:
         off = np.abs(np.array(delays) - late)

@@ -28,6 +28,7 @@ from studies.setup.flights import TOP
 from symheli import FlightRecord, Wind
 from symheli.errors import DataWarning, SymheliError
 from symheli.flight import SimulatedFlight
+from symheli.lpv.tools import Actuation
 
 JUDGED = (0, 2, 4, 8, 12, 16, 20, 26)
 """Of the airspeeds of a truth those that are judged at: 0, 1, 2, 4, 6, 8, 10, 13 m/s."""
@@ -128,7 +129,7 @@ CASES: Mapping[str, Case] = {
     ),
     "20 ms untold": Case(
         "commands 20 ms late, taken for deflections",
-        replace(CONDITIONS["delay"], late=1),
+        replace(CONDITIONS["delay"], flown=Actuation(delay=0.02)),
         IDEAL,
     ),
     "servos untold": Case(

@@ -20,7 +20,7 @@ from studies.known_kinematics.conditions import CONDITIONS, Instruments
 from studies.known_kinematics.flights import aggressive, transition
 from studies.known_kinematics.models import PAIRS, identified
 from studies.setup.bounds import PERIOD
-from studies.setup.flights import TOP, autopilot_for
+from studies.setup.flights import ACTUATION, TOP, autopilot_for
 from symheli import FlightPlan, Helicopter, Wind
 from symheli.errors import DataWarning
 from symheli.flight import XCELL_SERVOS, Autopilot, SimulatedFlight, gain_scheduled_lqr
@@ -52,9 +52,8 @@ def governed(heli: Helicopter, plan: FlightPlan) -> tuple[Helicopter, FlightPlan
 
 def sticking(heli: Helicopter, plan: FlightPlan, name: str, steps: int) -> Any:
     """A servo that moves in so many jumps from stop to stop."""
-    assert plan.servos is not None
-    servo = replace(plan.servos[name], steps=steps)
-    return heli, replace(plan, servos={**plan.servos, name: servo})
+    servos = plan.actuation.servos or {}
+    return heli, replace(plan, servos={**servos, name: replace(servos[name], steps=steps)})
 
 
 def wind(speed: float) -> Change:
@@ -141,7 +140,7 @@ def _identified(kind: str, seed: int, truth: str) -> tuple[Helicopter, Autopilot
 
 
 def _plan(kind: str, seed: int, autopilot: Autopilot, excited: bool) -> FlightPlan:
-    plan = transition(seed, autopilot, servos=kind == "commands")
+    plan = transition(seed, autopilot, servos=ACTUATION if kind == "commands" else None)
     return plan if excited else replace(plan, excitation=None)
 
 

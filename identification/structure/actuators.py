@@ -14,6 +14,8 @@ from scipy.signal import lfilter, ss2tf
 from symheli import LinearModel
 from symheli.errors import InputError
 from symheli.flight import Servo
+from symheli.flight.servo import one_each
+from symheli.lpv.tools import Actuation
 from symheli.records import FlightRecord
 from symheli.values import Signal
 from symheli.values.arrays import Array
@@ -31,9 +33,9 @@ class Actuators:
 
     Parameters
     ----------
-    servos : mapping of str to Servo, optional
+    servos : mapping of str to Servo, or Actuation, optional
         By control, as d_lon, d_lat, d_col, d_ped: from the bench, or the maker. None: the delay
-        alone.
+        alone. An Actuation has delay and period too.
     delay : float
         From command to servo, s, of any part of a sample.
     bandwidth_deviation : float
@@ -72,14 +74,15 @@ class Actuators:
     period: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("delay", "bandwidth_deviation", "delay_deviation"):
+        actuation = Actuation.of(self.servos, self.delay, self.period)
+        for name in ("servos", "delay", "period"):
+            object.__setattr__(self, name, getattr(actuation, name))
+        for name in ("bandwidth_deviation", "delay_deviation"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0):
                 raise InputError(f"{name}: expected a finite number >= 0, got {value!r}")
         if self.bandwidth_deviation and not self.servos:
             raise InputError("bandwidth_deviation: there are no servos whose bandwidth it could be")
-        if self.period is not None and not (math.isfinite(self.period) and self.period > 0):
-            raise InputError(f"period: expected a time > 0 s, got {self.period!r}")
 
     @property
     def unknown(self) -> tuple[str, ...]:
@@ -126,8 +129,7 @@ class Actuators:
     def require(self, controls: Sequence[str]) -> None:
         """Raises `InputError` where a control has no servo."""
         if self.servos is not None:
-            if missing := [u for u in controls if u not in self.servos]:
-                raise InputError(f"servos: none given for {', '.join(missing)}")
+            one_each({u: s for u, s in self.servos.items() if u in controls}, controls)
 
     # --- along a record --------------------------------------------------------------------------
 

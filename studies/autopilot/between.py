@@ -14,10 +14,10 @@ from studies.autopilot.tuned import closed_loops
 from symheli import Helicopter, LinearFamily, LPVStateSpace, Servo
 from symheli.errors import InputError, TrimError
 from symheli.flight import HelicopterLoops
+from symheli.lpv.tools import Actuation
 from symheli.progress import task, tracked
 from symheli.values.arrays import Array
 from synthesis import Certificate
-from synthesis.design.loops.actuated import actuated
 
 APART = 2.0
 """Largest distance (m/s) of the airspeeds between which the plant is taken as straight."""
@@ -79,7 +79,7 @@ def stable_between(
     high: float,
     rate: float,
     *,
-    servos: Mapping[str, Servo] | None = None,
+    servos: Mapping[str, Servo] | Actuation | None = None,
     delay: float = 0.0,
 ) -> Between:
     """Look for a Lyapunov function of the loops around the first helicopter over the airspeed (half
@@ -92,12 +92,13 @@ def stable_between(
         raise InputError(
             f"a proof between airspeeds needs two of them, got {low:g} to {high:g} m/s"
         )
+    actuation = Actuation.of(servos, delay, loops.dt)
     airspeeds = np.linspace(low, high, max(math.ceil((high - low) / APART), 1) + 1)
     halfway = 0.5 * (airspeeds[1:] + airspeeds[:-1])
 
     def plants(heli: Helicopter, at: Array) -> LinearFamily:
         family = symheli.sweep(heli, at.tolist())
-        each = family.models.each(lambda m: actuated(m, servos, delay, loops.dt))
+        each = family.models.each(actuation.discretize)
         return replace(family, models=each)
 
     found: list[tuple[LPVStateSpace, LPVStateSpace, Certificate]] = []

@@ -16,8 +16,8 @@ from symheli.errors import InputError, TrimError
 from symheli.flight import HelicopterLoops
 from symheli.flight.ardupilot import AXES, COMMANDS, MEASURED
 from symheli.lpv import connect
+from symheli.lpv.tools import Actuation
 from symheli.progress import tracked
-from synthesis.design.loops.actuated import actuated
 from synthesis.design.loops.loop_measures import LoopMeasures
 from synthesis.design.loops.margins import margins, open_loop
 from synthesis.design.loops.responses import Responses, responses
@@ -96,7 +96,7 @@ def loop_margins(
     loops: HelicopterLoops,
     airspeeds: Sequence[float],
     *,
-    servos: Mapping[str, Servo] | None = None,
+    servos: Mapping[str, Servo] | Actuation | None = None,
     delay: float = 0.0,
 ) -> list[LoopAt]:
     """Return margins and responses of every loop at every airspeed: those of the first helicopter,
@@ -106,11 +106,9 @@ def loop_margins(
     `delay` (s) is from command to servo, in whole periods of the loops. Raises `InputError` where
     it is not.
     """
-    if not (math.isfinite(delay) and delay >= 0):
-        raise InputError(f"delay: expected seconds >= 0, got {delay:g}")
-    rows = []
+    actuation, rows = Actuation.of(servos, delay, loops.dt), []
     for airspeed in tracked("margins", airspeeds):
-        each = [_at(h, loops, airspeed, servos, delay) for h in helicopters]
+        each = [_at(h, loops, airspeed, actuation) for h in helicopters]
         if each[0] is None:
             raise InputError(
                 f"the helicopter has no trim at {airspeed:g} m/s: leave this airspeed out"
@@ -122,18 +120,14 @@ def loop_margins(
 
 
 def _at(
-    heli: Helicopter,
-    loops: HelicopterLoops,
-    airspeed: float,
-    servos: Mapping[str, Servo] | None,
-    delay: float,
+    heli: Helicopter, loops: HelicopterLoops, airspeed: float, actuation: Actuation
 ) -> list[LoopMeasures] | None:
     """Numbers of the loop of each control; None without a trim."""
     try:
         model = symheli.linearize(heli, symheli.trim(heli, airspeed=float(airspeed)))
     except TrimError:
         return None
-    plant = actuated(model, servos, delay, loops.dt)
+    plant = actuation.discretize(model)
     closed = closed_loops(plant, loops)
     unknown = Responses(*[math.nan] * len(Responses._fields))
     reached = responses(closed, RESPOND) if closed.is_stable() else dict.fromkeys(CONTROLS, unknown)

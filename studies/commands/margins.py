@@ -131,7 +131,7 @@ def _of_vehicle(arguments: argparse.Namespace) -> Output:
     import symheli
     from identification import compare_frozen
     from studies.loops.lateral import HOLD
-    from studies.loops.margins import DELAY, over_airspeed
+    from studies.loops.margins import ACTUATION, over_airspeed
     from studies.setup.axes import LATERAL, LONGITUDINAL
     from synthesis.design.loops.loop_measures import MEASURES
 
@@ -174,9 +174,10 @@ def _of_vehicle(arguments: argparse.Namespace) -> Output:
     )
     gaps = beside["interpolated"].gap.tolist()
     head = (
-        f"{arguments.vehicle}, roll hold d_lat = {HOLD:g} phi with servo and {1000 * DELAY:g} ms"
-        " delay; roll (held) and pitch (free) response to the stick; gap: nu-gap at 50 Hz of exact"
-        " and interpolated lateral model (input / 0.01 rad, output / 0.1 SI)"
+        f"{arguments.vehicle}, roll hold d_lat = {HOLD:g} phi with servo and"
+        f" {1000 * ACTUATION.delay:g} ms delay; roll (held) and pitch (free) response to the stick;"
+        " gap: nu-gap at 50 Hz of exact and interpolated lateral model (input / 0.01 rad, output /"
+        " 0.1 SI)"
     )
     width = len(MARGINS) + len(RESPONSE[0]) - 1
     units = (*(MEASURES[name].unit for name in MARGINS), *RESPONSE[1])

@@ -115,6 +115,7 @@ def run(arguments: argparse.Namespace) -> Output:
     from studies.autopilot.tuned import CONTROLS, LEAST, loop_margins
     from symheli.flight import HelicopterLoops
     from symheli.logs.parameters import read_parameters
+    from symheli.lpv.tools import Actuation
     from synthesis.design.loops.loop_measures import MEASURES
 
     if not arguments.set:
@@ -143,11 +144,9 @@ def run(arguments: argparse.Namespace) -> Output:
     if arguments.servo:
         servo = symheli.Servo(natural_frequency=arguments.servo, damping=0.7)
         servos = dict.fromkeys(map(str, heli.inputs), servo)
+    actuation = Actuation(servos, arguments.delay)
     airspeeds = [options.number(v) for v in arguments.airspeeds or ("0", "4", "8", "12")]
-    both = [
-        loop_margins(drawn, loops, airspeeds, servos=servos, delay=arguments.delay)
-        for loops in (before, after)
-    ]
+    both = [loop_margins(drawn, loops, airspeeds, servos=actuation) for loops in (before, after)]
     table = [
         ["V", "loop", "gain before", "after", "phase before", "after", "crossover", ""],
         ["m/s", "", "dB", "dB", "deg", "deg", "rad/s", ""],
@@ -164,8 +163,7 @@ def run(arguments: argparse.Namespace) -> Output:
             min(airspeeds),
             max(airspeeds),
             arguments.rate,
-            servos=servos,
-            delay=arguments.delay,
+            servos=actuation,
         )
     lines = [
         *_assumed(arguments),

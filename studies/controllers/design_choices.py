@@ -25,6 +25,7 @@ from symheli import Servo
 from symheli.errors import InputError
 from symheli.flight import XCELL_SERVOS
 from symheli.lpv.mixing import ERROR
+from symheli.lpv.tools import Actuation
 from symheli.values.whole_files import write_text
 from synthesis.design.plant.parts import DISTURBANCE
 
@@ -76,6 +77,11 @@ GAIN = 7.0
 
 SERVO_RATE = 3.0
 """Rate limit of every servo, rad/s of blade pitch; assumed, the source of the servos gives none."""
+
+LIMITED = Actuation(
+    {u: replace(servo, rate=SERVO_RATE) for u, servo in XCELL_SERVOS.items()}, DELAY, PERIOD
+)
+"""Servos so limited, as controllers are flown."""
 
 TURBULENCE = 3.9
 """Turbulence that is flown, m/s: half of light, in which flights keep to the certificate."""
@@ -266,15 +272,16 @@ class DesignChoices:
         """
         return f"{name}{DISTURBANCE}" if name in self.controls else name
 
-    def servo(self, control: str) -> Servo | None:
-        """Return the given servo with the rate limit of the simulation; None where there is
-        none.
+    @property
+    def actuation(self) -> Actuation:
+        """Servos of the controls that have one, with the rate limit of the simulation, behind the
+        delay of a sampled command.
         """
-        if control not in self.servos:
-            return None
-        return replace(
-            Servo(**dict(zip(_OF_A_SERVO, self.servos[control], strict=False))), rate=SERVO_RATE
-        )
+        servos = {
+            u: Servo(**dict(zip(_OF_A_SERVO, numbers, strict=False)), rate=SERVO_RATE)
+            for u, numbers in self.servos.items()
+        }
+        return Actuation(servos, self.delay, self.period)
 
 
 _OF_A_SERVO = ("natural_frequency", "damping", "zero", "pole")

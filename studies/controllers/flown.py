@@ -4,27 +4,25 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from studies.controllers.design_choices import (
-    CONTROLS,
-    DELAY,
+    LIMITED,
     MEASUREMENTS,
     NOISE,
     NOISE_SHARE,
     PERIOD,
     RATE,
-    SERVO_RATE,
 )
 from studies.controllers.designs import Designs
 from studies.controllers.measures import Measures, measured
 from symheli import AirspeedSchedule, FlightPlan, Helicopter, LPVStateSpace, Wind
 from symheli.environment import Dryden
 from symheli.errors import ValidityWarning
-from symheli.flight import XCELL_SERVOS, ScheduledController, Sensor, fly_batch
+from symheli.flight import ScheduledController, Sensor, fly_batch
 
 if TYPE_CHECKING:
     from synthesis.tubes import Tube
@@ -126,9 +124,8 @@ def plan(controller: LPVStateSpace, wind: float) -> FlightPlan:
         dt=PERIOD,
         controller=ScheduledController(controller),
         wind=Wind(STEADY, turbulence=Dryden(wind, ALTITUDE)),
-        servos={u: replace(XCELL_SERVOS[u], rate=SERVO_RATE) for u in CONTROLS},
+        servos=LIMITED,
         sensors={y: Sensor(noise=NOISE_SHARE * NOISE[y]) for y in MEASUREMENTS},
-        delay=DELAY,
     )
 
 

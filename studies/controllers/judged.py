@@ -10,11 +10,12 @@ import symheli
 from studies.controllers.design_choices import SERVO_RATE, DesignChoices
 from studies.controllers.plant import behind_servos
 from symheli import Helicopter, LinearModel, LPVStateSpace, TableController
+from symheli.lpv.tools import Actuation
 from symheli.values.arrays import Array
-from synthesis.design.loops.actuated import actuated
 from synthesis.sheet.evaluation import (
     SpecificationTable,
     axis_loops,
+    driven_plant,
     frozen_controller,
     specifications,
 )
@@ -52,27 +53,24 @@ def judged(
         return None
     low, high = choices.airspeeds
     speeds = np.linspace(low, high, POINTS).tolist()
-    servos = {u: servo for u in choices.controls if (servo := choices.servo(u)) is not None}
     travel = travel_of(choices)
     if choices.vehicle:
         heli = Helicopter.load(choices.vehicle, governor="ideal")
         sheet = sheet.at_length(heli.vehicle.sections["main_rotor"]["radius"].value)
-    delay = 0.0
+    actuation = Actuation()
     if exact:
         family = symheli.sweep(heli, speeds, inputs=choices.controls)
         plant = family.select(choices.states) if choices.states else family
-        delay = choices.delay
+        actuation = choices.actuation
     else:
         plant = behind_servos(model, replace(choices, references=())).nominal
         plant = plant.select(inputs=choices.controls, outputs=choices.measurements)
-        servos = {}
     found = specifications(
         plant,
         {NAME: table.model},
         sheet,
         at=speeds,
-        servos=servos,
-        delay=delay,
+        servos=actuation,
         travel=travel,
         rate_limit=dict.fromkeys(choices.controls, SERVO_RATE),
     )
@@ -80,7 +78,7 @@ def judged(
     for v in (speeds[0], speeds[POINTS // 2], speeds[-1]):
         bare: LinearModel = plant.at(v)
         K = frozen_controller(table.model, bare, found.parameter, v)
-        behind = actuated(bare.select(inputs=K.outputs), servos, delay, K.dt)
+        behind = driven_plant(bare, K, actuation)
         for name, loop in axis_loops(behind, K, sheet).items():
             if loop.stable:
                 made = loop.closed.step_response(WINDOW)

@@ -73,21 +73,6 @@ def actuator(servo: Servo, name: str, late: float) -> LinearModel:
     )
 
 
-def lag(name: str, corner: float) -> LinearModel:
-    """Return the lag that keeps a control from acting on an output directly by D(p), as it does
-    in the continuous model of a sampled one; at 2/dt rad/s it is half a sample late.
-    """
-    return LinearModel(
-        np.array([[-corner]]),
-        np.array([[corner]]),
-        np.array([[1.0]]),
-        np.zeros((1, 1)),
-        (Signal(f"{name}_hold", "rad"),),
-        (Signal(f"{name}_command", "rad"),),
-        (Signal(name, "rad"),),
-    )
-
-
 def unweighted(model: LPVStateSpace, choices: DesignChoices = STUDY) -> Plant:
     """Return the plant with gusts, controls, and the measured states and commands as
     performance; what follows a command has its reference.
@@ -115,14 +100,15 @@ def design_plant(
     """Return the plant of the design: continuous, with actuators of low order behind the delay and
     the half sample that a command is `held` for, where the model does not have that already.
     """
-    servos = {u: choices.servo(u) for u in choices.controls}
-    late = choices.delay + held
-    actuators = {u: actuator(servo, u, late) for u, servo in servos.items() if servo is not None}
-    bare = [u for u, servo in servos.items() if servo is None]
+    late, servos = choices.delay + held, choices.actuation.servos or {}
+    actuators = {u: actuator(servos[u], u, late) for u in choices.controls if u in servos}
+    bare = [u for u in choices.controls if u not in servos]
     columns = indices(bare, model.inputs, "input")
     for u, i in zip(bare, columns, strict=True):
         if np.abs(model.D[1:, :, i]).max(initial=0) > ROUNDING * np.abs(model.D[:, :, i]).max():
-            actuators[u] = lag(u, 2 / choices.period)
+            # no feedthrough, which the continuous model of a sampled one has; half a sample late
+            corner = 2 / choices.period
+            actuators[u] = parts.first_order(-corner, corner, f"{u}_hold", u, None)
     behind = unweighted(model, choices).with_servo(actuators)
     return weighted(behind.with_delay(late, bare, order=1) if bare and late else behind, choices)
 
@@ -136,13 +122,8 @@ def flown_plant(model: LPVStateSpace, choices: DesignChoices = STUDY) -> Plant:
 
 def behind_servos(model: LPVStateSpace, choices: DesignChoices = STUDY) -> Plant:
     """Return that plant without sizes and noise."""
-    servos = {u: choices.servo(u) for u in choices.controls}
-    behind = unweighted(model, choices).with_servo(
-        {u: s for u, s in servos.items() if s is not None}
-    )
-    if model.dt is None:
-        behind = behind.sampled(choices.period, degree=SAMPLED_DEGREE)
-    return behind.with_delay(choices.delay) if choices.delay else behind
+    actuation = choices.actuation.select(choices.controls)
+    return unweighted(model, choices).behind(actuation, SAMPLED_DEGREE)
 
 
 def closed(plant: Plant, controller: object) -> LPVStateSpace:

@@ -322,7 +322,7 @@ def flights_of(table: TableController, choices: DesignChoices) -> tuple[FlightDa
     for y in choices.references:
         size, until = STEP_SHARE * choices.size_of_reference(y), STEP_AT + STEP_FOR
         controller = Stepped(controller, y, size, until)
-    servos = {u: choices.servo(u) for u in map(str, heli.inputs)}
+    servos = choices.actuation.servos or {}
     acceleration = RATE_SHARE * choices.acceleration or 1.0
     plan = FlightPlan(
         AirspeedSchedule.transition(*ends, acceleration=acceleration, hold=3.0),
@@ -331,7 +331,7 @@ def flights_of(table: TableController, choices: DesignChoices) -> tuple[FlightDa
         wind=Wind(STEADY, turbulence=Dryden(choices.turbulence, ALTITUDE))
         if choices.turbulence
         else Wind(),
-        servos=servos if all(servos.values()) else None,  # type: ignore[arg-type]
+        servos=servos if servos.keys() == set(map(str, heli.inputs)) else None,
         sensors={y: Sensor(noise=NOISE_SHARE * choices.noise[y]) for y in choices.measurements},
         delay=choices.delay,
     )

@@ -5,7 +5,7 @@ wind, turbulence, few samples, much noise, each with the structure that its mode
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -16,15 +16,17 @@ from identification import Actuators, KinematicARX, Polynomial, fit
 from identification.methods import FilterError
 from identification.model import KinematicModel
 from identification.structure import LateSensors, SteadyWind
+from identification.structure.actuators import faster
 from identification.structure.kinematic_arx import STATES
 from studies.known_kinematics.flights import aggressive
 from studies.known_kinematics.models import FASTEST, GUST, SCHEDULING, structure
 from studies.known_kinematics.truth import AXES, SPEEDS, FrozenAxes, Truth, frozen
 from studies.setup.bounds import PERIOD
-from studies.setup.flights import NOISE_DB, TOP, autopilot_for, light_turbulence
+from studies.setup.flights import ACTUATION, NOISE_DB, TOP, autopilot_for, light_turbulence
 from symheli import FlightPlan, FlightRecord, Helicopter, Sensor, Wind
 from symheli.flight import XCELL_SERVOS, SimulatedFlight, gain_scheduled_lqr
 from symheli.lpv import Product
+from symheli.lpv.tools import Actuation
 from symheli.values.arrays import Array
 
 ALL = "all axes"
@@ -50,10 +52,9 @@ class RealCondition:
         In a table.
     mark : float
         Of the median; the worst may be twice it.
-    servos : bool
-        Servos of the X-Cell, 20 ms, and an engine whose governor does not hold the rotor.
-    late : int
-        Samples from a command to the servo, or the rotor.
+    flown : Actuation
+        Servos, and the delay before them or the rotor; with servos the governor does not hold the
+        rotor.
     decimated : int
         Of so many samples one is logged.
     noise_db, longest : float
@@ -74,8 +75,7 @@ class RealCondition:
 
     about: str
     mark: float
-    servos: bool = False
-    late: int = 0
+    flown: Actuation = field(default_factory=Actuation)
     decimated: int = 1
     noise_db: float = NOISE_DB
     longest: float = 150.0
@@ -93,7 +93,7 @@ class RealCondition:
 
     def helicopter(self, name: str) -> Helicopter:
         """A vehicle with the engine of the condition."""
-        return Helicopter.load(name, governor="pi" if self.servos else "ideal")
+        return Helicopter.load(name, governor="pi" if self.flown.servos else "ideal")
 
     def flights(self, heli: Helicopter, seed: int) -> list[FlightRecord]:
         """The flights for identification, as they are logged."""
@@ -114,25 +114,22 @@ class RealCondition:
     def plan(self, heli: Helicopter, seed: int, longest: float | None = None) -> FlightPlan:
         """A flight for identification, heading north."""
         autopilot = (
-            gain_scheduled_lqr(heli, 0.0, TOP, PERIOD, servos=XCELL_SERVOS)
-            if self.servos
+            gain_scheduled_lqr(heli, 0.0, TOP, PERIOD, servos=self.flown.servos)
+            if self.flown.servos
             else autopilot_for(heli)
         )
         plan = aggressive(
             seed,
             autopilot,
             noise_db=self.noise_db,
-            servos=self.servos,
+            servos=self.flown,
             longest=longest or self.longest,
             wind=light_turbulence(seed) if self.turbulent else None,
         )
         if self.sensors is not None:
-            plan = replace(
-                plan,
-                noise_db=None,
-                sensors=self._late(symheli.fly(heli, replace(plan, noise_db=None))),
-            )
-        return replace(plan, delay=self.late * PERIOD)
+            clean = replace(plan, noise_db=None)
+            return replace(clean, sensors=self._late(symheli.fly(heli, clean)))
+        return plan
 
     def _late(self, clean: FlightRecord) -> dict[str, Sensor]:
         """Sensors with the noise of the condition, some of them late."""
@@ -170,7 +167,7 @@ class RealCondition:
             nb={names[u]: n for u, n in LAGS.items()},
             offset_rate=False,
             actuators=self.actuators,
-            rotor_speed="Om" if self.servos else None,
+            rotor_speed="Om" if self.flown.servos else None,
             wind=SteadyWind(deviation=WIND, over_ground=ground) if self.headings else None,
             sensors=self.sensors,
         )
@@ -186,10 +183,8 @@ class RealCondition:
         """Exact linearizations of what was flown, from the commands, at the period of the log;
         default of all axes.
         """
-        servos = XCELL_SERVOS if self.servos else None
-        late = self.late // self.decimated
         chosen = {name: AXES[name] for name in axes or (ALL,)}
-        return Truth.of(heli, chosen, period=self.period, servos=servos, late=late)
+        return Truth.of(heli, chosen, actuation=Actuation.of(self.flown, period=self.period))
 
 
 WIND, ANOTHER = 5.0, 50_000
@@ -248,15 +243,7 @@ FASTER = 1.2
 where it is to find it.
 """
 
-WRONG_SERVOS = {
-    u: replace(
-        s,
-        natural_frequency=FASTER * s.natural_frequency,
-        zero=s.zero and FASTER * s.zero,
-        pole=s.pole and FASTER * s.pole,
-    )
-    for u, s in XCELL_SERVOS.items()
-}
+WRONG_SERVOS = {u: faster(servo, FASTER) for u, servo in XCELL_SERVOS.items()}
 NOT_QUITE = partial(Actuators, delay=ASSUMED, delay_deviation=UNSURE)
 
 CONDITIONS: Mapping[str, RealCondition] = {
@@ -264,18 +251,18 @@ CONDITIONS: Mapping[str, RealCondition] = {
     "servos": RealCondition(
         "servos, 20 ms, governor; servos known, delay found",
         0.12,
-        True,
-        1,
+        ACTUATION,
         actuators=NOT_QUITE(XCELL_SERVOS),
     ),
     "bandwidth": RealCondition(
         "the same; bandwidth and delay found",
         0.12,
-        True,
-        1,
+        ACTUATION,
         actuators=NOT_QUITE(WRONG_SERVOS, bandwidth_deviation=0.2),
     ),
-    "delay": RealCondition("commands 40 ms late, delay found", 0.12, late=2, actuators=NOT_QUITE()),
+    "delay": RealCondition(
+        "commands 40 ms late, delay found", 0.12, Actuation(delay=0.04), actuators=NOT_QUITE()
+    ),
     "25 Hz": RealCondition(
         "logged at 25 Hz, commanded at 50 Hz, said so",
         0.10,

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from studies.setup.flights import AMPLITUDE as STUDY_AMPLITUDE
 from studies.setup.flights import NOISE_DB, TOP
 from symheli import AirspeedSchedule, Excitation, FlightPlan, Wind
-from symheli.flight import XCELL_SERVOS, Autopilot
+from symheli.flight import Autopilot
+from symheli.lpv.tools import Actuation
 
 TARGETS = (
     *(13.0, 0.0, 6.5, 13.0, 3.0, 10.0, 0.0, 13.0, 5.0, 0.0),
@@ -46,16 +47,13 @@ TEST_LINES = (0.1, 5.0)
 TEST_AMPLITUDE = STUDY_AMPLITUDE
 """Amplitudes of the flight that judges: those of the study."""
 
-DELAY = 0.02
-"""From command to servo, s, where servos fly."""
-
 
 def aggressive(
     seed: int,
     autopilot: Autopilot,
     *,
     noise_db: float | None = NOISE_DB,
-    servos: bool = False,
+    servos: Actuation | None = None,
     wind: Wind | None = None,
     longest: float = LONGEST,
 ) -> FlightPlan:
@@ -71,7 +69,7 @@ def gentle(
     autopilot: Autopilot,
     *,
     noise_db: float | None = NOISE_DB,
-    servos: bool = False,
+    servos: Actuation | None = None,
     wind: Wind | None = None,
 ) -> FlightPlan:
     """Hover again and again, and what lies between at 1 m/s^2: long holds, lower lines, 230 s."""
@@ -84,7 +82,7 @@ def transition(
     autopilot: Autopilot,
     *,
     noise_db: float | None = NOISE_DB,
-    servos: bool = False,
+    servos: Actuation | None = None,
     wind: Wind | None = None,
 ) -> FlightPlan:
     """Hover, 13 m/s, hover at 3.2 m/s^2 with other multisines: the study's test flight."""
@@ -114,7 +112,7 @@ def _plan(
     seed: int,
     autopilot: Autopilot,
     noise_db: float | None,
-    servos: bool,
+    servos: Actuation | None,
     wind: Wind | None,
     lines: tuple[float, float] = LINES,
     amplitude: Mapping[str, float] = AMPLITUDE,
@@ -126,6 +124,5 @@ def _plan(
         seed=seed,
         controller=autopilot,
         wind=wind or Wind(),
-        servos=XCELL_SERVOS if servos else None,
-        delay=DELAY if servos else 0.0,
+        servos=servos,
     )

@@ -16,8 +16,11 @@ from studies.setup.axes import ALL, LATERAL, LONGITUDINAL, Axis
 from studies.setup.bounds import PERIOD, SIZES
 from studies.setup.flights import TOP
 from symheli import Helicopter, LinearModel
-from symheli.flight import Servo
+from symheli.lpv.tools import Actuation
 from symheli.values import Signal
+
+HELD = Actuation(period=PERIOD)
+"""Commands held between the samples of the study, and nothing else."""
 
 SPEEDS = np.linspace(0.0, TOP, 27)
 """m/s."""
@@ -41,16 +44,12 @@ class Truth:
         heli: Helicopter,
         axes: Mapping[str, Axis] = AXES,
         *,
-        period: float = PERIOD,
-        servos: Mapping[str, Servo] | None = None,
-        late: int = 0,
+        actuation: Actuation = HELD,
     ) -> Truth:
-        """By exact linearization, sampled every `period` seconds; with `servos` and `late` samples
-        of delay before them.
-        """
+        """By exact linearization, sampled behind an actuation."""
         exact = [symheli.linearize(heli, symheli.trim(heli, float(v))) for v in SPEEDS]
         models = {
-            name: tuple(sampled(model, axis, period, servos, late) for model in exact)
+            name: tuple(sampled(model, axis, actuation) for model in exact)
             for name, axis in axes.items()
         }
         return cls(models)
@@ -78,36 +77,11 @@ class Truth:
         return static_gain(models["lateral"][k]) / static_gain(self.models["lateral"][k])
 
 
-def sampled(
-    model: LinearModel,
-    axis: Axis,
-    period: float = PERIOD,
-    servos: Mapping[str, Servo] | None = None,
-    late: int = 0,
-) -> LinearModel:
-    """The part of a continuous model that is an axis, sampled, behind `servos` and `late` samples
-    of delay.
-    """
+def sampled(model: LinearModel, axis: Axis, actuation: Actuation = HELD) -> LinearModel:
+    """The part of a continuous model that is an axis, sampled behind an actuation."""
     kept = model.select(states=axis.states) if axis.states else model
     kept = kept.select(inputs=axis.inputs, outputs=axis.outputs)
-    if servos is not None:
-        kept = kept.driven_by({u: servos[u].linear(u) for u in axis.inputs})
-    out = kept.discretize(period)
-    for sample in range(late):
-        out = delayed(out, f"late{sample + 1}")
-    return out
-
-
-def delayed(model: LinearModel, name: str = "late") -> LinearModel:
-    """Return the same with every input one sample later."""
-    nx, nu = model.B.shape
-    A = np.block([[model.A, model.B], [np.zeros((nu, nx + nu))]])
-    B = np.vstack([np.zeros((nx, nu)), np.eye(nu)])
-    C = np.hstack([model.C, model.D])
-    states = (*model.states, *(Signal(f"{u}_{name}", u.unit) for u in model.inputs))
-    return LinearModel(
-        A, B, C, np.zeros_like(model.D), states, model.inputs, model.outputs, dt=model.dt
-    )
+    return actuation.select(axis.inputs).discretize(kept)
 
 
 def frozen_axes(model: KinematicModel, truth: Truth) -> FrozenAxes:

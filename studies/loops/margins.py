@@ -9,16 +9,12 @@ from dataclasses import dataclass
 
 import synthesis
 from studies.loops.lateral import HOLD
+from studies.setup.flights import ACTUATION
 from symheli import LinearModel
-from symheli.flight import XCELL_SERVOS
-from symheli.lpv.tools import pade_delay
 from symheli.progress import tracked
 from synthesis.design.loops.handling_qualities import Bandwidth
 from synthesis.design.loops.loop_measures import LoopMeasures
 from synthesis.design.loops.margins import Margins
-
-DELAY = 0.02
-"""From measurement to command, s."""
 
 
 @dataclass(frozen=True)
@@ -43,22 +39,15 @@ class AtAirspeed:
         return LoopMeasures.of(attitude=self.pitch)
 
 
-def behind_servo(model: LinearModel, name: str) -> LinearModel:
-    """Return the model with the servo of the input `name` and the delay before it."""
-    return model.driven_by({name: XCELL_SERVOS[name].linear(name)}).driven_by(
-        {name: pade_delay(name, DELAY)}
-    )
-
-
 def over_airspeed(
     airspeeds: Sequence[float], lateral: Sequence[LinearModel], longitudinal: Sequence[LinearModel]
 ) -> Iterator[AtAirspeed]:
     """One entry an airspeed from the continuous lateral and longitudinal models there."""
     models = zip(airspeeds, lateral, longitudinal, strict=True)
     for airspeed, roll, pitch in tracked("margins", models, len(airspeeds)):
-        roll = behind_servo(roll, "d_lat")
+        roll = ACTUATION.behind(roll, ["d_lat"])
         held = roll.feedback({("d_lat", "phi"): HOLD}).select(inputs=["d_lat"], outputs=["phi"])
-        stick = behind_servo(pitch, "d_lon").select(inputs=["d_lon"], outputs=["theta"])
+        stick = ACTUATION.behind(pitch, ["d_lon"]).select(inputs=["d_lon"], outputs=["theta"])
         hold = synthesis.margins(
             synthesis.analysis.open_loop(roll, {("d_lat", "phi"): HOLD}, "d_lat")
         )

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 from symheli import AirspeedSchedule, Excitation, FlightRecord, Helicopter, Wind, fly
 from symheli.environment import Dryden
-from symheli.flight import Autopilot, gain_scheduled_lqr
+from symheli.flight import XCELL_SERVOS, Autopilot, gain_scheduled_lqr
+from symheli.lpv.tools import Actuation
 
 TOP = 13.0
 """Upper end of the transition, m/s (Budiyono & Sutarto: 0 <= p <= 13 m/s)."""
@@ -26,6 +27,9 @@ BREEZE, BREEZE_AT_20FT, ABOVE_GROUND = (-2.0, 1.0, 0.0), 7.7, 20.0
 """A steady wind (north, east, down, m/s) and the turbulence of a mean wind of 15 kt ("light"),
 flown 20 m above ground.
 """
+
+ACTUATION = Actuation(XCELL_SERVOS, delay=0.02)
+"""The servos of the X-Cell, 20 ms behind their commands."""
 
 
 def light_turbulence(seed: int) -> Wind:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from studies.controllers.design_choices import CONTROLS, DELAY, PERIOD, SERVO_RATE
+from studies.controllers.design_choices import CONTROLS, LIMITED, PERIOD
 from studies.controllers.flown import HIGH, LOW, WINDS, plan
 from studies.controllers.measures import AT_THE_STOP, heading, noise_of, of_flight, rms, to_body
 from studies.controllers.measures import MEASUREMENTS as MEASURED
@@ -21,7 +21,7 @@ from studies.setup.flights import autopilot_for
 from studies.specs.of_vehicle import FLIGHTS_FROM, OfVehicle, digest_of, share_met
 from symheli import AirspeedSchedule, FlightPlan, Helicopter, LPVStateSpace
 from symheli.errors import CompilerWarning, ValidityWarning
-from symheli.flight import XCELL_SERVOS, ScheduledController, fly_batch
+from symheli.flight import ScheduledController, fly_batch
 from symheli.flight.flight_data import FlightData
 from symheli.progress import tracked
 from symheli.values.arrays import Array
@@ -247,9 +247,8 @@ def _calm(heli: Helicopter, schedule: AirspeedSchedule, controller: Any) -> Flig
         schedule,
         dt=PERIOD,
         controller=controller,
-        servos={u: replace(XCELL_SERVOS[u], rate=SERVO_RATE) for u in CONTROLS},
+        servos=LIMITED,
         sensors={},
-        delay=DELAY,
     )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ValidityWarning)

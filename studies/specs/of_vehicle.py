@@ -17,7 +17,7 @@ import numpy as np
 
 import symheli
 from studies.controllers.certified import FORM, SOLVER
-from studies.controllers.design_choices import CONTROLS, DELAY, POINTS, SERVO_RATE, TOP
+from studies.controllers.design_choices import CONTROLS, POINTS, SERVO_RATE, TOP
 from studies.controllers.designs import (
     IDENTIFIED,
     NAMES,
@@ -30,10 +30,9 @@ from studies.controllers.designs import (
 from studies.controllers.in_airspeed import of_degree
 from studies.controllers.plant import baseline, flown_plant
 from studies.known_kinematics import flights, models
-from studies.setup.flights import autopilot_for
+from studies.setup.flights import ACTUATION, autopilot_for
 from studies.setup.stored_stages import Stored, StoredStages, content_key
 from symheli import Helicopter, LinearFamily, LPVStateSpace
-from symheli.flight import XCELL_SERVOS
 from symheli.progress import task, tracked
 from symheli.values.arrays import Array
 from synthesis.sheet.evaluation import SpecificationTable, specifications
@@ -102,8 +101,7 @@ class OfVehicle:
             self.family,
             controllers,
             self.scaled,
-            servos=XCELL_SERVOS,
-            delay=DELAY,
+            servos=ACTUATION,
             travel=self.travel,
             rate_limit=dict.fromkeys(CONTROLS, SERVO_RATE),
         )
@@ -132,8 +130,7 @@ class OfVehicle:
                 spec,
                 self.scaled.axes[spec.axis],
                 rate,
-                servos=XCELL_SERVOS,
-                delay=DELAY,
+                servos=ACTUATION,
                 form=FORM,
                 solver=SOLVER,
             )

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from studies.loops.lateral import HOLD
-from studies.loops.margins import DELAY, AtAirspeed, over_airspeed
+from studies.loops.margins import ACTUATION, AtAirspeed, over_airspeed
 from studies.setup.axes import LATERAL, LONGITUDINAL
 from studies.setup.axis_models import RATES, rotor_mode
 from symheli import LinearFamily
@@ -93,7 +93,8 @@ class FirstLook:
         if not held:
             return
         loops = [one.margins.hold for one in held if one.margins is not None]
-        loop = f"A simple roll hold, d_lat = {HOLD:g} phi behind servo and {1000 * DELAY:g} ms,"
+        late = f"{1000 * ACTUATION.delay:g} ms"
+        loop = f"A simple roll hold, d_lat = {HOLD:g} phi behind servo and {late},"
         unstable = [
             one.trim.airspeed
             for one, margins in zip(held, loops, strict=True)

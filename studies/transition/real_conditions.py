@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 from studies.known_kinematics.conditions import CONDITIONS, Instruments, frozen_all
 from studies.known_kinematics.models import simulator_of
-from studies.setup.bounds import PERIOD
 from symheli.errors import SymheliError
 from symheli.flight import SimulatedFlight
 from symheli.values.arrays import Array
@@ -39,7 +38,7 @@ def identify_under_real_conditions(vehicle: str, seed: int, aggressive: float) -
     flight is lost, has no result.
     """
     condition = replace(CONDITIONS[CONDITION], longest=aggressive)
-    out = RealConditions(about=condition.about, simulator="", delay=condition.late * PERIOD)
+    out = RealConditions(about=condition.about, simulator="", delay=condition.flown.delay)
     try:
         heli = condition.helicopter(vehicle)
         chosen, simulator = simulator_of(vehicle, heli)

@@ -13,6 +13,7 @@ from symheli.errors import InputError, UnknownNameError
 from symheli.flight.controller import ScheduledController
 from symheli.flight.servo import Servo
 from symheli.helicopter import Helicopter
+from symheli.lpv.actuation import Actuation
 from symheli.lpv.bases.interpolating import PiecewiseLinear
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.lpv_state_space import LPVStateSpace
@@ -131,7 +132,7 @@ def gain_scheduled_lqr(
     high: float,
     dt: float,
     points: int = 14,
-    servos: Mapping[str, Servo] | None = None,
+    servos: Mapping[str, Servo] | Actuation | None = None,
     sizes: Mapping[str, float] | None = None,
 ) -> Autopilot:
     """Design an LQR at several airspeeds on the model with quasi-steady flapping.
@@ -149,8 +150,8 @@ def gain_scheduled_lqr(
         Sample period, s.
     points : int
         Airspeeds, evenly from `low` to `high`.
-    servos : mapping of str to Servo, optional
-        By input.
+    servos : mapping of str to Servo, or Actuation, optional
+        By input; the delay of an Actuation, in whole samples, is in the full model too.
     sizes : mapping of str to float, optional
         Deviations of states and inputs (SI) that count as 1 in the weights, for those that shall
         not have the default one.
@@ -185,11 +186,12 @@ def gain_scheduled_lqr(
             raise UnknownNameError("state or input", name, SIZES)
         positive(size, f"size of {name}")
     counting = {**SIZES, **(sizes or {})}
+    actuation = Actuation.of(servos, period=dt)
     family = design_family(heli, np.linspace(low, high, whole(points, "points", 2)))
     design = family.residualize([s for s in UNMEASURED if s in family.states])
     designs, plants = (
         [design[k].discretize(dt) for k in range(len(design))],
-        [_plant(family[k], servos, dt) for k in range(len(family))],
+        [actuation.discretize(family[k]) for k in range(len(family))],
     )
     radius = np.inf
     for softer in INPUT_SCALE_FACTORS:
@@ -218,13 +220,6 @@ def _lqr(model: LinearModel, sizes: Mapping[str, float], softer: float) -> np.nd
             " between samples; choose dt near its time constants"
         ) from error
     return np.linalg.solve(R + model.B.T @ P @ model.B, model.B.T @ P @ model.A)
-
-
-def _plant(model: LinearModel, servos: Mapping[str, Servo] | None, dt: float) -> LinearModel:
-    """The linear model, behind its servos where there are any, sampled."""
-    if servos is not None:
-        model = model.driven_by({name: servos[name].linear(name) for name in model.inputs})
-    return model.discretize(dt)
 
 
 def _closed_loop_radius(plant: LinearModel, K: np.ndarray, measured: tuple[Signal, ...]) -> float:

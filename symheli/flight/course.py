@@ -14,7 +14,6 @@ from symheli.helicopter import Helicopter
 from symheli.values.arrays import Array
 from symheli.values.sample_period import same_period
 
-CONTROL_PERIOD = 0.02  # s; slower sampling still flies at about this period
 INTEGRATION_STEP = (
     0.005  # s; the error over a flight stays below 1e-5 of each state's peak (see tests)
 )
@@ -31,11 +30,11 @@ class Clock:
     substeps: int
 
     @classmethod
-    def of(cls, plan: FlightPlan, dt: float | None) -> Clock:
-        """The clock of a plan whose controller works every `dt` seconds (None: as suits)."""
-        every = round(plan.dt / dt) if dt else math.ceil(plan.dt / CONTROL_PERIOD - 1e-9)
+    def of(cls, plan: FlightPlan, dt: float) -> Clock:
+        """The clock of a plan whose controller works every `dt` seconds."""
+        every = round(plan.dt / dt)
         period = plan.dt / max(every, 1)
-        if dt and not same_period(period, dt):
+        if not same_period(period, dt):
             raise InputError(
                 f"the controller was designed for {dt:g} s, the record is sampled every"
                 f" {plan.dt:g} s: dt must be a whole multiple of the controller's"

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from symheli.flight.course import Clock
-from symheli.flight.plan import READ
+from symheli.flight.plan import READ, FlightPlan
 from symheli.flight.sensor import Sensor
-from symheli.flight.servo import Servo, ServoBank
+from symheli.flight.servo import ServoBank
 from symheli.helicopter import Helicopter
 from symheli.values.arrays import Array
 from symheli.values.controllers import PureController, StatefulController
@@ -65,16 +65,15 @@ class Equipment:
         heli: Helicopter,
         clock: Clock,
         controller: PureController | StatefulController,
-        sensors: Mapping[str, Sensor] | None,
-        servos: Mapping[str, Servo] | None,
-        delay: float,
+        plan: FlightPlan,
     ) -> Equipment:
         """Return the equipment of a plan."""
+        servos = plan.actuation.servos
         return cls(
             controller,
-            Readings.of(sensors or {}, clock.dt),
+            Readings.of(plan.sensors or {}, clock.dt),
             None if servos is None else ServoBank(servos, INPUTS, heli.travel, clock.step),
-            _whole(delay, clock.step),
+            _whole(plan.delay, clock.step),
             np.ascontiguousarray(heli.travel, float),
         )
 

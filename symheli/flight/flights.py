@@ -44,8 +44,7 @@ class Flights:
         """Return the controller of a plan, sampled; an LQR over the commanded airspeeds where it
         names none.
         """
-        dt = getattr(plan.controller, "dt", None)
-        clock = Clock.of(plan, dt if isinstance(dt, float | int) and dt > 0 else None)
+        clock = Clock.of(plan, plan.control_period)
         if plan.controller is not None:
             key: Hashable = (id(plan.controller), clock.dt)
         else:
@@ -82,14 +81,8 @@ class Flights:
         """Return the equipment of a plan; the same object for plans that can fly side by side."""
         key = (id(self.controller(plan)), id(plan.sensors), id(plan.servos), plan.delay, plan.dt)
         if key not in self._equipment:
-            self._equipment[key] = Equipment.of(
-                self.heli,
-                self.clock(plan),
-                self.controller(plan),
-                plan.sensors,
-                plan.servos,
-                plan.delay,
-            )
+            controller = self.controller(plan)
+            self._equipment[key] = Equipment.of(self.heli, self.clock(plan), controller, plan)
         return self._equipment[key]
 
     def loops(self, plans: Sequence[FlightPlan], flown: Sequence[Course]) -> Loops:

@@ -28,7 +28,8 @@ def _wind(wind: Wind) -> str:
 
 def _servos(plan: FlightPlan) -> str:
     late = f", {1e3 * plan.delay:g} ms late" if plan.delay else ""
-    if plan.servos is None:
+    servos = plan.actuation.servos
+    if servos is None:
         return f"none{late}"
-    each = (f"{name} {servo.natural_frequency:.3g} rad/s" for name, servo in plan.servos.items())
+    each = (f"{name} {servo.natural_frequency:.3g} rad/s" for name, servo in servos.items())
     return f"{', '.join(each)}{late}"

@@ -17,13 +17,17 @@ from symheli.flight.excitation import Excitation
 from symheli.flight.schedule import AirspeedSchedule
 from symheli.flight.sensor import Sensor
 from symheli.flight.servo import Servo, one_each
+from symheli.lpv.actuation import Actuation
 from symheli.values.kinematics import INPUTS
-from symheli.values.numbers import whole
+from symheli.values.numbers import by_name, whole
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 MIN_SAMPLE_PERIOD = 1e-6
 """Least sample period, s."""
+
+CONTROL_PERIOD = 0.02
+"""s; slower sampling still flies at about this period."""
 
 LONGEST_DELAY = 1.0
 """s, from command to servo."""
@@ -45,7 +49,7 @@ class Options(TypedDict, total=False):
     noise_db: float | None
     seed: int
     wind: Wind | Sequence[float]
-    servos: Mapping[str, Servo] | None
+    servos: Mapping[str, Servo] | Actuation | None
     sensors: Mapping[str, Sensor] | None
     delay: float
     trims: Trims
@@ -77,8 +81,8 @@ class FlightPlan:
         Of the sensors' noise.
     wind : Wind or (float, float, float)
         Or a steady one, north east down, m/s, from the start.
-    servos : mapping of str to Servo, optional
-        One by input, between command and blade pitch.
+    servos : mapping of str to Servo, or Actuation, optional
+        One by input, between command and blade pitch; an Actuation has the delay too.
     sensors : mapping of str to Sensor, optional
         By signal: u v w p q r phi theta, airspeed.
     delay : float
@@ -114,7 +118,7 @@ class FlightPlan:
     noise_db: float | None = None
     seed: int = 0
     wind: Wind = field(default_factory=Wind)
-    servos: Mapping[str, Servo] | None = None
+    servos: Mapping[str, Servo] | Actuation | None = None
     sensors: Mapping[str, Sensor] | None = None
     delay: float = 0.0
     trims: Trims = "quasi-steady"
@@ -147,12 +151,13 @@ class FlightPlan:
                 )
         object.__setattr__(self, "seed", whole(self.seed, "seed"))
         object.__setattr__(self, "wind", _wind(self.wind))
-        _each("servos", self.servos, Servo, INPUTS)
-        _each("sensors", self.sensors, Sensor, READ)
-        if self.servos is not None:
-            one_each(self.servos, INPUTS)
-        if not _number("delay", self.delay, "a number of seconds >= 0") >= 0:
-            raise InputError(f"delay: expected a number of seconds >= 0, got {self.delay}")
+        given = self.servos.servos if isinstance(self.servos, Actuation) else self.servos
+        if given is not None:
+            one_each(given, INPUTS)
+        actuation = Actuation.of(self.actuation, period=self.control_period)
+        object.__setattr__(self, "servos", actuation.servos)
+        object.__setattr__(self, "delay", actuation.delay)
+        _sensors(self.sensors)
         if self.delay > LONGEST_DELAY:
             raise InputError(
                 f"delay: {self.delay:g} s is implausibly long; delay is in seconds: {self.delay:g}"
@@ -160,6 +165,19 @@ class FlightPlan:
             )
         if self.trims not in get_args(Trims):
             raise UnknownNameError("kind of trims", self.trims, get_args(Trims))
+
+    @property
+    def actuation(self) -> Actuation:
+        """Servos and delay between the commands and the blade pitch."""
+        return Actuation.of(self.servos, self.delay)
+
+    @property
+    def control_period(self) -> float:
+        """Sample period of the controller, s; of one without, a part of `dt`."""
+        own = getattr(self.controller, "dt", None)
+        if isinstance(own, float | int) and own > 0:
+            return own
+        return self.dt / math.ceil(self.dt / CONTROL_PERIOD - 1e-9)
 
     def seeded(self, seed: int) -> FlightPlan:
         """Return the same flight with other random numbers: sensors' noise from `seed`, turbulence
@@ -224,14 +242,9 @@ def _wind(wind: Any) -> Wind:
     return Wind((north, east, down))
 
 
-def _each(name: str, given: Any, kind: type, known: Sequence[str]) -> None:
-    """Raises where this is no mapping from known names to things of one kind."""
-    if given is None:
-        return
-    if not isinstance(given, Mapping):
-        raise InputError(f"{name}: expected {{signal: {kind.__name__}}}, got {given!r:.80}")
-    for key, value in given.items():
-        if key not in known:
-            what = "measured signal" if kind is Sensor else "input"
-            raise UnknownNameError(what, key, known)
-        _expect(f"{name}[{key!r}]", value, kind)
+def _sensors(given: Mapping[str, Sensor] | None) -> None:
+    """Raises where these are no sensors by name of what is read."""
+    for name, sensor in by_name(given or {}, "sensors", "{signal: Sensor}").items():
+        if name not in READ:
+            raise UnknownNameError("measured signal", name, READ)
+        _expect(f"sensors[{name!r}]", sensor, Sensor)

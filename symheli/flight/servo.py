@@ -11,7 +11,7 @@ import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.linear_model import LinearModel
-from symheli.values.numbers import whole
+from symheli.values.numbers import by_name, whole
 from symheli.values.signal import Signal
 
 
@@ -121,10 +121,12 @@ XCELL_SERVOS: Mapping[str, Servo] = {
 
 
 def one_each(servos: Mapping[str, Servo], inputs: Sequence[str]) -> None:
-    """Raises `InputError` where an input has no servo, or a servo no input."""
-    for name in servos:
+    """Raises `InputError` where an input has no `Servo`, or one no input."""
+    for name, servo in by_name(servos, "servos", "{signal: Servo}").items():
         if name not in inputs:
             raise UnknownNameError("input", name, inputs)
+        if not isinstance(servo, Servo):
+            raise InputError(f"servos[{name!r}]: expected a Servo, got {servo!r:.80}")
     if missing := [name for name in inputs if name not in servos]:
         raise InputError(f"servos: none given for {', '.join(missing)}")
 

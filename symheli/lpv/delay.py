@@ -8,7 +8,8 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv.linear_model import LinearModel
-from symheli.values.numbers import whole
+from symheli.values.numbers import positive, whole
+from symheli.values.sample_period import SAME
 from symheli.values.signal import Signal
 
 
@@ -111,3 +112,26 @@ def sample_delay(name: str, samples: int, dt: float) -> LinearModel:
         (Signal(name, unit),),
         dt,
     )
+
+
+def delay_of(name: str, seconds: float, dt: float | None, order: int = 4) -> LinearModel:
+    """Return the delay of a signal of a model: whole samples of `dt` s where it is sampled, else
+    Pade's approximation of `order` states.
+    """
+    if dt is None:
+        return pade_delay(name, seconds, order)
+    return sample_delay(name, whole_samples(seconds, dt), dt)
+
+
+def whole_samples(seconds: float, dt: float) -> int:
+    """Return the samples of `dt` s in a delay > 0; raise `InputError` where they are not whole."""
+    samples = (seconds := positive(seconds, "the delay")) / dt
+    count = round(samples)
+    if count < 1 or abs(samples - count) > SAME * samples:
+        below = math.floor(samples)
+        near = [f"{n * dt:.6g} s" for n in (below, below + 1) if n > 0]
+        raise InputError(
+            f"a delay of {seconds:g} s is no whole number of samples of {dt:g} s; the nearest are"
+            f" {' and '.join(near)}"
+        )
+    return count

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any, Literal
 
 from symheli.errors import InputError
-from symheli.lpv.linear_model import LinearModel
+from symheli.lpv.linear_model import LinearModel, is_control_system
 from symheli.lpv.lower_feedback import apart, around
 from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.lpv.mixing import itself, mixed
@@ -52,6 +53,24 @@ def filtered_by(lpv: LPVStateSpace, parts: Mapping[str, Part]) -> LPVStateSpace:
         )
         lpv = _connected(wide, part, ahead, behind, "output", name)
     return lpv
+
+
+def as_part(
+    given: Any, what: str, simplest: str, dt: float | None, method: Literal["hold", "tustin"]
+) -> Part:
+    """Return what is in series as a system; a continuous LinearModel is sampled every `dt` s by
+    the method. Raises `InputError` for another kind, where `what` was to be `simplest`, or a model.
+    """
+    if is_control_system(given):
+        given = LinearModel.from_control(given)
+    if not isinstance(given, LinearModel | LPVStateSpace):
+        raise InputError(
+            f"{what}: expected {simplest}, a LinearModel, an LPVStateSpace or a system of"
+            f" python-control, got {given!r:.60}"
+        )
+    if isinstance(given, LinearModel) and given.dt is None and dt is not None and given.states:
+        return given.discretize(dt, method)
+    return given
 
 
 def _connected(

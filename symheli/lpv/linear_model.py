@@ -192,10 +192,12 @@ class LinearModel(Operators):
         """
         at = indices(actuators, self.inputs, "input")
         for name, part in actuators.items():
-            if not same_period(part.dt, self.dt) or len(part.inputs) != 1 or len(part.outputs) != 1:
+            single = isinstance(part, LinearModel) and len(part.inputs) == len(part.outputs) == 1
+            if not single or not same_period(part.dt, self.dt):
+                got = f"{type(part).__name__} with dt = {getattr(part, 'dt', None)}"
                 raise InputError(
-                    f"the actuator of {name} needs one input, one output and dt = {self.dt}; "
-                    f"got {len(part.inputs)}, {len(part.outputs)} and {part.dt}"
+                    f"the actuator of {name}: expected a LinearModel of one input and output with"
+                    f" dt = {self.dt}, got {got}"
                 )
         parts = list(actuators.values())
         A, B, C, D = (

@@ -1,3 +1,4 @@
+from symheli.lpv.actuation import Actuation as Actuation
 from symheli.lpv.delay import pade_delay as pade_delay
 from symheli.lpv.delay import sample_delay as sample_delay
 from symheli.lpv.frozen_plots import damping as damping

@@ -12,6 +12,7 @@ import numpy as np
 
 from symheli import LinearFamily, LinearModel, LPVStateSpace
 from symheli.errors import InputError, UnknownNameError
+from symheli.lpv.tools import Actuation
 from symheli.progress import tracked
 from symheli.threads import with_one_thread
 from symheli.values.aligned import columns
@@ -20,7 +21,6 @@ from symheli.values.html_table import as_table
 from symheli.values.labelled import frame
 from symheli.values.signal import Signal
 from symheli.values.summary import summarized
-from synthesis.design.loops.actuated import actuated
 from synthesis.design.plant.as_controller import as_controller
 from synthesis.sheet.measures import MEASURES, AxisLoop
 from synthesis.sheet.probed import is_asked, probed
@@ -308,7 +308,7 @@ def specifications(
     *,
     at: Sequence[float] | Array | None = None,
     length: float | None = None,
-    servos: Mapping[str, object] | None = None,
+    servos: Mapping[str, object] | Actuation | None = None,
     delay: float = 0.0,
     travel: Mapping[str, float] | None = None,
     rate_limit: Mapping[str, float] | None = None,
@@ -333,7 +333,7 @@ def specifications(
         Values of the parameter; by default the grid of a family, or `POINTS` values of a model.
     length : float, optional
         Rotor radius of the vehicle, m, to which the sheet is scaled; by default it is not.
-    servos : mapping, optional
+    servos : mapping or Actuation, optional
         {control: Servo, LinearModel or python-control system} in front of a continuous plant.
     delay : float
         From a command to its servo, s.
@@ -386,6 +386,7 @@ def specifications(
         if spec.axis not in sheet.axes:
             raise InputError(f"{spec.axis}, {spec.name}: the sheet does not define this axis")
     parameter, values = _grid(plant, at)
+    actuation = Actuation.of(servos, delay)
     given = controllers if _by_name(controllers) else {"controller": controllers}
     begin = time.perf_counter()
     found: dict[str, Array] = {}
@@ -398,12 +399,10 @@ def specifications(
             stable[name] = np.zeros(len(values), bool)
         p = float(values[k])
         bare = plant.at(p)
-        K = frozen_controller(given[name], bare, parameter, p)
+        K = frozen_controller(given[name], bare, parameter, p, actuation.period)
         driven = tuple(K.outputs)
         if (k, driven, K.dt) not in plants:
-            own = {u: servo for u, servo in (servos or {}).items() if u in driven}
-            bare = bare.select(inputs=driven)
-            plants[k, driven, K.dt] = actuated(bare, own, delay, K.dt)
+            plants[k, driven, K.dt] = driven_plant(bare, K, actuation)
         loops = axis_loops(plants[k, driven, K.dt], K, sheet, travel, rate_limit)
         if not loops:
             raise InputError(
@@ -447,9 +446,18 @@ def axis_loops(
     }
 
 
-def frozen_controller(given: Any, plant: LinearModel, parameter: Signal, p: float) -> LinearModel:
+def driven_plant(model: LinearModel, K: LinearModel, actuation: Actuation) -> LinearModel:
+    """Return a frozen model behind the actuation of a frozen controller, sampled as that is."""
+    own = Actuation.of(actuation.select(K.outputs), period=K.dt)
+    model = model.select(inputs=K.outputs)
+    return own.behind(model) if model.dt is own.period is None else own.discretize(model)
+
+
+def frozen_controller(
+    given: Any, plant: LinearModel, parameter: Signal, p: float, period: float | None = None
+) -> LinearModel:
     """Return a controller of any kind, frozen at p, with the signals of the plant; a gain without
-    states has the period of the plant.
+    states has the sample period of the plant, or else the given one.
     """
     model = getattr(given, "model", None)
     if is_asked(given) and not isinstance(model, LPVStateSpace):
@@ -462,7 +470,7 @@ def frozen_controller(given: Any, plant: LinearModel, parameter: Signal, p: floa
                 " parameter is expected; fix the others"
             )
         K = K.at(p)
-    return replace(K, dt=plant.dt) if not K.states and K.dt is None else K
+    return replace(K, dt=plant.dt or period) if not K.states and K.dt is None else K
 
 
 def _by_name(given: Any) -> bool:

@@ -14,6 +14,7 @@ import numpy as np
 
 from symheli import LinearModel, LPVStateSpace
 from symheli.errors import InputError
+from symheli.lpv.tools import Actuation
 from symheli.values.summary import summarized
 from synthesis.certify.questions.certificate import Certificate
 from synthesis.certify.questions.questions import l2_gain
@@ -74,7 +75,7 @@ def peak_loop(
     axis: ControlAxis,
     measure: str,
     *,
-    servos: Mapping[str, object] | None = None,
+    servos: Mapping[str, object] | Actuation | None = None,
     delay: float = 0.0,
     degree: int = 3,
 ) -> LPVStateSpace:
@@ -93,10 +94,8 @@ def peak_loop(
         controls=controller.outputs,
         measurements=controller.inputs,
     )
-    if plant.dt is None:
-        whole = whole.with_servo({u: s for u, s in (servos or {}).items() if u in whole.controls})
-        whole = whole if controller.dt is None else whole.sampled(controller.dt, degree)
-    whole = whole.with_delay(delay) if delay else whole
+    actuation = Actuation.of(servos, delay, controller.dt).select(controller.outputs)
+    whole = whole.behind(actuation, degree)
     if where == "control":
         whole = whole.with_input_disturbance([axis.control])
         assert whole.disturbances == (f"{axis.control}{DISTURBANCE}",)  # noqa: S101
@@ -123,7 +122,7 @@ def prove(
     axis: ControlAxis,
     rate: float = 0.0,
     *,
-    servos: Mapping[str, object] | None = None,
+    servos: Mapping[str, object] | Actuation | None = None,
     delay: float = 0.0,
     degree: int = 3,
     **options: Any,

@@ -103,8 +103,8 @@ def coverage(tube: Tube, flight: FlightRecord) -> Coverage:
     if plan is None:
         raise InputError("the record has no plan: it must be that of a simulated flight")
     equipment, command = reference.equipment, flight["airspeed_command"]
-    servos = _plain(plan.servos) == _plain(equipment.servos)
-    late = math.isclose(plan.delay, equipment.delay * equipment.period, abs_tol=1e-9)
+    servos = _plain(plan.servos) == _plain(equipment.actuation.servos)
+    late = math.isclose(plan.delay, equipment.actuation.delay, abs_tol=1e-9)
     quiet = plan.noise_db is None and all(
         s.noise == s.bias == 0 for s in (plan.sensors or {}).values()
     )

@@ -16,6 +16,7 @@ from symheli.errors import InputError
 from symheli.flight import Servo
 from symheli.flight.servo import one_each
 from symheli.lpv import append
+from symheli.lpv.tools import Actuation
 from symheli.values.kinematics import INPUTS
 from symheli.values.numbers import whole
 from symheli.values.summary import summarized
@@ -49,12 +50,9 @@ class LoopEquipment:
     ----------
     states : tuple of str
         Names of the controller's states.
-    servos : Mapping of Servo, optional
-        One for each control; None: blade pitch follows at once.
-    period : float
-        Sample period of the controller, s; 0: continuous time.
-    delay : int
-        Whole periods between a sample and the command that is made of it.
+    actuation : Actuation
+        Servos, one for each control or none; period of a sampled controller and, of one, whole
+        periods of delay between a sample and the command that is made of it.
     parts : int
         Intervals of the clock between whose ends P is linear.
 
@@ -65,31 +63,30 @@ class LoopEquipment:
 
     Examples
     --------
-    >>> LoopEquipment(period=0.02, delay=1).count
+    >>> LoopEquipment(actuation=Actuation(delay=0.02, period=0.02)).count
     8
     """
 
     states: tuple[str, ...] = ()
-    servos: Mapping[str, Servo] | None = field(default=None)
-    period: float = 0.0
-    delay: int = 0
+    actuation: Actuation = field(default_factory=Actuation)
     parts: int = 1
 
     __repr__ = summarized
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.period) and self.period >= 0):
-            raise InputError(f"period must be a number of seconds >= 0; got {self.period!r:.60}")
-        whole(self.delay, "delay", 0)
         whole(self.parts, "parts", 1)
-        if self.delay and not self.period:
-            raise InputError("a delay counts sample periods: give period too")
-        if self.servos is not None:
-            one_each(self.servos, [str(name) for name in INPUTS])
-            if self.period and any(math.isfinite(s.rate) for s in self.servos.values()):
+        self.actuation.samples  # noqa: B018 - raises for a delay of a part of a period
+        if self.actuation.servos is not None:
+            one_each(self.actuation.servos, [str(name) for name in INPUTS])
+            if self.period and any(math.isfinite(s.rate) for s in self.actuation.servos.values()):
                 raise InputError(
                     "a sampled command jumps: servos with a rate limit need continuous time"
                 )
+
+    @property
+    def period(self) -> float:
+        """Sample period of the controller, s; 0: continuous time."""
+        return self.actuation.period or 0.0
 
     @property
     def held(self) -> tuple[str, ...]:
@@ -100,14 +97,14 @@ class LoopEquipment:
 
     @property
     def _waits(self) -> list[str]:
-        return [*(f"waiting{i + 1}" for i in range(self.delay)), "held"]
+        return [*(f"waiting{i + 1}" for i in range(self.actuation.samples)), "held"]
 
     @cached_property
     def bank(self) -> Bank | None:
         """The servos' linear parts."""
-        if self.servos is None:
+        if self.actuation.servos is None:
             return None
-        made = append(*(self.servos[str(u)].linear(str(u)) for u in INPUTS))
+        made = append(*(self.actuation.servos[str(u)].linear(str(u)) for u in INPUTS))
         settled = -np.linalg.solve(made.A, made.B)
         units = tuple(s.unit == "rad/s" for s in made.states)
         return Bank(made.A, made.B, made.C, settled, tuple(map(str, made.states)), units)
@@ -197,10 +194,10 @@ class LoopEquipment:
         """Rates of the further states (m, q), each times a number within [-1, 1], by the steps in
         which servos resolve their commands.
         """
-        if self.servos is None or self.bank is None:
+        if self.actuation.servos is None or self.bank is None:
             return np.zeros((self.count, 0))
         half = [
-            t / s.steps if (s := self.servos[str(u)]).steps else 0.0
+            t / s.steps if (s := self.actuation.servos[str(u)]).steps else 0.0
             for u, t in zip(INPUTS, travel, strict=True)
         ]
         out = np.zeros((self.count, 4))
@@ -218,22 +215,23 @@ class LoopEquipment:
         clock = "in continuous time"
         if self.period:
             clock = (
-                f"sampled every {self.period:g} s and held, {self.delay} periods after the sample"
+                f"sampled every {self.period:g} s and held, {self.actuation.samples} periods after"
+                " the sample"
             )
         servos = "no servos: blade pitch follows its command at once"
-        if self.servos is not None:
-            each = ", ".join(f"{u} {_words(self.servos[str(u)])}" for u in INPUTS)
+        if self.actuation.servos is not None:
+            each = ", ".join(f"{u} {_words(self.actuation.servos[str(u)])}" for u in INPUTS)
             servos = f"servos {each}; they resolve their commands in the steps given, or better"
         return (f"a controller of {' '.join(known)}{own}, {clock}", servos)
 
     def written(self) -> dict[str, Any]:
         """As JSON holds it."""
         servos = None
-        if self.servos is not None:
+        if self.actuation.servos is not None:
             servos = {
                 str(u): {
                     name: value
-                    for name, value in asdict(self.servos[str(u)]).items()
+                    for name, value in asdict(self.actuation.servos[str(u)]).items()
                     if value is not None and math.isfinite(value)
                 }
                 for u in INPUTS
@@ -242,7 +240,7 @@ class LoopEquipment:
             "states": list(self.states),
             "servos": servos,
             "period": self.period,
-            "delay": self.delay,
+            "delay": self.actuation.samples,
             "parts": self.parts,
         }
 
@@ -254,11 +252,19 @@ class LoopEquipment:
             servos = {str(u): Servo(**own) for u, own in servos.items()}
         return cls(
             tuple(map(str, given["states"])),
-            servos,
-            float(given["period"]),
-            int(given["delay"]),
+            of_periods(servos, float(given["period"]), int(given["delay"])),
             int(given["parts"]),
         )
+
+
+def of_periods(servos: Any, period: float, delay: int) -> Actuation:
+    """Return the actuation of servos, a period in s (0: none), and a delay in whole periods."""
+    own = Actuation.of(servos, period=period or None)
+    if not whole(delay, "delay", 0):
+        return own
+    if own.period is None:
+        raise InputError("a delay counts sample periods: give period too")
+    return Actuation.of(own, delay * own.period)
 
 
 def _words(servo: Servo) -> str:

@@ -15,6 +15,7 @@ from scipy.linalg import solve_continuous_lyapunov
 from symheli import Helicopter, trim
 from symheli.errors import TrimError
 from symheli.flight import Servo
+from symheli.lpv.tools import Actuation
 from symheli.progress import task
 from symheli.steady import trim_batch
 from symheli.steady.newton import newton
@@ -219,10 +220,9 @@ def held(
     heli: Helicopter,
     airspeed: Any,
     choice: Choice | None = None,
-    servos: Mapping[str, Servo] | None = None,
-    delay: int = 0,
+    servos: Mapping[str, Servo] | Actuation | None = None,
 ) -> Reference:
-    """Steady level flight with the controller chosen; delay: whole periods of it."""
+    """Steady level flight with the controller chosen, behind servos or a whole actuation."""
     choice = choice or Choice()
     steady = trim(heli, airspeed=airspeed)
     x, u, p = np.array(steady.x), np.array(steady.u), np.array([float(airspeed)])
@@ -235,7 +235,7 @@ def held(
         np.zeros((1, 4)),
         gain,
         (0.0, 0.0, 0.0),
-        LoopEquipment(states, servos, choice.period, delay),
+        LoopEquipment(states, Actuation.of(servos, period=choice.period or None)),
     )
 
 
@@ -244,7 +244,7 @@ def moving(
     airspeeds: Array,
     limits: tuple[float, float, float],
     choice: Choice | None = None,
-    servos: Mapping[str, Servo] | None = None,
+    servos: Mapping[str, Servo] | Actuation | None = None,
 ) -> Reference:
     """Level flight that accelerates along these nodes, consistent with the equations where the
     acceleration stays the same, with the rates of its attitude; to first order also in a jerk that
@@ -283,7 +283,9 @@ def moving(
             snap[i] = _against(heli, *at, feed[i, :n])
         else:
             feed[i, n:] = _against(heli, *at, by[i])
-    return Reference(airspeeds, z, feed, snap, gain, limits, LoopEquipment(states, servos))
+    return Reference(
+        airspeeds, z, feed, snap, gain, limits, LoopEquipment(states, Actuation.of(servos))
+    )
 
 
 def _in_jerk(heli: Helicopter, x: Array, u: Array, by: Array) -> Array:

@@ -10,6 +10,7 @@ import casadi
 import numpy as np
 
 from symheli import Helicopter
+from symheli.values.kinematics import INPUTS
 from synthesis.tubes.deviations import CommandCell, Deviations
 from synthesis.tubes.enclosure import enclose
 from synthesis.tubes.inequality import MatrixSet
@@ -73,7 +74,7 @@ def why_not_free(
     """
     if not isinstance(loop.model, Helicopter) or not isinstance(loop.reference, Reference):
         return ""
-    most, servos = largest_controls(loop, cells), loop.reference.equipment.servos or {}
+    most, servos = largest_controls(loop, cells), loop.reference.equipment.actuation.servos or {}
     for row in outputs(loop):
         rows = np.broadcast_to(row.rows, (len(P), row.rows.shape[-1]))
         for cell, own in zip(cells, most, strict=True):
@@ -81,12 +82,12 @@ def why_not_free(
             left = float(np.nextafter(loop.model.travel[row.control] - own[row.control], -1.0))
             if not is_within(P[nodes], rows[nodes], left):
                 return f"{row.name} may reach its travel"
-    for i, (name, servo) in enumerate(servos.items()):
-        if math.isfinite(servo.rate):
+    for i, name in enumerate(map(str, INPUTS)):
+        if name in servos and math.isfinite(servos[name].rate):
             if len(P) > 1:
                 return f"the rate of {name}_command is bounded at a held airspeed alone"
             K = loop.reference.equipment.commands(loop.reference.gain)[0, i]
-            if not max(fastest(K, *at) for at in over) < servo.rate:
+            if not max(fastest(K, *at) for at in over) < servos[name].rate:
                 return f"{name}_command may change faster than its servo follows"
     return ""
 

@@ -17,12 +17,14 @@ from symheli import Helicopter
 from symheli.errors import InputError
 from symheli.flight import Servo
 from symheli.lazy import former_attribute
+from symheli.lpv.tools import Actuation
 from symheli.progress import Task, task, tracked
 from symheli.values.summary import summarized
 from synthesis.certify.statement.proven_statement import ProvenStatement
 from synthesis.numerics.program.cone_program import Solver
 from synthesis.tubes.controllers import Choice
 from synthesis.tubes.deviations import CommandCell, Deviations
+from synthesis.tubes.equipment import of_periods
 from synthesis.tubes.files import (
     numbers,
     read_loop,
@@ -372,7 +374,7 @@ def tube(
     snap: float = math.inf,
     gain: Any = None,
     known: Sequence[str] | None = None,
-    servos: Mapping[str, Servo] | None = None,
+    servos: Mapping[str, Servo] | Actuation | None = None,
     period: float = 0.0,
     delay: int = 0,
     sizes: Any = None,
@@ -411,8 +413,9 @@ def tube(
     known : sequence of str, optional
         States that the default feedback knows; by default the ten of an ideal governor. An observer
         estimates the others, but for the rotor's where neither is known.
-    servos : mapping of Servo, optional
-        One for each control. With a rate limit: continuous time and a held airspeed.
+    servos : mapping of Servo, or Actuation, optional
+        One for each control. With a rate limit: continuous time and a held airspeed. An Actuation
+        has period and delay too, both in s.
     period : float
         Sample period of the controller, s, whose command is held between; 0: continuous time. At a
         held airspeed.
@@ -456,8 +459,10 @@ def tube(
     limits = _limits(acceleration, jerk, snap)
     made: Reference | Motions
     if isinstance(model, Helicopter):
-        choice = Choice(gain, known, period, bool(period) or servos is not None)
-        made = _flight(model, reference, limits, choice, servos, delay)
+        actuation = of_periods(servos, period, delay)
+        slow = actuation.period is not None or actuation.servos is not None
+        choice = Choice(gain, known, actuation.period or 0.0, slow)
+        made = _flight(model, reference, limits, choice, actuation)
         own = np.concatenate([TUBE_SIZES[: made.own], made.equipment.sizes])
     else:
         others = [gain, known, servos, period or None, delay or None]
@@ -474,22 +479,21 @@ def _flight(
     airspeed: Any,
     limits: tuple[float, float, float],
     choice: Choice,
-    servos: Mapping[str, Servo] | None,
-    delay: int,
+    actuation: Actuation,
 ) -> Reference:
     """The reference of a helicopter."""
     if np.ndim(airspeed) > 0 or isinstance(airspeed, Motions):
-        if choice.period or delay:
+        if actuation.period or actuation.delay:
             raise InputError("a sampled loop needs one airspeed: its P follows the clock alone")
-        if any(np.isfinite(servo.rate) for servo in (servos or {}).values()):
+        if any(np.isfinite(servo.rate) for servo in (actuation.servos or {}).values()):
             raise InputError(
                 "servos with a rate limit need one airspeed: along a range the rates of their"
                 " commands are not bounded; leave the limit out (rate=inf) or hold an airspeed"
             )
-        return moving(heli, _range(airspeed, limits), limits, choice, servos)
+        return moving(heli, _range(airspeed, limits), limits, choice, actuation)
     if limits[0] or limits[1]:
         raise InputError("a held airspeed has no acceleration or jerk: give (low, high)")
-    return held(heli, airspeed, choice, servos, delay)
+    return held(heli, airspeed, choice, actuation)
 
 
 def _checked(model: Any, motions: Any, flight: Sequence[float], sizes: Any) -> Motions:

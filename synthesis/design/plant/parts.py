@@ -4,41 +4,21 @@ with one input and one output.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 
 from symheli import LinearModel, LPVStateSpace, UncertainStateSpace
 from symheli.errors import InputError
-from symheli.lpv.linear_model import is_control_system
+from symheli.lpv.in_series import Part, as_part
 from symheli.lpv.mixing import itself, mixed
-from symheli.lpv.tools import pade_delay, sample_delay
-from symheli.values.sample_period import SAME
+from symheli.values.numbers import positive
 from symheli.values.signal import Signal
 
-Part = LinearModel | LPVStateSpace
 Model = LPVStateSpace | UncertainStateSpace
 DISTURBANCE = "_disturbance"
 """Suffix of the name of a disturbance added to a control."""
-
-
-@runtime_checkable
-class Actuator(Protocol):
-    """A servo: anything that has a linear model."""
-
-    def linear(self, name: str) -> LinearModel:
-        """Return the linear model from `name`_command to `name`, continuous."""
-        ...
-
-
-def positive(given: Any, what: str) -> float:
-    """Return the number; raise `InputError` unless it is a finite number > 0."""
-    if not (_is_number(given) and 0 < float(given) < math.inf):
-        raise InputError(f"{what}: expected a number > 0, got {given!r:.60}")
-    return float(given)
 
 
 def weight(given: object, name: str, dt: float | None) -> Part:
@@ -47,16 +27,7 @@ def weight(given: object, name: str, dt: float | None) -> Part:
     """
     if _is_number(given):
         return _gain(positive(given, f"the weight of {name}"), name)
-    return _filter(given, f"the weight of {name}", "a number > 0", dt, "tustin")
-
-
-def actuator(given: object, name: str, dt: float | None) -> Part:
-    """Return an actuator as a system, on a sampled plant with its command held between the
-    samples.
-    """
-    if isinstance(given, Actuator):
-        given = given.linear(name)
-    return _filter(given, f"the actuator of {name}", "a Servo", dt, "hold")
+    return as_part(given, f"the weight of {name}", "a number > 0", dt, "tustin")
 
 
 def sensor_filter(given: object, name: str, dt: float | None) -> Part:
@@ -65,26 +36,8 @@ def sensor_filter(given: object, name: str, dt: float | None) -> Part:
     """
     if _is_number(given):
         omega = positive(given, f"the bandwidth of the filter of {name}")
-        given = _first_order(-omega, omega, f"{name}_filter", name, None)
-    return _filter(given, f"the filter of {name}", "a bandwidth in rad/s", dt, "tustin")
-
-
-def delay(seconds: float, name: str, order: int, dt: float | None) -> LinearModel:
-    """Return a delay: whole samples on a sampled plant, Pade's approximation on a
-    continuous one.
-    """
-    if dt is None:
-        return pade_delay(name, seconds, order)
-    samples = positive(seconds, "the delay") / dt
-    whole = round(samples)
-    if whole < 1 or abs(samples - whole) > SAME * samples:
-        below = math.floor(samples)
-        near = [f"{n * dt:.6g} s" for n in (below, below + 1) if n > 0]
-        raise InputError(
-            f"a delay of {seconds:g} s is no whole number of samples of {dt:g} s; the nearest are"
-            f" {' and '.join(near)}"
-        )
-    return sample_delay(name, whole, dt)
+        given = first_order(-omega, omega, f"{name}_filter", name, None)
+    return as_part(given, f"the filter of {name}", "a bandwidth in rad/s", dt, "tustin")
 
 
 def integrator(name: str, dt: float | None) -> LinearModel:
@@ -92,7 +45,7 @@ def integrator(name: str, dt: float | None) -> LinearModel:
     sampled plant.
     """
     A, B = (0.0, 1.0) if dt is None else (1.0, dt)
-    return _first_order(A, B, f"{name}_command", name, dt)
+    return first_order(A, B, f"{name}_command", name, dt)
 
 
 def on(model: Model, change: Callable[[LPVStateSpace], LPVStateSpace]) -> Model:
@@ -159,22 +112,7 @@ def new_name(
     return {name: of or {}}
 
 
-def _filter(
-    given: Any, what: str, simplest: str, dt: float | None, method: Literal["hold", "tustin"]
-) -> Part:
-    if is_control_system(given):
-        given = LinearModel.from_control(given)
-    if not isinstance(given, LinearModel | LPVStateSpace):
-        raise InputError(
-            f"{what}: expected {simplest}, a LinearModel, an LPVStateSpace or a system of"
-            f" python-control, got {given!r:.60}"
-        )
-    if isinstance(given, LinearModel) and given.dt is None and dt is not None and given.states:
-        return given.discretize(dt, method)
-    return given
-
-
-def _first_order(A: float, B: float, state: str, name: str, dt: float | None) -> LinearModel:
+def first_order(A: float, B: float, state: str, name: str, dt: float | None) -> LinearModel:
     """Return a first-order lag with the state as its output, in the unit of the signal."""
     a, b, c, d = (np.array([[entry]]) for entry in (A, B, 1.0, 0.0))
     signal = Signal(name)

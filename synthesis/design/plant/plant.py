@@ -12,14 +12,16 @@ from typing import TYPE_CHECKING, Any
 from symheli import LinearModel, LPVStateSpace, Scheduling, UncertainStateSpace
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.bases import FunctionSpace
+from symheli.lpv.delay import delay_of
+from symheli.lpv.in_series import Part
 from symheli.lpv.linear_model import is_control_system
 from symheli.lpv.lower_feedback import Partition, Positions
 from symheli.lpv.matrix_function import functions_of
 from symheli.lpv.mixing import ERROR, itself, mixed
 from symheli.lpv.scheduling import Rates
-from symheli.lpv.tools import lagged, lower_feedback
+from symheli.lpv.tools import Actuation, lagged, lower_feedback
 from symheli.values.html_table import as_table
-from symheli.values.numbers import by_name
+from symheli.values.numbers import by_name, positive
 from symheli.values.signal import Signal, indices, signals
 from symheli.values.summary import summarized
 from symheli.values.units import per_second
@@ -208,7 +210,7 @@ class Plant:
         performance: Mapping[str, float] = MappingProxyType({}),
         controls: Mapping[str, float],
         measurements: Mapping[str, float],
-        servos: Mapping[str, object] = MappingProxyType({}),
+        servos: Mapping[str, object] | Actuation = MappingProxyType({}),
         delay: float = 0.0,
     ) -> Plant:
         """Return a plant from the size of each of its signals, in the unit of the signal.
@@ -228,7 +230,7 @@ class Plant:
             {input: the size to permit}: each is performance too.
         measurements : mapping
             {output: the size of its noise}, 0 without.
-        servos : mapping
+        servos : mapping or Actuation
             {control: actuator}, as of `with_servo`, before the weights.
         delay : float
             Of all controls, s: as of `with_delay`, before the weights.
@@ -250,12 +252,9 @@ class Plant:
         """
         permitted = {**performance, **controls}
         for name, size in {**disturbances, **permitted}.items():
-            parts.positive(size, f"the size of {name}")
+            positive(size, f"the size of {name}")
         plant = cls(model, [*disturbances], [*permitted], [*controls], [*measurements])
-        if servos:
-            plant = plant.with_servo(servos)
-        if delay:
-            plant = plant.with_delay(delay)
+        plant = plant.behind(Actuation.of(servos, delay))
         noisy = {name: size for name, size in measurements.items() if size != 0}
         weights = {name: 1.0 / size for name, size in permitted.items()}
         return plant.with_noise(noisy).weighted({**disturbances, **weights})
@@ -279,7 +278,19 @@ class Plant:
                 plant = plant._weighted_performance(name, part)
         return plant
 
-    def with_servo(self, servos: Mapping[str, object]) -> Plant:
+    def behind(self, actuation: Actuation, degree: int | Sequence[int] | None = None) -> Plant:
+        """Put an `Actuation` before the controls: its servos, the sampling where it has a period
+        and the plant none (`degree` as of `sampled`), and the delay of all controls.
+
+        Raises `InputError` as `with_servo` and `with_delay`, and for a plant of another period.
+        """
+        plant = self._driven(actuation.parts(self.dt))
+        if plant.dt is None and actuation.period:
+            plant = plant.sampled(actuation.period, degree)
+        Actuation.of(actuation, period=plant.dt)
+        return plant.with_delay(actuation.delay) if actuation.delay else plant
+
+    def with_servo(self, servos: Mapping[str, object] | Actuation) -> Plant:
         """Add actuators {control: Servo, LinearModel or python-control system}; the controls keep
         their names and are the commands.
 
@@ -287,7 +298,7 @@ class Plant:
         `sampled` for the hold at the command alone. Raises `InputError` where the control is
         weighted already.
         """
-        return self._driven({name: parts.actuator(s, name, self.dt) for name, s in servos.items()})
+        return self.behind(Actuation.of(servos))
 
     def with_delay(
         self, seconds: float, signals: Sequence[str] | None = None, order: int = 4
@@ -299,7 +310,7 @@ class Plant:
         weighted already.
         """
         names = self.controls if signals is None else _tuple(signals)
-        return self._driven({name: parts.delay(seconds, name, order, self.dt) for name in names})
+        return self._driven({name: delay_of(name, seconds, self.dt, order) for name in names})
 
     def with_filter(self, filters: Mapping[str, object]) -> Plant:
         """Add filters {measurement: LinearModel, python-control system, or the bandwidth of a
@@ -339,7 +350,7 @@ class Plant:
         """
         plant = self
         for name, size in by_name(sizes, "noise", "{measurement: size}").items():
-            noise, size = Signal(f"{name}_noise", "1"), parts.positive(size, f"the noise of {name}")
+            noise, size = Signal(f"{name}_noise", "1"), positive(size, f"the noise of {name}")
             plant = plant._with_own_measurement(name)._with_disturbance(noise, {name: size})
         return plant
 
@@ -350,7 +361,7 @@ class Plant:
         plant = self
         for name, size in by_name(sizes, "cost", "{control: size}").items():
             (i,) = indices([name], self.controls, "control")
-            cost, size = Signal(f"{name}_cost", "1"), parts.positive(size, f"the cost of {name}")
+            cost, size = Signal(f"{name}_cost", "1"), positive(size, f"the cost of {name}")
             across: dict[str, float] = {self.controls[i]: size}
             plant = plant._changed(
                 lambda model, new=cost, across=across: with_row(model, new, {}, across),
@@ -448,10 +459,10 @@ class Plant:
         own = self.model.select(outputs=[y for y in self.model.outputs if y not in inputs])
         return replace(self, model=on(own, change), **groups)
 
-    def _driven(self, by: Mapping[str, parts.Part]) -> Plant:
+    def _driven(self, by: Mapping[str, Part]) -> Plant:
         indices(by, self.controls, "control")
         self._bare(by)
-        return self._changed(lambda model: model.driven_by(by))
+        return self._changed(lambda model: model.driven_by(by)) if by else self
 
     def _bare(self, controls: Iterable[str]) -> None:
         """Raise `InputError` where one of these signals is weighted."""
@@ -462,7 +473,7 @@ class Plant:
                     " first, then the weights of the commands"
                 )
 
-    def _weighted_disturbance(self, name: str, part: parts.Part) -> Plant:
+    def _weighted_disturbance(self, name: str, part: Part) -> Plant:
         unit = Signal(name, "1")
 
         def change(model: LPVStateSpace) -> LPVStateSpace:
@@ -472,7 +483,7 @@ class Plant:
 
         return self._changed(change, disturbances=_with(self.disturbances, name, unit))
 
-    def _weighted_performance(self, name: str, part: parts.Part) -> Plant:
+    def _weighted_performance(self, name: str, part: Part) -> Plant:
         if name not in self.performance and TRUE + name in self.performance:
             name = TRUE + name
         if name not in self.performance:

@@ -14,11 +14,12 @@ from symheli import Helicopter, LinearModel, trim
 from symheli.errors import InputError, UnknownNameError
 from symheli.flight import XCELL_SERVOS
 from symheli.lpv import connect
+from symheli.lpv.tools import Actuation
 from symheli.values.signal import Signal
 from synthesis.tubes import Tube, coverage, tube
 from synthesis.tubes.controllers import Choice
 from synthesis.tubes.deviations import CommandCell, Deviations
-from synthesis.tubes.equipment import LoopEquipment
+from synthesis.tubes.equipment import LoopEquipment, of_periods
 from synthesis.tubes.proof import falls_in, is_within
 from synthesis.tubes.reference import held
 from synthesis.tubes.travel import fastest, why_not_free
@@ -76,7 +77,7 @@ def test_servos_and_clock_make_the_loop_that_connections_make(at_3):
     law = LinearModel.gain(K, heli.states, [Signal(f"{name}_command", "rad") for name in names])
     servos = [FINE[name].linear(name) for name in names]
     loop = connect(plant, law, *servos, inputs=[], outputs=["phi"])
-    own = LoopEquipment(servos=FINE)
+    own = LoopEquipment(actuation=Actuation(FINE))
     np.testing.assert_allclose(
         sorted_poles(closed(A, B, K[None], own)), sorted_poles(loop.A), atol=1e-4
     )
@@ -85,7 +86,7 @@ def test_servos_and_clock_make_the_loop_that_connections_make(at_3):
         plant, *servos, inputs=[f"{name}_command" for name in names], outputs=list(heli.states)
     ).discretize(PERIOD)
     late = np.block([[driven.A, driven.B], [K @ driven.C, np.zeros((4, 4))]])
-    sampled = LoopEquipment(servos=FINE, period=PERIOD, delay=1)
+    sampled = LoopEquipment(actuation=of_periods(FINE, PERIOD, 1))
     F = closed(A, B, K[None], sampled)
     step = expm(F * PERIOD) @ sampled.jump(K[None])
     own_poles, other = (np.sort(np.abs(np.linalg.eigvals(M))) for M in (step, late))
@@ -166,16 +167,32 @@ def test_a_tube_that_reaches_the_travel_or_a_rate_limit_is_refused(enclosed):
     assert why_not_free(loop, [cell], P, [(over, factor)]) == ""
     assert "travel" in why_not_free(loop, [cell], P / 1e6, [(over, factor)])
     slow = {name: replace(servo, rate=1e-4) for name, servo in FINE.items()}
-    equipment = replace(loop.reference.equipment, servos=slow)
+    equipment = replace(loop.reference.equipment, actuation=Actuation(slow))
     limited = replace(loop, reference=replace(loop.reference, equipment=equipment))
     assert "faster" in why_not_free(limited, [cell], P, [(over, factor)])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("share", [0.99, 1.01])
+def test_a_rate_limit_is_that_of_its_control_in_any_order(enclosed, share):
+    """Every control at its own bound, which differ; the servos in another order."""
+    loop, cell, over, factor = enclosed
+    P = np.linalg.inv(factor @ factor.T)[None]
+    own = loop.reference.equipment
+    for u, row in zip(FINE, own.commands(loop.reference.gain)[0], strict=True):
+        limit = replace(FINE[u], rate=share * fastest(row, over, factor))
+        servos = {**dict(reversed(FINE.items())), u: limit}
+        equipment = replace(own, actuation=Actuation(servos))
+        limited = replace(loop, reference=replace(loop.reference, equipment=equipment))
+        why = why_not_free(limited, [cell], P, [(over, factor)])
+        assert why == ("" if share > 1 else f"{u}_command may change faster than its servo follows")
 
 
 def test_equipment_is_the_same_when_read_again():
     for own in (
         LoopEquipment(),
-        LoopEquipment(("z",), XCELL_SERVOS),
-        LoopEquipment(servos=FINE, period=PERIOD, delay=2, parts=3),
+        LoopEquipment(("z",), Actuation(XCELL_SERVOS)),
+        LoopEquipment(actuation=of_periods(FINE, PERIOD, 2), parts=3),
     ):
         again = LoopEquipment.read(json.loads(json.dumps(own.written())))
         assert again.written() == own.written()
@@ -195,8 +212,22 @@ def test_equipment_is_the_same_when_read_again():
     ],
 )
 def test_equipment_that_does_not_fit_is_refused(given):
+    of = {"servos": None, "period": 0.0, "delay": 0, "parts": 1, **given}
     with pytest.raises(InputError):
-        LoopEquipment(**given)
+        LoopEquipment((), of_periods(of["servos"], of["period"], of["delay"]), of["parts"])
+    with pytest.raises(InputError, match="no whole number of samples"):
+        LoopEquipment(actuation=Actuation(delay=0.03, period=PERIOD))
+
+
+def test_the_seconds_of_an_actuation_are_the_periods_of_a_tube(at_3):
+    """The same proof, to the last digit of its file; and no delay is given twice."""
+    heli, given = at_3[0], {"gust": 0.1, "period": PERIOD, "delay": 1}
+    counted = tube(heli, 3.0, **given)
+    timed = tube(heli, 3.0, gust=0.1, servos=Actuation(delay=PERIOD, period=PERIOD))
+    assert counted.verified
+    assert timed.stored == counted.stored
+    with pytest.raises(InputError, match="leave one out"):
+        tube(heli, 3.0, servos=Actuation(delay=PERIOD), **given)
 
 
 def test_controllers_that_do_not_fit_are_refused(at_3):
