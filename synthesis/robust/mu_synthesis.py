@@ -19,6 +19,7 @@ from scipy import optimize
 from symheli import LFT, LinearModel
 from symheli.errors import InputError
 from symheli.lpv import series
+from symheli.lpv.linear_model import as_model
 from symheli.threads import with_one_thread
 from symheli.values.numbers import whole
 from symheli.values.signal import Signal
@@ -26,7 +27,6 @@ from symheli.values.summary import summarized
 from synthesis.design.lti.hinf import hinf
 from synthesis.design.lti.point_design import PointDesign, named_loop
 from synthesis.design.plant.generalized import Channels, Generalized, sampled_controller
-from synthesis.numerics.linear.model import as_model
 from synthesis.numerics.linear.norm import to_continuous
 from synthesis.robust import witness
 from synthesis.robust.covers import rational

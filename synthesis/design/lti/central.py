@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from symheli.lpv.equilibration import is_singular
+from symheli.lpv.riccati import stabilising, without_rounding
 from synthesis.design.lti.linear_quadratic import given_direct_way
 from synthesis.design.plant.generalized import Generalized
-from synthesis.numerics.linear.riccati import stabilising, without_rounding
 
 Array = np.ndarray
 

@@ -10,10 +10,10 @@ from scipy import signal
 from symheli import LinearModel
 from symheli.errors import InputError
 from symheli.lpv.equilibration import is_singular
+from symheli.lpv.linear_model import as_model
 from symheli.values.arrays import Array, frozen
 from symheli.values.numbers import positive
 from symheli.values.signal import Signal
-from synthesis.numerics.linear.model import as_model
 
 STANDARD = (2.5, 2.0)
 """Stability indices of Manabe's standard form; the last one holds for all further ones."""

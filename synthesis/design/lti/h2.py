@@ -11,6 +11,7 @@ import numpy as np
 from scipy import linalg
 
 from symheli import LinearModel
+from symheli.lpv.linear_model import as_model
 from synthesis.design.lti.linear_quadratic import Matrices, given_direct_way, lqg
 from synthesis.design.lti.point_design import (
     DesignStatus,
@@ -20,7 +21,6 @@ from synthesis.design.lti.point_design import (
 )
 from synthesis.design.plant.diagnosis import reasons
 from synthesis.design.plant.generalized import Channels, Generalized
-from synthesis.numerics.linear.model import as_model
 
 Array = np.ndarray
 

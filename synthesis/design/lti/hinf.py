@@ -15,6 +15,7 @@ from scipy import linalg, optimize
 
 from symheli import LinearModel
 from symheli.errors import InputError
+from symheli.lpv.linear_model import as_model
 from synthesis.design.lti.central import Normalised, Obstacle, RiccatiTrial
 from synthesis.design.lti.linear_quadratic import Matrices, lqg
 from synthesis.design.lti.point_design import DesignStatus, PointDesign, checked
@@ -26,7 +27,6 @@ from synthesis.design.plant.generalized import (
     sampled_controller,
 )
 from synthesis.design.plant.refusals import levels_above
-from synthesis.numerics.linear.model import as_model
 from synthesis.numerics.linear.norm import norm
 
 Array = np.ndarray

@@ -10,15 +10,15 @@ import numpy as np
 from symheli import LinearModel
 from symheli.errors import InputError
 from symheli.lpv import series
+from symheli.lpv.linear_model import as_model
+from symheli.lpv.riccati import stabilising
 from symheli.values.signal import Signal
 from synthesis.design.lti.point_design import DesignStatus, PointDesign, checked
 from synthesis.design.lti.weights import Weight, as_weight
 from synthesis.design.plant.diagnosis import reasons
 from synthesis.design.plant.generalized import Channels, Generalized, sampled_controller
 from synthesis.design.plant.refusals import levels_above
-from synthesis.numerics.linear.model import as_model
 from synthesis.numerics.linear.norm import to_continuous
-from synthesis.numerics.linear.riccati import stabilising
 
 Array = np.ndarray
 

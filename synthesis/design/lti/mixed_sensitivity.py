@@ -9,11 +9,11 @@ from scipy.linalg import block_diag
 
 from symheli import LinearModel
 from symheli.errors import InputError
+from symheli.lpv.linear_model import as_model
 from symheli.values.signal import Signal
 from synthesis.design.lti.hinf import hinf
 from synthesis.design.lti.point_design import PointDesign
 from synthesis.design.lti.weights import Weight, as_weight
-from synthesis.numerics.linear.model import as_model
 
 Array = np.ndarray
 

@@ -10,10 +10,9 @@ from scipy.linalg import block_diag
 
 from symheli import LinearModel
 from symheli.errors import InputError
-from symheli.lpv.linear_model import is_control_system
+from symheli.lpv.linear_model import as_model, is_control_system
 from symheli.values.sample_period import same_period
 from symheli.values.signal import Signal
-from synthesis.numerics.linear.model import as_model
 
 Weight = Any
 """A number, a system of one input and output (on every channel alike), a square system, or a

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy import linalg
 
+from symheli.lpv.riccati import stabilising
 from synthesis.numerics.linear.norm import to_continuous
-from synthesis.numerics.linear.riccati import stabilising
 from synthesis.numerics.polynomial.symmetric import powered, symmetrized
 
 Array = np.ndarray
