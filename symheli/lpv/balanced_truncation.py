@@ -273,7 +273,7 @@ def _of_factors(model: LinearModel, su: Array, sy: Array, p: Array) -> tuple[Arr
     found = []
     for side, equation in sides.items():
         try:
-            found.append(regulator(*equation, model.dt).X)
+            found.append(regulator(*equation, dt=model.dt).X)
         except InputError as error:
             raise InputError(
                 f"the frozen model{_where(p)} is not stabilisable and detectable, it cannot be"
