@@ -311,7 +311,7 @@ class _StructureSearch:
     ) -> _StructureSearch:
         """Check what was given."""
         require_plant(plant)
-        require_channels(plant)
+        require_channels(plant, states=False)
         if isinstance(plant.model, UncertainStateSpace):
             raise InputError(
                 "structured: the plant is uncertain; tune for its nominal model, and certify the"

@@ -169,7 +169,7 @@ class TunableController:
         Raises
         ------
         InputError
-            Other letters, a derivative without corner frequency.
+            Other letters, a derivative without corner frequency, a plant without controls.
         UnknownNameError
             A signal that the plant does not have, a bound of a gain that is not there.
 
@@ -181,6 +181,8 @@ class TunableController:
         ['u_y_P', 'u_y_I'] 1
         """
         given = paths or {(u, y): "P" for u in plant.controls for y in plant.measurements}
+        if not given:
+            raise InputError("the plant has no controls or no measurements: name them")
         controls = _known([u for u, _ in given], plant.controls, "control")
         measured = _known([y for _, y in given], plant.measurements, "measurement")
         for path, terms in given.items():

@@ -138,7 +138,6 @@ def model_scaling(model: LinearModel, gain: float, elsewhere: Matrices | None = 
     reached = np.hstack([B, MIN_COUPLING * size_of(B) * np.diag(np.sqrt(own))])
     seen = np.vstack([C, MIN_COUPLING * size_of(C) * np.diag(np.sqrt(own))])
     Wc, Wo = _gramian(A, reached, continuous), _gramian(A.T, seen.T, continuous)
-    inverse = linalg.inv(Wc)
     # where inputs and outputs weigh alike: the geometric mean of the Hankel singular values
     level = np.exp(0.5 * (np.linalg.slogdet(Wo)[1] + np.linalg.slogdet(Wc)[1]) / n)
     if not SMALLEST < level < 1 / SMALLEST:
@@ -146,6 +145,7 @@ def model_scaling(model: LinearModel, gain: float, elsewhere: Matrices | None = 
             f"a model whose gain is near {level:.0e} cannot be squared; choose other units of its"
             " inputs and outputs"
         )
+    inverse = linalg.inv(Wc)
     X = symmetrized(Wo / level + level * inverse)
     side = inverse @ reached
     Q = seen.T @ seen / level + level * (

@@ -84,7 +84,7 @@ def estimator(
     impose: Grid | None = None,
 ) -> Estimator:
     """Design an observer whose error has the least L2 gain, for every p(t) within its range and
-    rates.
+    rates. It returns an `Estimator`: an observer commands nothing.
 
     The plant may be unstable: what is estimated is seen through the error alone. L needs no rate
     of p.

@@ -49,6 +49,10 @@ def loop_shaping(
     """Design the scheduled controller of the least gain [K; I] (I - W2 G W1 K)^-1 [I, W2 G W1] of a
     plant shaped by weights: `output_feedback` of the problem that `ncfsyn` solves at one p.
 
+    It takes the loop alone, since its weights stand for disturbances and performance. Of a `Plant`
+    it is the design for `plant.nominal.select(inputs=plant.controls, outputs=plant.measurements)`,
+    and `Controller.of(plant, made.controller)` is its `Controller`.
+
     Parameters
     ----------
     G : LPVStateSpace
@@ -88,7 +92,7 @@ def loop_shaping(
     """
     if not isinstance(G, LPVStateSpace):
         raise InputError(
-            f"G: expected an LPVStateSpace, got {type(G).__name__}; ncf takes one linear model"
+            f"G: expected an LPVStateSpace, got {type(G).__name__}; ncfsyn takes one linear model"
         )
     before = _weight(W1, "W1", G.inputs, G.dt)
     behind = _weight(W2, "W2", G.outputs, G.dt)

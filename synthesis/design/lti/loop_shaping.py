@@ -29,6 +29,10 @@ def ncfsyn(
     """Design the controller of the largest normalized coprime stability margin of the shaped plant
     W2 G W1.
 
+    It takes the loop alone, since its weights stand for disturbances and performance. Of a `Plant`
+    it is the design for `plant.nominal.at(p).select(inputs=plant.controls,
+    outputs=plant.measurements)`, and `.on(plant)` of the result is its `Controller`.
+
     The smallest gamma is known in closed form, sqrt(1 + rho(X Z)) with the solutions of two Riccati
     equations: every plant within 1/gamma of the shaped one in the nu-gap is stabilised as well. Up
     to 4 the shape of the loop is nearly kept.
@@ -82,7 +86,7 @@ def ncfsyn(
     behind = as_weight(W2, "W2", G.outputs, G.dt)
     shaped = series(series(before, G), behind)
     plant, names = _four_block(shaped)
-    if against := reasons(plant, names, dt=G.dt):
+    if against := reasons(plant.checked(names), names, dt=G.dt):
         return PointDesign.without(DesignStatus.IMPOSSIBLE, against)
     found = _closed_form(shaped, back_off)
     design = None if found is None else checked(plant, found[1], names, G.dt)

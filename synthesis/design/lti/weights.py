@@ -28,6 +28,8 @@ def as_weight(
     `InputError` where it has another number of channels or another sample period.
     """
     n = len(channels)
+    if not n:
+        raise InputError("G: expected a model from controls to measurements, one of each at least")
     if isinstance(weight, LinearModel) or is_control_system(weight):
         system = as_model(weight)
         parts = [system] * n if len(system.inputs) == len(system.outputs) == 1 else [system]

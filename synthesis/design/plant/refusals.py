@@ -73,8 +73,11 @@ def require_channels(
     measurements: bool = True,
     disturbances: bool = True,
     performance: bool = True,
+    states: bool = True,
 ) -> Channels:
-    """Return the channels of a plant; raise `InputError` where a group has none."""
+    """Return the channels of a plant; raise `InputError` where a group has none, and for numbers
+    that cannot be squared.
+    """
     named = plant.channels
     for wanted, group in (
         (disturbances, "disturbances"),
@@ -84,6 +87,12 @@ def require_channels(
     ):
         if wanted and not getattr(named, group):
             raise InputError(f"the plant has no {group}: name them, Plant(model, {group}=[...])")
+    if states and not named.states:
+        raise InputError(
+            "the plant has no states: give it a servo, a delay or a weight with states, or take"
+            " synthesis.hinf, which designs for gains too"
+        )
+    plant.matrices(conditions(plant)[0]).checked(named)
     return named
 
 
