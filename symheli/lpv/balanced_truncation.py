@@ -10,7 +10,7 @@ from typing import Generic, Literal
 import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv.balancing import Model, balanced_gramians, projected, response_gramians
+from symheli.lpv.balancing import Model, balanced_gramians, method, projected, response_gramians
 from symheli.lpv.bases.function_space import tensor_grid
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.lpv_state_space import LPVStateSpace
@@ -132,22 +132,13 @@ def reduced(
     model: Model, order: int | None = None, by: str | None = None, loss: float | None = None
 ) -> Model:
     """See `LPVStateSpace.reduce`."""
-    by = by or ("minimal" if order is None and loss is None else "coprime")
     if by == "bounded":
         raise InputError(
             "by: the method with a bound while p moves solves matrix inequalities; it is"
             " synthesis.designs.bounded_truncation(model, order).model"
         )
-    if by not in (known := ("minimal", *METHODS)):
-        raise UnknownNameError("method of reduction", by, known)
-    if order is not None and loss is not None:
-        raise InputError("reduce: give an order, or a loss such as 0.03, and not both")
+    by = method(by, order, loss, *METHODS)
     if by == "minimal":
-        if order is not None or loss is not None:
-            raise InputError(
-                'by: "minimal" loses nothing and finds its order; for an order or a loss give'
-                ' "coprime" or "balanced"'
-            )
         return minimal_realization(model)
     if order == len(model.states) or (order is None and not model.states):
         return model

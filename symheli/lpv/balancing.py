@@ -8,6 +8,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from scipy.linalg import solve_continuous_lyapunov, solve_discrete_lyapunov
 
+from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.values.arrays import Array
@@ -19,6 +20,24 @@ REGULAR = 1e-15
 """Fraction of its largest eigenvalue to which a Gramian is raised where states that nothing moves
 or shows may be kept: their coordinates stay regular.
 """
+
+
+def method(by: str | None, order: int | None, loss: float | None, *approximations: str) -> str:
+    """Return the method of a reduction: without a name "minimal", with an order or a loss the first
+    of the approximations. Raises `UnknownNameError`, and `InputError` for what it does not take.
+    """
+    given = order is not None or loss is not None
+    by = by or (approximations[0] if given else "minimal")
+    if by not in (known := ("minimal", *approximations)):
+        raise UnknownNameError("method of reduction", by, known)
+    if order is not None and loss is not None:
+        raise InputError("reduce: give an order, or a loss such as 0.03, and not both")
+    if by == "minimal" and given:
+        raise InputError(
+            'by: "minimal" loses nothing and finds its order; for an order or a loss give'
+            f" {' or '.join(approximations)}"
+        )
+    return by
 
 
 class Balancing(NamedTuple):

@@ -21,6 +21,7 @@ from symheli.errors import InputError
 from symheli.lpv import series
 from symheli.lpv.linear_model import as_model
 from symheli.threads import with_one_thread
+from symheli.values.arrays import Array
 from symheli.values.numbers import whole
 from symheli.values.signal import Signal
 from symheli.values.summary import summarized
@@ -33,8 +34,6 @@ from synthesis.robust.covers import rational
 from synthesis.robust.intervals import LevelProof
 from synthesis.robust.structure import BlockLoop, DynamicBlock, Part, behind, channels_of, loop_of
 from synthesis.robust.upper_bound import Upper, proven_level
-
-Array = np.ndarray
 
 FREQUENCIES = 80
 """Frequencies at which scalings are found, over the poles of plant and controller and a decade

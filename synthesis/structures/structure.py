@@ -13,14 +13,13 @@ from symheli import LinearModel, LPVStateSpace, Scheduling
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.bases import FunctionSpace
 from symheli.lpv.tools import lower_feedback
+from symheli.values.arrays import Array
 from symheli.values.signal import Signal, indices, signals
 from symheli.values.summary import summarized
 from synthesis.design.plant.parts import positive
 
 if TYPE_CHECKING:
     from synthesis.design.plant.plant import Plant
-
-Array = np.ndarray
 
 TERMS = "PID"
 """Proportional, integral and derivative part of a path."""

@@ -15,10 +15,9 @@ from symheli.errors import InputError
 from symheli.flight.controller import deviations
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.riccati import regulator
+from symheli.values.arrays import Array
 from symheli.values.sample_period import same_period
 from symheli.values.signal import indices, signals
-
-Array = np.ndarray
 
 STATE_SIZES = (1.0, 1.0, 1.0, 0.5, 0.5, 0.5, 0.2, 0.2, 0.1, 0.1, 10.0, 10.0)
 """Deviations of equal weight in the default feedback: m/s, rad/s, rad; rotor speed, rad/s, and the

@@ -281,21 +281,18 @@ class LFT(Operators, LFTMatrices):
         Raises `InputError` for a tolerance that is no fraction or stands beside an order or a loss,
         `UnknownNameError` for another method.
         """
+        from symheli.lpv.balancing import method
         from symheli.lpv.lft.reduction import reduce
 
-        by = by or ("minimal" if order is None and loss is None else "balanced")
-        if by not in (known := ("minimal", "balanced")):
-            raise UnknownNameError("method of reduction", by, known)
-        if by == "balanced" and tolerance is None:
-            return self.truncate(loss, order=order).lft
-        if by == "balanced" or order is not None or loss is not None:
-            raise InputError('reduce: tolerance is of by="minimal", order and loss of "balanced"')
-        if tolerance is not None and not positive(tolerance, "tolerance", or_zero=True) < 1:
+        by = method(by, order, loss, "balanced")
+        if tolerance is not None and not (
+            by == "minimal" and positive(tolerance, "tolerance", or_zero=True) < 1
+        ):
             raise InputError(
-                f"tolerance: expected a number from 0 to 1 such as 1e-12, got {tolerance!r:.80};"
-                " an order has its name, reduce(order=...)"
+                f'tolerance: expected a number from 0 to 1 such as 1e-12, of by="minimal", got'
+                f" {tolerance!r:.80}; an order has its name, reduce(order=...)"
             )
-        return reduce(self, tolerance)
+        return reduce(self, tolerance) if by == "minimal" else self.truncate(loss, order=order).lft
 
     def truncate(self, error: float | None = None, *, order: int | None = None) -> Truncation:
         """Return an approximation with fewer copies, whose error is measured and, where possible,

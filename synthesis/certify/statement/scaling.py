@@ -15,14 +15,13 @@ from scipy import linalg
 from symheli import LinearModel, LPVStateSpace
 from symheli.errors import InputError
 from symheli.lpv.tools import Matrices
+from symheli.values.arrays import Array
 from synthesis.certify.statement.norm_bounded import NormBounded
 from synthesis.certify.statement.units import Scaling
 from synthesis.numerics.linear.balance import balance, size_of
 from synthesis.numerics.linear.norm import norm
 from synthesis.numerics.polynomial.symmetric import powered, symmetrized
 from synthesis.numerics.program.storage import least_storage, strict_storage
-
-Array = np.ndarray
 
 SMALLEST = 1e-150
 """Gain from all inputs to all outputs, in the units given, whose square is still a number."""

@@ -18,22 +18,21 @@ from typing import Any
 import numpy as np
 
 from symheli import LPVStateSpace
-from symheli.errors import InputError, SynthesisError, UnknownNameError
-from symheli.lpv.balanced_truncation import METHODS
+from symheli.errors import InputError, SynthesisError
 from symheli.lpv.balancing import (
     REGULAR,
     Balancing,
     balanced_gramians,
+    method,
     projected,
     response_gramians,
 )
 from symheli.lpv.bases.polynomials import lobatto_points
 from symheli.lpv.tools import lower_feedback
+from symheli.values.arrays import Array
 from symheli.values.signal import signals
 from synthesis.design.loops.controller import Controller
 from synthesis.numerics.linear.norm import norm, stable
-
-Array = np.ndarray
 
 NOT_STABLE = (
     "the closed loop is not stable at every frozen p: it has no Gramians by which the states of"
@@ -50,8 +49,7 @@ def by_itself(controller: Controller, order: int | None, by: str, loss: float | 
     By "minimal" it is the same controller, and promises what it did. Raises `SynthesisError` where
     the loop is not stable at some frozen p.
     """
-    if by not in (known := ("loop", "minimal", *METHODS, "bounded")):
-        raise UnknownNameError("method of reduction", by, known[:-1])
+    by = method(by, order, loss, "coprime", "balanced", "loop")
     model = controller.model.reduce(order, by=by, loss=loss)
     if len(model.states) == controller.order:
         return controller

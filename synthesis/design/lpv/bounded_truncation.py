@@ -30,11 +30,10 @@ from symheli.lpv.balancing import REGULAR, balanced_gramians, projected
 from symheli.lpv.bases.polynomials import factors_of, lobatto_points, polynomials
 from symheli.lpv.nu_gap import channel_scales
 from symheli.threads import with_one_thread
+from symheli.values.arrays import Array
 from synthesis.design.lpv.scaled_plant import breaks_of, degrees_of
 from synthesis.numerics.program.affine_program import AffineProgram, cells, from_lower
 from synthesis.numerics.program.cone_program import Solver
-
-Array = np.ndarray
 
 LARGEST = 1e8
 """Gramians and their inverses are kept below this multiple of the identity, in coordinates in which
@@ -199,20 +198,16 @@ class _FullModel:
         """
         A, B, C, D = self.matrices(p)
         if self.balance == "response":
-            flow = A @ M + M @ _t(A)
-            return from_lower([[-flow], [known(_t(B)), known(np.eye(B.shape[2]))]])
-        R = np.linalg.inv(np.eye(D.shape[2]) + _t(D) @ D)
-        A = A - B @ R @ _t(D) @ C
-        flow = A @ M + M @ _t(A)
-        S = np.eye(D.shape[1]) + D @ _t(D)
-        return from_lower([[known(B @ R @ _t(B)) - flow], [-(C @ M), known(S)]])
+            flow = A @ M + M @ A.mT
+            return from_lower([[-flow], [known(B.mT), known(np.eye(B.shape[2]))]])
+        R = np.linalg.inv(np.eye(D.shape[2]) + D.mT @ D)
+        A = A - B @ R @ D.mT @ C
+        flow = A @ M + M @ A.mT
+        S = np.eye(D.shape[1]) + D @ D.mT
+        return from_lower([[known(B @ R @ B.mT) - flow], [-(C @ M), known(S)]])
 
     def holds(self, M: Array) -> bool:
         """Whether the inequality holds on a fine grid, to rounding."""
         p = lobatto_points(POINTS.get(len(self.box), 7), self.box).reshape(-1, len(self.box))
         values = np.linalg.eigvalsh(self.inequality(p, M, lambda known: known))
         return bool(values[:, 0].min() >= -ROUNDING * np.abs(values).max())
-
-
-def _t(M: Array) -> Array:
-    return np.swapaxes(M, -1, -2)

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 from symheli import LinearModel, LPVStateSpace
 from symheli.errors import InputError
 from symheli.lpv import series
-from symheli.lpv.mixing import itself, mixed
 from symheli.values.sample_period import same_period
 from symheli.values.signal import Signal
 from synthesis.certify.statement.impose import Grid
@@ -17,8 +16,8 @@ from synthesis.certify.statement.rates import Rate
 from synthesis.design.loops.controller import Controller
 from synthesis.design.lpv.output_feedback import output_feedback
 from synthesis.design.lpv.search import BACK_OFF
+from synthesis.design.lti.loop_shaping import four_block
 from synthesis.design.lti.weights import Weight, as_weight
-from synthesis.design.plant.plant import Plant
 from synthesis.numerics.program.bases import Dependence
 
 
@@ -97,7 +96,7 @@ def loop_shaping(
     before = _weight(W1, "W1", G.inputs, G.dt)
     behind = _weight(W2, "W2", G.outputs, G.dt)
     shaped = series(series(before, G), behind)
-    made = output_feedback(_four_block(shaped), rate, X=X, Y=Y, back_off=back_off, impose=impose)
+    made = output_feedback(four_block(shaped), rate, X=X, Y=Y, back_off=back_off, impose=impose)
     made = replace(made, method=f"loop shaping, {made.method}")
     return LoopShaping(series(series(behind, made.model), before), made)
 
@@ -121,22 +120,3 @@ def _weight(
         )
     states = tuple(Signal(f"{name}_{s}", s.unit) for s in given.states)
     return replace(given, states=states, inputs=tuple(channels), outputs=tuple(channels))
-
-
-def _four_block(G: LPVStateSpace) -> Plant:
-    """Return the plant of `ncfsyn` over p: from noise on y and a disturbance of u to u and y."""
-    noise = {Signal(f"{y}_noise", y.unit): y for y in G.outputs}
-    disturbance = {Signal(f"{u}_disturbance", u.unit): u for u in G.inputs}
-    inputs = {
-        **{n: {} for n in noise},
-        **{d: {u: 1.0} for d, u in disturbance.items()},
-        **itself(G.inputs),
-    }
-    across = {y: {n: 1.0} for n, y in noise.items()}
-    return Plant(
-        mixed(G, inputs, itself(G.outputs), across),
-        disturbances=(*noise, *disturbance),
-        performance=(*G.inputs, *G.outputs),
-        controls=G.inputs,
-        measurements=G.outputs,
-    )

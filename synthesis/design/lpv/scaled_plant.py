@@ -16,6 +16,7 @@ from symheli.lpv.bases import FunctionSpace
 from symheli.lpv.bases.function_space import tensor_grid
 from symheli.lpv.bases.polynomials import factors_of, interpolation_points
 from symheli.lpv.tools import Matrices
+from symheli.values.arrays import Array
 from synthesis.certify.statement.scaling import model_scaling
 from synthesis.design.lti.linear_quadratic import control_gains
 from synthesis.design.plant.generalized import Generalized
@@ -23,8 +24,6 @@ from synthesis.numerics.program.bases import extreme_motions
 
 if TYPE_CHECKING:
     from synthesis.design.plant.plant import Plant
-
-Array = np.ndarray
 
 MatricesAt = Callable[[Array], Generalized]
 

@@ -12,6 +12,7 @@ from scipy import linalg
 
 from symheli import LinearModel
 from symheli.lpv.linear_model import as_model
+from symheli.values.arrays import Array
 from synthesis.design.loops.controller import Controller
 from synthesis.design.lti.linear_quadratic import Matrices, given_direct_way, lqg
 from synthesis.design.lti.point_design import (
@@ -24,8 +25,6 @@ from synthesis.design.lti.point_design import (
 from synthesis.design.plant.diagnosis import reasons
 from synthesis.design.plant.generalized import Channels, Generalized
 from synthesis.design.plant.plant import Plant
-
-Array = np.ndarray
 
 NEGLIGIBLE_FEEDTHROUGH = 1e-9
 """Feedthrough from disturbances to performance below this fraction of its terms counts as zero."""

@@ -17,6 +17,7 @@ from scipy import linalg, optimize
 from symheli import LinearModel
 from symheli.errors import InputError
 from symheli.lpv.linear_model import as_model
+from symheli.values.arrays import Array
 from synthesis.design.loops.controller import Controller
 from synthesis.design.lti.central import Normalised, Obstacle, RiccatiTrial
 from synthesis.design.lti.linear_quadratic import Matrices, lqg
@@ -31,8 +32,6 @@ from synthesis.design.plant.generalized import (
 from synthesis.design.plant.plant import Plant
 from synthesis.design.plant.refusals import levels_above
 from synthesis.numerics.linear.norm import norm
-
-Array = np.ndarray
 
 ACCURACY = 1e-10
 """Relative accuracy of the optimum."""

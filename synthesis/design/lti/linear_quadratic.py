@@ -10,9 +10,9 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv.riccati import regulator
+from symheli.values.arrays import Array
 from synthesis.design.plant.generalized import Generalized
 
-Array = np.ndarray
 Matrices = tuple[Array, Array, Array, Array]
 
 

@@ -12,11 +12,10 @@ import numpy as np
 
 from symheli.lpv.equilibration import equilibrate
 from symheli.lpv.modes import Mode, hidden_modes, on_the_border, unstable
+from symheli.values.arrays import Array
 from synthesis.design.plant.generalized import Channels, Generalized, continuous_plant
 from synthesis.design.plant.unreachable import Unreachable, unreachable_gain
 from synthesis.numerics.linear.norm import norm
-
-Array = np.ndarray
 
 SINGULAR = 1e-9
 """Singular values of a matrix with entries of order one up to this fraction of the largest count

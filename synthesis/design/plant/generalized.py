@@ -11,11 +11,10 @@ import numpy as np
 from symheli import LinearModel
 from symheli.errors import InputError
 from symheli.lpv.equilibration import is_singular
+from symheli.values.arrays import Array
 from symheli.values.signal import Signal, indices
 from symheli.values.summary import summarized
 from synthesis.numerics.linear.norm import to_continuous
-
-Array = np.ndarray
 
 SIZE_LIMITS = 1e-100, 1e100
 """Least and largest entries: Riccati equations square control weights and measurement noise, and

@@ -10,14 +10,13 @@ import numpy as np
 
 from symheli.errors import InputError, SynthesisError
 from symheli.lpv.bases.polynomials import lobatto_points
+from symheli.values.arrays import Array
 from synthesis.certify.statement.outcome import Attempt
 from synthesis.design.plant.diagnosis import reasons, unpriced
 
 if TYPE_CHECKING:
     from synthesis.design.plant.generalized import Channels
     from synthesis.design.plant.plant import Plant
-
-Array = np.ndarray
 
 NOTHING_WRONG = (
     "nothing is wrong with the plant at frozen p: a lower rate, other functions for X and Y, or"

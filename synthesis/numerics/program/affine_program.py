@@ -20,13 +20,12 @@ from scipy import sparse
 from symheli.lpv.bases import FunctionSpace
 from symheli.lpv.bases.function_space import tensor_grid
 from symheli.lpv.bases.polynomials import interpolation_points
+from symheli.values.arrays import Array
 from synthesis.numerics.polynomial.bernstein import blossom
 from synthesis.numerics.polynomial.symmetric import basis as symmetric_basis
 from synthesis.numerics.polynomial.symmetric import svec, symmetrized
 from synthesis.numerics.program.cone_program import ConeProgram, Solver, SolverPoint, solve
 from synthesis.numerics.program.unknown import UnknownFunction
-
-Array = np.ndarray
 
 MARGIN = 1e-8
 """Every inequality is imposed as >= this multiple of the identity."""
