@@ -4,6 +4,7 @@ unstable models.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Generic, Literal
 
@@ -27,6 +28,8 @@ METHODS: dict[str, Balance] = {"coprime": "factors", "balanced": "response"}
 """Methods of `reduce` by their names, with the Gramians that each balances."""
 NODES = 21
 """Values of each parameter over which Gramians are averaged."""
+BETWEEN = slice(1, None, 2)
+"""Of twice as many values those half way between."""
 NEGLIGIBLE = 1e-7
 """A state with a singular value below this fraction of the largest counts as absent: the square
 root of the rounding of Riccati solutions.
@@ -144,22 +147,15 @@ def reduced(
         return model
     if order is not None:
         return balanced_truncation(model, order, balance=METHODS[by]).model
-    return _least(
-        model, METHODS[by], None if loss is None else positive(loss, "loss", or_zero=True)
-    )
-
-
-def _least(model: Model, balance: Balance, loss: float | None) -> Model:
-    """Return the model of the fewest states whose frozen error is at most `loss`, with None the
-    model of all states that matter; the model itself where it needs them all.
-    """
+    allowed = math.inf if loss is None else positive(loss, "loss", or_zero=True)
+    balance = METHODS[by]
     su, sy = np.ones(len(model.inputs)), np.ones(len(model.outputs))
     gramians = mean_gramians(model, balance, NODES, su, sy)
     matter = _matter(balanced_gramians(*gramians).values)
-    for order in range(1 if loss is not None else matter, min(matter + 1, len(model.states))):
-        found = truncated_by(gramians, model, order, balance, NODES, su, sy)
+    for k in range(matter if loss is None else 1, min(matter + 1, len(model.states))):
+        found = truncated_by(gramians, model, k, balance, NODES, su, sy)
         error = found.nu_gap if balance == "factors" else found.error
-        if loss is None or error.max() <= loss:
+        if loss is None or error.max() <= allowed:
             return found.model
     return model
 
@@ -177,7 +173,7 @@ def mean_gramians(
     """
     if balance not in (rules := {"factors": _of_factors, "response": _of_response}):
         raise UnknownNameError("balance", balance, list(rules))
-    each = [rules[balance](m, su, sy, p) for p, m in _nodes(model, nodes)]
+    each = [rules[balance](m, su, sy, p) for p, m in _frozen(model, nodes)]
     X, Y = (np.mean(parts, axis=0) for parts in zip(*each, strict=True))
     return X, Y
 
@@ -214,7 +210,8 @@ def truncated_by(
             f" {count} or fewer"
         )
     small = projected(model, into[:order], out[:, :order])
-    pairs = list(zip(_between(model, nodes), _between(small, nodes), strict=True))
+    between = (_frozen(each, 2 * nodes - 1, BETWEEN) for each in (model, small))
+    pairs = list(zip(*between, strict=True))
     compared = [sampled_alike(full, reduced) for (_, full), (_, reduced) in pairs]
     gaps = [nu_gap(full, reduced, input_scale=su, output_scale=sy) for full, reduced in compared]
     errors = [_relative_error(full, reduced, su, sy) for full, reduced in compared]
@@ -226,19 +223,13 @@ def truncated_by(
     return BalancedTruncation(small, values, p, np.array(gaps), np.array(errors), bound)
 
 
-def _nodes(model: LPVStateSpace | LinearModel, count: int) -> list[tuple[Array, LinearModel]]:
-    """Models at `count` values of every parameter."""
+def _frozen(
+    model: LPVStateSpace | LinearModel, count: int, those: slice = slice(None)
+) -> list[tuple[Array, LinearModel]]:
+    """Models at those of `count` values of every parameter."""
     if isinstance(model, LinearModel):
         return [(np.array([np.nan]), model)]
-    axes = [np.linspace(s.low, s.high, count) for s in model.parameters]
-    return [(p, model.at(*p)) for p in tensor_grid(axes)]
-
-
-def _between(model: LPVStateSpace | LinearModel, count: int) -> list[tuple[Array, LinearModel]]:
-    """Models half way between those."""
-    if isinstance(model, LinearModel):
-        return _nodes(model, count)
-    axes = [np.linspace(s.low, s.high, 2 * count - 1)[1::2] for s in model.parameters]
+    axes = [np.linspace(s.low, s.high, count)[those] for s in model.parameters]
     return [(p, model.at(*p)) for p in tensor_grid(axes)]
 
 

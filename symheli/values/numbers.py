@@ -44,7 +44,7 @@ def by_name(value: Any, name: str, shape: str) -> Mapping[Any, Any]:
 def positive(value: Any, name: str, *, or_zero: bool = False) -> float:
     """The value as a float; raises `InputError` unless it is finite and > 0, or 0 if asked."""
     try:
-        number = float(value)
+        number = math.nan if isinstance(value, str | bool) else float(value)
     except (TypeError, ValueError):
         number = math.nan
     if not (math.isfinite(number) and (number > 0 or (or_zero and number == 0))):

@@ -16,6 +16,7 @@ from symheli.errors import InputError
 from symheli.lpv.linear_model import is_control_system
 from symheli.lpv.mixing import itself, mixed
 from symheli.lpv.tools import pade_delay, sample_delay
+from symheli.values.numbers import positive
 from symheli.values.sample_period import SAME
 from symheli.values.signal import Signal
 
@@ -32,13 +33,6 @@ class Actuator(Protocol):
     def linear(self, name: str) -> LinearModel:
         """Return the linear model from `name`_command to `name`, continuous."""
         ...
-
-
-def positive(given: Any, what: str) -> float:
-    """Return the number; raise `InputError` unless it is a finite number > 0."""
-    if not (_is_number(given) and 0 < float(given) < math.inf):
-        raise InputError(f"{what}: expected a number > 0, got {given!r:.60}")
-    return float(given)
 
 
 def weight(given: object, name: str, dt: float | None) -> Part:

@@ -19,7 +19,7 @@ from symheli.lpv.mixing import ERROR, itself, mixed
 from symheli.lpv.scheduling import Rates
 from symheli.lpv.tools import lagged, lower_feedback
 from symheli.values.html_table import as_table
-from symheli.values.numbers import by_name
+from symheli.values.numbers import by_name, positive
 from symheli.values.signal import Signal, indices, signals
 from symheli.values.summary import summarized
 from symheli.values.units import per_second
@@ -250,7 +250,7 @@ class Plant:
         """
         permitted = {**performance, **controls}
         for name, size in {**disturbances, **permitted}.items():
-            parts.positive(size, f"the size of {name}")
+            positive(size, f"the size of {name}")
         plant = cls(model, [*disturbances], [*permitted], [*controls], [*measurements])
         if servos:
             plant = plant.with_servo(servos)
@@ -339,7 +339,7 @@ class Plant:
         """
         plant = self
         for name, size in by_name(sizes, "noise", "{measurement: size}").items():
-            noise, size = Signal(f"{name}_noise", "1"), parts.positive(size, f"the noise of {name}")
+            noise, size = Signal(f"{name}_noise", "1"), positive(size, f"the noise of {name}")
             plant = plant._with_own_measurement(name)._with_disturbance(noise, {name: size})
         return plant
 
@@ -350,7 +350,7 @@ class Plant:
         plant = self
         for name, size in by_name(sizes, "cost", "{control: size}").items():
             (i,) = indices([name], self.controls, "control")
-            cost, size = Signal(f"{name}_cost", "1"), parts.positive(size, f"the cost of {name}")
+            cost, size = Signal(f"{name}_cost", "1"), positive(size, f"the cost of {name}")
             across: dict[str, float] = {self.controls[i]: size}
             plant = plant._changed(
                 lambda model, new=cost, across=across: with_row(model, new, {}, across),
