@@ -26,6 +26,8 @@ LOSS = 64 * np.finfo(float).eps
 """Largest change of what an entry has of the parameters, in units of the size that row and column
 give that part or of its own terms, that is rounding of the reduction itself.
 """
+NOTHING = np.zeros((0, 0))
+"""First block of a diagonal that may have no other."""
 
 
 def reduce(lft: LFT, tolerance: float | None) -> LFT:
@@ -116,7 +118,7 @@ def _reached_exactly(own: ExactCopies) -> ExactCopies:
             break
         spans = grown
     chosen = [a.start + k for a, (_, own_rows) in zip(here, spans, strict=True) for k in own_rows]
-    V = block_diag(*(basis for basis, _ in spans))
+    V = block_diag(NOTHING, *(basis for basis, _ in spans))
     sizes = tuple(len(rows) for _, rows in spans)
     return ExactCopies((own.M11 @ V)[chosen], own.M12[chosen], own.M21 @ V, sizes)
 
@@ -357,7 +359,7 @@ def _extended(basis: Array, columns: Array, threshold: float) -> Array:
 
 def _projected(lft: LFT, left: list[Array], right: list[Array]) -> LFT:
     """The LFT with copies z_i = right_i z_i', left_i' right_i = I."""
-    L, R = block_diag(*left), block_diag(*right)
+    L, R = block_diag(NOTHING, *left), block_diag(NOTHING, *right)
     blocks = tuple(
         Block(block.scheduling, basis.shape[1])
         for block, basis in zip(lft.blocks, right, strict=True)

@@ -122,7 +122,8 @@ def h2(
     [[-3.]] [[1.]] [[-1.]] [[0.]]
     """
     if isinstance(model, Plant):
-        return on_plant(model, h2, "H2", gain=False)
+        names = controls, measurements, disturbances, performance
+        return on_plant(model, names, h2, "H2", gain=False)
     model = as_model(model)
     names = Channels.of(model, controls, measurements, disturbances, performance)
     plant = Generalized.between(model, names)

@@ -155,7 +155,8 @@ def hinf(
     """
     if isinstance(model, Plant):
         design = partial(hinf, gamma=gamma, back_off=back_off)
-        return on_plant(model, design, "H-infinity", gain=True)
+        names = controls, measurements, disturbances, performance
+        return on_plant(model, names, design, "H-infinity", gain=True)
     model = as_model(model)
     if gamma is not None and not 1 / MAX_LEVEL < gamma < MAX_LEVEL:
         raise InputError(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Any
@@ -95,11 +95,19 @@ def design_at(plant: Plant, p: Sequence[float], design: Callable[..., PointDesig
 
 
 def on_plant(
-    plant: Plant, design: Callable[..., PointDesign], method: str, *, gain: bool
+    plant: Plant,
+    names: Iterable[object],
+    design: Callable[..., PointDesign],
+    method: str,
+    *,
+    gain: bool,
 ) -> Controller:
     """Return the controller of a plant that is one model, with a promise where the design is of the
-    gain; raise `InputError` for another plant, and `SynthesisError` where there is none.
+    gain; raise `InputError` for another plant and for `names` of channels beside it, and
+    `SynthesisError` where there is none.
     """
+    if any(names):
+        raise InputError("a plant names its channels: leave out controls, measurements and others")
     if plant.basis.size > 1 or isinstance(plant.model, UncertainStateSpace):
         names = ", ".join(s.name for s in plant.parameters)
         raise InputError(

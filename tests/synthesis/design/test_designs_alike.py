@@ -158,6 +158,8 @@ def test_hinf_and_h2_take_a_plant_of_one_model_or_a_model():
         with pytest.raises(InputError, match=r"depends on p.*output_feedback.*replace\(plant"):
             design(many)
         assert design(replace(many, model=many.nominal.at(0.5))).closed().at(0.0).is_stable()
+        with pytest.raises(InputError, match="a plant names its channels"):
+            design(one, ["u"], ["y"])
         for wrong in (model, None):
             with pytest.raises(InputError, match=r"synthesis\.Plant|a Plant"):
                 design(wrong)
