@@ -6,11 +6,11 @@ from dataclasses import replace
 from typing import NamedTuple, TypeVar
 
 import numpy as np
-from scipy.linalg import solve_continuous_lyapunov, solve_discrete_lyapunov
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.lpv_state_space import LPVStateSpace
+from symheli.lpv.riccati import lyapunov
 from symheli.values.arrays import Array
 from symheli.values.signal import Signal
 
@@ -75,9 +75,7 @@ def balanced_gramians(seen: Array, reached: Array, floor: float = 0.0) -> Balanc
 
 def response_gramians(A: Array, B: Array, C: Array, dt: float | None) -> tuple[Array, Array]:
     """Return the observability and reachability Gramians (n, n) of a stable model."""
-    solve = solve_continuous_lyapunov if dt is None else solve_discrete_lyapunov
-    sign = -1.0 if dt is None else 1.0
-    return solve(A.T, sign * C.T @ C), solve(A, sign * B @ B.T)
+    return lyapunov(A.T, C.T @ C, dt), lyapunov(A, B @ B.T, dt)
 
 
 def projected(model: Model, into: Array, out: Array) -> Model:

@@ -1,5 +1,5 @@
-"""Stabilising solutions of algebraic Riccati equations, accepted only if their properties hold, and
-the linear-quadratic regulator that they give.
+"""Stabilising solutions of algebraic Riccati equations, accepted only if their properties hold, the
+linear-quadratic regulator that they give, and Lyapunov equations.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from scipy import linalg
 
 from symheli.errors import InputError
 from symheli.lpv.modes import hidden_modes, on_the_border, unstable
-from symheli.values.arrays import Array
+from symheli.values.arrays import Array, frozen
 
 MAX_SUBSPACE_ERROR = 1e-6
 """Largest entry of V'JV of the stable subspace V with orthonormal columns, exactly zero in theory:
@@ -27,6 +27,13 @@ which the Hamiltonian matrix is balanced.
 
 ROUNDING = 1e-13
 """Entries of a difference below this fraction of its terms count as zero."""
+
+
+def lyapunov(A: Array, Q: Array, dt: float | None) -> Array:
+    """Return X of AX + XA' + Q = 0, with a sample period of AXA' - X + Q = 0."""
+    if dt is None:
+        return linalg.solve_continuous_lyapunov(A, -Q)
+    return linalg.solve_discrete_lyapunov(A, Q)
 
 
 def without_rounding(value: Array, terms: Array) -> Array:
@@ -110,9 +117,14 @@ def regulator(
     A Kalman filter is the regulator of A', C', W, V, whose K' is the filter's gain. `terms` (n, n)
     are sizes of the sums that Q was computed from, default Q's own.
 
-    Raises `InputError` where no solution stabilises, with the reason.
+    Raises `InputError` for matrices that do not fit, and where no solution stabilises, with the
+    reason.
     """
-    S = np.zeros(B.T.shape) if N is None else N.T
+    n, m = np.shape(B)
+    S = np.zeros((m, n)) if N is None else N.T
+    shapes = {"A": (A, n, n), "B": (B, n, m), "Q": (Q, n, n), "R": (R, m, m), "N": (S.T, n, m)}
+    for name, (M, *shape) in shapes.items():
+        frozen(M, name, shape)
     try:
         if dt is None:
             inverse = np.linalg.inv(R)
@@ -137,8 +149,6 @@ def regulator(
 
 def _obstacle(A: Array, B: Array, Q: Array, R: Array, S: Array, dt: float | None) -> str:
     """Return why no solution stabilises, with what to change."""
-    if not all(np.all(np.isfinite(M)) for M in (A, B, Q, R, S)):
-        return "the matrices must be finite numbers"
     sampled = dt is not None
     for mode in hidden_modes(A.T, B.T, partial(unstable, sampled=sampled)):
         return (

@@ -58,10 +58,16 @@ def test_a_weight_of_both_counts_and_units_do_not():
         (([[1.0]], [[1.0]], 0 * ONE, ONE, None, 0.1), "z = 1 is on the border.*no weight"),
         (([[1.0]], [[1.0]], ONE, 0 * ONE), "R is not positive definite"),
         (([[0.0]], [[1.0]], ONE, ONE, 2 * ONE), r"\[Q N; N' R\] is indefinite"),
-        (([[np.nan]], [[1.0]], ONE, ONE), "finite numbers"),
     ],
 )
 def test_the_reason_why_there_is_none_is_told(given, reason):
     matrices = [M if M is None or isinstance(M, float) else np.array(M) for M in given]
     with pytest.raises(InputError, match=f"no linear-quadratic regulator: .*{reason}"):
         regulator(*matrices)
+
+
+def test_matrices_that_do_not_fit_are_refused():
+    with pytest.raises(InputError, match=r"Q: expected shape \(1, 1\), got \(2, 2\)"):
+        regulator(ONE, ONE, np.eye(2), ONE)
+    with pytest.raises(InputError, match=r"A: entry .* must be a finite number"):
+        regulator(np.nan * ONE, ONE, ONE, ONE)

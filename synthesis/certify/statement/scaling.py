@@ -14,6 +14,7 @@ from scipy import linalg
 
 from symheli import LinearModel, LPVStateSpace
 from symheli.errors import InputError
+from symheli.lpv.riccati import lyapunov
 from symheli.lpv.tools import Matrices
 from symheli.values.arrays import Array
 from synthesis.certify.statement.norm_bounded import NormBounded
@@ -265,10 +266,6 @@ def _gramian(A: Array, B: Array, continuous: bool, least: float = 1e-12) -> Arra
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", linalg.LinAlgWarning)
-        X = (
-            linalg.solve_continuous_lyapunov(A, -B @ B.T)
-            if continuous
-            else linalg.solve_discrete_lyapunov(A, B @ B.T)
-        )
+        X = lyapunov(A, B @ B.T, None if continuous else 1.0)
     values, vectors = linalg.eigh(symmetrized(X))
     return (vectors * np.maximum(values, least * abs(values[-1]))) @ vectors.T

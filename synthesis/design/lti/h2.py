@@ -12,6 +12,7 @@ from scipy import linalg
 
 from symheli import LinearModel
 from symheli.lpv.linear_model import as_model
+from symheli.lpv.riccati import lyapunov
 from symheli.values.arrays import Array
 from synthesis.design.loops.controller import Controller
 from synthesis.design.lti.linear_quadratic import Matrices, given_direct_way, lqg
@@ -225,11 +226,6 @@ def _variance(A: Array, B: Array, C: Array, dt: float | None) -> _Variance | Non
     W is refined; the last change, and the rounding of the sum, bound the error.
     """
 
-    def solved(Q: Array) -> Array:
-        if dt is None:
-            return linalg.solve_continuous_lyapunov(A, -Q)
-        return linalg.solve_discrete_lyapunov(A, Q)
-
     def shown(M: Array) -> Any:
         return np.sum((C @ M) * C)
 
@@ -238,7 +234,7 @@ def _variance(A: Array, B: Array, C: Array, dt: float | None) -> _Variance | Non
     try:
         for _ in range(1 + REFINEMENTS):
             left = (A @ W + W @ A.T if dt is None else A @ W @ A.T - W) + driven
-            more = solved(np.asarray(left, dtype=float))
+            more = lyapunov(A, np.asarray(left, dtype=float), dt)
             W = W + 0.5 * (more + more.T)
             values.append(float(shown(W)))
     except (np.linalg.LinAlgError, ValueError):
