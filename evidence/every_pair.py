@@ -132,10 +132,15 @@ def of_the_loop(plant: Plant) -> Any:
     return middle(plant).select(inputs=plant.controls, outputs=plant.measurements)
 
 
+def for_the_loop(plant: Plant, design: Callable[..., Any], *options: float) -> Any:
+    """The controller of a design for the bare plant."""
+    return synthesis.Controller.of(plant, design(of_the_loop(plant), *options))
+
+
 def shaped(plant: Plant) -> Any:
     """Loop shaping over the range."""
     bare = plant.nominal.select(inputs=plant.controls, outputs=plant.measurements)
-    return synthesis.Controller.of(plant, designs.loop_shaping(bare).controller)
+    return synthesis.Controller.of(plant, designs.loop_shaping(bare))
 
 
 def cascade(plant: Plant) -> Any:
@@ -157,13 +162,9 @@ DESIGNS: Mapping[str, Callable[[Plant], Any]] = {  # each of `synthesis` and `sy
     "hinf": lambda plant: over_the_range(plant, synthesis.hinf(at_the_middle(plant))),
     "h2": lambda plant: over_the_range(plant, synthesis.h2(at_the_middle(plant))),
     "loop_shaping": shaped,
-    "ncfsyn": lambda plant: designs.ncfsyn(of_the_loop(plant)).on(plant),
-    "mixed_sensitivity": lambda plant: designs.mixed_sensitivity(of_the_loop(plant), 0.5, 0.1).on(
-        plant
-    ),
-    "coefficient_diagram": lambda plant: synthesis.Controller.of(
-        plant, designs.coefficient_diagram(of_the_loop(plant), 0.5)
-    ),
+    "ncfsyn": lambda plant: for_the_loop(plant, designs.ncfsyn),
+    "mixed_sensitivity": lambda plant: for_the_loop(plant, designs.mixed_sensitivity, 0.5, 0.1),
+    "coefficient_diagram": lambda plant: for_the_loop(plant, designs.coefficient_diagram, 0.5),
     "structured": cascade,
 }
 

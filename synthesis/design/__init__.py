@@ -1,7 +1,7 @@
 """Designs: plants, and the controllers made for them.
 
 A design takes a `Plant`, returns a `Controller` and raises `SynthesisError` where there is none.
-One of a frozen model or of a loop alone returns a `PointDesign`, whose `on(plant)` does the same.
+One of a frozen model or of a loop alone returns a `PointDesign`, which `Controller.of` takes.
 What a design promises is an estimate; the analysis of `synthesis.certify` proves the loop as it
 flies.
 

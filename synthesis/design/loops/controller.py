@@ -120,10 +120,11 @@ class Controller:
     @classmethod
     def of(cls, plant: Plant, given: Any, method: str = "given") -> Controller:
         """Return a controller of a plant that was made in another way: gains set by hand, the
-        controller of a point design, a `TunableController` with its gains; whatever `Plant.close`
+        result of a point design, a `TunableController` with its gains; whatever `Plant.close`
         takes.
 
-        Raises `InputError` for anything else, `UnknownNameError` for signals of another plant.
+        Raises `InputError` for anything else, `UnknownNameError` for signals of another plant,
+        `SynthesisError` with the reasons for a design that found none.
 
         Examples
         --------

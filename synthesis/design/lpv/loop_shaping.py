@@ -50,7 +50,7 @@ def loop_shaping(
 
     It takes the loop alone, since its weights stand for disturbances and performance. Of a `Plant`
     it is the design for `plant.nominal.select(inputs=plant.controls, outputs=plant.measurements)`,
-    and `Controller.of(plant, made.controller)` is its `Controller`.
+    and `Controller.of(plant, made)` is its `Controller`.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ def ncfsyn(
 
     It takes the loop alone, since its weights stand for disturbances and performance. Of a `Plant`
     it is the design for `plant.nominal.at(p).select(inputs=plant.controls,
-    outputs=plant.measurements)`, and `.on(plant)` of the result is its `Controller`.
+    outputs=plant.measurements)`, and `Controller.of(plant, design)` is its `Controller`.
 
     The smallest gamma is known in closed form, sqrt(1 + rho(X Z)) with the solutions of two Riccati
     equations: every plant within 1/gamma of the shaped one in the nu-gap is stabilised as well. Up

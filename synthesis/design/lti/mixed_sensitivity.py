@@ -32,7 +32,7 @@ def mixed_sensitivity(
 
     It takes the loop alone, since its weights stand for disturbances and performance. Of a `Plant`
     it is the design for `plant.nominal.at(p).select(inputs=plant.controls,
-    outputs=plant.measurements)`, and `.on(plant)` of the result is its `Controller`.
+    outputs=plant.measurements)`, and `Controller.of(plant, design)` is its `Controller`.
 
     With a disturbance w at the outputs of the plant, y = G u + w and u = K y (positive feedback: to
     follow a reference, give the controller y - r): S from w to y, K S from w to u, T from w to G u.

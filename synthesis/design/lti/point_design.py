@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from symheli import LinearModel, UncertainStateSpace
-from symheli.errors import InputError, SynthesisError
+from symheli.errors import InputError
 from symheli.values.signal import Signal
 from symheli.values.summary import summarized
 from synthesis.design.loops.controller import Controller
@@ -71,14 +71,6 @@ class PointDesign:
         """Return a design without a controller, with the reason."""
         return cls(status, None, None, float("inf"), optimum, tuple(reasons))
 
-    def on(self, plant: Plant, method: str = "of one model") -> Controller:
-        """Return the controller on a plant, which promises nothing; raise `SynthesisError` with the
-        reasons where there is none.
-        """
-        if self.controller is None:
-            raise SynthesisError(str(self), self.reasons)
-        return Controller.of(plant, self.controller, method)
-
     def __str__(self) -> str:
         head = self.status.value
         if self.controller is not None:
@@ -116,7 +108,7 @@ def on_plant(
             " model=plant.nominal.at(...)) is one model of it"
         )
     found = design_at(plant, [0.5 * (s.low + s.high) for s in plant.parameters], design)
-    made = found.on(plant, method)
+    made = Controller.of(plant, found, method)
     if not gain:
         return replace(made, notes=(f"the {method} norm of its loop is {found.hinf_norm:.6g}",))
     least = found.optimum if found.optimum > 0 else None
