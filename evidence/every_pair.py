@@ -14,6 +14,7 @@ import sys
 import traceback
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -116,22 +117,14 @@ def middle(plant: Plant) -> Any:
     return plant.nominal.at(plant.parameters[0].middle)
 
 
-def at_the_middle(design: Callable[..., Any]) -> Callable[[Plant], Any]:
-    """A design for the model at the middle of the range, as one controller for all of it."""
-
-    def made(plant: Plant) -> Any:
-        channels = {"disturbances": plant.disturbances, "performance": plant.performance}
-        found = design(middle(plant), plant.controls, plant.measurements, **channels)
-        return of_a_point(plant, found)
-
-    return made
+def at_the_middle(plant: Plant) -> Plant:
+    """The plant of the model at the middle of the range."""
+    return replace(plant, model=middle(plant))
 
 
-def of_a_point(plant: Plant, found: Any) -> Any:
-    """The controller of a point design on the plant; its reasons where there is none."""
-    if found.controller is None:
-        raise SynthesisError(str(found), ())
-    return synthesis.Controller.of(plant, found.controller)
+def over_the_range(plant: Plant, of_one: Any) -> Any:
+    """The controller of one model as that of all of a plant."""
+    return synthesis.Controller.of(plant, of_one.at(0.5))
 
 
 def of_the_loop(plant: Plant) -> Any:
@@ -139,10 +132,15 @@ def of_the_loop(plant: Plant) -> Any:
     return middle(plant).select(inputs=plant.controls, outputs=plant.measurements)
 
 
+def for_the_loop(plant: Plant, design: Callable[..., Any], *options: float) -> Any:
+    """The controller of a design for the bare plant."""
+    return synthesis.Controller.of(plant, design(of_the_loop(plant), *options))
+
+
 def shaped(plant: Plant) -> Any:
     """Loop shaping over the range."""
     bare = plant.nominal.select(inputs=plant.controls, outputs=plant.measurements)
-    return synthesis.Controller.of(plant, designs.loop_shaping(bare).controller)
+    return synthesis.Controller.of(plant, designs.loop_shaping(bare))
 
 
 def cascade(plant: Plant) -> Any:
@@ -152,7 +150,7 @@ def cascade(plant: Plant) -> Any:
     return synthesis.structured(plant, tunable, starts=2)
 
 
-DESIGNS: Mapping[str, Callable[[Plant], Any]] = {
+DESIGNS: Mapping[str, Callable[[Plant], Any]] = {  # each of `synthesis` and `synthesis.designs`
     "output_feedback": lambda plant: synthesis.output_feedback(plant, X=0, Y=1),
     "lft_feedback": designs.lft_feedback,
     "state_feedback": lambda plant: synthesis.state_feedback(plant, Y=1),
@@ -161,10 +159,12 @@ DESIGNS: Mapping[str, Callable[[Plant], Any]] = {
     ),
     "lqr": synthesis.lqr,
     "lqg": synthesis.lqg,
-    "hinf": at_the_middle(synthesis.hinf),
-    "h2": at_the_middle(synthesis.h2),
+    "hinf": lambda plant: over_the_range(plant, synthesis.hinf(at_the_middle(plant))),
+    "h2": lambda plant: over_the_range(plant, synthesis.h2(at_the_middle(plant))),
     "loop_shaping": shaped,
-    "ncfsyn": lambda plant: of_a_point(plant, designs.ncfsyn(of_the_loop(plant))),
+    "ncfsyn": lambda plant: for_the_loop(plant, designs.ncfsyn),
+    "mixed_sensitivity": lambda plant: for_the_loop(plant, designs.mixed_sensitivity, 0.5, 0.1),
+    "coefficient_diagram": lambda plant: for_the_loop(plant, designs.coefficient_diagram, 0.5),
     "structured": cascade,
 }
 

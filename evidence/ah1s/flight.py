@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.linalg import solve_discrete_are
 
 from evidence.ah1s.simulator import AH1S, DEFLECTIONS, DT, STATES, STICKS
 from evidence.ah1s.trim import GUESS, Trim, trim
 from evidence.ah1s.truth import SLOWEST, held_model
 from symheli.errors import FlightLostError
 from symheli.flight import AirspeedSchedule, Excitation
+from symheli.lpv.riccati import regulator
 from symheli.records import FlightRecord
 from symheli.values import Signal
 from symheli.values.arrays import Array
@@ -90,8 +90,7 @@ def unknown(found: Trim) -> Array:
 def _regulator(simulator: AH1S, near: Trim) -> Array:
     model = held_model(simulator, near).discretize(DT)
     Q, R = np.diag(ERRORS**-2.0), np.eye(len(STICKS)) / EFFORT**2
-    P = solve_discrete_are(model.A, model.B, Q, R)
-    return np.linalg.solve(R + model.B.T @ P @ model.B, model.B.T @ P @ model.A)
+    return regulator(model.A, model.B, Q, R, dt=model.dt).K
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import casadi
 import numpy as np
-from scipy.linalg import solve_continuous_are
 
 from evidence.planar_vtol.flights import from_its_border, published_law, worst_position
 from evidence.planar_vtol.metric import Metric, proven_positive, refuted
 from evidence.planar_vtol.model import ARM, GRAVITY, INERTIA, INPUTS, MASS, STATES, over_ground
 from evidence.tables import markdown
+from symheli.lpv.riccati import regulator
 from synthesis.tubes import Motions, Tube, tube
 
 Array = np.ndarray
@@ -49,7 +49,7 @@ CASES = (
 )
 
 
-def regulator(bank: float, case: Case) -> Array:
+def gain(bank: float, case: Case) -> Array:
     """K (2, 6) at a bank, rad, of the weight as thrust."""
     s, c = np.sin(bank), np.cos(bank)
     A, B = np.zeros((6, 6)), np.zeros((6, 2))
@@ -58,7 +58,7 @@ def regulator(bank: float, case: Case) -> Array:
     B[3:5] = np.array([[-s], [c]]) / MASS
     B[5] = ARM / INERTIA, -ARM / INERTIA
     Q, R = np.diag(np.array(case.deviations) ** -2.0), np.eye(2) / case.control**2
-    return -np.linalg.solve(R, B.T @ solve_continuous_are(A, B, Q, R))
+    return -regulator(A, B, Q, R).K
 
 
 def motions(case: Case) -> Motions:
@@ -69,7 +69,7 @@ def motions(case: Case) -> Motions:
         c = casadi.SX.sym("c", 1)
         x, u = casadi.SX.zeros(6), MASS * c / 2 * casadi.SX.ones(2)
         reference = casadi.Function("level", [c], [x, u])
-        return Motions(reference, regulator(0.0, case), others=[thrusts], **names)
+        return Motions(reference, gain(0.0, case), others=[thrusts], **names)
     c, limit = casadi.SX.sym("c", 3), np.radians(case.bank)
     # any position, velocity and torque of the reference: the deviation does not depend on them
     x = casadi.vertcat(0, 0, c[0], 0, 0, c[1])
@@ -77,7 +77,7 @@ def motions(case: Case) -> Motions:
     nodes, rate = np.linspace(-limit, limit, case.nodes), np.radians(case.turn)
     return Motions(
         casadi.Function("banked", [c], [x, u]),
-        np.array([regulator(bank, case) for bank in nodes]),
+        np.array([gain(bank, case) for bank in nodes]),
         schedule=nodes,
         rate=(-rate, rate),
         others=[thrusts],

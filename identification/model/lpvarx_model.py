@@ -240,15 +240,11 @@ class LPVARXModel:
         )
         return build(self.coefficients, parameters, self.outputs, self.inputs, self.dt)
 
-    def truncate(
-        self, order: int, *, input_scale: object = 1.0, output_scale: object = 1.0
-    ) -> BalancedTruncation[LPVStateSpace]:
+    def truncate(self, order: int, **options: Any) -> BalancedTruncation[LPVStateSpace]:
         """The exact realization, truncated to `order` states, with the frozen error it makes; see
-        `symheli.lpv.balanced_truncation`.
+        `symheli.lpv.balanced_truncation`, which has the options.
         """
-        return self.to_state_space().truncate(
-            order, input_scale=input_scale, output_scale=output_scale
-        )
+        return self.to_state_space().truncate(order, **options)
 
     def to_frame(self) -> pandas.DataFrame:
         """The coefficients: a row a regressor, a column an output; the units of the outputs in

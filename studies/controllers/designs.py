@@ -157,8 +157,7 @@ def classical(base: LPVStateSpace) -> dict[str, Callable[[], Controller]]:
     plant = design_plant(base)
 
     def of_one_airspeed() -> Controller:
-        found = hinf_at(plant, [TOP / 2], BACK_OFF)
-        return Controller.of(plant, found.controller, ONE_POINT)
+        return Controller.of(plant, hinf_at(plant, [TOP / 2], BACK_OFF), ONE_POINT)
 
     return {
         REGULATOR: partial(lqr, plant),

@@ -21,8 +21,8 @@ from studies.loops.lateral import ATTITUDE_HOLD, INPUTS, close
 from studies.setup.axes import LATERAL
 from symheli import Helicopter, LinearFamily, LPVStateSpace, Scheduling
 from symheli.lpv.bases import Patches
+from symheli.values.arrays import Array
 
-Array = np.ndarray
 Channel = Literal["gust", "inputs"]
 
 DEGREE = 4

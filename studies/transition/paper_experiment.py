@@ -7,7 +7,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_discrete_are
 
 from identification import LPVARX, Polynomial, RecursiveLeastSquares, excitation_report
 from identification.model import LPVARXModel
@@ -15,6 +14,7 @@ from studies.setup.axes import LONGITUDINAL
 from studies.setup.flights import TOP
 from symheli import FlightRecord, LinearFamily, LPVStateSpace
 from symheli.errors import ExcitationError
+from symheli.lpv.riccati import regulator
 
 PERIOD = 0.11408
 """Sample period, s (Budiyono & Sutarto)."""
@@ -106,8 +106,8 @@ def fly_baseline(plant: LPVStateSpace, closed: bool, seed: int) -> FlightRecord:
     middle = plant.at(0.5 * TOP)
     gain = np.zeros((1, len(plant.states)))
     if closed:
-        P = solve_discrete_are(middle.A, middle.B, np.diag([0.02, 0.02, 0.1, 1.0, 0.0]), np.eye(1))
-        gain = np.linalg.solve(1 + middle.B.T @ P @ middle.B, middle.B.T @ P @ middle.A)
+        Q = np.diag([0.02, 0.02, 0.1, 1.0, 0.0])
+        gain = regulator(middle.A, middle.B, Q, np.eye(1), dt=PERIOD).K
     x, y, u = np.zeros(len(plant.states)), np.empty((SAMPLES, 3)), np.empty(SAMPLES)
     for i in range(SAMPLES):
         u[i] = e[i] - (gain @ x)[0]

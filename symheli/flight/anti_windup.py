@@ -5,9 +5,9 @@ from __future__ import annotations
 from itertools import combinations
 
 import numpy as np
-from scipy.linalg import solve_discrete_are
 
 from symheli.errors import InputError
+from symheli.lpv.riccati import regulator
 from symheli.values.arrays import Array
 
 VARIANCE_RATIOS = tuple(10.0**k for k in range(-4, 7))
@@ -72,9 +72,8 @@ def _kalman(A: Array, B: Array, C: Array, trust: float) -> Array:
     size = np.diag(C @ Q @ C.T)
     R = trust * np.diag(np.maximum(size, 1e-6 * max(size.max(), np.finfo(float).tiny)))
     try:
-        P = solve_discrete_are(A.T, C.T, Q, R)
-        L = np.linalg.solve(C @ P @ C.T + R, C @ P @ A.T).T
-    except (np.linalg.LinAlgError, ValueError):
+        L = regulator(A.T, C.T, Q, R, dt=1.0).K.T
+    except InputError:
         L = np.zeros((n, len(C)))
     if not _radius(A - L @ C) < 1.0:
         raise InputError(

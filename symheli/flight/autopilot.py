@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import solve_discrete_are
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.flight.controller import ScheduledController
@@ -17,6 +16,7 @@ from symheli.lpv.actuation import Actuation
 from symheli.lpv.bases.interpolating import PiecewiseLinear
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.lpv_state_space import LPVStateSpace
+from symheli.lpv.riccati import regulator
 from symheli.lpv.scheduling import Scheduling
 from symheli.steady.airspeed_sweep import design_family
 from symheli.values.arrays import frozen
@@ -212,14 +212,12 @@ def _lqr(model: LinearModel, sizes: Mapping[str, float], softer: float) -> np.nd
     Q = np.diag([1 / sizes[s] ** 2 for s in model.states])
     R = np.diag([1 / (softer * sizes[u]) ** 2 for u in model.inputs])
     try:
-        with np.errstate(all="ignore"):
-            P = solve_discrete_are(model.A, model.B, Q, R)
-    except np.linalg.LinAlgError as error:
+        return regulator(model.A, model.B, Q, R, dt=model.dt).K
+    except InputError as error:
         raise InputError(
             f"no LQR at dt = {model.dt} s ({error}): the plant changes too little or too much"
             " between samples; choose dt near its time constants"
         ) from error
-    return np.linalg.solve(R + model.B.T @ P @ model.B, model.B.T @ P @ model.A)
 
 
 def _closed_loop_radius(plant: LinearModel, K: np.ndarray, measured: tuple[Signal, ...]) -> float:

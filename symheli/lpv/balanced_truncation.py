@@ -4,30 +4,32 @@ unstable models.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
-from typing import Generic, Literal, TypeVar
+from typing import Generic, Literal
 
 import numpy as np
-from scipy.linalg import (
-    solve_continuous_are,
-    solve_continuous_lyapunov,
-    solve_discrete_are,
-    solve_discrete_lyapunov,
-)
 
 from symheli.errors import InputError, UnknownNameError
+from symheli.lpv.balancing import Model, balanced_gramians, method, projected, response_gramians
 from symheli.lpv.bases.function_space import tensor_grid
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.lpv_state_space import LPVStateSpace
+from symheli.lpv.minimal_realization import minimal_realization
 from symheli.lpv.nu_gap import angles, channel_scales, nu_gap, sampled_alike
+from symheli.lpv.riccati import regulator
 from symheli.values.arrays import Array
-from symheli.values.signal import Signal
+from symheli.values.numbers import positive
 from symheli.values.summary import summarized
-
-Model = TypeVar("Model", LPVStateSpace, LinearModel)
 
 Balance = Literal["factors", "response"]
 
+METHODS: dict[str, Balance] = {"coprime": "factors", "balanced": "response"}
+"""Methods of `reduce` by their names, with the Gramians that each balances."""
+NODES = 21
+"""Values of each parameter over which Gramians are averaged."""
+BETWEEN = slice(1, None, 2)
+"""Of twice as many values those half way between."""
 NEGLIGIBLE = 1e-7
 """A state with a singular value below this fraction of the largest counts as absent: the square
 root of the rounding of Riccati solutions.
@@ -64,7 +66,7 @@ def balanced_truncation(
     order: int,
     *,
     balance: Balance = "factors",
-    nodes: int = 21,
+    nodes: int = NODES,
     input_scale: object = 1.0,
     output_scale: object = 1.0,
 ) -> BalancedTruncation[Model]:
@@ -129,15 +131,38 @@ def balanced_truncation(
     return found if isinstance(model, LinearModel) else replace(found, bound=np.nan)
 
 
-def balancing(gramians: tuple[Array, Array]) -> tuple[Array, Array, Array]:
-    """left, right (n, n) with left' right = I, and the singular values (n,), falling, which both
-    Gramians have on their diagonals in the coordinates left' x; those that are rounding count as
-    `NEGLIGIBLE` of the largest.
-    """
-    Lx, Ly = map(_root, gramians)
-    U, values, V = np.linalg.svd(Lx.T @ Ly)
-    size = np.sqrt(np.maximum(values, NEGLIGIBLE * values[0]))
-    return Lx @ U / size, Ly @ V.T / size, values
+def reduced(
+    model: Model, order: int | None = None, by: str | None = None, loss: float | None = None
+) -> Model:
+    """See `LPVStateSpace.reduce`."""
+    if by == "bounded":
+        raise InputError(
+            "by: the method with a bound while p moves solves matrix inequalities; it is"
+            " synthesis.designs.bounded_truncation(model, order).model"
+        )
+    by = method(by, order, loss, *METHODS)
+    if by == "minimal":
+        return minimal_realization(model)
+    if order == len(model.states) or (order is None and not model.states):
+        return model
+    if order is not None:
+        return balanced_truncation(model, order, balance=METHODS[by]).model
+    allowed = math.inf if loss is None else positive(loss, "loss", or_zero=True)
+    balance = METHODS[by]
+    su, sy = np.ones(len(model.inputs)), np.ones(len(model.outputs))
+    gramians = mean_gramians(model, balance, NODES, su, sy)
+    matter = _matter(balanced_gramians(*gramians).values)
+    for k in range(matter if loss is None else 1, min(matter + 1, len(model.states))):
+        found = truncated_by(gramians, model, k, balance, NODES, su, sy)
+        error = found.nu_gap if balance == "factors" else found.error
+        if loss is None or error.max() <= allowed:
+            return found.model
+    return model
+
+
+def _matter(values: Array) -> int:
+    """Return how many states can be excited and seen, by their falling singular values."""
+    return int(np.sum(values > NEGLIGIBLE * values.max(initial=0.0)))
 
 
 def mean_gramians(
@@ -148,7 +173,7 @@ def mean_gramians(
     """
     if balance not in (rules := {"factors": _of_factors, "response": _of_response}):
         raise UnknownNameError("balance", balance, list(rules))
-    each = [rules[balance](m, su, sy, p) for p, m in _nodes(model, nodes)]
+    each = [rules[balance](m, su, sy, p) for p, m in _frozen(model, nodes)]
     X, Y = (np.mean(parts, axis=0) for parts in zip(*each, strict=True))
     return X, Y
 
@@ -178,15 +203,15 @@ def truncated_by(
     factors: of control) and of reachability (of filtering); `bound` is twice the tail, which is one
     for all p where the Gramians are.
     """
-    left, right, values = balancing(gramians)
-    if values[order - 1] <= NEGLIGIBLE * values[0]:
-        count = int(np.sum(values > NEGLIGIBLE * values[0]))
+    into, out, values = balanced_gramians(*gramians)
+    if (count := _matter(values)) < order:
         raise InputError(
             f"order: only {count} of the {len(values)} states can be excited and seen; keep"
             f" {count} or fewer"
         )
-    small = projected(model, left[:, :order], right[:, :order])
-    pairs = list(zip(_between(model, nodes), _between(small, nodes), strict=True))
+    small = projected(model, into[:order], out[:, :order])
+    between = (_frozen(each, 2 * nodes - 1, BETWEEN) for each in (model, small))
+    pairs = list(zip(*between, strict=True))
     compared = [sampled_alike(full, reduced) for (_, full), (_, reduced) in pairs]
     gaps = [nu_gap(full, reduced, input_scale=su, output_scale=sy) for full, reduced in compared]
     errors = [_relative_error(full, reduced, su, sy) for full, reduced in compared]
@@ -198,19 +223,13 @@ def truncated_by(
     return BalancedTruncation(small, values, p, np.array(gaps), np.array(errors), bound)
 
 
-def _nodes(model: LPVStateSpace | LinearModel, count: int) -> list[tuple[Array, LinearModel]]:
-    """Models at `count` values of every parameter."""
+def _frozen(
+    model: LPVStateSpace | LinearModel, count: int, those: slice = slice(None)
+) -> list[tuple[Array, LinearModel]]:
+    """Models at those of `count` values of every parameter."""
     if isinstance(model, LinearModel):
         return [(np.array([np.nan]), model)]
-    axes = [np.linspace(s.low, s.high, count) for s in model.parameters]
-    return [(p, model.at(*p)) for p in tensor_grid(axes)]
-
-
-def _between(model: LPVStateSpace | LinearModel, count: int) -> list[tuple[Array, LinearModel]]:
-    """Models half way between those."""
-    if isinstance(model, LinearModel):
-        return _nodes(model, count)
-    axes = [np.linspace(s.low, s.high, 2 * count - 1)[1::2] for s in model.parameters]
+    axes = [np.linspace(s.low, s.high, count)[those] for s in model.parameters]
     return [(p, model.at(*p)) for p in tensor_grid(axes)]
 
 
@@ -219,16 +238,9 @@ def _of_response(model: LinearModel, su: Array, sy: Array, p: Array) -> tuple[Ar
     if not model.is_stable():
         raise InputError(
             f"the frozen model{_where(p)} is not stable: its response has no Gramians; balance the"
-            ' coprime factors, balance="factors"'
+            ' coprime factors, balance="factors" or reduce(by="coprime")'
         )
     return response_gramians(model.A, model.B * su, model.C / sy[:, None], model.dt)
-
-
-def response_gramians(A: Array, B: Array, C: Array, dt: float | None) -> tuple[Array, Array]:
-    """Observability and reachability Gramians (n, n) of a stable model."""
-    solve = solve_continuous_lyapunov if dt is None else solve_discrete_lyapunov
-    sign = -1.0 if dt is None else 1.0
-    return solve(A.T, sign * C.T @ C), solve(A, sign * B @ B.T)
 
 
 def _where(p: Array) -> str:
@@ -238,31 +250,19 @@ def _where(p: Array) -> str:
 def _of_factors(model: LinearModel, su: Array, sy: Array, p: Array) -> tuple[Array, Array]:
     """Solutions of the control and filter Riccati equations with scaled channels."""
     A, B, C, D = model.A, model.B * su, model.C / sy[:, None], model.D * su / sy[:, None]
-    solve = solve_continuous_are if model.dt is None else solve_discrete_are
-    try:
-        X = solve(A, B, C.T @ C, np.eye(B.shape[1]) + D.T @ D, s=C.T @ D)
-        Y = solve(A.T, C.T, B @ B.T, np.eye(C.shape[0]) + D @ D.T, s=B @ D.T)
-    except (np.linalg.LinAlgError, ValueError) as error:
-        raise InputError(
-            f"the frozen model{_where(p)} is not stabilisable and detectable, it cannot be balanced"
-            f" ({error})"
-        ) from error
-    return X, Y
-
-
-def _root(M: Array) -> Array:
-    values, vectors = np.linalg.eigh(0.5 * (M + M.T))
-    return vectors * np.sqrt(np.maximum(values, 0.0))
-
-
-def projected(model: Model, left: Array, right: Array) -> Model:
-    """The model of the states left' x, with x = right times these."""
-    states = tuple(Signal(f"x{i + 1}") for i in range(right.shape[1]))
-    parts = dict(A=left.T @ model.A @ right, B=left.T @ model.B, C=model.C @ right, states=states)
-    if isinstance(model, LinearModel):
-        return replace(model, **parts, point=None)
-    trim = model.trim and model.trim.projected(left)
-    return replace(model, **parts, trim=trim, residuals=None)
+    R, S = np.eye(B.shape[1]) + D.T @ D, np.eye(C.shape[0]) + D @ D.T
+    sides = {"": (A, B, C.T @ C, R, C.T @ D), " for the adjoint": (A.T, C.T, B @ B.T, S, B @ D.T)}
+    found = []
+    for side, equation in sides.items():
+        try:
+            found.append(regulator(*equation, dt=model.dt).X)
+        except InputError as error:
+            raise InputError(
+                f"the frozen model{_where(p)} is not stabilisable and detectable, it cannot be"
+                f" balanced ({error}{side}); .reduce() leaves out states that no input reaches or"
+                " no output shows"
+            ) from error
+    return found[0], found[1]
 
 
 def _relative_error(one: LinearModel, two: LinearModel, su: Array, sy: Array) -> float:

@@ -170,6 +170,14 @@ class LinearModel(Operators):
             outputs=tuple(self.outputs[i] for i in rows),
         )
 
+    def reduce(
+        self, order: int | None = None, *, by: str | None = None, loss: float | None = None
+    ) -> LinearModel:
+        """Return the model with fewer states; see `LPVStateSpace.reduce`."""
+        from symheli.lpv.balanced_truncation import reduced
+
+        return reduced(self, order, by, loss)
+
     def discretize(self, dt: float, method: Literal["hold", "tustin"] = "hold") -> LinearModel:
         """Equivalent at sample period `dt` (s): "hold", with inputs held between the samples, exact
         at these; "tustin", s = (2/dt) (z - 1)/(z + 1), which keeps stability and the largest gain.
@@ -430,6 +438,20 @@ def is_control_system(system: object) -> bool:
     """
     return type(system).__module__.partition(".")[0] == "control" and hasattr(
         system, "input_labels"
+    )
+
+
+def as_model(system: object) -> LinearModel:
+    """Return a LinearModel itself, a system of python-control as one; `InputError` for anything
+    else.
+    """
+    if isinstance(system, LinearModel):
+        return system
+    if is_control_system(system):
+        return LinearModel.from_control(system)
+    raise InputError(
+        "expected a LinearModel or a system of python-control, got"
+        f" {type(system).__name__}; an LPV model has .at(p), a Plant .nominal.at(p)"
     )
 
 

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import ArrayLike
 
-    from symheli.lpv.balanced_truncation import Balance, BalancedTruncation
+    from symheli.lpv.balanced_truncation import BalancedTruncation
     from symheli.lpv.lft import LFT
     from symheli.lpv.prediction import SteppedFlight
 
@@ -533,28 +533,31 @@ class LPVStateSpace(Operators, LPVMatrices):
         ]
         return Matrices(*(np.stack([getattr(model, name) for model in frozen]) for name in "ABCD"))
 
-    def truncate(
-        self,
-        order: int,
-        *,
-        balance: Balance = "factors",
-        nodes: int = 21,
-        input_scale: object = 1.0,
-        output_scale: object = 1.0,
-    ) -> BalancedTruncation[LPVStateSpace]:
+    def reduce(
+        self, order: int | None = None, *, by: str | None = None, loss: float | None = None
+    ) -> LPVStateSpace:
+        """Return the model with `order` states, or with the fewest whose error is at most `loss`.
+
+        By "minimal", the default without order and loss, `minimal_realization`. By "coprime", else
+        the default, `truncate` for feedback, of unstable models too; its error is the nu-gap at
+        frozen p. By "balanced" `truncate` for the response; its error is the largest gain of the
+        difference by that of the model. `synthesis.designs.bounded_truncation` has a bound while p
+        moves.
+
+        Raises `InputError` for an order or a method that does not serve the model,
+        `UnknownNameError` for another method.
+        """
+        from symheli.lpv.balanced_truncation import reduced
+
+        return reduced(self, order, by, loss)
+
+    def truncate(self, order: int, **options: Any) -> BalancedTruncation[LPVStateSpace]:
         """`order` states by one projection balanced over p, with the error it makes; see
-        `symheli.lpv.balanced_truncation`.
+        `symheli.lpv.balanced_truncation`, which has the options.
         """
         from symheli.lpv.balanced_truncation import balanced_truncation
 
-        return balanced_truncation(
-            self,
-            order,
-            balance=balance,
-            nodes=nodes,
-            input_scale=input_scale,
-            output_scale=output_scale,
-        )
+        return balanced_truncation(self, order, **options)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the model with names, units, trim and residuals as JSON, every number exact; a

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv.balanced_truncation import Model, projected
+from symheli.lpv.balancing import Model, projected
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.values.arrays import Array
@@ -66,7 +66,7 @@ def minimal_realization(model: Model, *, tolerance: float = TOLERANCE) -> Model:
         A, into = _stacks(small, dual)
         V = _reached(A, into, tolerance)
         if V.shape[1] < len(V):
-            small = projected(small, V, V)
+            small = projected(small, V.T, V)
     return small
 
 

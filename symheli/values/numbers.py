@@ -41,12 +41,12 @@ def by_name(value: Any, name: str, shape: str) -> Mapping[Any, Any]:
     return value
 
 
-def positive(value: Any, name: str) -> float:
-    """The value as a float; raises `InputError` unless it is finite and > 0."""
+def positive(value: Any, name: str, *, or_zero: bool = False) -> float:
+    """The value as a float; raises `InputError` unless it is finite and > 0, or 0 if asked."""
     try:
         number = math.nan if isinstance(value, str | bool) else float(value)
     except (TypeError, ValueError):
         number = math.nan
-    if not (math.isfinite(number) and number > 0):
-        raise InputError(f"{name}: expected a number > 0, got {value!r:.80}")
+    if not (math.isfinite(number) and (number > 0 or (or_zero and number == 0))):
+        raise InputError(f"{name}: expected a number >{'=' * or_zero} 0, got {value!r:.80}")
     return number

@@ -1,8 +1,9 @@
 """Designs: plants, and the controllers made for them.
 
-A scheduled design takes a `Plant`, returns a `Controller` and raises `SynthesisError` where there
-is none; one of a frozen model returns a `PointDesign`, with the reasons where there is none. What a
-design promises is an estimate; the analysis of `synthesis.certify` proves the loop as it flies.
+A design takes a `Plant`, returns a `Controller` and raises `SynthesisError` where there is none.
+One of a frozen model or of a loop alone returns a `PointDesign`, which `Controller.of` takes.
+What a design promises is an estimate; the analysis of `synthesis.certify` proves the loop as it
+flies.
 
 In the order of the rooms, each of which knows only those before it:
 
@@ -10,12 +11,12 @@ In the order of the rooms, each of which knows only those before it:
 of a model, and puts weights, servos and delays around it (`parts.py`); `generalized.py` has its
 matrices, `diagnosis.py` says why there is no controller.
 
-`lti`: Controllers of one frozen model: `hinf.py` on `central.py`, `h2.py` on `linear_quadratic.py`,
-mixed sensitivity, loop shaping, the coefficient diagram; `point_design.py` is what each returns.
-
 `loops`: A controller and its loop: `controller.py`, `margins.py` and `margin_table.py`,
 `handling_qualities.py`, `reduction.py`; `sampled_loop.py` certifies the controller as implemented,
 `wrong_parameter.py` under errors of the measured parameter.
+
+`lti`: Controllers of one frozen model: `hinf.py` on `central.py`, `h2.py` on `linear_quadratic.py`,
+mixed sensitivity, loop shaping, the coefficient diagram; `point_design.py` is what each returns.
 
 `lpv`: Scheduled controllers: `output_feedback.py`, `state_feedback.py`, `estimator.py`,
 `multiobjective.py`, `linear_quadratic.py`. Behind output feedback `existence.py` has the two

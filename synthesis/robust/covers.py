@@ -23,13 +23,12 @@ from scipy import optimize
 
 from symheli import LinearModel
 from symheli.errors import InputError
+from symheli.values.arrays import Array
 from symheli.values.signal import Signal
 from synthesis.numerics.polynomial.definite import negative_definite, negative_definite_exactly
 from synthesis.numerics.polynomial.matrix import PolynomialMatrix
 from synthesis.numerics.polynomial.positive import positive, product
 from synthesis.numerics.polynomial.transfer import Transfer
-
-Array = np.ndarray
 
 CORNER, ZEROS, POLES = Fraction(2363, 1000), Fraction(838, 1000), Fraction(685, 1000)
 """Corner frequency (times the delay) and damping of the second-order factor of the weight of a

@@ -11,13 +11,13 @@ import numpy as np
 from symheli import LFT, LinearModel, LPVStateSpace
 from symheli.errors import InputError
 from symheli.lpv.lft_matrices import LFTMatrices
+from symheli.lpv.linear_model import as_model
 from symheli.lpv.lpv_matrices import LPVMatrices
 from symheli.values.arrays import frozen
 from symheli.values.signal import signals
 from synthesis.certify.questions.certificate_file import decoded, encoded, same_model
 from synthesis.certify.statement.proven_statement import ProvenStatement
 from synthesis.certify.statement.sentences import motion
-from synthesis.numerics.linear.model import as_model
 from synthesis.robust.intervals import Interval, LevelProof, Scalings
 from synthesis.robust.structure import DynamicBlock, Part
 

@@ -19,9 +19,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy import optimize
 
+from symheli.values.arrays import Array
 from synthesis.robust.structure import BlockLoop, Part
-
-Array = np.ndarray
 
 ITERATIONS = 30
 """Steps of the power iteration from each start."""

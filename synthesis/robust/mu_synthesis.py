@@ -19,22 +19,21 @@ from scipy import optimize
 from symheli import LFT, LinearModel
 from symheli.errors import InputError
 from symheli.lpv import series
+from symheli.lpv.linear_model import as_model
 from symheli.threads import with_one_thread
+from symheli.values.arrays import Array
 from symheli.values.numbers import whole
 from symheli.values.signal import Signal
 from symheli.values.summary import summarized
 from synthesis.design.lti.hinf import hinf
 from synthesis.design.lti.point_design import PointDesign, named_loop
 from synthesis.design.plant.generalized import Channels, Generalized, sampled_controller
-from synthesis.numerics.linear.model import as_model
 from synthesis.numerics.linear.norm import to_continuous
 from synthesis.robust import witness
 from synthesis.robust.covers import rational
 from synthesis.robust.intervals import LevelProof
 from synthesis.robust.structure import BlockLoop, DynamicBlock, Part, behind, channels_of, loop_of
 from synthesis.robust.upper_bound import Upper, proven_level
-
-Array = np.ndarray
 
 FREQUENCIES = 80
 """Frequencies at which scalings are found, over the poles of plant and controller and a decade

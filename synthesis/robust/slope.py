@@ -25,18 +25,16 @@ from scipy import optimize
 
 from symheli import LinearModel
 from symheli.errors import InputError, UnknownNameError
+from symheli.lpv.linear_model import as_model
 from symheli.threads import with_one_thread
-from symheli.values.arrays import frozen
+from symheli.values.arrays import Array, frozen
 from symheli.values.signal import indices
 from symheli.values.summary import summarized
 from synthesis.certify.questions.certificate_file import decoded, encoded
 from synthesis.certify.statement.proven_statement import ProvenStatement
-from synthesis.numerics.linear.model import as_model
 from synthesis.numerics.polynomial.positive import bernstein, positive_until, product
 from synthesis.numerics.polynomial.transfer import Transfer
 from synthesis.robust import witness
-
-Array = np.ndarray
 
 CRITERIA = ("circle", "Popov", "Zames-Falb")
 """The classes of multipliers, each with those before it."""

@@ -15,6 +15,7 @@ from symheli import LFT, LinearModel, LPVStateSpace, Scheduling, UncertainStateS
 from symheli.errors import InputError
 from symheli.lpv.lft.reduction import reduce_exactly
 from symheli.lpv.lft_matrices import parts as slices
+from symheli.values.arrays import Array
 from symheli.values.sample_period import same_period
 from symheli.values.signal import Signal, indices
 from synthesis.design.lti.weights import as_weight
@@ -23,8 +24,6 @@ from synthesis.numerics.linear.balance import balance
 from synthesis.numerics.linear.norm import stable, to_continuous
 from synthesis.numerics.polynomial.transfer import Transfer, inverse, rationals
 from synthesis.robust import covers
-
-Array = np.ndarray
 
 
 class DynamicBlock(NamedTuple):

@@ -24,13 +24,12 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
+from symheli.values.arrays import Array
 from synthesis.numerics.polynomial.symmetric import svec
 from synthesis.numerics.program.answer import Answer
 from synthesis.numerics.program.cone_program import ConeProgram, Solver, solve
 from synthesis.robust.intervals import Check, Interval, LevelProof, Scalings
 from synthesis.robust.structure import BlockLoop
-
-Array = np.ndarray
 
 LEAST_MARGIN = 1e-7
 """The left side counts as positive where its least eigenvalue is above this, for scalings <= 1."""

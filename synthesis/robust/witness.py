@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symheli.values.arrays import Array
+
 if TYPE_CHECKING:
     from synthesis.robust.intervals import LevelProof
     from synthesis.robust.slope import SlopeProof
     from synthesis.robust.structure import ExactLoop
 
-Array = np.ndarray
 DIGITS = 60
 FREQUENCIES = 40
 """Frequencies besides those of the poles at which a slope is looked at."""

@@ -10,9 +10,9 @@ import numpy as np
 from scipy import optimize
 
 from symheli.progress import tracked
+from symheli.values.arrays import Array
 from synthesis.structures.peaks import Value
 
-Array = np.ndarray
 Function = Callable[[Array, float], Value]
 """The value and slope at numbers (n,); above the limit any value above it is enough."""
 

@@ -16,6 +16,7 @@ from symheli.errors import InputError, SynthesisError
 from symheli.lpv.bases.polynomials import lobatto_points
 from symheli.progress import task
 from symheli.threads import with_one_thread
+from symheli.values.arrays import Array
 from symheli.values.numbers import whole
 from symheli.values.summary import summarized
 from synthesis.design.loops.controller import Controller
@@ -30,8 +31,6 @@ from synthesis.numerics.linear.norm import norm
 from synthesis.structures.descent import STANDSTILL, Point, Stationarity, bfgs, sampled_descent
 from synthesis.structures.peaks import Active, StructureLoops, Value
 from synthesis.structures.structure import TunableController
-
-Array = np.ndarray
 
 POINTS = {1: 9, 2: 4}
 """Conditions of each parameter at first (more parameters: 3)."""
@@ -311,7 +310,7 @@ class _StructureSearch:
     ) -> _StructureSearch:
         """Check what was given."""
         require_plant(plant)
-        require_channels(plant)
+        require_channels(plant, states=False)
         if isinstance(plant.model, UncertainStateSpace):
             raise InputError(
                 "structured: the plant is uncertain; tune for its nominal model, and certify the"

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from symheli.errors import AccuracyError, InputError
+from symheli.values.arrays import Array
 from symheli.values.signal import indices
 from synthesis.design.plant.generalized import Generalized, blocks
 from synthesis.numerics.linear.norm import below, norm
@@ -20,8 +21,6 @@ from synthesis.structures.structure import TunableController
 if TYPE_CHECKING:
     from synthesis.design.lpv.objectives import L2
     from synthesis.design.plant.plant import Plant
-
-Array = np.ndarray
 
 SAME = 1e-9
 """Relative excess up to which a peak counts as known: that of `norm`, rounded up."""

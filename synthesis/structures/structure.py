@@ -13,14 +13,13 @@ from symheli import LinearModel, LPVStateSpace, Scheduling
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.bases import FunctionSpace
 from symheli.lpv.tools import lower_feedback
+from symheli.values.arrays import Array
 from symheli.values.numbers import positive
 from symheli.values.signal import Signal, indices, signals
 from symheli.values.summary import summarized
 
 if TYPE_CHECKING:
     from synthesis.design.plant.plant import Plant
-
-Array = np.ndarray
 
 TERMS = "PID"
 """Proportional, integral and derivative part of a path."""
@@ -169,7 +168,7 @@ class TunableController:
         Raises
         ------
         InputError
-            Other letters, a derivative without corner frequency.
+            Other letters, a derivative without corner frequency, a plant without controls.
         UnknownNameError
             A signal that the plant does not have, a bound of a gain that is not there.
 
@@ -181,6 +180,8 @@ class TunableController:
         ['u_y_P', 'u_y_I'] 1
         """
         given = paths or {(u, y): "P" for u in plant.controls for y in plant.measurements}
+        if not given:
+            raise InputError("the plant has no controls or no measurements: name them")
         controls = _known([u for u, _ in given], plant.controls, "control")
         measured = _known([y for _, y in given], plant.measurements, "measurement")
         for path, terms in given.items():

@@ -13,6 +13,7 @@ from scipy import linalg
 from symheli import LinearModel, LPVStateSpace
 from symheli.errors import InputError
 from symheli.lpv import Polynomial
+from symheli.lpv.riccati import lyapunov
 from symheli.threads import with_one_thread
 from symheli.values.arrays import Array, frozen
 from symheli.values.numbers import positive, whole
@@ -461,10 +462,7 @@ class _ModeSearch:
         total = np.zeros_like(size)
         for A in self.middle:
             own = (A * units / units[:, None]).T
-            if self.modes.dt is None:
-                P = linalg.solve_continuous_lyapunov(own, -np.eye(len(own)))
-            else:
-                P = linalg.solve_discrete_lyapunov(own, np.eye(len(own)))
+            P = lyapunov(own, np.eye(len(own)), self.modes.dt)
             total += P / np.trace(P)
         return units[:, None] * np.linalg.inv(np.linalg.cholesky(_even(total))).T
 

@@ -9,16 +9,15 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.linalg import solve_continuous_are
 
 from symheli import Helicopter
 from symheli.errors import InputError
 from symheli.flight.controller import deviations
 from symheli.lpv.linear_model import LinearModel
+from symheli.lpv.riccati import regulator
+from symheli.values.arrays import Array
 from symheli.values.sample_period import same_period
 from symheli.values.signal import indices, signals
-
-Array = np.ndarray
 
 STATE_SIZES = (1.0, 1.0, 1.0, 0.5, 0.5, 0.5, 0.2, 0.2, 0.1, 0.1, 10.0, 10.0)
 """Deviations of equal weight in the default feedback: m/s, rad/s, rad; rotor speed, rad/s, and the
@@ -98,7 +97,7 @@ class Choice:
             slow, moving = (SLOW_SIZES, SLOW_CONTROLS), (MOVING_SIZES, MOVING_CONTROLS)
             states, controls = slow if self.slow else moving
         Q, R = (np.diag(np.array(sizes) ** -2.0) for sizes in (states[: len(x)], controls))
-        return -np.linalg.solve(R, B.T @ solve_continuous_are(A, B, Q, R))
+        return -regulator(A, B, Q, R).K
 
     def _estimating(self, heli: Helicopter, x: Array, u: Array) -> LinearModel:
         """The regulator, with an observer of the unknown states of the model it is designed on."""
@@ -118,8 +117,7 @@ class Choice:
         L = np.zeros((len(names), int(y.sum())))
         if names:
             Q, R = np.diag(FLAP_ERROR * sizes[~y]) ** 2, np.diag(RATE_ERROR * sizes[y]) ** 2
-            X = solve_continuous_are(A[np.ix_(~y, ~y)].T, A[np.ix_(y, ~y)].T, Q, R)
-            L = np.linalg.solve(R, A[np.ix_(y, ~y)] @ X).T
+            L = regulator(A[np.ix_(~y, ~y)].T, A[np.ix_(y, ~y)].T, Q, R).K.T
         # z follows the unknown states minus L times the known ones; T takes it from all states
         T, by_known, by_own = (
             np.zeros(shape) for shape in ((len(L), len(x)), (len(x), L.shape[1]), (len(x), len(L)))

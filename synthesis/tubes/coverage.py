@@ -18,8 +18,6 @@ from synthesis.tubes.controllers import Choice
 from synthesis.tubes.reference import Reference
 from synthesis.tubes.tube import Tube
 
-Array = np.ndarray
-
 SAME = 1e-9
 """Difference between two controllers, relative to the largest entry, up to which they are one."""
 SLACK = 1e-9

@@ -11,14 +11,13 @@ import casadi
 import numpy as np
 
 from symheli import Helicopter
+from symheli.values.arrays import Array
 from symheli.values.summary import summarized
 from synthesis.tubes.enclosure import AffineForm, Domain, SegmentAverages, enclose, segment_averages
 from synthesis.tubes.enclosure.form import EPS
 from synthesis.tubes.inequality import ROUNDED, ROUNDED_UP, MatrixSet, elementwise, rank_one
 from synthesis.tubes.motions import Motions
 from synthesis.tubes.reference import Reference
-
-Array = np.ndarray
 
 SMALL = 1e-3
 """Rate, 1/s, up to which a term is part of the remainder: the deviations' change over their size.

@@ -17,11 +17,10 @@ from symheli.flight import Servo
 from symheli.flight.servo import one_each
 from symheli.lpv import append
 from symheli.lpv.tools import Actuation
+from symheli.values.arrays import Array
 from symheli.values.kinematics import INPUTS
 from symheli.values.numbers import whole
 from symheli.values.summary import summarized
-
-Array = np.ndarray
 
 STATE_SIZE = 0.05
 """Half width of equal weight of a controller's state, a held command and a servo, rad,"""

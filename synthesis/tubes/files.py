@@ -13,14 +13,13 @@ import numpy as np
 from symheli import Helicopter
 from symheli.airframe.vehicle import load_vehicle
 from symheli.airframe.written import as_toml
+from symheli.values.arrays import Array
 from synthesis.tubes.deviations import Deviations
 from synthesis.tubes.enclosure import equations
 from synthesis.tubes.equipment import LoopEquipment
 from synthesis.tubes.inequality import Multipliers
 from synthesis.tubes.motions import Motions
 from synthesis.tubes.reference import Reference
-
-Array = np.ndarray
 
 ARRAYS = ("airspeeds", "steady", "jerk", "snap", "gain")
 """Fields of `Reference` that are stored as they are."""

@@ -9,14 +9,13 @@ from typing import Any
 import numpy as np
 
 from symheli.errors import InputError
+from symheli.values.arrays import Array
 from symheli.values.summary import summarized
 from synthesis.numerics.program.cone_program import Solver
 from synthesis.tubes.files import numbers, read_multipliers, written_multipliers
 from synthesis.tubes.inequality import Multipliers
 from synthesis.tubes.proof import is_above, is_bounded
 from synthesis.tubes.search import Enclosed, least_gain
-
-Array = np.ndarray
 
 SPARE = 1e-3
 """Spare of the inequality in the search, 1/s, for outputs in units of their half widths."""

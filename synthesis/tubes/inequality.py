@@ -16,10 +16,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from symheli.values.arrays import Array
 from synthesis.numerics.polynomial.exact import Number, matmul
 from synthesis.numerics.program.affine_program import from_lower
-
-Array = np.ndarray
 
 ROUNDED_UP = 1 + 1e-12
 """Factor on bounds of the remainder that are computed in floating point, of some 20 roundings."""

@@ -11,9 +11,8 @@ import casadi
 import numpy as np
 
 from symheli.errors import InputError
+from symheli.values.arrays import Array
 from symheli.values.summary import summarized
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from symheli.values.arrays import Array
 from synthesis.numerics.polynomial.exact import Number, exact, matmul, positive_definite, rational
 from synthesis.tubes.deviations import CommandCell
 from synthesis.tubes.inequality import (
@@ -16,8 +17,6 @@ from synthesis.tubes.inequality import (
     invariant,
     motion,
 )
-
-Array = np.ndarray
 
 SPARE = 1e-6
 """Spare of bounds that are computed in floating point, 1/s, as a share of P."""

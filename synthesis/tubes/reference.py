@@ -19,11 +19,10 @@ from symheli.lpv.tools import Actuation
 from symheli.progress import task
 from symheli.steady import trim_batch
 from symheli.steady.newton import newton
+from symheli.values.arrays import Array
 from symheli.values.summary import summarized
 from synthesis.tubes.controllers import Choice
 from synthesis.tubes.equipment import LoopEquipment
-
-Array = np.ndarray
 
 TUBE_SIZES = (0.4, 0.5, 0.8, 0.1, 0.1, 0.3, 0.08, 0.06, 0.02, 0.02, 3.0, 3.0)
 """Half widths of equal weight in the size of a tube, m/s, rad/s, rad; rotor speed, rad/s,

@@ -10,6 +10,7 @@ import numpy as np
 from scipy import sparse
 
 from symheli.lpv import Polynomial
+from symheli.values.arrays import Array
 from synthesis.numerics.program.affine_program import (
     AffineProgram,
     BernsteinCell,
@@ -28,8 +29,6 @@ from synthesis.tubes.inequality import (
     invariant,
     motion,
 )
-
-Array = np.ndarray
 
 POINT = BernsteinCell(np.zeros((1, 1)), np.ones((1, 1)))
 """The cell of a program without a scheduling parameter."""

@@ -10,15 +10,13 @@ import casadi
 import numpy as np
 
 from symheli import Helicopter
+from symheli.values.arrays import Array
 from symheli.values.kinematics import INPUTS
 from synthesis.tubes.deviations import CommandCell, Deviations
 from synthesis.tubes.enclosure import enclose
 from synthesis.tubes.inequality import MatrixSet
 from synthesis.tubes.proof import is_within
 from synthesis.tubes.reference import Reference
-
-Array = np.ndarray
-
 
 RAISED = 1 + 1e-9
 """Factor on bounds of rates that are computed in floating point, of some thousand roundings."""

@@ -19,6 +19,7 @@ from symheli.flight import Servo
 from symheli.lazy import former_attribute
 from symheli.lpv.tools import Actuation
 from symheli.progress import Task, task, tracked
+from symheli.values.arrays import Array
 from symheli.values.summary import summarized
 from synthesis.certify.statement.proven_statement import ProvenStatement
 from synthesis.numerics.program.cone_program import Solver
@@ -39,8 +40,6 @@ from synthesis.tubes.proof import falls_in, holds
 from synthesis.tubes.reference import TUBE_SIZES, Reference, held, moving
 from synthesis.tubes.search import Enclosed, TubeSolution, smallest
 from synthesis.tubes.travel import why_not_free
-
-Array = np.ndarray
 
 INTERVAL = 1.0
 """Largest distance of the nodes of reference, feedback and P along airspeed, m/s."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from symheli.errors import UnknownNameError
+from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.lft_matrices import Block, LFTMatrices
 from symheli.lpv.linear_model import LinearModel, feedback_matrix
 from symheli.lpv.lpv_state_space import LPVStateSpace
@@ -18,6 +18,7 @@ from symheli.lpv.operators import Operators
 from symheli.lpv.scheduling import Scheduling
 from symheli.values.arrays import Array
 from symheli.values.html_table import as_table
+from symheli.values.numbers import positive
 from symheli.values.signal import Signal, indices, signals
 from symheli.values.summary import summarized
 
@@ -259,17 +260,39 @@ class LFT(Operators, LFTMatrices):
             outputs=tuple(self.outputs[i - nx] for i in rows[nx:]),
         )
 
-    def reduce(self, tolerance: float | None = None) -> LFT:
-        """Return the same model with fewer copies of the parameters: minimal for one parameter,
-        structured Kalman for several. No entry changes by more than the rounding of what depends
-        on the parameters, and no parameter goes.
+    def reduce(
+        self,
+        tolerance: float | None = None,
+        *,
+        order: int | None = None,
+        by: str | None = None,
+        loss: float | None = None,
+    ) -> LFT:
+        """Return the model with fewer copies of the parameters, by "minimal" the same model, by
+        "balanced" the approximation of `truncate` with an order or a loss.
+
+        Minimal is the default without order and loss. It is exact for one parameter, structured
+        Kalman for several. No entry changes by more than the rounding of what depends on the
+        parameters, and no parameter goes.
 
         With a `tolerance`, 1e-12 say, another model of fewer copies: what is below it, of the size
         that its row and column give an entry, counts as rounding and is lost.
+
+        Raises `InputError` for a tolerance that is no fraction or stands beside an order or a loss,
+        `UnknownNameError` for another method.
         """
+        from symheli.lpv.balancing import method
         from symheli.lpv.lft.reduction import reduce
 
-        return reduce(self, tolerance)
+        by = method(by, order, loss, "balanced")
+        if tolerance is not None and not (
+            by == "minimal" and positive(tolerance, "tolerance", or_zero=True) < 1
+        ):
+            raise InputError(
+                f'tolerance: expected a number from 0 to 1 such as 1e-12, of by="minimal", got'
+                f" {tolerance!r:.80}; an order has its name, reduce(order=...)"
+            )
+        return reduce(self, tolerance) if by == "minimal" else self.truncate(loss, order=order).lft
 
     def truncate(self, error: float | None = None, *, order: int | None = None) -> Truncation:
         """Return an approximation with fewer copies, whose error is measured and, where possible,

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from symheli.errors import InputError
+from symheli.lpv.balancing import Balancing, balancing
 from symheli.lpv.equilibration import equilibrate, peaks_to_one, significant
 from symheli.lpv.lft.model import LFT
 from symheli.lpv.lft_matrices import Block, parts
@@ -25,6 +26,8 @@ LOSS = 64 * np.finfo(float).eps
 """Largest change of what an entry has of the parameters, in units of the size that row and column
 give that part or of its own terms, that is rounding of the reduction itself.
 """
+NOTHING = np.zeros((0, 0))
+"""First block of a diagonal that may have no other."""
 
 
 def reduce(lft: LFT, tolerance: float | None) -> LFT:
@@ -63,7 +66,7 @@ def _in_balanced_coordinates(lft: LFT, exact: ExactCopies) -> LFT:
     """
     if len(lft.blocks) != 1 or not lft.order:
         return lft
-    into, out = _balancing(lft)
+    into, out, _ = _balancing(lft)
     if not np.abs(into @ out - np.eye(lft.order)).max() < NEARLY:
         return lft
     T, near = _rational(out), _rational(into)
@@ -115,7 +118,7 @@ def _reached_exactly(own: ExactCopies) -> ExactCopies:
             break
         spans = grown
     chosen = [a.start + k for a, (_, own_rows) in zip(here, spans, strict=True) for k in own_rows]
-    V = _diagonal([basis for basis, _ in spans], object)
+    V = block_diag(NOTHING, *(basis for basis, _ in spans))
     sizes = tuple(len(rows) for _, rows in spans)
     return ExactCopies((own.M11 @ V)[chosen], own.M12[chosen], own.M21 @ V, sizes)
 
@@ -226,12 +229,12 @@ def _balanced(lft: LFT) -> LFT:
     """
     if not lft.order:
         return lft
-    into, out = _balancing(lft)
+    into, out, _ = _balancing(lft)
     return replace(lft, M11=into @ lft.M11 @ out, M12=into @ lft.M12, M21=lft.M21 @ out)
 
 
-def _balancing(lft: LFT) -> tuple[Array, Array]:
-    """Return (into, out), inverse to one another: balanced copies are `into` times the given."""
+def _balancing(lft: LFT) -> Balancing:
+    """Return the coordinates of the copies of one parameter that balance its Hankel matrix."""
     power, size = lft.M12, np.zeros(lft.M22.shape)
     for _ in range(2 * lft.order):
         size, power = np.maximum(size, np.abs(lft.M21 @ power)), lft.M11 @ power
@@ -241,10 +244,7 @@ def _balancing(lft: LFT) -> tuple[Array, Array]:
     for _ in range(lft.order - 1):
         reach.append(lft.M11 @ reach[-1])
         sight.append(sight[-1] @ lft.M11)
-    R, S = np.hstack(reach), np.vstack(sight)
-    U, s, Vt = np.linalg.svd(S @ R, full_matrices=False)
-    root = np.sqrt(np.maximum(s[: lft.order], np.finfo(float).tiny))
-    return (U[:, : lft.order] / root).T @ S, R @ (Vt[: lft.order].T / root)
+    return balancing(np.vstack(sight), np.hstack(reach))
 
 
 def _structured(lft: LFT, tolerance: float) -> LFT:
@@ -359,18 +359,9 @@ def _extended(basis: Array, columns: Array, threshold: float) -> Array:
 
 def _projected(lft: LFT, left: list[Array], right: list[Array]) -> LFT:
     """The LFT with copies z_i = right_i z_i', left_i' right_i = I."""
-    L, R = _diagonal(left), _diagonal(right)
+    L, R = block_diag(NOTHING, *left), block_diag(NOTHING, *right)
     blocks = tuple(
         Block(block.scheduling, basis.shape[1])
         for block, basis in zip(lft.blocks, right, strict=True)
     )
     return replace(lft, M11=L.T @ lft.M11 @ R, M12=L.T @ lft.M12, M21=lft.M21 @ R, blocks=blocks)
-
-
-def _diagonal(parts: Sequence[Array], kind: type = float) -> Array:
-    out = np.zeros((sum(p.shape[0] for p in parts), sum(p.shape[1] for p in parts)), dtype=kind)
-    i = j = 0
-    for p in parts:
-        out[i : i + p.shape[0], j : j + p.shape[1]] = p
-        i, j = i + p.shape[0], j + p.shape[1]
-    return out

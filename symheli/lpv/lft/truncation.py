@@ -7,13 +7,16 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from symheli.errors import InputError
+from symheli.lpv.balancing import REGULAR, balanced_gramians
 from symheli.lpv.equilibration import equilibrate, significant
 from symheli.lpv.lft.model import LFT
 from symheli.lpv.lft.reduction import reduce
 from symheli.lpv.lft_matrices import Block, parts
 from symheli.values.arrays import Array
+from symheli.values.numbers import positive, whole
 from symheli.values.summary import summarized
 
 
@@ -42,19 +45,17 @@ def truncate(lft: LFT, error: float | None, order: int | None) -> Truncation:
     Automatic Control 41 (1996). Here they come from a linear fixed point that pays a factor m for m
     parameters; where that diverges the factor is dropped and nothing is proven.
     """
-    if (
-        (error is None) == (order is None)
-        or (error is not None and not error >= 0)
-        or (order is not None and order < 0)
-    ):
+    if (error is None) == (order is None):
         raise InputError("give either the error allowed (>= 0) or the order wanted (>= 0)")
-    whole = reduce(lft, 1e-12)
-    if not whole.order:
-        return Truncation(whole, 0.0, 0.0)
-    row, column = equilibrate(_dependence(whole))
-    balanced, sigma, proven = _balanced(whole, row, column)
+    allowed = None if error is None else positive(error, "error", or_zero=True)
+    wanted = None if order is None else whole(order, "order")
+    small = reduce(lft, 1e-12)
+    if not small.order:
+        return Truncation(small, 0.0, 0.0)
+    row, column = equilibrate(_dependence(small))
+    balanced, sigma, proven = _balanced(small, row, column)
     ranking = np.argsort(sigma)  # the least first
-    grid = _grid(len(whole.blocks))
+    grid = _grid(len(small.blocks))
     exact = lft.matrix(grid)
 
     def cut(count: int) -> tuple[LFT, float]:
@@ -63,13 +64,9 @@ def truncate(lft: LFT, error: float | None, order: int | None) -> Truncation:
         wrong = row[:, None] * (smaller.matrix(grid) - exact) * column
         return smaller, float(np.linalg.norm(wrong, 2, axis=(-2, -1)).max())
 
-    if order is not None:
-        count = max(0, whole.order - order)
-    else:
-        assert error is not None  # noqa: S101 - one of the two is given
-        count = 0
-        while count < whole.order and cut(count + 1)[1] <= error:
-            count += 1
+    count = 0 if wanted is None else max(0, small.order - wanted)
+    while allowed is not None and count < small.order and cut(count + 1)[1] <= allowed:
+        count += 1
     smaller, measured = cut(count)
     bound = 2.0 * float(sigma[ranking[:count]].sum()) if proven else np.inf
     return Truncation(smaller, measured, bound)
@@ -89,26 +86,10 @@ def _balanced(lft: LFT, row: Array, column: Array) -> tuple[LFT, Array, bool]:
             "no structured Gramians: the parameter loop is not contractive; narrow the ranges of"
             " the parameters"
         )
-    left, right, sigma = (
-        np.zeros((lft.order, lft.order)),
-        np.zeros((lft.order, lft.order)),
-        np.zeros(lft.order),
-    )
-    for here, X, Y in zip(parts(sizes), *grams, strict=True):  # type: ignore[arg-type]
-        root = _root(X)
-        values, V = np.linalg.eigh(root.T @ Y @ root)
-        s = np.sqrt(np.maximum(values, 1e-300))
-        T = root @ V / np.sqrt(s)
-        right[here, here], left[here, here], sigma[here] = (
-            T,
-            np.linalg.pinv(T),
-            np.sqrt(np.maximum(values, 0.0)),
-        )
-    return (
-        replace(lft, M11=left @ lft.M11 @ right, M12=left @ lft.M12, M21=lft.M21 @ right),
-        sigma,
-        proven,
-    )
+    each = [balanced_gramians(Y, X, REGULAR) for X, Y in zip(*grams, strict=True)]  # type: ignore[arg-type]
+    into, out = block_diag(*(b.into for b in each)), block_diag(*(b.out for b in each))
+    balanced = replace(lft, M11=into @ lft.M11 @ out, M12=into @ lft.M12, M21=lft.M21 @ out)
+    return balanced, np.concatenate([b.values for b in each]), proven
 
 
 def _gramians(M11: Array, B: Array, sizes: tuple[int, ...], factor: int) -> list[Array] | None:
@@ -131,11 +112,6 @@ def _gramians(M11: Array, B: Array, sizes: tuple[int, ...], factor: int) -> list
             return [new[part, part] for part in parts(sizes)]
         X = new
     return None
-
-
-def _root(X: Array) -> Array:
-    values, V = np.linalg.eigh(0.5 * (X + X.T))
-    return V * np.sqrt(np.maximum(values, 1e-15 * max(float(values[-1]), 1e-300)))
 
 
 def _kept(lft: LFT, kept: Array) -> LFT:

@@ -27,6 +27,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import sparse
 
+from symheli.values.arrays import Array
 from synthesis.certify.statement.norm_bounded import NormBounded
 from synthesis.numerics.polynomial.bernstein import (
     composition,
@@ -38,8 +39,6 @@ from synthesis.numerics.polynomial.cells import Cell, Strip
 from synthesis.numerics.polynomial.symmetric import basis, smat, svec
 from synthesis.numerics.program.cone_program import ConeProgram
 from synthesis.numerics.program.lyapunov_program import Sizes
-
-Array = np.ndarray
 
 
 class Blocks(NamedTuple):

@@ -15,6 +15,7 @@ import numpy as np
 from scipy import sparse
 
 from symheli.errors import InputError
+from symheli.values.arrays import Array
 from synthesis.certify.assemble.imposed import (
     Conditions,
     coefficient_conditions,
@@ -31,8 +32,6 @@ from synthesis.numerics.polynomial.pieces import Pieces
 from synthesis.numerics.polynomial.regions import Region, regions
 from synthesis.numerics.polynomial.symmetric import basis, extended, length, svec
 from synthesis.numerics.program.cone_program import ConeProgram
-
-Array = np.ndarray
 
 
 class Shape(NamedTuple):

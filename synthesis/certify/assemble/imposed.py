@@ -28,10 +28,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
+from symheli.values.arrays import Array
 from synthesis.numerics.polynomial.bernstein import blossom, elevation_matrix, restriction
 from synthesis.numerics.polynomial.symmetric import length
-
-Array = np.ndarray
 
 
 class Conditions(NamedTuple):

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from symheli.lpv.lpv_matrices import Matrices
+from symheli.values.arrays import Array
 from synthesis.certify.assemble.bounded_real import (
     BlockMultipliers,
     Supply,
@@ -21,8 +22,6 @@ from synthesis.numerics.polynomial.cells import Cell, Strip
 from synthesis.numerics.polynomial.pieces import ModelPiece
 from synthesis.numerics.polynomial.symmetric import smat
 from synthesis.numerics.program.lyapunov_program import LyapunovBlocks, Supplied
-
-Array = np.ndarray
 
 
 def continuous_products(

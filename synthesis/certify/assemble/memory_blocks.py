@@ -21,6 +21,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from symheli.values.arrays import Array
 from synthesis.certify.assemble.bounded_real import (
     Blocks,
     bordered,
@@ -33,8 +34,6 @@ from synthesis.certify.statement.lag import LagRegion
 from synthesis.numerics.polynomial.bernstein import elevation_matrix, product_weights, restriction
 from synthesis.numerics.polynomial.cells import Cell
 from synthesis.numerics.polynomial.symmetric import basis, svec
-
-Array = np.ndarray
 
 
 def memory_blocks(

@@ -11,6 +11,7 @@ import numpy as np
 
 from symheli.lpv.bases.polynomials import lobatto_points
 from symheli.lpv.tools import Matrices
+from symheli.values.arrays import Array
 from synthesis.certify.assemble.box import Shape, coefficients_of
 from synthesis.certify.assemble.lyapunov_blocks import of_state
 from synthesis.certify.statement.demand import Demand
@@ -18,8 +19,6 @@ from synthesis.numerics.polynomial.bernstein import blossom
 from synthesis.numerics.polynomial.regions import Region
 from synthesis.numerics.polynomial.symmetric import extended
 from synthesis.numerics.program.lyapunov_program import LyapunovBlocks
-
-Array = np.ndarray
 
 
 def points_of(region: Region, count: int) -> Array:

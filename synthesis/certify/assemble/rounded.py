@@ -8,10 +8,9 @@ from math import comb
 import numpy as np
 
 from symheli.lpv.lpv_matrices import LPVMatrices
+from symheli.values.arrays import Array
 from synthesis.numerics.polynomial.matrix import PolynomialMatrix
 from synthesis.numerics.polynomial.pieces import ModelPiece, Pieces, function_pieces
-
-Array = np.ndarray
 
 CONSTANT = 1e-14
 """In the search for a proof only, coefficients of an entry that differ by less than this fraction

@@ -18,6 +18,7 @@ import numpy as np
 from symheli import LPVStateSpace, UncertainStateSpace
 from symheli.lpv.bases.polynomials import lobatto_points
 from symheli.lpv.tools import Matrices
+from symheli.values.arrays import Array
 from synthesis.certify.assemble.bounded_real import (
     BlockMultipliers,
     Blocks,
@@ -54,8 +55,6 @@ from synthesis.numerics.polynomial.symmetric_power import (
     null_size,
 )
 from synthesis.numerics.program.lyapunov_program import MANY_STATES, LyapunovBlocks, Sizes
-
-Array = np.ndarray
 
 POINTS = 9
 """Least number of values of p in a segment of P at which a program of few blocks begins."""

@@ -10,10 +10,9 @@ import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.lft_matrices import parts
+from symheli.values.arrays import Array
 from synthesis.certify.lft.multipliers import SCALINGS
 from synthesis.numerics.polynomial.symmetric import basis
-
-Array = np.ndarray
 
 MOST_CORNERS = 64
 """Largest number of corners: full block multipliers are for few parameters."""

@@ -10,10 +10,9 @@ from scipy import linalg
 from symheli import LFT
 from symheli.lpv.lft_matrices import parts
 from symheli.lpv.tools import Matrices
+from symheli.values.arrays import Array
 from synthesis.certify.lft.proof import Coordinates
 from synthesis.certify.statement.scaling import model_scaling
-
-Array = np.ndarray
 
 
 class Loop(NamedTuple):

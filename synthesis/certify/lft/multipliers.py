@@ -25,10 +25,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from symheli.errors import InputError
+from symheli.values.arrays import Array
 from symheli.values.summary import summarized
 from synthesis.numerics.polynomial import structure
-
-Array = np.ndarray
 
 SCALINGS = ("small gain", "D", "DG", "full block")
 """The classes, from the most to the least conservative."""

@@ -15,12 +15,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
+from symheli.values.arrays import Array
 from synthesis.certify.lft.classes import Class
 from synthesis.certify.lft.coordinates import Loop
 from synthesis.numerics.polynomial.symmetric import basis, extended, smat, svec
 from synthesis.numerics.program.cone_program import ConeProgram
-
-Array = np.ndarray
 
 FLOOR = 0.1
 """P and the conditions of the multiplier are held above this fraction of the margin (scaled

@@ -16,6 +16,7 @@ import numpy as np
 from symheli.lpv.lft_matrices import LFTMatrices, parts
 from symheli.lpv.lpv_matrices import Matrices
 from symheli.lpv.scheduling import Scheduling
+from symheli.values.arrays import Array
 from synthesis.certify.lft.multipliers import Multiplier
 from synthesis.certify.proof import pointwise
 from synthesis.certify.statement.kind import L2_GAIN, STABILITY
@@ -23,8 +24,6 @@ from synthesis.certify.statement.units import Scaling
 from synthesis.numerics.polynomial import structure
 from synthesis.numerics.polynomial.exact import Number, exact, positive_definite, rational
 from synthesis.numerics.polynomial.symmetric import schur_complement, symmetrized
-
-Array = np.ndarray
 
 MAX_PARAMETERS_AT_CORNERS = 6
 """Largest number of parameters for which a proof is checked independently at all corners of the

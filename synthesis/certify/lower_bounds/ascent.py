@@ -18,6 +18,7 @@ import numpy as np
 from scipy import sparse
 from scipy.optimize import linprog, minimize
 
+from symheli.values.arrays import Array
 from synthesis.certify.lower_bounds.paths import (
     UNLIMITED,
     Budget,
@@ -27,8 +28,6 @@ from synthesis.certify.lower_bounds.paths import (
 )
 from synthesis.certify.lower_bounds.periodic import Sensitivity, gain, growth
 from synthesis.certify.statement.trajectory import SchedulingTrajectory
-
-Array = np.ndarray
 
 INITIAL_RADIUS = 0.25
 """Radius of the first trust region, as a fraction of the range of p; the period may then change by

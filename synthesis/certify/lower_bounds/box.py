@@ -14,6 +14,7 @@ from scipy import linalg
 
 from symheli import LPVStateSpace
 from symheli.progress import tracked
+from symheli.values.arrays import Array
 from synthesis.certify.lower_bounds.frozen import FrozenGain, grid_of, worst_over
 from synthesis.certify.lower_bounds.lines import Line, alone, directions, growing_on, shared
 from synthesis.certify.lower_bounds.lower_bound import LowerBoundSearch, lower_bound
@@ -35,7 +36,6 @@ from synthesis.numerics.linear.norm import (
 from synthesis.numerics.polynomial.motion import Motion
 from synthesis.numerics.polynomial.pieces import Pieces
 
-Array = np.ndarray
 Measure = Callable[[Array, Array, Array, Array], float]
 
 WAVES = 30

@@ -16,11 +16,10 @@ from scipy.optimize import minimize, minimize_scalar
 from symheli import LFT, LPVStateSpace
 from symheli.errors import InputError
 from symheli.lpv import UserFunctions
+from symheli.values.arrays import Array
 from symheli.values.numbers import whole
 from synthesis.certify.lower_bounds.paths import Scheduled
 from synthesis.numerics.linear.norm import gain_at_poles, norm
-
-Array = np.ndarray
 
 
 class FrozenGain(NamedTuple):

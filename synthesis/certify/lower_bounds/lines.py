@@ -16,6 +16,7 @@ from symheli import LFT, Scheduling
 from symheli.errors import InputError
 from symheli.lpv.lft import Block
 from symheli.progress import tracked
+from symheli.values.arrays import Array
 from synthesis.certify.lower_bounds.frozen import FrozenGain, grid_of, worst_over
 from synthesis.certify.lower_bounds.lower_bound import (
     LowerBound,
@@ -26,8 +27,6 @@ from synthesis.certify.lower_bounds.lower_bound import (
 from synthesis.certify.lower_bounds.paths import Budget
 from synthesis.certify.statement.trajectory import SchedulingTrajectory
 from synthesis.numerics.linear.norm import gain_at_poles, norm
-
-Array = np.ndarray
 
 
 class Line(NamedTuple):

@@ -19,6 +19,7 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.progress import tracked
+from symheli.values.arrays import Array
 from symheli.values.numbers import whole
 from symheli.values.summary import summarized
 from synthesis.certify.lower_bounds.ascent import (
@@ -42,8 +43,6 @@ from synthesis.certify.lower_bounds.paths import (
 from synthesis.certify.lower_bounds.periodic import Lifted, multiplier, ratio_from_rest, worst_input
 from synthesis.certify.statement.rates import Rate, rates
 from synthesis.certify.statement.trajectory import SchedulingTrajectory
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True)

@@ -15,10 +15,9 @@ from typing import Any
 import numpy as np
 
 from symheli import Scheduling
+from symheli.values.arrays import Array
 from synthesis.certify.lower_bounds.frozen import grid_of
 from synthesis.numerics.polynomial.pieces import Pieces
-
-Array = np.ndarray
 
 POINTS = {1: 9, 2: 4}
 """Values of each parameter that are looked at (more parameters: 2)."""

@@ -14,12 +14,11 @@ import numpy as np
 from symheli import Scheduling
 from symheli.lpv.exponential import expm
 from symheli.lpv.tools import Matrices
+from symheli.values.arrays import Array
 from synthesis.certify.statement.trajectory import SchedulingTrajectory
 
 if TYPE_CHECKING:
     from synthesis.certify.lower_bounds.lower_bound import LowerBoundSearch
-
-Array = np.ndarray
 
 
 class Scheduled(Protocol):

@@ -14,9 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from symheli.values.arrays import Array
 from synthesis.certify.lower_bounds.paths import TransitionMatrices
-
-Array = np.ndarray
 
 LANCZOS_STEPS = 30
 """Largest number of steps for the norm at one frequency: an unconverged norm makes the bound

@@ -16,11 +16,10 @@ import numpy as np
 
 from symheli import UncertainStateSpace
 from symheli.lpv.tools import Matrices
+from symheli.values.arrays import Array
 from symheli.values.signal import indices
 from synthesis.certify.lower_bounds.frozen import worst_over
 from synthesis.numerics.linear.norm import gain_at_poles, norm, surely_unstable
-
-Array = np.ndarray
 
 GRID = 17
 """Number of values of p between which the worst perturbation Delta is searched, and of the breaks

@@ -16,14 +16,13 @@ from scipy import linalg
 
 from symheli import LPVStateSpace
 from symheli.progress import tracked
+from symheli.values.arrays import Array
 from synthesis.certify.lower_bounds.lower_bound import LowerBoundSearch
 from synthesis.certify.lower_bounds.paths import Budget, WaveFamily, samples, steps
 from synthesis.certify.lower_bounds.periodic import Lifted
 from synthesis.certify.statement.kind import Kind
 from synthesis.certify.statement.trajectory import SchedulingTrajectory
 from synthesis.numerics.linear.norm import stable
-
-Array = np.ndarray
 
 FREQUENCIES = 60
 """Frequencies at which a frozen model is first looked at; the worst is then refined."""

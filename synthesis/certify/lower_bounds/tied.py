@@ -18,12 +18,11 @@ from scipy.optimize import minimize
 from symheli import LPVStateSpace, Scheduling
 from symheli.errors import InputError
 from symheli.lpv.tools import Matrices
+from symheli.values.arrays import Array
 from synthesis.certify.lower_bounds.lower_bound import LowerBound, LowerBoundSearch, along_cycle
 from synthesis.certify.lower_bounds.paths import Budget, Wave, WaveFamily
 from synthesis.certify.statement.trajectory import SchedulingTrajectory
 from synthesis.numerics.polynomial.motion import Motion
-
-Array = np.ndarray
 
 CANDIDATES = 24
 """Number of trapezoidal trajectories that are averaged and simulated."""

@@ -18,6 +18,7 @@ import numpy as np
 from symheli.lpv.bases.polynomials import factors_of
 from symheli.lpv.lpv_matrices import LPVMatrices, Matrices
 from symheli.lpv.scheduling import Scheduling
+from symheli.values.arrays import Array
 from symheli.values.tracking import tracked
 from synthesis.certify.proof import pointwise
 from synthesis.certify.proof.inequalities import Pair, decrease, output_form, positivity
@@ -30,8 +31,6 @@ from synthesis.numerics.polynomial.exact import Number, exact, rational
 from synthesis.numerics.polynomial.matrix import PolynomialMatrix
 from synthesis.numerics.polynomial.pieces import Pieces
 from synthesis.numerics.polynomial.regions import convert, regions
-
-Array = np.ndarray
 
 GRID = 100
 """Number of values of p at which a proof is checked in floating point."""

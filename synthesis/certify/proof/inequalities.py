@@ -33,6 +33,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from symheli.values.arrays import Array
 from synthesis.certify.statement.demand import Demand
 from synthesis.certify.statement.kind import L2_GAIN, Supply
 from synthesis.certify.statement.norm_bounded import NormBounded
@@ -43,8 +44,6 @@ from synthesis.numerics.polynomial.motion import Drift, Motion
 from synthesis.numerics.polynomial.pieces import Pieces
 from synthesis.numerics.polynomial.regions import Region, convert, model_on, now, regions, successor
 from synthesis.numerics.polynomial.symmetric_power import generator, null_matrix
-
-Array = np.ndarray
 
 
 class Pair(NamedTuple):

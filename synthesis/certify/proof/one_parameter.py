@@ -13,6 +13,7 @@ import numpy as np
 
 from symheli.lpv.lpv_matrices import LPVMatrices, Matrices
 from symheli.lpv.scheduling import Scheduling
+from symheli.values.arrays import Array
 from symheli.values.tracking import tracked
 from synthesis.certify.proof import pointwise
 from synthesis.certify.proof.inequalities import Statement, lmi_polynomials
@@ -26,8 +27,6 @@ from synthesis.numerics.polynomial.exact import Number, exact, positive_definite
 from synthesis.numerics.polynomial.motion import Motion
 from synthesis.numerics.polynomial.pieces import ModelPiece, joined, model_pieces, same_pieces
 from synthesis.numerics.polynomial.symmetric import extended, schur_complement, symmetrized
-
-Array = np.ndarray
 
 GRID = 100
 """Least number of values of p at which a P(p) is checked in floating point."""

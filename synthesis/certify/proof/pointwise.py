@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from symheli.lpv.lpv_matrices import Matrices
+from symheli.values.arrays import Array
 from synthesis.certify.statement.box import BoxLyapunov
 from synthesis.certify.statement.norm_bounded import NormBounded
 from synthesis.certify.statement.spline import MemoryLyapunov, SplineLyapunov
@@ -26,8 +27,6 @@ from synthesis.numerics.polynomial.symmetric import extended, symmetrized
 if TYPE_CHECKING:
     from synthesis.certify.statement.demand import Demand
 from synthesis.certify.statement.kind import Supply
-
-Array = np.ndarray
 
 RELATIVE_POSITIONS = (0.03, 0.382, 0.764, 0.97)
 """Positions in an interval between knots and breaks at which an inequality is checked: near its

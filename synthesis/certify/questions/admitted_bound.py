@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from symheli.values.arrays import Array
 from synthesis.certify.proof.box import BoxEvidence
 from synthesis.certify.proof.inequalities import Pair, decrease, output_form
 from synthesis.certify.statement.box import BoxLyapunov
@@ -21,8 +22,6 @@ from synthesis.numerics.polynomial.matrix import PolynomialMatrix
 from synthesis.numerics.polynomial.pieces import Pieces
 from synthesis.numerics.polynomial.regions import regions
 from synthesis.numerics.polynomial.symmetric import schur_complement
-
-Array = np.ndarray
 
 LOOSENINGS = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
 """Fractions by which the bound is increased in turn until it is verified on the whole box."""

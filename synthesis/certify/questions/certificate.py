@@ -13,6 +13,7 @@ import numpy as np
 from symheli import Scheduling
 from symheli.errors import CertificateError, InputError
 from symheli.lazy import former_attribute
+from symheli.values.arrays import Array
 from symheli.values.summary import summarized
 from synthesis.certify.statement.kind import Kind
 from synthesis.certify.statement.outcome import Attempt, Seconds, Status
@@ -22,8 +23,6 @@ from synthesis.certify.statement.trajectory import SchedulingTrajectory
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-Array = np.ndarray
 
 BOUNDS = ("gamma", "lower", "alpha", "upper", "index", "index_limit")
 """Fields that hold the bounds of some kind."""

@@ -14,6 +14,7 @@ import numpy as np
 
 from symheli import LFT, LPVStateSpace, Scheduling, UncertainStateSpace
 from symheli.errors import InputError
+from symheli.values.arrays import Array
 from synthesis.certify.lower_bounds.box import Worst, growing, unstable_at, worst_by, worst_moving
 from synthesis.certify.lower_bounds.no_common import no_common
 from synthesis.certify.lower_bounds.paths import search_hypothesis
@@ -40,8 +41,6 @@ from synthesis.certify.statement.outcome import Attempt, Seconds, Status
 from synthesis.certify.statement.trajectory import SchedulingTrajectory
 from synthesis.numerics.polynomial.pieces import Pieces, pieces
 from synthesis.numerics.program.answer import Answer
-
-Array = np.ndarray
 
 MARGINAL_DECAY = 1e-12
 """Decay rate, 1/s, that the search must exceed where the slowest frozen mode is stable or unstable

@@ -16,6 +16,7 @@ from scipy import linalg
 
 from symheli.lpv.tools import Matrices
 from symheli.progress import task
+from symheli.values.arrays import Array
 from synthesis.certify.assemble.unknowns import ScaledProblem
 from synthesis.certify.proof.inequalities import Statement, lmi_polynomials
 from synthesis.certify.statement.scaling import of_model
@@ -23,8 +24,6 @@ from synthesis.certify.statement.spline import SplineLyapunov
 from synthesis.numerics.polynomial.pieces import joined
 from synthesis.numerics.polynomial.symmetric import basis, smat, svec
 from synthesis.numerics.program.storage import strict_storage
-
-Array = np.ndarray
 
 LEVELS = (1.02, 1.05)
 """Multiples of the worst frozen gain at which the storage functions are computed, in turn until the

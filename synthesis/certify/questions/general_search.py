@@ -12,6 +12,7 @@ import numpy as np
 
 from symheli import LinearModel
 from symheli.lpv.tools import Matrices
+from symheli.values.arrays import Array
 from synthesis.certify.assemble.box import Shape, affine_inequalities, assemble
 from synthesis.certify.assemble.points import at_points, points_of
 from synthesis.certify.assemble.rounded import rounded_pieces
@@ -39,8 +40,6 @@ from synthesis.numerics.program.answer import Answer
 from synthesis.numerics.program.cone_program import LYAPUNOV, SolverPoint, general_solver, solve
 from synthesis.numerics.program.interior_point import Minimum
 from synthesis.numerics.program.lyapunov_program import LyapunovBlocks, LyapunovProgram, Sizes
-
-Array = np.ndarray
 
 SAMPLES_PER_REGION = {1: 17, 2: 13}
 """Samples of each parameter in a region at which the bound that P admits is first computed (more

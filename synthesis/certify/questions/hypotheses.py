@@ -15,8 +15,6 @@ from synthesis.certify.statement.kind import Kind
 from synthesis.certify.statement.opened import open_block
 from synthesis.certify.statement.sentences import motion
 
-Array = np.ndarray
-
 NEGLIGIBLE_ENTRY = 1e-12
 """Entries below this fraction of the largest of their row of [A B] or [C D] are rounding, and so is
 their misfit.

@@ -10,6 +10,7 @@ import numpy as np
 
 from symheli import LFT, Scheduling
 from symheli.errors import InputError
+from symheli.values.arrays import Array
 from synthesis.certify.lft.classes import check_scaling, multiplier_class
 from synthesis.certify.lft.coordinates import coordinates, scaled
 from synthesis.certify.lft.multipliers import Multiplier
@@ -43,8 +44,6 @@ from synthesis.numerics.linear.norm import surely_unstable
 from synthesis.numerics.polynomial.motion import Motion
 from synthesis.numerics.program.answer import Answer
 from synthesis.numerics.program.cone_program import Solver, general_solver, solve
-
-Array = np.ndarray
 
 MARGINS = (1e-7, 1e-6, 1e-5, 1e-3)
 """The (x, w) block is held below -margin I in scaled coordinates, tried in turn until the answer is

@@ -17,6 +17,7 @@ from symheli.lpv.bases import FunctionSpace
 from symheli.lpv.bases.function_space import tensor_grid
 from symheli.lpv.bases.polynomials import polynomials
 from symheli.lpv.tools import Matrices
+from symheli.values.arrays import Array
 from synthesis.certify.questions.certificate import Certificate
 from synthesis.certify.questions.hypotheses import hypotheses
 from synthesis.certify.questions.problem import Model
@@ -29,8 +30,6 @@ from synthesis.numerics.linear.norm import norm
 from synthesis.numerics.program.affine_program import AffineProgram, BernsteinCell, from_lower
 from synthesis.numerics.program.bases import extreme_motions, functions, limited, used
 from synthesis.numerics.program.cone_program import Solver, SolverPoint
-
-Array = np.ndarray
 
 SOLVER = Solver(tolerance=1e-7)
 """Solver of the program; the tolerance is that of g, the squared gain."""
@@ -154,26 +153,22 @@ def _least(
     for k, point in enumerate(points):
         cell = BernsteinCell(point[None], np.eye(1))
         A, B, C, D = (M[k : k + 1] for M in model)
-        into, gone = _t(A) @ p, _t(B) @ p
+        into, gone = A.mT @ p, B.mT @ p
         program.positive(cell, p)
         for motion in extreme_motions(moving, cell.nodes, used(basis), time):
             if dt is None:
-                flow = into + _t(into) + program.slope(P)
-                cross, supply = gone, program.known(_t(D) @ D)
+                flow = into + into.mT + program.slope(P)
+                cross, supply = gone, program.known(D.mT @ D)
             else:
                 flow, cross = into @ A - p, gone @ A
-                supply = gone @ B + program.known(_t(D) @ D)
+                supply = gone @ B + program.known(D.mT @ D)
             F = from_lower(
                 [
-                    [flow + program.known(_t(C) @ C)],
-                    [cross + program.known(_t(D) @ C), supply - level],
+                    [flow + program.known(C.mT @ C)],
+                    [cross + program.known(D.mT @ C), supply - level],
                 ]
             )
             program.positive(cell, -F, motion)
     cost = np.zeros(program.count)
     cost[g.columns] = 1.0
     return program.minimise(cost, SOLVER)
-
-
-def _t(M: Array) -> Array:
-    return np.swapaxes(M, -1, -2)

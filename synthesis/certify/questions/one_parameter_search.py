@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from symheli.lpv.tools import Matrices
+from symheli.values.arrays import Array
 from synthesis.certify.assemble.bounded_real import assemble
 from synthesis.certify.assemble.unknowns import (
     Quadratic,
@@ -39,8 +40,6 @@ from synthesis.numerics.program.lyapunov_program import (
     LyapunovProgram,
     Sizes,
 )
-
-Array = np.ndarray
 
 MAX_VIOLATION = 1e-8
 """Largest eigenvalue (scaled) of a block outside the program above which the block is added."""

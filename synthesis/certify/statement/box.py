@@ -10,11 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from symheli.errors import InputError
+from symheli.values.arrays import Array
 from symheli.values.summary import summarized
 from synthesis.numerics.polynomial import structure
 from synthesis.numerics.polynomial.matrix import PolynomialMatrix
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 
 from symheli.errors import InputError
+from symheli.values.arrays import Array
 from synthesis.numerics.polynomial import structure
-
-Array = np.ndarray
 
 CORNER_OFFSET = 2.0**-20
 """The region begins this fraction of the range away from e = 0, so that it stays invariant with

@@ -16,9 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from symheli.lpv.lpv_matrices import LPVMatrices
+from symheli.values.arrays import Array
 from synthesis.numerics.polynomial import structure
-
-Array = np.ndarray
 
 
 class NormBounded(NamedTuple):

@@ -14,15 +14,15 @@ from scipy import linalg
 
 from symheli import LinearModel, LPVStateSpace
 from symheli.errors import InputError
+from symheli.lpv.riccati import lyapunov
 from symheli.lpv.tools import Matrices
+from symheli.values.arrays import Array
 from synthesis.certify.statement.norm_bounded import NormBounded
 from synthesis.certify.statement.units import Scaling
 from synthesis.numerics.linear.balance import balance, size_of
 from synthesis.numerics.linear.norm import norm
 from synthesis.numerics.polynomial.symmetric import powered, symmetrized
 from synthesis.numerics.program.storage import least_storage, strict_storage
-
-Array = np.ndarray
 
 SMALLEST = 1e-150
 """Gain from all inputs to all outputs, in the units given, whose square is still a number."""
@@ -138,7 +138,6 @@ def model_scaling(model: LinearModel, gain: float, elsewhere: Matrices | None = 
     reached = np.hstack([B, MIN_COUPLING * size_of(B) * np.diag(np.sqrt(own))])
     seen = np.vstack([C, MIN_COUPLING * size_of(C) * np.diag(np.sqrt(own))])
     Wc, Wo = _gramian(A, reached, continuous), _gramian(A.T, seen.T, continuous)
-    inverse = linalg.inv(Wc)
     # where inputs and outputs weigh alike: the geometric mean of the Hankel singular values
     level = np.exp(0.5 * (np.linalg.slogdet(Wo)[1] + np.linalg.slogdet(Wc)[1]) / n)
     if not SMALLEST < level < 1 / SMALLEST:
@@ -146,6 +145,7 @@ def model_scaling(model: LinearModel, gain: float, elsewhere: Matrices | None = 
             f"a model whose gain is near {level:.0e} cannot be squared; choose other units of its"
             " inputs and outputs"
         )
+    inverse = linalg.inv(Wc)
     X = symmetrized(Wo / level + level * inverse)
     side = inverse @ reached
     Q = seen.T @ seen / level + level * (
@@ -266,10 +266,6 @@ def _gramian(A: Array, B: Array, continuous: bool, least: float = 1e-12) -> Arra
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", linalg.LinAlgWarning)
-        X = (
-            linalg.solve_continuous_lyapunov(A, -B @ B.T)
-            if continuous
-            else linalg.solve_discrete_lyapunov(A, B @ B.T)
-        )
+        X = lyapunov(A, B @ B.T, None if continuous else 1.0)
     values, vectors = linalg.eigh(symmetrized(X))
     return (vectors * np.maximum(values, least * abs(values[-1]))) @ vectors.T

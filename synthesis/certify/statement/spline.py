@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from symheli.errors import InputError
+from symheli.values.arrays import Array
 from symheli.values.summary import summarized
 from synthesis.certify.statement.lag import LagRegion
 from synthesis.numerics.polynomial import structure
@@ -22,8 +23,6 @@ from synthesis.numerics.polynomial.symmetric_power import (
     null_weights,
     power,
 )
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True, eq=False)

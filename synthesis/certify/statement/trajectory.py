@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
+from symheli.values.arrays import Array
 from symheli.values.summary import summarized
-
-Array = np.ndarray
 
 
 class SchedulingTrajectory(NamedTuple):

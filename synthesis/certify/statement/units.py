@@ -9,12 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from symheli.lpv.tools import Matrices
+from symheli.values.arrays import Array
 from synthesis.certify.statement.norm_bounded import NormBounded
 from synthesis.numerics.polynomial import structure
 from synthesis.numerics.polynomial.pieces import ModelPiece
 from synthesis.numerics.polynomial.symmetric import symmetrized
-
-Array = np.ndarray
 
 
 class Scaling(NamedTuple):

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-Array = np.ndarray
+from symheli.values.arrays import Array
 
 ITERATIONS, WEIGHT_EXPONENT = 60, 6.0
 """Number of balancing iterations, and the exponent with which larger responses are weighted."""

@@ -120,10 +120,11 @@ class Controller:
     @classmethod
     def of(cls, plant: Plant, given: Any, method: str = "given") -> Controller:
         """Return a controller of a plant that was made in another way: gains set by hand, the
-        controller of a point design, a `TunableController` with its gains; whatever `Plant.close`
+        result of a point design, a `TunableController` with its gains; whatever `Plant.close`
         takes.
 
-        Raises `InputError` for anything else, `UnknownNameError` for signals of another plant.
+        Raises `InputError` for anything else, `UnknownNameError` for signals of another plant,
+        `SynthesisError` with the reasons for a design that found none.
 
         Examples
         --------
@@ -237,16 +238,22 @@ class Controller:
 
         return sampled(self, dt)
 
-    def reduce(self, order: int | None = None, *, loss: float | None = None) -> Controller:
+    def reduce(
+        self, order: int | None = None, *, by: str = "loop", loss: float | None = None
+    ) -> Controller:
         """Reduce to at most `order` states, or to the fewest with which the largest gain of the
         frozen loops is at most the fraction `loss` above that of all states; give one of the two.
 
-        One projection keeps what the closed loop sees of the controller; see
-        `synthesis.design.loops.reduction`. What was promised of all states is not promised of
-        fewer: `gamma` is NaN then, and the `notes` tell both frozen gains.
+        By "loop" one projection keeps what the closed loop sees of the controller; see
+        `synthesis.design.loops.reduction`. By "minimal", "coprime" and "balanced" the controller is
+        reduced as a model without its loop, with their orders and losses; see
+        `LPVStateSpace.reduce`. What was promised of all states is not promised of fewer:
+        `promised` is NaN then, and the `notes` tell both frozen gains. By "minimal" the response is
+        the same, and the promise too.
 
         Raises `InputError` for both or none, an order below 0 or a loss that is no number >= 0,
-        `SynthesisError` where the loop is not stable at some frozen p, before or after.
+        `UnknownNameError` for another method, `SynthesisError` where the loop is not stable at some
+        frozen p, before or after.
 
         Examples
         --------
@@ -254,13 +261,17 @@ class Controller:
         >>> made.reduce(loss=0.0).order <= made.order
         True
         """
-        from synthesis.design.loops.reduction import reduced, within
+        from synthesis.design.loops.reduction import by_itself, reduced, within
 
+        if by != "loop":
+            return by_itself(self, order, by, loss)
         if order is not None and loss is None:
             return reduced(self, order)
         if loss is not None and order is None:
             return within(self, loss)
-        raise InputError("reduce: give an order, or a loss such as 0.03, and not both")
+        raise InputError(
+            'reduce: give an order, or a loss such as 0.03, and not both; by="minimal" needs none'
+        )
 
     @cached_property
     def reasons(self) -> tuple[str, ...]:

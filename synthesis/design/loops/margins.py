@@ -11,13 +11,11 @@ from scipy.linalg import eigvals
 
 from symheli import LinearModel
 from symheli.errors import InputError
-from symheli.lpv.linear_model import feedback_matrix
+from symheli.lpv.linear_model import as_model, feedback_matrix
 from symheli.lpv.lower_feedback import PREFIX, apart
+from symheli.values.arrays import Array
 from symheli.values.signal import indices
-from synthesis.numerics.linear.model import as_model
 from synthesis.numerics.linear.norm import crossings, norm, of_one_size, pace_of, to_continuous
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True)

@@ -19,13 +19,20 @@ import numpy as np
 
 from symheli import LPVStateSpace
 from symheli.errors import InputError, SynthesisError
-from symheli.lpv.balanced_truncation import response_gramians
+from symheli.lpv.balancing import (
+    REGULAR,
+    Balancing,
+    balanced_gramians,
+    method,
+    projected,
+    response_gramians,
+)
 from symheli.lpv.bases.polynomials import lobatto_points
 from symheli.lpv.tools import lower_feedback
+from symheli.values.arrays import Array
+from symheli.values.signal import signals
 from synthesis.design.loops.controller import Controller
 from synthesis.numerics.linear.norm import norm, stable
-
-Array = np.ndarray
 
 NOT_STABLE = (
     "the closed loop is not stable at every frozen p: it has no Gramians by which the states of"
@@ -34,6 +41,21 @@ NOT_STABLE = (
 
 NODES = {1: 14, 2: 6}
 """Values of each parameter at which the loop is evaluated (more parameters: 4)."""
+
+
+def by_itself(controller: Controller, order: int | None, by: str, loss: float | None) -> Controller:
+    """Return the controller whose model was reduced without the loop; see `LPVStateSpace.reduce`.
+
+    By "minimal" it is the same controller, and promises what it did. Raises `SynthesisError` where
+    the loop is not stable at some frozen p.
+    """
+    by = method(by, order, loss, "coprime", "balanced", "loop")
+    model = controller.model.reduce(order, by=by, loss=loss)
+    if len(model.states) == controller.order:
+        return controller
+    if by == "minimal":
+        return replace(controller, model=_numbered(model))
+    return _FullController(controller).checked(model)
 
 
 def reduced(controller: Controller, order: int) -> Controller:
@@ -97,15 +119,12 @@ class _FullController:
         self.controller = controller
 
     @cached_property
-    def directions(self) -> tuple[Array, Array]:
-        """(left (n, n), right (n, n)) of the states, in falling order of their Hankel
-        singular values in the loop; the first rows and columns project on a reduced order.
+    def balanced(self) -> Balancing:
+        """Coordinates of the states, in falling order of their Hankel singular values in the loop;
+        the first rows and columns project on a reduced order.
         """
-        P, Q = gramians(self.controller)
-        L, R = _root(P), _root(Q)
-        U, s, Vt = np.linalg.svd(R.T @ L)
-        size = np.sqrt(np.maximum(s, 1e-300))
-        return (U / size).T @ R.T, L @ Vt.T / size
+        reached, seen = gramians(self.controller)
+        return balanced_gramians(seen, reached, REGULAR)
 
     @cached_property
     def gain(self) -> float:
@@ -116,21 +135,17 @@ class _FullController:
         """Return the controller of `order` states; raises `SynthesisError` where the loop is not
         stable.
         """
-        controller, n = self.controller, self.controller.order
-        left, right = self.directions[0][:order], self.directions[1][:, :order]
-        model = controller.model
-        projected = replace(
-            model,
-            A=left @ model.A @ right,
-            B=left @ model.B,
-            C=model.C @ right,
-            states=tuple(f"k{i + 1}" for i in range(order)),  # type: ignore[arg-type]
-            trim=None,
-            residuals=None,
-        )
+        into, out = self.balanced.into[:order], self.balanced.out[:, :order]
+        return self.checked(projected(self.controller.model, into, out))
+
+    def checked(self, model: LPVStateSpace) -> Controller:
+        """Return the controller with a model of fewer states; raises `SynthesisError` where the
+        loop is not stable.
+        """
+        controller, n, order = self.controller, self.controller.order, len(model.states)
         made = replace(
             controller,
-            model=projected,
+            model=_numbered(model),
             method=f"{controller.method}, {order} of {n} states kept",
             promised=math.nan,
             optimum=None,
@@ -146,6 +161,10 @@ class _FullController:
             " states"
         )
         return replace(made, notes=(note,))
+
+
+def _numbered(model: LPVStateSpace) -> LPVStateSpace:
+    return replace(model, states=signals(f"k{i + 1}" for i in range(len(model.states))), trim=None)
 
 
 def frozen_gain(controller: Controller) -> float:
@@ -197,8 +216,3 @@ def _closed_apart(controller: Controller) -> Iterator[tuple[Array, Array, Array,
 
 def _conditions(loop: LPVStateSpace) -> Array:
     return lobatto_points(NODES.get(len(loop.parameters), 4), loop.box)
-
-
-def _root(M: Array) -> Array:
-    values, vectors = np.linalg.eigh(0.5 * (M + M.T))
-    return vectors * np.sqrt(np.maximum(values, 1e-14 * values[-1]))

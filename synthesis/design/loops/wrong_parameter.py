@@ -29,6 +29,7 @@ from symheli.lpv.equilibration import equilibrate
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.lower_feedback import Partition, Positions
 from symheli.lpv.matrix_function import MatrixFunction, block, functions_of, in_one_basis
+from symheli.values.arrays import Array
 from symheli.values.sample_period import same_period
 from symheli.values.signal import signals
 from synthesis.design.loops.balanced_block import balanced
@@ -37,8 +38,6 @@ from synthesis.design.plant.plant import Plant, require_plant
 from synthesis.numerics.polynomial.bernstein import restriction
 from synthesis.numerics.polynomial.pieces import function_pieces
 from synthesis.numerics.program.bases import MAX_DIVISIONS
-
-Array = np.ndarray
 
 ROUNDING = 64 * np.finfo(float).eps
 """Relative rounding error of an entry, as a fraction of the sum of its own terms, so that the

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from symheli.progress import tracked
+from symheli.values.arrays import Array
 from synthesis.certify.statement.outcome import Attempt
 from synthesis.design.lpv.fitted import Fitted
 from synthesis.design.lpv.recovery import Gains
@@ -22,8 +23,6 @@ from synthesis.design.plant.generalized import Generalized
 
 if TYPE_CHECKING:
     from synthesis.design.plant.plant import Plant
-
-Array = np.ndarray
 
 
 class AtRest(NamedTuple):

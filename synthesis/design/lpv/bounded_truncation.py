@@ -22,20 +22,18 @@ from symheli.lpv.balanced_truncation import (
     NEGLIGIBLE,
     Balance,
     BalancedTruncation,
-    balancing,
     check_order,
     mean_gramians,
-    projected,
     truncated_by,
 )
+from symheli.lpv.balancing import REGULAR, balanced_gramians, projected
 from symheli.lpv.bases.polynomials import factors_of, lobatto_points, polynomials
 from symheli.lpv.nu_gap import channel_scales
 from symheli.threads import with_one_thread
+from symheli.values.arrays import Array
 from synthesis.design.lpv.scaled_plant import breaks_of, degrees_of
 from synthesis.numerics.program.affine_program import AffineProgram, cells, from_lower
 from synthesis.numerics.program.cone_program import Solver
-
-Array = np.ndarray
 
 LARGEST = 1e8
 """Gramians and their inverses are kept below this multiple of the identity, in coordinates in which
@@ -45,6 +43,8 @@ POINTS = {1: 201, 2: 21}
 """Values of each parameter at which the inequalities are recomputed (more parameters: 7)."""
 ROUNDING = 1e-9
 """Fraction of the largest term of an inequality by which it may be violated there."""
+SOLVER = Solver("CLARABEL", tolerance=1e-12)
+"""Far below `ROUNDING`: at its usual tolerance one answer in seven is refused there."""
 
 
 @with_one_thread
@@ -112,17 +112,18 @@ def bounded_truncation(
         factor.pieces()
     su = channel_scales(input_scale, "input_scale", len(model.inputs))
     sy = channel_scales(output_scale, "output_scale", len(model.outputs))
-    left, right, values = balancing(mean_gramians(model, balance, nodes, su, sy))
+    gramians = mean_gramians(model, balance, nodes, su, sy)
+    into, out, values = balanced_gramians(*gramians, REGULAR)
     values = np.maximum(values, NEGLIGIBLE * values[0])
     inside = model.scaled(
         dict(zip(model.inputs, su, strict=True)), dict(zip(model.outputs, sy, strict=True))
     )
-    whole = _FullModel.of(projected(inside, left, right), balance)
+    whole = _FullModel.of(projected(inside, into, out), balance)
     first, second = whole.least(values), whole.dual.least(values)
     if balance == "factors":
-        found = left @ np.linalg.inv(first) @ left.T, right @ np.linalg.inv(second) @ right.T
+        found = into.T @ np.linalg.inv(first) @ into, out @ np.linalg.inv(second) @ out.T
     else:
-        found = left @ second @ left.T, right @ first @ right.T
+        found = into.T @ second @ into, out @ first @ out.T
     return truncated_by(found, model, order, balance, nodes, su, sy)
 
 
@@ -181,7 +182,7 @@ class _FullModel:
         sign, weight = (-1.0, values) if self.balance == "factors" else (1.0, 1 / values)
         cost = np.zeros(program.count)
         cost[unknown.columns[0]] = sign * np.einsum("eii,i->e", unknown.entries, weight)
-        x = program.minimise(cost, Solver("CLARABEL")).x
+        x = program.minimise(cost, SOLVER).x
         found = None if x is None else unknown.coefficients(x)[0]
         if found is None or not self.holds(found):
             raise SynthesisError(
@@ -197,20 +198,16 @@ class _FullModel:
         """
         A, B, C, D = self.matrices(p)
         if self.balance == "response":
-            flow = A @ M + M @ _t(A)
-            return from_lower([[-flow], [known(_t(B)), known(np.eye(B.shape[2]))]])
-        R = np.linalg.inv(np.eye(D.shape[2]) + _t(D) @ D)
-        A = A - B @ R @ _t(D) @ C
-        flow = A @ M + M @ _t(A)
-        S = np.eye(D.shape[1]) + D @ _t(D)
-        return from_lower([[known(B @ R @ _t(B)) - flow], [-(C @ M), known(S)]])
+            flow = A @ M + M @ A.mT
+            return from_lower([[-flow], [known(B.mT), known(np.eye(B.shape[2]))]])
+        R = np.linalg.inv(np.eye(D.shape[2]) + D.mT @ D)
+        A = A - B @ R @ D.mT @ C
+        flow = A @ M + M @ A.mT
+        S = np.eye(D.shape[1]) + D @ D.mT
+        return from_lower([[known(B @ R @ B.mT) - flow], [-(C @ M), known(S)]])
 
     def holds(self, M: Array) -> bool:
         """Whether the inequality holds on a fine grid, to rounding."""
         p = lobatto_points(POINTS.get(len(self.box), 7), self.box).reshape(-1, len(self.box))
         values = np.linalg.eigvalsh(self.inequality(p, M, lambda known: known))
         return bool(values[:, 0].min() >= -ROUNDING * np.abs(values).max())
-
-
-def _t(M: Array) -> Array:
-    return np.swapaxes(M, -1, -2)

@@ -21,9 +21,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from symheli.values.arrays import Array
 from synthesis.design.plant.generalized import Generalized
-
-Array = np.ndarray
 
 
 class Half(NamedTuple):
@@ -47,8 +46,8 @@ def observed(plant: Generalized) -> Half:
     seen = np.concatenate([C1, np.zeros((K, nz, blind.shape[-1]))], axis=-1) + D11 @ w
     m = flow.shape[-1]
     constant, level = np.zeros((K, m + nz, m + nz)), np.zeros((K, m + nz, m + nz))
-    constant[:, m:, :m], constant[:, :m, m:] = seen, _t(seen)
-    level[:, :m, :m], level[:, m:, m:] = _t(w) @ w, np.eye(nz)
+    constant[:, m:, :m], constant[:, :m, m:] = seen, seen.mT
+    level[:, :m, :m], level[:, m:, m:] = w.mT @ w, np.eye(nz)
     return Half(np.concatenate([flow, np.zeros((K, n, nz))], axis=-1), constant, level)
 
 
@@ -58,7 +57,7 @@ def controlled(plant: Generalized) -> Half:
 
 
 def _right_inverse(D: Array) -> Array:
-    return _t(D) @ np.linalg.inv(D @ _t(D))
+    return D.mT @ np.linalg.inv(D @ D.mT)
 
 
 def _blind(D: Array, inverse: Array) -> Array:
@@ -68,7 +67,3 @@ def _blind(D: Array, inverse: Array) -> Array:
     ny, nw = D.shape[-2:]
     start = np.linalg.svd(D[0])[2][ny:].T
     return start - inverse @ (D @ start) if nw > ny else np.zeros((len(D), nw, 0))
-
-
-def _t(M: Array) -> Array:
-    return np.swapaxes(M, -1, -2)

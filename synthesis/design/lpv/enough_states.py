@@ -12,12 +12,11 @@ from __future__ import annotations
 import numpy as np
 
 from symheli.lpv.bases.function_space import tensor_grid
+from symheli.values.arrays import Array
 from synthesis.design.lpv.scaled_plant import ScaledPlant
 from synthesis.design.lti.hinf import central_gains
 from synthesis.design.plant.generalized import Generalized
 from synthesis.numerics.linear.norm import below
-
-Array = np.ndarray
 
 FEW_STATES = 12
 """Number of states up to which all are kept: their design takes seconds."""

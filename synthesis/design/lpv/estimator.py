@@ -12,6 +12,7 @@ import numpy as np
 from symheli import LPVStateSpace
 from symheli.lpv.matrix_function import MatrixFunction, block, in_one_basis
 from symheli.threads import with_one_thread
+from symheli.values.arrays import Array
 from symheli.values.html_table import as_table
 from symheli.values.signal import Signal
 from symheli.values.summary import summarized
@@ -29,8 +30,6 @@ from synthesis.design.lpv.search import BACK_OFF, Gains, best, settled
 from synthesis.design.plant.plant import Plant, require_plant
 from synthesis.design.plant.refusals import failed, least_ranks, levels_above
 from synthesis.numerics.program.bases import Bases, Dependence, dependence
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -84,7 +83,7 @@ def estimator(
     impose: Grid | None = None,
 ) -> Estimator:
     """Design an observer whose error has the least L2 gain, for every p(t) within its range and
-    rates.
+    rates. It returns an `Estimator`: an observer commands nothing.
 
     The plant may be unstable: what is estimated is seen through the error alone. L needs no rate
     of p.

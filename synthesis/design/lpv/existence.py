@@ -21,6 +21,7 @@ from symheli.lpv import UserFunctions
 from symheli.lpv.bases import FunctionSpace
 from symheli.lpv.bases.function_space import tensor_grid
 from symheli.lpv.bases.polynomials import factors_of, piecewise_lobatto
+from symheli.values.arrays import Array
 from symheli.values.numbers import whole
 from synthesis.certify.statement.impose import Grid
 from synthesis.design.lpv.elimination import Half, controlled, observed
@@ -31,8 +32,6 @@ from synthesis.numerics.program.bases import MAX_DIVISIONS, moves, used
 from synthesis.numerics.program.cone_program import Solver
 from synthesis.numerics.program.lyapunov_program import LyapunovBlocks, Sizes
 from synthesis.numerics.program.unknown import BlockTerms, UnknownFunction, selector, unknowns
-
-Array = np.ndarray
 
 Divisions = int | Grid
 """In how many parts every range is cut at first, or the points themselves."""

@@ -12,14 +12,13 @@ from symheli import LPVStateSpace, Scheduling
 from symheli.lpv import BSpline
 from symheli.lpv.bases import FunctionSpace
 from symheli.lpv.bases.polynomials import lobatto_points, piecewise_lobatto, polynomials
+from symheli.values.arrays import Array
 from symheli.values.signal import signals
 from synthesis.design.loops.controller import Controller
 from synthesis.design.lpv.scaled_plant import ScaledPlant
 
 if TYPE_CHECKING:
     from synthesis.design.plant.plant import Plant
-
-Array = np.ndarray
 
 DEGREES = {1: (0, 1, 2, 3, 4, 5, 6, 8, 10), 2: (0, 1, 2, 3, 4, 5, 6, 8)}
 """Degrees of the polynomials tried in turn (more parameters: up to 4)."""

@@ -8,11 +8,10 @@ import numpy as np
 from scipy import linalg
 
 from symheli import LPVStateSpace
+from symheli.values.arrays import Array
 from synthesis.numerics.polynomial.definite import negative_definite
 from synthesis.numerics.polynomial.matrix import PolynomialMatrix
 from synthesis.numerics.polynomial.pieces import pieces
-
-Array = np.ndarray
 
 MAX_CELLS = 500
 """Largest number of Lyapunov equations that are solved; beyond it stability between points is left

@@ -13,6 +13,7 @@ from scipy import linalg
 from symheli import UncertainStateSpace
 from symheli.errors import InputError, SynthesisError
 from symheli.lpv.bases import PiecewiseLinear
+from symheli.lpv.riccati import SEMIDEFINITE
 from symheli.values.arrays import Array, frozen
 from symheli.values.signal import Signal, indices, signals
 from synthesis.design.loops.controller import Controller
@@ -23,7 +24,6 @@ from synthesis.design.plant.diagnosis import reasons
 from synthesis.design.plant.generalized import Generalized
 from synthesis.design.plant.plant import Plant, require_plant
 from synthesis.design.plant.refusals import conditions, least_ranks, require_channels
-from synthesis.numerics.linear.riccati import SEMIDEFINITE
 
 ACCURACY = 1e-3
 """Relative error of the functions of p that a schedule is made of, at which the next are not tried.

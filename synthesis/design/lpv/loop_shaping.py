@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 from symheli import LinearModel, LPVStateSpace
 from symheli.errors import InputError
 from symheli.lpv import series
-from symheli.lpv.mixing import itself, mixed
 from symheli.values.sample_period import same_period
 from symheli.values.signal import Signal
 from synthesis.certify.statement.impose import Grid
@@ -17,8 +16,8 @@ from synthesis.certify.statement.rates import Rate
 from synthesis.design.loops.controller import Controller
 from synthesis.design.lpv.output_feedback import output_feedback
 from synthesis.design.lpv.search import BACK_OFF
+from synthesis.design.lti.loop_shaping import four_block
 from synthesis.design.lti.weights import Weight, as_weight
-from synthesis.design.plant.plant import Plant
 from synthesis.numerics.program.bases import Dependence
 
 
@@ -48,6 +47,10 @@ def loop_shaping(
 ) -> LoopShaping:
     """Design the scheduled controller of the least gain [K; I] (I - W2 G W1 K)^-1 [I, W2 G W1] of a
     plant shaped by weights: `output_feedback` of the problem that `ncfsyn` solves at one p.
+
+    It takes the loop alone, since its weights stand for disturbances and performance. Of a `Plant`
+    it is the design for `plant.nominal.select(inputs=plant.controls, outputs=plant.measurements)`,
+    and `Controller.of(plant, made)` is its `Controller`.
 
     Parameters
     ----------
@@ -88,12 +91,12 @@ def loop_shaping(
     """
     if not isinstance(G, LPVStateSpace):
         raise InputError(
-            f"G: expected an LPVStateSpace, got {type(G).__name__}; ncf takes one linear model"
+            f"G: expected an LPVStateSpace, got {type(G).__name__}; ncfsyn takes one linear model"
         )
     before = _weight(W1, "W1", G.inputs, G.dt)
     behind = _weight(W2, "W2", G.outputs, G.dt)
     shaped = series(series(before, G), behind)
-    made = output_feedback(_four_block(shaped), rate, X=X, Y=Y, back_off=back_off, impose=impose)
+    made = output_feedback(four_block(shaped), rate, X=X, Y=Y, back_off=back_off, impose=impose)
     made = replace(made, method=f"loop shaping, {made.method}")
     return LoopShaping(series(series(behind, made.model), before), made)
 
@@ -117,22 +120,3 @@ def _weight(
         )
     states = tuple(Signal(f"{name}_{s}", s.unit) for s in given.states)
     return replace(given, states=states, inputs=tuple(channels), outputs=tuple(channels))
-
-
-def _four_block(G: LPVStateSpace) -> Plant:
-    """Return the plant of `ncfsyn` over p: from noise on y and a disturbance of u to u and y."""
-    noise = {Signal(f"{y}_noise", y.unit): y for y in G.outputs}
-    disturbance = {Signal(f"{u}_disturbance", u.unit): u for u in G.inputs}
-    inputs = {
-        **{n: {} for n in noise},
-        **{d: {u: 1.0} for d, u in disturbance.items()},
-        **itself(G.inputs),
-    }
-    across = {y: {n: 1.0} for n, y in noise.items()}
-    return Plant(
-        mixed(G, inputs, itself(G.outputs), across),
-        disturbances=(*noise, *disturbance),
-        performance=(*G.inputs, *G.outputs),
-        controls=G.inputs,
-        measurements=G.outputs,
-    )

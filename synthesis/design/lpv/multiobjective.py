@@ -16,6 +16,7 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.lpv.bases import FunctionSpace
 from symheli.threads import with_one_thread
+from symheli.values.arrays import Array
 from symheli.values.signal import indices
 from synthesis.certify.statement.outcome import Attempt
 from synthesis.certify.statement.rates import Rate, limits
@@ -40,8 +41,6 @@ from synthesis.numerics.program.affine_program import (
 from synthesis.numerics.program.answer import Answer
 from synthesis.numerics.program.bases import Dependence, functions, limited, used
 from synthesis.numerics.program.cone_program import Solver, general_solver
-
-Array = np.ndarray
 
 BACK_OFF = 1.02
 """Factor by which every bound is relaxed before X and Y are fixed."""
@@ -372,13 +371,13 @@ class _Problem:
         sampled = self.scaled.dt is not None
         gain = isinstance(o, L2)
         if sampled:
-            F = [[-loop.P], [_t(loop.A), -loop.P], [_t(loop.B), None, -one]]
+            F = [[-loop.P], [loop.A.mT, -loop.P], [loop.B.mT, None, -one]]
             rows = [*F, [None, loop.C, loop.D, -top]] if gain else F
             program.positive(cell, -from_lower(rows), name=_words(o))
         else:
             zero = np.zeros((program.values, 1, *unknowns.X.entries.shape[1:]))
             drift = from_lower([[-program.slope(unknowns.Y)], [zero, program.slope(unknowns.X)]])
-            F = [[loop.A + _t(loop.A) + drift], [_t(loop.B), -one]]
+            F = [[loop.A + loop.A.mT + drift], [loop.B.mT, -one]]
             rows = [*F, [loop.C, loop.D, -top]] if gain else F
             for motion in self.scaled.motions(cell.nodes, self.moving):
                 program.positive(cell, -from_lower(rows), motion, _words(o))
@@ -410,13 +409,13 @@ def _region(region: PoleRegion, loop: _LoopInNewVariables) -> Iterator[Array]:
     """Yield the inequalities of a pole region (Chilali and Gahinet 1996)."""
     A, P = loop.A, loop.P
     if region.decay > 0:
-        yield A + _t(A) + 2 * region.decay * P
+        yield A + A.mT + 2 * region.decay * P
     if math.isfinite(region.radius):
-        yield from_lower([[-region.radius * P], [_t(A), -region.radius * P]])
+        yield from_lower([[-region.radius * P], [A.mT, -region.radius * P]])
     if region.damping > 0:
         s, c = region.damping, math.sqrt(1 - region.damping**2)
-        along, across = c * (A + _t(A)), s * (A - _t(A))
-        yield from_lower([[along], [_t(across), along]])
+        along, across = c * (A + A.mT), s * (A - A.mT)
+        yield from_lower([[along], [across.mT, along]])
 
 
 def _words(o: Objective) -> str:
@@ -427,7 +426,3 @@ def _words(o: Objective) -> str:
 
 def _places(given: Sequence[str] | None, known: Sequence[str], kind: str) -> list[int]:
     return list(range(len(known))) if given is None else indices(given, known, kind)  # type: ignore[arg-type]
-
-
-def _t(M: Array) -> Array:
-    return np.swapaxes(M, -1, -2)

@@ -12,6 +12,7 @@ from symheli import UncertainStateSpace
 from symheli.errors import SynthesisError
 from symheli.lpv.bases.polynomials import lobatto_points
 from symheli.threads import with_one_thread
+from symheli.values.arrays import Array
 from synthesis.certify.statement.impose import Grid
 from synthesis.certify.statement.outcome import Attempt
 from synthesis.certify.statement.rates import Rate, limits
@@ -49,8 +50,6 @@ from synthesis.numerics.program.bases import (
     used,
 )
 from synthesis.numerics.program.cone_program import LYAPUNOV, Solver
-
-Array = np.ndarray
 
 CENTRAL = "output feedback, central controllers of the frozen models"
 BOUND_DECIDES = (

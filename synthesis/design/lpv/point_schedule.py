@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from symheli.values.arrays import Array
 from synthesis.design.loops.controller import Controller
 from synthesis.design.lpv.fitted import Fitted, controller_from
 from synthesis.design.lti.hinf import hinf
-from synthesis.design.lti.point_design import PointDesign
+from synthesis.design.lti.point_design import PointDesign, design_at
 from synthesis.design.plant.plant import Plant
 
 
@@ -20,15 +21,7 @@ def hinf_at(plant: Plant, p: Sequence[float], back_off: float = 1.01) -> PointDe
     """Design the H-infinity controller of a plant frozen at p, one value a parameter; `back_off` as
     in `hinf`.
     """
-    named = plant.channels
-    return hinf(
-        plant.nominal.at(*p),
-        named.controls,
-        named.measurements,
-        disturbances=named.disturbances,
-        performance=named.performance,
-        back_off=back_off,
-    )
+    return design_at(plant, p, partial(hinf, back_off=back_off))
 
 
 def hinf_schedule(

@@ -26,10 +26,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from symheli.values.arrays import Array
 from synthesis.design.lti.linear_quadratic import given_direct_way
 from synthesis.design.plant.generalized import Generalized
 
-Array = np.ndarray
 ROUNDING = 1e-6
 """Least relative margin of a level above the smallest one, at which the formula is singular."""
 
@@ -64,13 +64,13 @@ def split(plant: Generalized, X: Array, Y: Array, gamma: float) -> Transformed:
     D = direct(D11, D12, D21, gamma)
     Dcl = D11 + D12 @ D @ D21
     C = control_gain(plant, Y, D, gamma)
-    B = _t(control_gain(plant.dual, X, _t(D), gamma))
+    B = control_gain(plant.dual, X, D.mT, gamma).mT
     nw, nz = B1.shape[-1], C1.shape[-2]
-    M = np.block([[_identity(-gamma, nw, Dcl), _t(Dcl)], [Dcl, _identity(-gamma, nz, Dcl)]])
+    M = np.block([[_identity(-gamma, nw, Dcl), Dcl.mT], [Dcl, _identity(-gamma, nz, Dcl)]])
     loop = A + B2 @ D @ C2
-    left = np.concatenate([X @ B1 + B @ D21, _t(C1 + D12 @ D @ C2)], axis=-1)
-    right = np.concatenate([_t(B1 + B2 @ D @ D21), C1 @ Y + D12 @ C], axis=-2)
-    return Transformed(left @ np.linalg.solve(M, right) - _t(loop), B, C, D)
+    left = np.concatenate([X @ B1 + B @ D21, (C1 + D12 @ D @ C2).mT], axis=-1)
+    right = np.concatenate([(B1 + B2 @ D @ D21).mT, C1 @ Y + D12 @ C], axis=-2)
+    return Transformed(left @ np.linalg.solve(M, right) - loop.mT, B, C, D)
 
 
 def control_gain(plant: Generalized, Y: Array, D: Array, gamma: float) -> Array:
@@ -82,12 +82,12 @@ def control_gain(plant: Generalized, Y: Array, D: Array, gamma: float) -> Array:
     zero = np.zeros
     M = np.block(
         [
-            [zero((K, nu, nu)), _t(D12), zero((K, nu, nw))],
+            [zero((K, nu, nu)), D12.mT, zero((K, nu, nw))],
             [D12, _identity(-gamma, nz, Dcl), Dcl],
-            [zero((K, nw, nu)), _t(Dcl), _identity(-gamma, nw, Dcl)],
+            [zero((K, nw, nu)), Dcl.mT, _identity(-gamma, nw, Dcl)],
         ]
     )
-    known = np.concatenate([_t(B2), C1 @ Y, _t(B1 + B2 @ D @ D21)], axis=-2)
+    known = np.concatenate([B2.mT, C1 @ Y, (B1 + B2 @ D @ D21).mT], axis=-2)
     return -np.linalg.solve(M, known)[:, :nu]
 
 
@@ -135,7 +135,7 @@ def sampled_controller(plant: Generalized, X: Array, Y: Array, S: Array, gamma: 
     inverse = np.linalg.inv(X)
     root = np.linalg.cholesky(X)
     now, after = (np.linalg.cholesky(Z - inverse) for Z in (Y, S))
-    error, ahead = _t(root), np.linalg.inv(after)  # of x - x_k and of x_k after the step
+    error, ahead = root.mT, np.linalg.inv(after)  # of x - x_k and of x_k after the step
     before = np.concatenate([np.linalg.inv(error), now], axis=-1)  # x of both before it
     zero, none = np.zeros((K, n, n)), np.zeros((K, n, B2.shape[-1]))
     found = _central(
@@ -194,15 +194,15 @@ def contraction(M: Array, left: Array, right: Array, level: float) -> Array:
     """
     k, l = left.shape[-1], right.shape[-2]
     P, into = np.linalg.qr(left, mode="complete")
-    Q, out = np.linalg.qr(_t(right), mode="complete")
-    inner = _t(P) @ M @ Q
+    Q, out = np.linalg.qr(right.mT, mode="complete")
+    inner = P.mT @ M @ Q
     above, beside, corner = inner[:, :k, l:], inner[:, k:, :l], inner[:, k:, l:]
     least = np.maximum(_norm(inner[:, k:]), _norm(inner[:, :, l:]))
     bound = np.maximum(level, least * (1 + ROUNDING))[:, None, None]
-    room = bound**2 * np.eye(corner.shape[-1]) - _t(corner) @ corner
-    best = -above @ np.linalg.solve(room, _t(corner) @ beside)
+    room = bound**2 * np.eye(corner.shape[-1]) - corner.mT @ corner
+    best = -above @ np.linalg.solve(room, corner.mT @ beside)
     gain = best - inner[:, :k, :l]
-    return np.linalg.solve(into[:, :k], gain) @ np.linalg.inv(_t(out[:, :l]))
+    return np.linalg.solve(into[:, :k], gain) @ np.linalg.inv(out[:, :l].mT)
 
 
 def _norm(M: Array) -> Array:
@@ -211,7 +211,3 @@ def _norm(M: Array) -> Array:
 
 def _identity(factor: float, n: int, like: Array) -> Array:
     return np.broadcast_to(factor * np.eye(n), (len(like), n, n))
-
-
-def _t(M: Array) -> Array:
-    return np.swapaxes(M, -1, -2)

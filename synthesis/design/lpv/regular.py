@@ -9,14 +9,13 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from symheli.values.arrays import Array
 from symheli.values.signal import Signal
 from synthesis.design.lpv.worst_optimum import worst_optimum
 from synthesis.design.plant.diagnosis import NAMED_FRACTION, free_directions
 from synthesis.design.plant.generalized import Generalized, continuous_plant
 from synthesis.design.plant.plant import Plant
 from synthesis.design.plant.refusals import conditions
-
-Array = np.ndarray
 
 SHARES = (1e-2, 1e-3, 1e-4)
 """Noise in shares of what the disturbances do to a measurement, and costs in shares of what a

@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from symheli import UncertainStateSpace
+from symheli.values.arrays import Array
 from symheli.values.signal import Signal
 
 if TYPE_CHECKING:
     from synthesis.design.plant.plant import Plant
-
-Array = np.ndarray
 
 SCALE_DECADES = (0.0, -1.0, 1.0, -2.0, 2.0)
 """Scales of the block's channels that are tried, as decimal exponents relative to the scale that

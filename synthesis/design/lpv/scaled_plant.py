@@ -12,10 +12,12 @@ from numpy.polynomial import chebyshev
 
 from symheli import LinearModel, LPVStateSpace, Scheduling
 from symheli.errors import InputError
+from symheli.lpv.balancing import square_root
 from symheli.lpv.bases import FunctionSpace
 from symheli.lpv.bases.function_space import tensor_grid
 from symheli.lpv.bases.polynomials import factors_of, interpolation_points
 from symheli.lpv.tools import Matrices
+from symheli.values.arrays import Array
 from synthesis.certify.statement.scaling import model_scaling
 from synthesis.design.lti.linear_quadratic import control_gains
 from synthesis.design.plant.generalized import Generalized
@@ -23,8 +25,6 @@ from synthesis.numerics.program.bases import extreme_motions
 
 if TYPE_CHECKING:
     from synthesis.design.plant.plant import Plant
-
-Array = np.ndarray
 
 MatricesAt = Callable[[Array], Generalized]
 
@@ -184,9 +184,8 @@ def _balancing(plants: Generalized, dt: float | None) -> tuple[Array | None, Arr
             return None, None
         values, vectors = np.linalg.eigh(one)
         return vectors * values**power, None
-    values, vectors = np.linalg.eigh(Y)
     # the mean cost of a state may be rounding beside that of another
-    L = vectors * np.sqrt(np.maximum(values, REGULARIZATION**2 * values[-1]))
+    L = square_root(Y, REGULARIZATION**2)
     U, squares, _ = np.linalg.svd(L.T @ X @ L)
     return L @ U / squares**0.25, squares
 

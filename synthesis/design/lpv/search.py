@@ -23,6 +23,7 @@ import numpy as np
 from symheli import Scheduling
 from symheli.lpv.bases.function_space import tensor_grid
 from symheli.progress import tracked
+from symheli.values.arrays import Array
 from synthesis.certify.statement.outcome import Attempt
 from synthesis.design.lpv.existence import MATRIX_BOUNDS, Divisions, Existence, Solution
 from synthesis.design.lpv.fitted import Fitted, cut_to_serve, fits
@@ -34,8 +35,6 @@ from synthesis.numerics.program.cone_program import Solver
 
 if TYPE_CHECKING:
     from synthesis.design.plant.plant import Plant
-
-Array = np.ndarray
 
 
 BACK_OFF = (1.02, 1.04, 1.01, 1.1, 1.2, 1.5)

@@ -9,6 +9,7 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.threads import with_one_thread
+from symheli.values.arrays import Array
 from synthesis.certify.statement.impose import Grid
 from synthesis.certify.statement.outcome import Attempt
 from synthesis.certify.statement.rates import Rate, limits
@@ -23,8 +24,6 @@ from synthesis.design.lpv.search import BACK_OFF, best, settled
 from synthesis.design.plant.plant import Plant, require_plant
 from synthesis.design.plant.refusals import conditions, failed, least_ranks, levels_above
 from synthesis.numerics.program.bases import Bases, Dependence, dependence
-
-Array = np.ndarray
 
 MAX_CONDITION = 1e12
 """Largest condition number of C2 at which all states count as measured."""

@@ -31,6 +31,7 @@ import numpy as np
 
 from symheli.lpv.bases import FunctionSpace
 from symheli.progress import tracked
+from symheli.values.arrays import Array
 from synthesis.certify.lower_bounds.box import of_gramian
 from synthesis.certify.statement.kind import H2_GAIN
 from synthesis.certify.statement.outcome import Attempt
@@ -59,7 +60,6 @@ from synthesis.numerics.program.cone_program import LYAPUNOV, Solver
 from synthesis.numerics.program.lyapunov_program import LyapunovBlocks
 from synthesis.numerics.program.unknown import BlockTerms, UnknownFunction, selector
 
-Array = np.ndarray
 Cost = Callable[[Array], tuple[Array, Array]]
 """Columns (K, n, k) whose variances by the inverse of the unknown are summed, and a known part (K,)
 of the sum, at p (K, m).
@@ -217,8 +217,8 @@ class _Search:
 
         def feedback(p: Array) -> tuple[Array, Array]:
             at, P = self.scaled.at(p), control.inverse(chosen, p)
-            root = np.linalg.cholesky(_t(at.D12) @ at.D12)
-            return _t(_gains(at, P)) @ root, np.einsum("kni,knm,kmi->k", at.B1, P, at.B1)
+            root = np.linalg.cholesky(at.D12.mT @ at.D12)
+            return _gains(at, P).mT @ root, np.einsum("kni,knm,kmi->k", at.B1, P, at.B1)
 
         return feedback
 
@@ -233,7 +233,7 @@ class _Search:
         def gains(p: Array) -> Array:
             at = self.scaled.at(p)
             F = _gains(at, control.inverse(chosen, p))
-            L = _t(_gains(at.dual, filtering.inverse(settled, p)))
+            L = _gains(at.dual, filtering.inverse(settled, p)).mT
             nothing = np.zeros((len(p), F.shape[-2], L.shape[-1]))
             A = at.A + at.B2 @ F + L @ at.C2
             return Gains(*given_direct_way(at.D22, A, -L, F, nothing)).packed
@@ -289,7 +289,7 @@ class _Search:
 
 def _gains(plant: Generalized, P: Array) -> Array:
     """Return F (K, nu, n) = -R^-1 (B2'P + D12'C1)."""
-    return -np.linalg.solve(_t(plant.D12) @ plant.D12, _t(plant.B2) @ P + _t(plant.D12) @ plant.C1)
+    return -np.linalg.solve(plant.D12.mT @ plant.D12, plant.B2.mT @ P + plant.D12.mT @ plant.C1)
 
 
 class _FrozenBounds(NamedTuple):
@@ -322,7 +322,3 @@ def _innovations(plant: Generalized) -> Array:
     found = control_gains(plant.dual, None)
     assert found is not None  # noqa: S101 - `_worst_frozen` was asked before
     return found.F.T @ np.linalg.cholesky(found.R)
-
-
-def _t(M: Array) -> Array:
-    return np.swapaxes(M, -1, -2)

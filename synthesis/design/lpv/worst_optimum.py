@@ -12,13 +12,12 @@ from scipy import optimize
 
 from symheli.lpv.bases.polynomials import lobatto_points
 from symheli.progress import tracked
+from symheli.values.arrays import Array
 from synthesis.design.lti.hinf import ROUGH_ACCURACY, optimum_above, slack
 from synthesis.design.plant.generalized import Generalized
 
 if TYPE_CHECKING:
     from synthesis.design.plant.plant import Plant
-
-Array = np.ndarray
 
 POINTS = {1: 65, 2: 5}
 """Number of values of each parameter (more parameters: 3)."""

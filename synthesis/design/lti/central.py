@@ -11,11 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from symheli.lpv.equilibration import is_singular
+from symheli.lpv.riccati import stabilising, without_rounding
+from symheli.values.arrays import Array
 from synthesis.design.lti.linear_quadratic import given_direct_way
 from synthesis.design.plant.generalized import Generalized
-from synthesis.numerics.linear.riccati import stabilising, without_rounding
-
-Array = np.ndarray
 
 
 class Obstacle(Enum):

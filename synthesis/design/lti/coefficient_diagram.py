@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import signal
+from scipy.linalg import companion
 
 from symheli import LinearModel
 from symheli.errors import InputError
 from symheli.lpv.equilibration import is_singular
+from symheli.lpv.linear_model import as_model
 from symheli.values.arrays import Array, frozen
 from symheli.values.numbers import positive
 from symheli.values.signal import Signal
-from synthesis.numerics.linear.model import as_model
 
 STANDARD = (2.5, 2.0)
 """Stability indices of Manabe's standard form; the last one holds for all further ones."""
@@ -44,6 +44,10 @@ def coefficient_diagram(
 ) -> LinearModel:
     """Design a controller of one model by the coefficient diagram method.
 
+    It takes the loop alone, since its target is the polynomial of that. Of a `Plant` it is the
+    design for `plant.nominal.at(p).select(inputs=plant.controls, outputs=plant.measurements)`, and
+    `Controller.of(plant, K)` of the result is its `Controller`.
+
     The characteristic polynomial of the loop is that of an equivalent time constant and of
     stability indices, reached by the controller of least order: one below the plant's, one more for
     an integrator, and one more to be strictly proper.
@@ -64,8 +68,7 @@ def coefficient_diagram(
     Returns
     -------
     LinearModel
-        u = K y, with positive feedback as of every design here; `Controller.of(plant, K)`
-        certifies and flies it.
+        u = K y, with positive feedback as of every design here.
 
     Raises
     ------
@@ -88,11 +91,12 @@ def coefficient_diagram(
     """
     G = as_model(G)
     tau, g = positive(tau, "tau"), frozen(indices, "indices", (None,))
-    if G.dt is not None or np.any(G.D) or (len(G.inputs), len(G.outputs)) != (1, 1):
+    sizes = len(G.states), len(G.inputs), len(G.outputs)
+    if G.dt is not None or np.any(G.D) or sizes[1:] != (1, 1) or not sizes[0]:
         raise InputError(
-            "cdm: expected a continuous, strictly proper plant of one input and one output (of a"
-            f" direct way put a servo before it), got {len(G.inputs)} inputs, {len(G.outputs)}"
-            f" outputs, dt {G.dt}, D {'not zero' if np.any(G.D) else 'zero'}"
+            "cdm: expected a continuous, strictly proper plant with states, of one input and one"
+            " output (of a direct way put a servo before it), got {} states, {} inputs, {} outputs,"
+            f" dt {G.dt}, D {'not zero' if np.any(G.D) else 'zero'}".format(*sizes)
         )
     if not len(g) or not (g > 0).all():
         raise InputError(f"indices: expected numbers > 0, got {indices!r:.80}")
@@ -119,10 +123,10 @@ def coefficient_diagram(
         )
     a = np.concatenate([x[: len(powers_a)], np.zeros(int(integral))])
     b = x[len(powers_a) :] / size
-    A, B, C, D = signal.tf2ss(-b, a)
+    a, b = a / a[0], np.concatenate([np.zeros(int(roll_off)), -b / a[0]])
+    A, B = companion(a) if order else np.zeros((0, 0)), np.eye(order, 1)
+    C, D = (b[1:] - b[0] * a[1:])[None], b[:1, None]
     states = tuple(Signal(f"k{i + 1}") for i in range(order))
-    if not order:
-        A, B, C = np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0))
     return LinearModel(A / tau, B / tau, C, D, states, G.outputs, G.inputs)
 
 

@@ -5,24 +5,27 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, overload
 
 import numpy as np
 from scipy import linalg
 
 from symheli import LinearModel
+from symheli.lpv.linear_model import as_model
+from symheli.lpv.riccati import lyapunov
+from symheli.values.arrays import Array
+from synthesis.design.loops.controller import Controller
 from synthesis.design.lti.linear_quadratic import Matrices, given_direct_way, lqg
 from synthesis.design.lti.point_design import (
     DesignStatus,
     PointDesign,
     named_controller,
     named_loop,
+    on_plant,
 )
 from synthesis.design.plant.diagnosis import reasons
 from synthesis.design.plant.generalized import Channels, Generalized
-from synthesis.numerics.linear.model import as_model
-
-Array = np.ndarray
+from synthesis.design.plant.plant import Plant
 
 NEGLIGIBLE_FEEDTHROUGH = 1e-9
 """Feedthrough from disturbances to performance below this fraction of its terms counts as zero."""
@@ -47,6 +50,9 @@ INACCURATE = (
 )
 
 
+@overload
+def h2(model: Plant) -> Controller: ...
+@overload
 def h2(
     model: LinearModel,
     controls: Sequence[str],
@@ -54,8 +60,17 @@ def h2(
     *,
     disturbances: Sequence[str] | None = None,
     performance: Sequence[str] | None = None,
-) -> PointDesign:
-    """Design the H2-optimal output-feedback controller of one model, continuous or sampled.
+) -> PointDesign: ...
+def h2(
+    model: Any,
+    controls: Sequence[str] = (),
+    measurements: Sequence[str] = (),
+    *,
+    disturbances: Sequence[str] | None = None,
+    performance: Sequence[str] | None = None,
+) -> Any:
+    """Design the H2-optimal output-feedback controller of one model, continuous or sampled: of a
+    `Plant` that depends on no parameter, or of a `LinearModel` with its channels.
 
     A linear-quadratic regulator on a Kalman filter. Of a continuous model the direct way from
     disturbances to performance must be one that a static gain can cancel; a sampled one may have
@@ -63,23 +78,25 @@ def h2(
 
     Parameters
     ----------
-    model : LinearModel or system of python-control
+    model : Plant, LinearModel or system of python-control
         From disturbances and controls to performance and measurements.
     controls, measurements : sequence of str
-        Inputs that the controller commands, outputs that it reads.
+        Inputs that the controller commands, outputs that it reads; a plant names its own.
     disturbances, performance : sequence of str, optional
         The inputs and outputs between which the norm counts; default all others.
 
     Returns
     -------
-    PointDesign
-        The controller u = K y; `gamma` is the H2 norm of its loop, recomputed, and the `optimum`.
-        Where there is no controller, `reasons`.
+    Controller or PointDesign
+        Of a plant the controller. Of a model the controller u = K y; `hinf_norm` is the H2 norm of
+        its loop, recomputed, and the `optimum`. Where there is no controller, `reasons`.
 
     Raises
     ------
     InputError
-        Another type of model.
+        Another type of model, a plant that depends on p.
+    SynthesisError
+        No controller of a plant; with the reasons.
     UnknownNameError
         A signal that the model does not have.
 
@@ -105,6 +122,9 @@ def h2(
     >>> print(K.A, K.B, K.C, K.D)
     [[-3.]] [[1.]] [[-1.]] [[0.]]
     """
+    if isinstance(model, Plant):
+        names = controls, measurements, disturbances, performance
+        return on_plant(model, names, h2, "H2", gain=False)
     model = as_model(model)
     names = Channels.of(model, controls, measurements, disturbances, performance)
     plant = Generalized.between(model, names)
@@ -206,11 +226,6 @@ def _variance(A: Array, B: Array, C: Array, dt: float | None) -> _Variance | Non
     W is refined; the last change, and the rounding of the sum, bound the error.
     """
 
-    def solved(Q: Array) -> Array:
-        if dt is None:
-            return linalg.solve_continuous_lyapunov(A, -Q)
-        return linalg.solve_discrete_lyapunov(A, Q)
-
     def shown(M: Array) -> Any:
         return np.sum((C @ M) * C)
 
@@ -219,7 +234,7 @@ def _variance(A: Array, B: Array, C: Array, dt: float | None) -> _Variance | Non
     try:
         for _ in range(1 + REFINEMENTS):
             left = (A @ W + W @ A.T if dt is None else A @ W @ A.T - W) + driven
-            more = solved(np.asarray(left, dtype=float))
+            more = lyapunov(A, np.asarray(left, dtype=float), dt)
             W = W + 0.5 * (more + more.T)
             values.append(float(shown(W)))
     except (np.linalg.LinAlgError, ValueError):

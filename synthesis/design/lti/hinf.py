@@ -8,16 +8,20 @@ import math
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple, overload
 
 import numpy as np
 from scipy import linalg, optimize
 
 from symheli import LinearModel
 from symheli.errors import InputError
+from symheli.lpv.linear_model import as_model
+from symheli.values.arrays import Array
+from synthesis.design.loops.controller import Controller
 from synthesis.design.lti.central import Normalised, Obstacle, RiccatiTrial
 from synthesis.design.lti.linear_quadratic import Matrices, lqg
-from synthesis.design.lti.point_design import DesignStatus, PointDesign, checked
+from synthesis.design.lti.point_design import DesignStatus, PointDesign, checked, on_plant
 from synthesis.design.plant.diagnosis import decided_by, reasons
 from synthesis.design.plant.generalized import (
     Channels,
@@ -25,11 +29,9 @@ from synthesis.design.plant.generalized import (
     continuous_plant,
     sampled_controller,
 )
+from synthesis.design.plant.plant import Plant
 from synthesis.design.plant.refusals import levels_above
-from synthesis.numerics.linear.model import as_model
 from synthesis.numerics.linear.norm import norm
-
-Array = np.ndarray
 
 ACCURACY = 1e-10
 """Relative accuracy of the optimum."""
@@ -66,6 +68,9 @@ MAX_LEVEL = 1e100
 """Largest level, and the inverse of the smallest: its square must neither over- nor underflow."""
 
 
+@overload
+def hinf(model: Plant, *, gamma: float | None = None, back_off: float = 1.01) -> Controller: ...
+@overload
 def hinf(
     model: LinearModel,
     controls: Sequence[str],
@@ -75,8 +80,19 @@ def hinf(
     performance: Sequence[str] | None = None,
     gamma: float | None = None,
     back_off: float = 1.01,
-) -> PointDesign:
-    """Design the H-infinity output-feedback controller of one model, continuous or sampled.
+) -> PointDesign: ...
+def hinf(
+    model: Any,
+    controls: Sequence[str] = (),
+    measurements: Sequence[str] = (),
+    *,
+    disturbances: Sequence[str] | None = None,
+    performance: Sequence[str] | None = None,
+    gamma: float | None = None,
+    back_off: float = 1.01,
+) -> Any:
+    """Design the H-infinity output-feedback controller of one model, continuous or sampled: of a
+    `Plant` that depends on no parameter, or of a `LinearModel` with its channels.
 
     Two Riccati equations decide whether a level can be reached; the smallest is found to eight
     digits (five where noise or price are 1e-5 of the rest), and the central controller is that of a
@@ -85,10 +101,10 @@ def hinf(
 
     Parameters
     ----------
-    model : LinearModel or system of python-control
+    model : Plant, LinearModel or system of python-control
         From disturbances and controls to performance and measurements.
     controls, measurements : sequence of str
-        Inputs that the controller commands, outputs that it reads.
+        Inputs that the controller commands, outputs that it reads; a plant names its own.
     disturbances, performance : sequence of str, optional
         The inputs and outputs between which the gain counts; default all others.
     gamma : float, optional
@@ -98,15 +114,17 @@ def hinf(
 
     Returns
     -------
-    PointDesign
-        `optimum`, the controller u = K y, and the recomputed norm `hinf_norm` of its loop. Where
-        there is no controller, `reasons` with the modes, controls or measurements that stand
-        against it.
+    Controller or PointDesign
+        Of a plant the controller, with the norm of its loop `promised`. Of a model `optimum`, the
+        controller u = K y, and the recomputed norm `hinf_norm` of its loop. Where there is no
+        controller, `reasons` with the modes, controls or measurements that stand against it.
 
     Raises
     ------
     InputError
-        A level or back-off that cannot be, another type of model.
+        A level or back-off that cannot be, another type of model, a plant that depends on p.
+    SynthesisError
+        No controller of a plant; with the reasons.
     UnknownNameError
         A signal that the model does not have.
 
@@ -135,6 +153,10 @@ def hinf(
     >>> print(f"{design.optimum:.7f} {design.hinf_norm:.3f}", design.controller.is_stable())
     0.6009252 0.607 True
     """
+    if isinstance(model, Plant):
+        design = partial(hinf, gamma=gamma, back_off=back_off)
+        names = controls, measurements, disturbances, performance
+        return on_plant(model, names, design, "H-infinity", gain=True)
     model = as_model(model)
     if gamma is not None and not 1 / MAX_LEVEL < gamma < MAX_LEVEL:
         raise InputError(

@@ -7,16 +7,16 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy import linalg
 
+from symheli.errors import InputError
+from symheli.lpv.riccati import regulator
+from symheli.values.arrays import Array
 from synthesis.design.plant.generalized import Generalized
-from synthesis.numerics.linear.riccati import stabilising, without_rounding
 
-Array = np.ndarray
 Matrices = tuple[Array, Array, Array, Array]
 
 
-class Regulator(NamedTuple):
+class ControlGains(NamedTuple):
     """The control that minimises |z| with the states known: u = F x + F0 w, X the solution of the
     Riccati equation, R the weight of u.
 
@@ -30,36 +30,17 @@ class Regulator(NamedTuple):
     R: Array
 
 
-def control_gains(P: Generalized, dt: float | None) -> Regulator | None:
-    """Return the regulator, None where the equation has no stabilising solution."""
-    return _continuous(P) if dt is None else _sampled(P)
-
-
-def _continuous(P: Generalized) -> Regulator | None:
-    R = P.D12.T @ P.D12
-    S = P.D12.T @ P.C1
-    inverse = np.linalg.inv(R)
-    seen, crossed = np.abs(P.C1), np.abs(S)
-    Q = without_rounding(
-        P.C1.T @ P.C1 - S.T @ inverse @ S, seen.T @ seen + crossed.T @ np.abs(inverse) @ crossed
-    )
-    X = stabilising(P.A - P.B2 @ inverse @ S, -P.B2 @ inverse @ P.B2.T, Q)
-    if X is None:
-        return None
-    return Regulator(-inverse @ (S + P.B2.T @ X), np.zeros((len(R), P.B1.shape[1])), X, R)
-
-
-def _sampled(P: Generalized) -> Regulator | None:
+def control_gains(P: Generalized, dt: float | None) -> ControlGains | None:
+    """Return the gains, None where the equation has no stabilising solution."""
+    Q, R, S = P.C1.T @ P.C1, P.D12.T @ P.D12, P.D12.T @ P.C1
     try:
-        X = linalg.solve_discrete_are(P.A, P.B2, P.C1.T @ P.C1, P.D12.T @ P.D12, s=P.C1.T @ P.D12)
-        R = P.D12.T @ P.D12 + P.B2.T @ X @ P.B2
-        F = -np.linalg.solve(R, P.B2.T @ X @ P.A + P.D12.T @ P.C1)
-        F0 = -np.linalg.solve(R, P.B2.T @ X @ P.B1 + P.D12.T @ P.D11)
-    except (np.linalg.LinAlgError, ValueError):
+        found = regulator(P.A, P.B2, Q, R, S.T, dt, terms=np.abs(P.C1).T @ np.abs(P.C1))
+    except InputError:
         return None
-    if np.abs(np.linalg.eigvals(P.A + P.B2 @ F)).max(initial=0.0) >= 1:
-        return None
-    return Regulator(F, F0, X, R)
+    F0 = np.zeros((len(R), P.B1.shape[1]))
+    if dt is not None:
+        F0 = -np.linalg.solve(found.R, P.B2.T @ found.X @ P.B1 + P.D12.T @ P.D11)
+    return ControlGains(-found.K, F0, found.X, found.R)
 
 
 def lqg(P: Generalized, dt: float | None) -> Matrices | None:

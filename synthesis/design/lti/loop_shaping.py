@@ -7,20 +7,21 @@ from dataclasses import replace
 
 import numpy as np
 
-from symheli import LinearModel
+from symheli import LinearModel, LPVStateSpace
 from symheli.errors import InputError
 from symheli.lpv import series
+from symheli.lpv.linear_model import as_model
+from symheli.lpv.mixing import itself, mixed
+from symheli.lpv.riccati import stabilising
+from symheli.values.arrays import Array
 from symheli.values.signal import Signal
 from synthesis.design.lti.point_design import DesignStatus, PointDesign, checked
 from synthesis.design.lti.weights import Weight, as_weight
 from synthesis.design.plant.diagnosis import reasons
-from synthesis.design.plant.generalized import Channels, Generalized, sampled_controller
+from synthesis.design.plant.generalized import sampled_controller
+from synthesis.design.plant.plant import Plant
 from synthesis.design.plant.refusals import levels_above
-from synthesis.numerics.linear.model import as_model
 from synthesis.numerics.linear.norm import to_continuous
-from synthesis.numerics.linear.riccati import stabilising
-
-Array = np.ndarray
 
 
 def ncfsyn(
@@ -28,6 +29,10 @@ def ncfsyn(
 ) -> PointDesign:
     """Design the controller of the largest normalized coprime stability margin of the shaped plant
     W2 G W1.
+
+    It takes the loop alone, since its weights stand for disturbances and performance. Of a `Plant`
+    it is the design for `plant.nominal.at(p).select(inputs=plant.controls,
+    outputs=plant.measurements)`, and `Controller.of(plant, design)` is its `Controller`.
 
     The smallest gamma is known in closed form, sqrt(1 + rho(X Z)) with the solutions of two Riccati
     equations: every plant within 1/gamma of the shaped one in the nu-gap is stabilised as well. Up
@@ -65,7 +70,7 @@ def ncfsyn(
     --------
     For an integrator the optimum is sqrt(2):
 
-    >>> from symheli import LinearModel
+    >>> from symheli import LinearModel, LPVStateSpace
 
     >>> from symheli.lpv import series
     >>> integrator = LinearModel([[0.0]], [[1.0]], [[1.0]], [[0.0]], ["x"], ["u"], ["y"])
@@ -81,7 +86,8 @@ def ncfsyn(
     before = as_weight(W1, "W1", G.inputs, G.dt)
     behind = as_weight(W2, "W2", G.outputs, G.dt)
     shaped = series(series(before, G), behind)
-    plant, names = _four_block(shaped)
+    whole = four_block(LPVStateSpace.constant(shaped))
+    plant, names = whole.at(0.5).checked(whole.channels), whole.channels
     if against := reasons(plant, names, dt=G.dt):
         return PointDesign.without(DesignStatus.IMPOSSIBLE, against)
     found = _closed_form(shaped, back_off)
@@ -90,30 +96,28 @@ def ncfsyn(
         return PointDesign.without(
             DesignStatus.FAILED, ["a Riccati equation was not solved to a stable loop"]
         )
-    whole = series(series(behind, design.controller), before)
-    return replace(design, optimum=min(found[0], design.hinf_norm), controller=whole)
+    K = series(series(behind, design.controller), before)
+    return replace(design, optimum=min(found[0], design.hinf_norm), controller=K)
 
 
-def _four_block(G: LinearModel) -> tuple[Generalized, Channels]:
-    """Return the system from noise on y and a disturbance on u to (u, y): [K; I] (I - G K)^-1 [I,
+def four_block(G: LPVStateSpace) -> Plant:
+    """Return the plant from noise on y and a disturbance of u to u and y: [K; I] (I - G K)^-1 [I,
     G].
     """
-    nx, nu, ny = len(G.states), len(G.inputs), len(G.outputs)
-    plant = Generalized(
-        A=G.A,
-        B1=np.hstack([np.zeros((nx, ny)), G.B]),
-        B2=G.B,
-        C1=np.vstack([np.zeros((nu, nx)), G.C]),
-        C2=G.C,
-        D11=np.block([[np.zeros((nu, ny)), np.zeros((nu, nu))], [np.eye(ny), G.D]]),
-        D12=np.vstack([np.eye(nu), G.D]),
-        D21=np.hstack([np.eye(ny), G.D]),
-        D22=G.D,
-    )
-    noise = tuple(Signal(f"{y}_noise", y.unit) for y in G.outputs)
-    disturbance = tuple(Signal(f"{u}_disturbance", u.unit) for u in G.inputs)
-    return plant, Channels(
-        G.states, (*noise, *disturbance), G.inputs, (*G.inputs, *G.outputs), G.outputs
+    noise = {Signal(f"{y}_noise", y.unit): y for y in G.outputs}
+    disturbance = {Signal(f"{u}_disturbance", u.unit): u for u in G.inputs}
+    inputs = {
+        **{n: {} for n in noise},
+        **{d: {u: 1.0} for d, u in disturbance.items()},
+        **itself(G.inputs),
+    }
+    across = {y: {n: 1.0} for n, y in noise.items()}
+    return Plant(
+        mixed(G, inputs, itself(G.outputs), across),
+        disturbances=(*noise, *disturbance),
+        performance=(*G.inputs, *G.outputs),
+        controls=G.inputs,
+        measurements=G.outputs,
     )
 
 

@@ -4,18 +4,19 @@ together.
 
 from __future__ import annotations
 
-import numpy as np
-from scipy.linalg import block_diag
+from dataclasses import replace
 
-from symheli import LinearModel
+import numpy as np
+
+from symheli import LinearModel, LPVStateSpace
 from symheli.errors import InputError
+from symheli.lpv import append, series
+from symheli.lpv.linear_model import as_model
+from symheli.lpv.mixing import itself, mixed
 from symheli.values.signal import Signal
 from synthesis.design.lti.hinf import hinf
 from synthesis.design.lti.point_design import PointDesign
 from synthesis.design.lti.weights import Weight, as_weight
-from synthesis.numerics.linear.model import as_model
-
-Array = np.ndarray
 
 
 def mixed_sensitivity(
@@ -28,6 +29,10 @@ def mixed_sensitivity(
     back_off: float = 1.01,
 ) -> PointDesign:
     """Design the controller that minimises the gain of [W1 S; W2 K S; W3 T].
+
+    It takes the loop alone, since its weights stand for disturbances and performance. Of a `Plant`
+    it is the design for `plant.nominal.at(p).select(inputs=plant.controls,
+    outputs=plant.measurements)`, and `Controller.of(plant, design)` is its `Controller`.
 
     With a disturbance w at the outputs of the plant, y = G u + w and u = K y (positive feedback: to
     follow a reference, give the controller y - r): S from w to y, K S from w to u, T from w to G u.
@@ -89,43 +94,18 @@ def mixed_sensitivity(
 
 def _weighted(G: LinearModel, *weights: LinearModel | None) -> LinearModel:
     """Return the system from (w, u) to (S, KS, T, y)."""
-    nx, nu, ny = len(G.states), len(G.inputs), len(G.outputs)
-    # what each weight is given, from (x, w, u)
-    output = np.hstack([G.C, np.zeros((ny, ny)), G.D])
-    measured = np.hstack([G.C, np.eye(ny), G.D])
-    control = np.hstack([np.zeros((nu, nx + ny)), np.eye(nu)])
-    labels = ("S", "KS", "T")
-    there = [
-        (W, given, label)
-        for W, given, label in zip(weights, (measured, control, output), labels, strict=True)
-        if W is not None
-    ]
-    A = np.asarray(block_diag(G.A, *(W.A for W, _, _ in there)))
-    into = np.vstack(
-        [np.hstack([np.zeros((nx, ny)), G.B]), *(W.B @ g[:, nx:] for W, g, _ in there)]
-    )
-    A[nx:, :nx] = np.vstack([np.zeros((0, nx)), *(W.B @ g[:, :nx] for W, g, _ in there)])
-    own = np.asarray(block_diag(*(W.C for W, _, _ in there)))
-    order = len(A) - nx
-    C = np.vstack(
-        [
-            np.hstack(
-                [
-                    np.vstack([W.D @ g[:, :nx] for W, g, _ in there]),
-                    own.reshape(sum(len(W.D) for W, _, _ in there), order),
-                ]
-            ),
-            np.hstack([G.C, np.zeros((ny, order))]),
-        ]
-    )
-    D = np.vstack([*(W.D @ g[:, nx:] for W, g, _ in there), measured[:, nx:]])
-    return LinearModel(
-        A,
-        into,
-        C,
-        D,
-        (*G.states, *(s for W, _, _ in there for s in W.states)),
-        (*(Signal(f"{y}_disturbance", y.unit) for y in G.outputs), *G.inputs),
-        (*(Signal(f"{label}_{s}") for W, _, label in there for s in W.outputs), *G.outputs),
-        G.dt,
-    )
+    disturbed = {y: Signal(f"{y}_disturbance", y.unit) for y in G.outputs}
+    inputs = {**{w: {} for w in disturbed.values()}, **itself(G.inputs)}
+    measured = {y: {w: 1.0} for y, w in disturbed.items()}
+    outputs, across, behind = {}, dict(measured), []
+    for label, W in zip(("S", "KS", "T"), weights, strict=True):
+        if W is not None:
+            names = tuple(Signal(f"{label}_{s}") for s in W.outputs)
+            behind.append(replace(W, inputs=names, outputs=names, dt=G.dt))
+            for name, s in zip(names, W.outputs, strict=True):
+                outputs[name] = {} if label == "KS" else {s: 1.0}
+                across[name] = {"S": measured.get(s, {}), "KS": {s: 1.0}, "T": {}}[label]
+    outputs |= itself(G.outputs)
+    own = mixed(LPVStateSpace.constant(G), inputs, outputs, across).at(0.5)
+    straight = LinearModel.gain(np.eye(len(G.outputs)), G.outputs, G.outputs)
+    return series(own, append(*behind, replace(straight, dt=G.dt)))

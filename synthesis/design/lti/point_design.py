@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Any
 
 import numpy as np
 
-from symheli import LinearModel
+from symheli import LinearModel, UncertainStateSpace
 from symheli.errors import InputError
 from symheli.values.signal import Signal
 from symheli.values.summary import summarized
+from synthesis.design.loops.controller import Controller
 from synthesis.design.plant.generalized import Channels, Generalized
+from synthesis.design.plant.plant import Plant
 from synthesis.numerics.linear.norm import norm
 
 Matrices = tuple[Any, Any, Any, Any]
@@ -74,6 +76,46 @@ class PointDesign:
         if self.controller is not None:
             head += f"; gamma = {self.hinf_norm:.6g}"
         return "\n".join([head, *([self.limit] if self.limit else []), *self.reasons])
+
+
+def design_at(plant: Plant, p: Sequence[float], design: Callable[..., PointDesign]) -> PointDesign:
+    """Return the design for the model of a plant at p, one value a parameter, with its channels."""
+    w, z = plant.disturbances, plant.performance
+    return design(
+        plant.nominal.at(*p), plant.controls, plant.measurements, disturbances=w, performance=z
+    )
+
+
+def on_plant(
+    plant: Plant,
+    names: Iterable[object],
+    design: Callable[..., PointDesign],
+    method: str,
+    *,
+    gain: bool,
+) -> Controller:
+    """Return the controller of a plant that is one model, with a promise where the design is of the
+    gain; raise `InputError` for another plant and for `names` of channels beside it, and
+    `SynthesisError` where there is none.
+    """
+    if any(names):
+        raise InputError("a plant names its channels: leave out controls, measurements and others")
+    if plant.basis.size > 1 or isinstance(plant.model, UncertainStateSpace):
+        names = ", ".join(s.name for s in plant.parameters)
+        raise InputError(
+            f"{method} is of one model, and the plant depends on {names} or is uncertain:"
+            " synthesis.output_feedback takes it whole, dataclasses.replace(plant,"
+            " model=plant.nominal.at(...)) is one model of it"
+        )
+    found = design_at(plant, [0.5 * (s.low + s.high) for s in plant.parameters], design)
+    made = Controller.of(plant, found, method)
+    if not gain:
+        return replace(made, notes=(f"the {method} norm of its loop is {found.hinf_norm:.6g}",))
+    least = found.optimum if found.optimum > 0 else None
+    notes = (found.limit, *(found.reasons if least is None else ()))
+    return replace(
+        made, promised=found.hinf_norm, optimum=least, notes=tuple(note for note in notes if note)
+    )
 
 
 def named_controller(K: Matrices, names: Channels, dt: float | None) -> LinearModel:

@@ -10,10 +10,9 @@ from scipy.linalg import block_diag
 
 from symheli import LinearModel
 from symheli.errors import InputError
-from symheli.lpv.linear_model import is_control_system
+from symheli.lpv.linear_model import as_model, is_control_system
 from symheli.values.sample_period import same_period
 from symheli.values.signal import Signal
-from synthesis.numerics.linear.model import as_model
 
 Weight = Any
 """A number, a system of one input and output (on every channel alike), a square system, or a
@@ -29,6 +28,8 @@ def as_weight(
     `InputError` where it has another number of channels or another sample period.
     """
     n = len(channels)
+    if not n:
+        raise InputError("G: expected a model from controls to measurements, one of each at least")
     if isinstance(weight, LinearModel) or is_control_system(weight):
         system = as_model(weight)
         parts = [system] * n if len(system.inputs) == len(system.outputs) == 1 else [system]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from symheli import LinearModel, LPVStateSpace, UncertainStateSpace
-from symheli.errors import InputError
+from symheli.errors import InputError, SynthesisError
 from symheli.lpv.linear_model import feedback_matrix, is_control_system
 from symheli.lpv.mixing import ERROR, turned
 from symheli.values.arrays import frozen
@@ -19,8 +19,14 @@ def as_controller(
     given: Any, controls: Sequence[Signal], measurements: Sequence[Signal]
 ) -> LinearModel | LPVStateSpace:
     """Return the controller that is `given` in one of the ways of `Plant.close`; raise `InputError`
-    for anything else, `UnknownNameError` for signals that are not the plant's.
+    for anything else, `UnknownNameError` for signals that are not the plant's, `SynthesisError`
+    with its reasons for a design that found none.
     """
+    if hasattr(given, "controller"):
+        if given.controller is None:
+            reasons = tuple(given.reasons)
+            raise SynthesisError(f"the design has no controller: {'; '.join(reasons)}", reasons)
+        given = given.controller
     inner = getattr(given, "model", None)
     if isinstance(inner, LPVStateSpace) and not isinstance(given, UncertainStateSpace):
         # what flies reads measured minus reference
@@ -38,7 +44,7 @@ def as_controller(
         raise InputError(
             "controller: expected {(control, measurement): gain}, an array of gains, a"
             " LinearModel, an LPVStateSpace, a system of python-control or an object with such"
-            f" a .model, got {type(given).__name__}"
+            f" a .model or .controller, got {type(given).__name__}"
         )
     indices(given.inputs, measurements, "measurement")
     indices(given.outputs, controls, "control")

@@ -6,16 +6,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
 from symheli.lpv.equilibration import equilibrate
+from symheli.lpv.modes import Mode, hidden_modes, on_the_border, unstable
+from symheli.values.arrays import Array
 from synthesis.design.plant.generalized import Channels, Generalized, continuous_plant
-from synthesis.design.plant.modes import Mode, hidden_modes, on_the_axis, unstable
 from synthesis.design.plant.unreachable import Unreachable, unreachable_gain
 from synthesis.numerics.linear.norm import norm
-
-Array = np.ndarray
 
 SINGULAR = 1e-9
 """Singular values of a matrix with entries of order one up to this fraction of the largest count
@@ -136,29 +136,17 @@ def _modes(P: Generalized, names: Channels, dt: float | None, *, dual: bool = Fa
     """Return sentences on modes that cannot be stabilised; for the dual plant, on those that cannot
     be detected.
     """
-    hidden = hidden_modes(
-        P.A.T, P.B2.T, lambda value, size: unstable(value, size, sampled=dt is not None)
-    )
+    hidden = hidden_modes(P.A.T, P.B2.T, partial(unstable, sampled=dt is not None))
     through, sense = (
         (names.measurements, "detect it: measure what it moves")
         if dual
         else (names.controls, "stabilise it: add a control that drives it")
     )
     return [
-        f"the mode {_place(mode, dt)} (mostly {mode.among(names.states)}) is not stable, and"
+        f"the mode {mode.place(dt)} (mostly {mode.among(names.states)}) is not stable, and"
         f" {_listed(through)} cannot {sense}, or leave it out"
         for mode in hidden
     ]
-
-
-def _place(mode: Mode, dt: float | None) -> str:
-    value = mode.value
-    imaginary = f" +- {value.imag:.4g}j" if value.imag else ""
-    return (
-        f"at {value.real:.4g}{imaginary} rad/s"
-        if dt is None
-        else f"z = {value.real:.4g}{imaginary}"
-    )
 
 
 def _singular(P: Generalized, names: Channels, dt: float | None) -> list[str]:
@@ -221,7 +209,9 @@ def axis_zeros(P: Generalized) -> list[Mode]:
     """
     inverse = np.linalg.pinv(P.D12)
     rest = np.eye(len(P.D12)) - P.D12 @ inverse
-    return hidden_modes(P.A - P.B2 @ inverse @ P.C1, rest @ P.C1, on_the_axis)
+    return hidden_modes(
+        P.A - P.B2 @ inverse @ P.C1, rest @ P.C1, partial(on_the_border, sampled=False)
+    )
 
 
 def _zero(mode: Mode, names: Channels, dt: float | None, *, dual: bool) -> str:

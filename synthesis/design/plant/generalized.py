@@ -11,11 +11,10 @@ import numpy as np
 from symheli import LinearModel
 from symheli.errors import InputError
 from symheli.lpv.equilibration import is_singular
+from symheli.values.arrays import Array
 from symheli.values.signal import Signal, indices
 from symheli.values.summary import summarized
 from synthesis.numerics.linear.norm import to_continuous
-
-Array = np.ndarray
 
 SIZE_LIMITS = 1e-100, 1e100
 """Least and largest entries: Riccati equations square control weights and measurement noise, and
@@ -60,8 +59,7 @@ class Generalized(NamedTuple):
     def between(cls, model: LinearModel, channels: Channels) -> Generalized:
         """Return the matrices of a model that has these channels.
 
-        Raises `InputError` for numbers whose squares are no numbers: an entry beyond the second of
-        `SIZE_LIMITS`, a price of a control or noise of a measurement below the first.
+        Raises `InputError` for numbers whose squares are no numbers, see `checked`.
         """
         w = indices(channels.disturbances, model.inputs, "input")
         u = indices(channels.controls, model.inputs, "input")
@@ -69,26 +67,32 @@ class Generalized(NamedTuple):
         y = indices(channels.measurements, model.outputs, "output")
         B, C, D = model.B, model.C, model.D
         through = (D[np.ix_(rows, columns)] for rows in (z, y) for columns in (w, u))
-        plant = cls(model.A, B[:, w], B[:, u], C[z], C[y], *through)
-        prices, noises = (
-            np.abs(M).max(axis=axis, initial=0.0) for M, axis in ((plant.D12, 0), (plant.D21, 1))
-        )
-        for what, signals, sizes in (
-            ("price", channels.controls, prices),
-            ("noise", channels.measurements, noises),
+        return cls(model.A, B[:, w], B[:, u], C[z], C[y], *through).checked(channels)
+
+    def checked(self, channels: Channels) -> Generalized:
+        """Return the plant; raise `InputError` for numbers whose squares are no numbers.
+
+        These are an entry beyond the second of `SIZE_LIMITS`, and a price or an effect of a
+        control, noise or reading of a measurement below the first.
+        """
+        for what, signals, M, axis in (
+            ("price", channels.controls, self.D12, -2),
+            ("effect", channels.controls, self.B2, -2),
+            ("noise", channels.measurements, self.D21, -1),
+            ("reading", channels.measurements, self.C2, -1),
         ):
-            for signal, size in zip(signals, sizes, strict=True):
-                if 0 < size < SIZE_LIMITS[0]:
-                    raise InputError(
-                        f"the {what} of {signal} is {size:.3g}, whose square underflows; increase"
-                        " its weight"
-                    )
-        if max(np.abs(M).max(initial=0.0) for M in plant) > SIZE_LIMITS[1]:
+            sizes = np.abs(M).max(axis=axis, initial=0.0)
+            for at in np.argwhere((sizes > 0) & (sizes < SIZE_LIMITS[0])):
+                raise InputError(
+                    f"the {what} of {signals[at[-1]]} is {sizes[tuple(at)]:.3g}, whose square"
+                    " underflows; increase its weight, or choose other units"
+                )
+        if max(np.abs(M).max(initial=0.0) for M in self) > SIZE_LIMITS[1]:
             raise InputError(
                 f"a model with entries beyond {SIZE_LIMITS[1]:.0e} cannot be squared; choose other"
                 " units or weights"
             )
-        return plant
+        return self
 
     @classmethod
     def split(
@@ -215,7 +219,7 @@ class Channels(NamedTuple):
             if not found[group]:
                 raise InputError(
                     f"{group}: none is left; the model goes from {', '.join(model.inputs)} to"
-                    f" {', '.join(model.outputs)}"
+                    f" {', '.join(model.outputs)}; name some, or give a synthesis.Plant"
                 )
         if both := [s for s in found["controls"] if s in found["disturbances"]]:
             raise InputError(f"{', '.join(both)} cannot be both a control and a disturbance")

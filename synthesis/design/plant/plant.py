@@ -441,8 +441,9 @@ class Plant:
 
         `controller`: {(control, measurement): gain}, an array (controls, measurements) of gains, a
         LinearModel, an LPVStateSpace, a python-control system (in the order of the plant where its
-        signals have no names), or what has such a `model`. Controls that it does not drive stay
-        zero. An `UncertainStateSpace` of an uncertain plant.
+        signals have no names), or what has such a `model` or `controller`. Controls that it does
+        not drive stay zero. An `UncertainStateSpace` of an uncertain plant. Raises `SynthesisError`
+        for a design without a controller.
         """
         return lower_feedback(
             self.model,

@@ -10,14 +10,13 @@ import numpy as np
 
 from symheli.errors import InputError, SynthesisError
 from symheli.lpv.bases.polynomials import lobatto_points
+from symheli.values.arrays import Array
 from synthesis.certify.statement.outcome import Attempt
 from synthesis.design.plant.diagnosis import reasons, unpriced
 
 if TYPE_CHECKING:
     from synthesis.design.plant.generalized import Channels
     from synthesis.design.plant.plant import Plant
-
-Array = np.ndarray
 
 NOTHING_WRONG = (
     "nothing is wrong with the plant at frozen p: a lower rate, other functions for X and Y, or"
@@ -73,8 +72,11 @@ def require_channels(
     measurements: bool = True,
     disturbances: bool = True,
     performance: bool = True,
+    states: bool = True,
 ) -> Channels:
-    """Return the channels of a plant; raise `InputError` where a group has none."""
+    """Return the channels of a plant; raise `InputError` where a group has none, and for numbers
+    that cannot be squared.
+    """
     named = plant.channels
     for wanted, group in (
         (disturbances, "disturbances"),
@@ -84,6 +86,12 @@ def require_channels(
     ):
         if wanted and not getattr(named, group):
             raise InputError(f"the plant has no {group}: name them, Plant(model, {group}=[...])")
+    if states and not named.states:
+        raise InputError(
+            "the plant has no states: give it a servo, a delay or a weight with states, or take"
+            " synthesis.hinf, which designs for gains too"
+        )
+    plant.matrices(conditions(plant)[0]).checked(named)
     return named
 
 

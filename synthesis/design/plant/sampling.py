@@ -12,10 +12,9 @@ from symheli import LinearModel, LPVStateSpace
 from symheli.errors import InputError
 from symheli.lpv.bases.polynomials import lobatto_points, piecewise_lobatto
 from symheli.lpv.tools import Matrices
+from symheli.values.arrays import Array
 from symheli.values.numbers import positive
 from synthesis.design.plant.plant import Plant
-
-Array = np.ndarray
 
 NODES = {1: 41, 2: 13}
 """Least number of values of each parameter at which the rule is applied (more parameters: 7)."""

@@ -7,9 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from symheli.values.arrays import Array
 from synthesis.design.plant.generalized import Generalized
-
-Array = np.ndarray
 
 NEGLIGIBLE = 1e-11
 """Fraction of its terms below which a direction of a response counts as zero."""

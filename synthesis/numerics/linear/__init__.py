@@ -1,1 +1,1 @@
-"""Linear time-invariant models: H-infinity norm, Riccati equations, balancing of matrices."""
+"""Linear time-invariant models: H-infinity norm, balancing of matrices."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-Array = np.ndarray
+from symheli.values.arrays import Array
 
 MIN_BALANCED = 1e-3
 """Couplings of which both directions are below this fraction of the states' own rate are not

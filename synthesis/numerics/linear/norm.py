@@ -9,8 +9,7 @@ import numpy as np
 from scipy import linalg
 
 from symheli.errors import AccuracyError
-
-Array = np.ndarray
+from symheli.values.arrays import Array
 
 
 def norm(

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-Array = np.ndarray
+from symheli.values.arrays import Array
 
 
 def blossom(arguments: Sequence[Any]) -> Array:

@@ -8,9 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from symheli.values.arrays import Array
 from synthesis.numerics.polynomial.pieces import ModelPiece
-
-Array = np.ndarray
 
 
 class Cell(NamedTuple):

@@ -6,10 +6,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from symheli.values.arrays import Array
 from synthesis.numerics.polynomial.exact import integers, nearest, positive_definite
 from synthesis.numerics.polynomial.matrix import PolynomialMatrix
-
-Array = np.ndarray
 
 MAX_BOXES = 4000
 """Largest number of boxes examined; beyond it the answer is "not shown"."""

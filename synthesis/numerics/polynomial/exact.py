@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-Array = np.ndarray
+from symheli.values.arrays import Array
+
 Number = Callable[[float], Any]
 """Conversion of a double into a number of the arithmetic: `float`, or its exact rational."""
 

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 
 from symheli.errors import InputError
+from symheli.values.arrays import Array
 from symheli.values.summary import summarized
 from synthesis.numerics.polynomial.bernstein import blossom, elevation_matrix, restriction
 from synthesis.numerics.polynomial.exact import matmul, quotient, whole
 
-Array = np.ndarray
 Box = tuple[tuple[Any, Any], ...]
 
 

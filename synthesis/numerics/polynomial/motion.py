@@ -9,11 +9,7 @@ from collections.abc import Iterator, Sequence
 from itertools import product
 from typing import NamedTuple
 
-import numpy as np
-
 from symheli import Scheduling
-
-Array = np.ndarray
 
 PARTS_PER_SIGN = {True: 2, False: 4}
 """Number of parts into which either sign of a parameter that is the rate of another is divided, by

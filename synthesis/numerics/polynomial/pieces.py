@@ -14,10 +14,9 @@ from symheli.errors import InputError
 from symheli.lpv.bases import FunctionSpace, Piece, Polynomial, Product
 from symheli.lpv.lpv_matrices import LPVMatrices, Matrices
 from symheli.lpv.scheduling import Scheduling
+from symheli.values.arrays import Array
 from synthesis.numerics.polynomial.bernstein import restriction
 from synthesis.numerics.polynomial.matrix import PolynomialMatrix
-
-Array = np.ndarray
 
 
 class ModelPiece(NamedTuple):

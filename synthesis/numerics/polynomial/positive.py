@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-Array = np.ndarray
+from symheli.values.arrays import Array
+
 Number = Any
 """An integer or a rational."""
 Coefficients = Sequence[Any] | Array

@@ -10,14 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from symheli.values.arrays import Array
 from synthesis.numerics.polynomial.bernstein import composition
 from synthesis.numerics.polynomial.cells import Strip, strips
 from synthesis.numerics.polynomial.exact import Number, exact
 from synthesis.numerics.polynomial.matrix import Box, PolynomialMatrix
 from synthesis.numerics.polynomial.motion import Motion
 from synthesis.numerics.polynomial.pieces import ModelPiece, Pieces
-
-Array = np.ndarray
 
 
 class Region(NamedTuple):

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from symheli.errors import InputError
-
-Array = np.ndarray
+from symheli.values.arrays import Array
 
 
 def first(*faults: str | None) -> str | None:

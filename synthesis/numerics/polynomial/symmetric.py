@@ -9,7 +9,7 @@ from functools import lru_cache
 
 import numpy as np
 
-Array = np.ndarray
+from symheli.values.arrays import Array
 
 
 def length(n: int) -> int:

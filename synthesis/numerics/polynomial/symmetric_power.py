@@ -14,7 +14,7 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 
-Array = np.ndarray
+from symheli.values.arrays import Array
 
 
 @lru_cache(maxsize=16)

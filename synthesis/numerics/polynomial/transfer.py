@@ -11,9 +11,8 @@ import numpy as np
 from scipy import linalg
 
 from symheli.errors import InputError
+from symheli.values.arrays import Array
 from synthesis.numerics.polynomial.positive import hurwitz, product
-
-Array = np.ndarray
 
 
 class Gaussian(NamedTuple):

@@ -21,6 +21,7 @@ from symheli.errors import InputError
 from symheli.lpv.bases import FunctionSpace
 from symheli.lpv.bases.function_space import tensor_grid
 from symheli.lpv.bases.polynomials import interpolation_points
+from symheli.values.arrays import Array
 from synthesis.numerics.polynomial.bernstein import blossom
 from synthesis.numerics.polynomial.matrix import Box
 from synthesis.numerics.polynomial.symmetric import basis as symmetric_basis
@@ -28,8 +29,6 @@ from synthesis.numerics.polynomial.symmetric import length, svec, symmetrized
 from synthesis.numerics.program.cone_program import ConeProgram, Solver, SolverPoint, solve
 from synthesis.numerics.program.expression import AffineMatrix, Inequality
 from synthesis.numerics.program.unknown import UnknownFunction
-
-Array = np.ndarray
 
 MARGIN = 1e-8
 """Every inequality is imposed as >= this multiple of the identity."""
@@ -294,8 +293,8 @@ class AffineProgram:
 
     def _stacked(self, rows: Sequence[tuple[sparse.csr_matrix, Array]]) -> sparse.csr_matrix:
         """The rows below one another, those from before a variable with zeros for it."""
-        for A, _ in rows:
-            A.resize(A.shape[0], self.count)
+        for A, b in rows:
+            A.resize(len(b), self.count)
         return sparse.csr_matrix(sparse.vstack([A for A, _ in rows]))
 
     def _factors(self, number: AffineMatrix) -> Array:

@@ -13,8 +13,7 @@ from symheli import Scheduling
 from symheli.errors import InputError
 from symheli.lpv.bases import FunctionSpace
 from symheli.lpv.bases.polynomials import factors_of, polynomials
-
-Array = np.ndarray
+from symheli.values.arrays import Array
 
 Dependence = int | tuple[int, ...] | FunctionSpace
 """Dependence of X or Y on the parameters: a degree for all, one each, or the functions themselves.

@@ -9,10 +9,8 @@ from collections.abc import Mapping
 import numpy as np
 from scipy import linalg
 
+from symheli.values.arrays import Array
 from synthesis.numerics.polynomial.symmetric import length
-
-Array = np.ndarray
-
 
 MAX_DENSE_ROWS = 128
 """Number of rows of a block below which a matrix without zero blocks is factored as one dense

@@ -25,14 +25,13 @@ import numpy as np
 from scipy import sparse
 
 from symheli.errors import InputError, SolverError
+from symheli.values.arrays import Array
 from synthesis.numerics.polynomial.symmetric import basis, length
 from synthesis.numerics.program.answer import Answer
 from synthesis.numerics.program.interruptible import in_process, in_thread, no_panic
 
 if TYPE_CHECKING:
     import cvxpy
-
-Array = np.ndarray
 
 
 LYAPUNOV = "LYAPUNOV"

@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 
 from symheli.errors import InputError
+from symheli.values.arrays import Array
 from synthesis.numerics.polynomial.matrix import PolynomialMatrix
 from synthesis.numerics.polynomial.matrix import block as known_block
-
-Array = np.ndarray
 
 PRODUCT = (
     "the product of two unknown matrices is not affine: give one of them a value, or replace the"

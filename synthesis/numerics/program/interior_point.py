@@ -31,13 +31,12 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from symheli.progress import Task, task
+from symheli.values.arrays import Array
 from synthesis.numerics.polynomial.symmetric import indices, length, smat, svec, symmetrized
 from synthesis.numerics.program.answer import Answer
 from synthesis.numerics.program.block_cholesky import BlockCholesky
 from synthesis.numerics.program.cone_program import Solver, SolverPoint
 from synthesis.numerics.program.lyapunov_program import LyapunovBlocks, Program, Sizes
-
-Array = np.ndarray
 
 MIN_START = 10.0
 """Least multiple of the identity from which slacks and multipliers start."""

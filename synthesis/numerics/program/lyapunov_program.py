@@ -12,7 +12,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-Array = np.ndarray
+from symheli.values.arrays import Array
 
 MANY_STATES = 12
 """Number of states above which fewer coefficients of P are tried."""

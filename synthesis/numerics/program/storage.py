@@ -8,11 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy import linalg
 
+from symheli.lpv.riccati import stabilising
+from symheli.values.arrays import Array
 from synthesis.numerics.linear.norm import to_continuous
-from synthesis.numerics.linear.riccati import stabilising
 from synthesis.numerics.polynomial.symmetric import powered, symmetrized
-
-Array = np.ndarray
 
 MIN_DISSIPATION = 1e-12
 """Least dissipation, as a fraction of the rates of the states."""

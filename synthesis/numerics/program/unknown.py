@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from symheli.lpv.bases import FunctionSpace
+from symheli.values.arrays import Array
 from synthesis.numerics.program.lyapunov_program import LyapunovBlocks
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True, eq=False)

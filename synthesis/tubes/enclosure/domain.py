@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from symheli.errors import InputError
-
-Array = np.ndarray
+from symheli.values.arrays import Array
 
 
 @dataclass(frozen=True)

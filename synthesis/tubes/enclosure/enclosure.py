@@ -13,11 +13,10 @@ import numpy as np
 from symheli.codegen.program import Operation, ScalarProgram
 from symheli.codegen.translation import operations
 from symheli.errors import InputError
+from symheli.values.arrays import Array
 from synthesis.tubes.enclosure.domain import Domain
 from synthesis.tubes.enclosure.form import EPS, MARGIN, AffineForm, hull, pick
 from synthesis.tubes.enclosure.interval import Interval
-
-Array = np.ndarray
 
 TRIALS = 8
 """Radii tried, each four times the last, until Newton's operator maps an interval into itself."""

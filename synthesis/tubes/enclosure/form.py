@@ -13,9 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from symheli.values.arrays import Array
 from synthesis.tubes.enclosure.interval import Interval, down, up
-
-Array = np.ndarray
 
 EPS = float(np.finfo(float).eps)
 MARGIN = 1 + 2.0**-40

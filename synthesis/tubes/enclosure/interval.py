@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-Array = np.ndarray
+from symheli.values.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -78,7 +78,7 @@ def test_a_weight_over_p_undoes_the_dependence_of_the_plant():
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"G": carriage(0.0).at(1.0)}, "ncf takes one linear model"),
+        ({"G": carriage(0.0).at(1.0)}, "ncfsyn takes one linear model"),
         ({"W1": 0.0}, "W1: expected a weight that is not 0"),
         ({"W2": carriage(0.0).discretize(0.1)}, "its sample period is 0.1 s"),
         ({"W1": [1.0, 2.0]}, "expected a weight of 1 channels"),

@@ -677,7 +677,9 @@ def test_a_design_of_a_model_says_that_it_needs_a_plant(design, given):
 
 def test_a_point_design_of_a_plant_says_where_its_model_is():
     with pytest.raises(InputError, match=r"got Plant; .* a Plant \.nominal\.at\(p\)"):
-        synthesis.hinf(plant(), ["d_lat"], ["phi"])
+        synthesis.designs.ncfsyn(plant())
+    with pytest.raises(InputError, match=r"depends on airspeed .*model=plant\.nominal\.at\("):
+        synthesis.hinf(plant())
 
 
 @pytest.mark.parametrize("dt", [None, 0.02])

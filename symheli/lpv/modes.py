@@ -9,8 +9,7 @@ import numpy as np
 from scipy import linalg
 
 from symheli.lpv.equilibration import equilibrate
-
-Array = np.ndarray
+from symheli.values.arrays import Array
 
 HIDDEN = 1e-9
 """[A - s I; C], with rows and columns in units of their own, loses rank at s where its smallest
@@ -42,6 +41,13 @@ class Mode(NamedTuple):
         """Return the names of the states with the largest participation."""
         order = np.argsort(-self.participation)
         return ", ".join(states[i] for i in order[:4] if self.participation[i] >= NAMED_FRACTION)
+
+    def place(self, dt: float | None) -> str:
+        """Return the eigenvalue in words; rad/s where continuous."""
+        imaginary = f" +- {self.value.imag:.4g}j" if self.value.imag else ""
+        if dt is None:
+            return f"at {self.value.real:.4g}{imaginary} rad/s"
+        return f"z = {self.value.real:.4g}{imaginary}"
 
 
 def hidden_modes(A: Array, C: Array, counts: Callable[[complex, float], bool]) -> list[Mode]:
@@ -90,6 +96,6 @@ def unstable(value: complex, size: float, *, sampled: bool) -> bool:
     return margin >= -BOUNDARY
 
 
-def on_the_axis(value: complex, size: float) -> bool:
-    """Whether a mode of a continuous model is on the imaginary axis, to rounding."""
-    return abs(value.real) <= BOUNDARY * size
+def on_the_border(value: complex, size: float, *, sampled: bool) -> bool:
+    """Whether a mode is on the border of stability, to rounding."""
+    return abs(abs(value) - 1 if sampled else value.real / size) <= BOUNDARY
