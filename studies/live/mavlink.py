@@ -69,6 +69,9 @@ class MavlinkSource:
         Without pymavlink, and for an address that cannot be opened.
     """
 
+    signals = (*"uvwpqr", "phi", "theta", "psi", "airspeed", *STICKS)
+    rate = 50
+
     def __init__(self, address: str = f"udpin:127.0.0.1:{PORT}", baud: int = 57600):
         self.name = f"MAVLink at {address}"
         self._link = opened(address, baud=baud, robust_parsing=True)

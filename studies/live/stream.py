@@ -39,6 +39,7 @@ class StreamState(Enum):
     REORDERED = "a sample came after a later one and is left out"
     CLOCK_JUMP = "the sender's clock jumped: the recursion starts with new lags"
     NOT_A_NUMBER = "a value is missing, not finite or beyond 1e4: the row is unknown"
+    COARSE_CLOCK = "the sender's clock has too few digits: begin its flight anew"
     OTHER_VEHICLE = "another sender is heard and left out"
 
 
@@ -117,8 +118,14 @@ class Stream:
             known = bool(np.isfinite(old).all() and np.isfinite(values).all())
             self._is(StreamState.LOST if known else StreamState.NOT_A_NUMBER)
         else:
-            self._is(StreamState.GOOD)
+            coarse = all(self._coarse(t) for t in (before, time))
+            self._is(StreamState.COARSE_CLOCK if coarse else StreamState.GOOD)
         return rows
+
+    def _coarse(self, time: float) -> bool:
+        """Whether a time is in single precision, with too few digits for the period."""
+        single = np.float32(time)
+        return float(single) == time and bool(np.spacing(single) > 0.2 * self.dt)
 
     def idle(self, now: float) -> None:
         """Say that nothing came until `now` (s), on this machine's clock."""

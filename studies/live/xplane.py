@@ -157,6 +157,7 @@ class XPlaneSource:
         self.name = f"X-Plane at {host}:{port}"
         self.rate, self.datarefs = rate, {**DATAREFS, **(datarefs or {})}
         self._quantities = list(self.datarefs)
+        self.signals = (*"uvw", *self._quantities)
         if not 0 < port < 2**16:
             raise InputError(f"port: expected 1 to 65535, got {port}")
         try:

@@ -2,6 +2,9 @@
 
 import json
 import math
+import signal
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -9,8 +12,11 @@ import pytest
 import identification
 import symheli
 from studies import cli
-from studies.live.identifier import LAG, LiveIdentifier
-from studies.live.stream import Row
+from studies.live.identifier import ENOUGH_SAMPLES, LAG, LiveIdentifier
+from studies.live.recorder import Recorder
+from studies.live.sample import Sample
+from studies.live.stream import Row, Stream
+from studies.live.watch import Watch
 from symheli import FlightRecord
 
 DEFLECTIONS = ("d_lon", "d_lat", "d_col", "d_ped")
@@ -133,12 +139,143 @@ def test_a_reader_sees_tables(log, capsys):
     assert "p by d_lat" in out
 
 
+SHORT = ("--speed", "1000", "--airspeeds", "0", "6", "--degree", "1")
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ([], "has no stick_lon, stick_lat, stick_col, stick_ped: --inputs names the controls"),
+        (["--inputs", "d_lon,d_foo"], "it has u, v, w, p, q, r, phi, theta, airspeed, d_lon"),
+        (["--inputs", "d_lon", "--rate", "100"], "has 50 samples a second: leave --rate out"),
+        (["--inputs", "d_lon", "--rate", "2000"], "expected 1 to 1000 Hz"),
+        (["--inputs", "d_lon", "--record", "no/a.csv"], "make the folder no first"),
+    ],
+)
+def test_what_a_record_cannot_give_is_said(log, words, message, capsys):
+    assert cli.main(["live", str(log[0]), *SHORT, *words]) == 1
+    assert message in capsys.readouterr().err
+
+
+@pytest.fixture
+def slow(log, tmp_path):
+    """Every other line of the log: 25 Hz."""
+    head, *lines = log[0].read_text().splitlines()
+    (tmp_path / "slow.csv").write_text("\n".join([head, *lines[::2]]))
+    return tmp_path / "slow.csv"
+
+
+def test_a_file_is_learnt_at_its_own_rate(slow, capsys):
+    words = ["live", str(slow), *SHORT, "--inputs", ",".join(DEFLECTIONS), "--json"]
+    assert cli.main(words) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["learnt"] <= found["samples"]
+    assert {p["control"] for p in found["control_power"]} == set(DEFLECTIONS)
+
+
+def test_a_report_is_printed_where_no_model_can_be_saved(log, tmp_path, capsys):
+    head, *lines = log[0].read_text().splitlines()
+    (tmp_path / "short.csv").write_text("\n".join([head, *lines[:20]]))
+    words = ["live", str(tmp_path / "short.csv"), *SHORT, "--inputs", ",".join(DEFLECTIONS)]
+    assert cli.main([*words, "--save", str(tmp_path / "a.json")]) == 1
+    out = capsys.readouterr().out
+    assert "20 samples from short.csv" in out
+    assert "no model is saved" in out
+
+
+def watched(source, identifier, rate=50.0):
+    """A watch with a record of what comes from a source."""
+    return Watch(source, identifier, Stream(identifier.signals, 1.0 / rate))
+
+
+class Samples:
+    """A source of samples that are there."""
+
+    name = "samples"
+
+    def __init__(self, samples):
+        self.left = list(samples)
+
+    def receive(self, timeout):
+        if not self.left:
+            raise EOFError
+        return [self.left.pop(0)]
+
+    def close(self):
+        pass
+
+
+def test_a_signal_that_never_comes_is_named(flight):
+    _, record = flight
+    identifier = LiveIdentifier(DEFLECTIONS, 0.0, 6.0)
+    rows = [dict(zip(record.signals, row, strict=True)) for row in record.values[:100]]
+    for row in rows:
+        del row["airspeed"], row["d_ped"]
+    watch = watched(Samples(Sample(0.02 * k, row, "a") for k, row in enumerate(rows)), identifier)
+    watch.run(10.0, print)
+    assert "no number has come of d_ped, airspeed" in watch.line()
+
+
+@pytest.mark.parametrize(("hz", "said"), [(50, False), (30, True)])
+def test_samples_that_come_too_slowly_are_said(hz, said):
+    values = dict.fromkeys(LiveIdentifier(["stick"], 0.0, 6.0).signals, 0.0)
+    samples = (Sample(k / hz, values, "a") for k in range(200))
+    watch = watched(Samples(samples), LiveIdentifier(["stick"], 0.0, 6.0))
+    watch.run(10.0, print)
+    assert ("only 30 samples come a second: give --rate 30" in watch.line()) == said
+
+
+def test_another_vehicle_is_neither_recorded_nor_counted(tmp_path):
+    values = dict.fromkeys(LiveIdentifier(["stick"], 0.0, 6.0).signals, 0.0)
+    samples = [Sample(0.02 * k, values, "ab"[k % 2]) for k in range(20)]
+    watch = watched(Samples(samples), LiveIdentifier(["stick"], 0.0, 6.0), 25.0)
+    watch.recorder = Recorder(tmp_path / "a.csv", ("q",))
+    watch.run(10.0, print)
+    assert watch.received == len(FlightRecord.from_csv(tmp_path / "a.csv")) == 10
+
+
+def test_the_next_airspeed_is_the_nearest_and_moves_on(flight):
+    """Each advice that is followed gives another, until every airspeed is covered."""
+    identifier, row = LiveIdentifier(["stick"], 0.0, 6.0), 1
+    V, advice = 3.5, []
+    identifier.take(Row(0.0, np.array([0.0] * 9 + [V])))
+    while (said := identifier.next_to_fly()) != "every airspeed is covered":
+        assert said not in advice
+        advice.append(said)
+        V = float(said.split()[2]) + 0.5
+        for _ in range(ENOUGH_SAMPLES + 400):  # and until the lagged airspeed is there
+            values = [0.0] * 8 + [math.sin(0.1 * row), V]
+            identifier.take(Row(0.02 * row, np.array(values)))
+            row += 1
+    assert [one.split()[2] for one in advice] == ["3", "2", "1", "0", "4", "5"]
+
+
+@pytest.mark.usefixtures("interruptible")
+def test_an_interrupted_watch_reports_and_leaves_a_whole_record(log, tmp_path):
+    """Ctrl-C in the middle of a flight at its own pace."""
+    words = ["live", str(log[0]), "--inputs", ",".join(DEFLECTIONS), "--degree", "0"]
+    code = "import sys; from studies.cli import main; sys.exit(main(sys.argv[1:]))"
+    words += ["--record", str(tmp_path / "a.csv")]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen([sys.executable, "-c", code, *words], **pipes) as watching:
+        while "learnt" not in (said := watching.stderr.readline()):
+            assert said
+        watching.send_signal(signal.SIGINT)
+        out, _ = watching.communicate(timeout=30)
+    assert watching.returncode == 0
+    samples = int(out.split()[0])
+    assert 20 < samples == len(FlightRecord.from_csv(tmp_path / "a.csv"))
+    assert (tmp_path / "a.csv").read_text().count("\n") == samples + 1
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
         (["nowhere.csv"], "sources are xplane, mavlink and a CSV file"),
         (["xplane:localhost:abc"], "expected xplane:HOST:PORT"),
         (["xplane", "--airspeeds", "5", "5"], "expected 0 <= LOW < HIGH"),
+        (["xplane:127.0.0.1:70000"], "expected 1 to 65535"),
+        (["xplane", "--inputs", "d_lon"], "has no d_lon"),
         (["xplane:127.0.0.1:9", "--duration", "0.2"], "nothing came from X-Plane at 127.0.0.1:9"),
     ],
 )

@@ -363,6 +363,11 @@ def test_a_record_is_read_back_to_the_last_bit(tmp_path):
         Recorder(tmp_path / "a.csv", ("q",))
 
 
+def test_a_record_of_nothing_leaves_no_file(tmp_path):
+    Recorder(tmp_path / "a.csv", ("q",)).close()
+    assert list(tmp_path.iterdir()) == []
+
+
 class Full:
     """A file on a disk that takes `space` bytes and no more."""
 

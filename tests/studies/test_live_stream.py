@@ -147,6 +147,20 @@ def test_a_paused_simulator_goes_on_without_a_jump():
     assert stream.state is StreamState.GOOD
 
 
+@pytest.mark.parametrize(
+    ("start", "kind", "state"),
+    [
+        (1e3, np.float32, StreamState.GOOD),
+        (1e5, np.float32, StreamState.COARSE_CLOCK),
+        (1e5, np.float64, StreamState.GOOD),
+    ],
+)
+def test_a_clock_with_too_few_digits_is_said(start, kind, state):
+    """X-Plane sends its time in single precision."""
+    stream, _ = rows_of([sample(float(kind(start + DT * k)), 0.0) for k in range(50)])
+    assert stream.state is state
+
+
 @pytest.mark.parametrize("pace", [0.5, 2.0])
 def test_slow_motion_is_no_fault(pace):
     samples = [sample(DT * k) for k in range(500)]
