@@ -23,6 +23,7 @@ STICKS = ("stick_lon", "stick_lat", "stick_col", "stick_ped")
 LEGEND = """\
 motion: standard deviation of the input about its mean of 2 s, as a fraction of its largest value;
   still to move: inputs that have moved too little there; all where fewer than 250 samples came"""
+SCATTER = "standard error: of the scatter alone; noise of the sensors shifts the values besides"
 FIT = "fit: 100 % less the error as a share of the standard deviation over the flight"
 FASTEST = 1000.0
 """Samples a second, at most."""
@@ -42,9 +43,7 @@ ARGUMENTS = (
         type=options.number,
         default=(0.0, 13.0),
     ),
-    option(
-        "--rate", "HZ", "samples a second (default: 50, of a file its own)", options.at_least_one
-    ),
+    option("--rate", "HZ", "rows a second (default: 50, or a file's own)", options.at_least_one),
     option("--degree", "N", "of the coefficients in airspeed", options.count, 2),
     option(
         "--forgetting",
@@ -146,7 +145,8 @@ def _report(watch: Watch) -> list[str]:
     ]
     for cell in found.coverage():
         motion = [f"{cell.motion[u] / max(found.largest[u], 1e-9):.2f}" for u in found.inputs]
-        missing = ", ".join(cell.missing(found.largest))
+        left = cell.missing(found.largest)
+        missing = "all" if len(left) == len(found.inputs) else ", ".join(left)
         table.append([f"{cell.low:g} to {cell.low + BIN:g}", f"{cell.samples}", *motion, missing])
     powers = [["control power", "airspeed, m/s", "value", "standard error", "unit"]]
     for p in found.control_powers([cell.low for cell in found.coverage()][1::3]):
@@ -162,6 +162,7 @@ def _report(watch: Watch) -> list[str]:
         LEGEND,
         "",
         columns(powers) if len(powers) > 1 else "no model yet: not every coefficient is determined",
+        *([SCATTER] if len(powers) > 1 else []),
     ]
     if watch.prediction is not None:
         fits = ", ".join(f"{y} {fit:.0f}" for y, fit in watch.prediction.fit.items())

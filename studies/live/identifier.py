@@ -139,10 +139,7 @@ class LiveIdentifier:
         self._seen = np.zeros((3, len(STATES)))  # number, sum and sum of squares
 
     def take(self, row: Row) -> bool:
-        """Take in a row of `signals`; return whether it taught something.
-
-        A row that does not come `dt` after the last is a start.
-        """
+        """Take in a row, a start where it is not `dt` after the last; return whether it taught."""
         if not abs(row.time - self._time - self.dt) <= 0.01 * self.dt:
             self.online.forget_past()
             self._recent.clear()

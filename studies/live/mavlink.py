@@ -47,10 +47,8 @@ def opened(address: str, **options: Any) -> Any:
     except (OSError, ValueError, OverflowError) as error:
         raise InputError(f"MAVLink at {address} cannot be opened: {error}") from error
     except ImportError as error:
-        raise InputError(
-            f"MAVLink at {address}: a serial line needs pyserial (pip install pyserial); an address"
-            " on the network begins with udpin: or udpout:"
-        ) from error
+        hint = "a serial line needs `pip install pyserial`; a port begins with udpin:"
+        raise InputError(f"MAVLink at {address} cannot be opened: {hint}") from error
 
 
 class MavlinkSource:
@@ -99,9 +97,7 @@ class MavlinkSource:
         return []
 
     def _time(self, message: Any, system: int) -> float:
-        """Time of a message since boot, s; of one without it that of the last one that has it:
-        SERVO_OUTPUT_RAW counts microseconds in 32 bits, for 71 minutes.
-        """
+        """Time of a message since boot, s, or the last (microseconds in 32 bits do not count)."""
         if hasattr(message, "time_boot_ms"):
             self._clock[system] = 1e-3 * message.time_boot_ms
         return self._clock.get(system, -math.inf)

@@ -75,16 +75,12 @@ class Watch:
                 self.recorder.close()
 
     def _interrupted(self, *_: Any) -> None:
-        """End at the next look at the clock, with every sample whole; a second Ctrl-C does not
-        wait.
-        """
+        """End at the next look at the clock; a second Ctrl-C does not wait for it."""
         self._stopped = True
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
     def take(self, sample: Sample, now: float) -> None:
-        """Record a sample and identify from it, unless another vehicle sent it; `now` (s) is when
-        it came.
-        """
+        """Record and learn a sample that came at `now` (s), unless another vehicle sent it."""
         rows = self.stream.take(sample, now)
         if sample.sender != self.stream.sender:
             return
@@ -130,7 +126,8 @@ class Watch:
         if self.prediction is None:
             return []
         worst, fit = min(self.prediction.fit.items(), key=lambda item: item[1])
-        return [f"1 s prediction: {fit:.0f} % fit of {worst}, the worst"]
+        fits = f"{fit:.0f} %" if fit >= 0 else "worse than the mean"
+        return [f"1 s prediction: worst {worst}, {fits}"]
 
     def data(self) -> Mapping[str, Any]:
         """Return the numbers for a program."""

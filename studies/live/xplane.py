@@ -38,7 +38,7 @@ an aircraft.
 LARGEST = 65535
 """Bytes of a datagram, at most."""
 AT_ONCE = 1000
-"""Datagrams that are read in one go, at most: a flood of them stops nothing else."""
+"""Datagrams that are read in one go, at most: a flood stops nothing else."""
 PER_ANSWER = 180
 """Values in an answer, at most: more do not pass an Ethernet in one piece."""
 

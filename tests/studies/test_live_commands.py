@@ -289,5 +289,19 @@ def test_a_vehicle_serves_until_its_time_is_over(capsys):
     words = ["serve", "--duration", "5", "--speed", "50", "--xplane", "0", "--noise"]
     assert cli.main([*words, "--airspeeds", "1", "3", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
-    assert found["flown"] >= 5.0
+    assert 5.0 <= found["flown"] < 15.0  # to the end of a leg
     assert found["samples"] == pytest.approx(found["flown"] / 0.02)
+
+
+def test_a_served_flight_is_excited_to_its_end(monkeypatch):
+    """Its excitation is as long as its schedule, which takes little more than the duration."""
+    made = {}
+
+    def fly(heli, schedule, controller, **_):
+        made.update(schedule=schedule, added=controller._added)
+
+    monkeypatch.setattr(symheli, "fly", fly)
+    assert cli.main(["serve", "--duration", "70", "--xplane", "0"]) == 0
+    assert 70.0 <= made["schedule"].duration < 92.0
+    assert len(made["added"]) * 0.02 >= made["schedule"].duration
+    assert np.abs(made["added"][-100:]).max() > 0.0
