@@ -95,14 +95,13 @@ def run(arguments: argparse.Namespace) -> Output:
         )
     data = dict(watch.data())
     lines, status = _report(watch), 0
-    if arguments.save is not None:
-        model = identifier.model()
-        if model is None:
-            status = 1
-            lines.append("no model is saved: the data do not determine every coefficient")
-        else:
-            data["written"] = model.save(arguments.save)
-            lines.append(f"wrote {arguments.save}")
+    model = identifier.model() if arguments.save is not None else None
+    if model is not None:
+        data["written"] = model.save(arguments.save)
+        lines.append(f"wrote {arguments.save}")
+    elif arguments.save is not None:
+        status = 1
+        lines.append("no model is saved: the data do not determine every coefficient")
     return Output("\n".join(lines), data, status)
 
 

@@ -4,6 +4,7 @@ takes commands from there.
 
 from __future__ import annotations
 
+import contextlib
 import math
 import select
 import time
@@ -64,10 +65,8 @@ class XPlaneLine:
             self._due[client] = at + 1.0 / frequency
             found = {k: shown.get(one.dataref, 0.0) for k, one in requests.items()}
             for datagram in xplane.answers(found):
-                try:
+                with contextlib.suppress(OSError):  # no way there
                     self._socket.sendto(datagram, client)
-                except OSError:  # no way there
-                    pass
 
     def _shown(self, at: float, values: Mapping[str, float]) -> dict[str, float]:
         """Datarefs by name, in X-Plane's units."""

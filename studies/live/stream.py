@@ -5,7 +5,7 @@ a number, or of another vehicle is named, and never learnt from.
 from __future__ import annotations
 
 import math
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Iterator, Sequence
 from enum import Enum
 from typing import NamedTuple
@@ -78,8 +78,12 @@ class Stream:
         self._last: tuple[float, Array] | None = None
         self._received = -math.inf
         self._seen = np.zeros(len(self.signals), bool)
-        self.period = math.nan
-        """Mean time between samples on the sender's clock, s."""
+        self._steps: deque[float] = deque([dt], maxlen=50)
+
+    @property
+    def period(self) -> float:
+        """Median time between the last samples on the sender's clock, s."""
+        return float(np.median(self._steps))
 
     @property
     def missing(self) -> list[str]:
@@ -112,7 +116,7 @@ class Stream:
         if step < 0.0:
             return self._is(StreamState.REORDERED)
         self._last, self._received = (time, values), received
-        self.period = step if math.isnan(self.period) else self.period + (step - self.period) / 50.0
+        self._steps.append(step)
         rows = list(self._between(before, old, time, values))
         if any(np.isnan(row.values).any() for row in rows):
             known = bool(np.isfinite(old).all() and np.isfinite(values).all())

@@ -119,7 +119,7 @@ class Watch:
             names = ", ".join(self.stream.missing)
             found.append(f"nothing can be learnt: no number has come of {names}")
         if rate * SLOWER * self.stream.dt < 1.0:
-            found.append(f"only {rate:.0f} samples come a second: give --rate {rate:.0f}")
+            found.append(f"only {rate:.3g} samples come a second: give --rate {max(rate, 1):.0f}")
         return found
 
     def _predicted(self) -> list[str]:

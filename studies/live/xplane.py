@@ -9,6 +9,7 @@ Source: "Exchanging data with X-Plane" in the folder Instructions of X-Plane 11 
 
 from __future__ import annotations
 
+import contextlib
 import math
 import select
 import socket
@@ -202,11 +203,9 @@ class XPlaneSource:
         return [Sample(raw.pop("time"), raw, sender)]
 
     def _ask(self, frequency: int) -> None:
-        try:
+        with contextlib.suppress(OSError):  # no way there now: it is asked again
             for k, name in enumerate(self._quantities):
                 self._socket.sendto(request(frequency, k, self.datarefs[name][0]), self._peer)
-        except OSError:  # no way there now: it is asked again
-            pass
 
     def close(self) -> None:
         """Ask X-Plane to send no more."""
