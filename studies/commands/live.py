@@ -96,7 +96,7 @@ def run(arguments: argparse.Namespace) -> Output:
     data = dict(watch.data())
     lines, status = _report(watch), 0
     model = identifier.model() if arguments.save is not None else None
-    if model is not None:
+    if model is not None and arguments.save is not None:
         data["written"] = model.save(arguments.save)
         lines.append(f"wrote {arguments.save}")
     elif arguments.save is not None:
