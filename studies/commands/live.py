@@ -13,14 +13,20 @@ from studies.output import Output, columns, progress
 from symheli.errors import InputError
 
 if TYPE_CHECKING:
-    from studies.live.sample import Source
+    from studies.live.mavlink import MavlinkSource
+    from studies.live.replay import RecordSource
     from studies.live.watch import Watch
+    from studies.live.xplane import XPlaneSource
 
 HELP = "identify while a vehicle flies: X-Plane, MAVLink, or a record that comes again"
 STICKS = ("stick_lon", "stick_lat", "stick_col", "stick_ped")
 LEGEND = """\
-motion: standard deviation of each input about its slow mean, as a fraction of its largest value;
-  missing: inputs that have not moved enough there, or all where too few samples came"""
+motion: standard deviation of the input about its mean of 2 s, as a fraction of its largest value;
+  still to move: inputs that have moved too little there; all where fewer than 250 samples came"""
+SCATTER = "standard error: of the scatter alone; noise of the sensors shifts the values besides"
+FIT = "fit: 100 % less the error as a share of the standard deviation over the flight"
+FASTEST = 1000.0
+"""Samples a second, at most."""
 
 ARGUMENTS = (
     positional(
@@ -37,7 +43,7 @@ ARGUMENTS = (
         type=options.number,
         default=(0.0, 13.0),
     ),
-    option("--rate", "HZ", "samples a second", options.at_least_one, 50),
+    option("--rate", "HZ", "rows a second (default: 50, or a file's own)", options.at_least_one),
     option("--degree", "N", "of the coefficients in airspeed", options.count, 2),
     option(
         "--forgetting",
@@ -63,14 +69,24 @@ def run(arguments: argparse.Namespace) -> Output:
     low, high = arguments.airspeeds
     if not 0 <= low < high:
         raise InputError(f"--airspeeds: expected 0 <= LOW < HIGH, got {low:g} and {high:g}")
-    dt = 1.0 / arguments.rate
+    if arguments.rate is not None and arguments.rate > FASTEST:
+        raise InputError(f"--rate: expected 1 to {FASTEST:g} Hz, got {arguments.rate}")
+    found = source(arguments)
+    dt = 1.0 / (arguments.rate or found.rate)
     identifier = LiveIdentifier(
         arguments.inputs, low, high, dt, arguments.degree, arguments.forgetting
     )
+    missing = [name for name in identifier.signals if name not in found.signals]
+    if missing:
+        found.close()
+        raise InputError(
+            f"{found.name} has no {', '.join(missing)}: --inputs names the controls,"
+            f" the other signals must be there; it has {', '.join(found.signals)}"
+        )
     recorder = None
     if arguments.record is not None:
         recorder = Recorder(arguments.record, (*SIGNALS, *arguments.inputs))
-    watch = Watch(source(arguments), identifier, Stream(identifier.signals, dt), recorder)
+    watch = Watch(found, identifier, Stream(identifier.signals, dt), recorder)
     progress(f"listening to {watch.source.name}; Ctrl-C ends")
     watch.run(arguments.duration or math.inf, progress)
     if not watch.received:
@@ -78,20 +94,18 @@ def run(arguments: argparse.Namespace) -> Output:
             f"nothing came from {watch.source.name}: check that it sends, its address and port"
         )
     data = dict(watch.data())
-    lines = [*_report(watch)]
-    if arguments.save is not None:
-        model = identifier.model()
-        if model is None:
-            raise InputError(
-                "there is no model to save: the data do not determine every coefficient; "
-                + identifier.next_to_fly()
-            )
+    lines, status = _report(watch), 0
+    model = identifier.model() if arguments.save is not None else None
+    if model is not None and arguments.save is not None:
         data["written"] = model.save(arguments.save)
         lines.append(f"wrote {arguments.save}")
-    return Output("\n".join(lines), data)
+    elif arguments.save is not None:
+        status = 1
+        lines.append("no model is saved: the data do not determine every coefficient")
+    return Output("\n".join(lines), data, status)
 
 
-def source(arguments: argparse.Namespace) -> Source:
+def source(arguments: argparse.Namespace) -> XPlaneSource | MavlinkSource | RecordSource:
     """Return the source that is named. Raises `InputError` for one that is not known."""
     kind, _, address = arguments.source.partition(":")
     if kind == "xplane":
@@ -100,7 +114,7 @@ def source(arguments: argparse.Namespace) -> Source:
         host, _, port = address.partition(":")
         if port and not port.isdecimal():
             raise InputError(f"expected xplane:HOST:PORT, got {arguments.source!r}")
-        return XPlaneSource(host or "127.0.0.1", int(port or PORT), arguments.rate)
+        return XPlaneSource(host or "127.0.0.1", int(port or PORT), arguments.rate or 50)
     if kind == "mavlink":
         from studies.live.mavlink import PORT, MavlinkSource
 
@@ -113,35 +127,45 @@ def source(arguments: argparse.Namespace) -> Source:
     from studies.live.replay import RecordSource
     from symheli import FlightRecord
 
-    return RecordSource(FlightRecord.from_csv(path), path.name, arguments.speed)
+    found = RecordSource(FlightRecord.from_csv(path), path.name, arguments.speed)
+    if arguments.rate is not None and arguments.rate > 1.001 * found.rate:
+        raise InputError(f"{path} has {found.rate:.4g} samples a second: leave --rate out")
+    return found
 
 
 def _report(watch: Watch) -> list[str]:
     """Return what came, what is covered, and what is known, for a reader."""
+    from studies.live.identifier import BIN
+
     found = watch.identifier
     counts = ", ".join(f"{state.name} {n}" for state, n in watch.stream.counts.items())
-    table = [["m/s", "samples", *(f"motion of {u}" for u in found.inputs), "missing"]]
+    table = [
+        ["airspeed, m/s", "samples", *(f"motion of {u}" for u in found.inputs), "still to move"]
+    ]
     for cell in found.coverage():
         motion = [f"{cell.motion[u] / max(found.largest[u], 1e-9):.2f}" for u in found.inputs]
-        missing = ", ".join(cell.missing(found.largest))
-        table.append([f"{cell.low:g}", f"{cell.samples}", *motion, missing])
-    powers = [["control power", "m/s", "value", "standard error"]]
+        left = cell.missing(found.largest)
+        missing = "all" if len(left) == len(found.inputs) else ", ".join(left)
+        table.append([f"{cell.low:g} to {cell.low + BIN:g}", f"{cell.samples}", *motion, missing])
+    powers = [["control power", "airspeed, m/s", "value", "standard error", "unit"]]
     for p in found.control_powers([cell.low for cell in found.coverage()][1::3]):
-        powers.append(
-            [f"{p.output} by {p.control}", f"{p.airspeed:g}", f"{p.value:.4g}", f"{p.error:.2g}"]
-        )
+        numbers = [f"{p.airspeed:g}", f"{p.value:.4g}", f"{p.error:.2g}"]
+        powers.append([f"{p.output} by {p.control}", *numbers, p.unit])
     lines = [
         f"{watch.received} samples from {watch.source.name}: {counts}",
-        f"{found.learnt} of them taught; {found.outside} were outside the range of airspeeds",
+        f"{found.learnt} rows of {1 / found.dt:.4g} a second were learnt;"
+        f" {found.outside} were outside the range of airspeeds",
+        *watch.problems(),
         "",
         columns(table),
         LEGEND,
         "",
         columns(powers) if len(powers) > 1 else "no model yet: not every coefficient is determined",
+        *([SCATTER] if len(powers) > 1 else []),
     ]
     if watch.prediction is not None:
         fits = ", ".join(f"{y} {fit:.0f}" for y, fit in watch.prediction.fit.items())
-        lines += ["", f"1 s ahead over the last seconds, % of what each varies: {fits}"]
+        lines += ["", f"1 s prediction over the last seconds, fit in %: {fits}", FIT]
     lines += ["", found.next_to_fly()]
     if watch.recorder is not None:
         lines.append(f"wrote {watch.recorder.path}")

@@ -31,7 +31,7 @@ ARGUMENTS = (
         default=(0.5, 12.0),
     ),
     option("--acceleration", "A", "of the commanded airspeed, m/s^2", options.positive, 1.0),
-    option("--duration", "S", "of the flight", options.positive, 600.0),
+    option("--duration", "S", "of the flight, and to the end of a leg", options.positive, 600.0),
     option("--speed", "X", "times real time", options.positive, 1.0),
     option("--xplane", "PORT", "port of X-Plane's UDP", options.count, 49000),
     option(
@@ -68,16 +68,15 @@ def run(arguments: argparse.Namespace) -> Output:
     if not 0 <= low < high:
         raise InputError(f"--airspeeds: expected 0 <= LOW < HIGH, got {low:g} and {high:g}")
     heli = options.helicopter(arguments)
-    leg = (high - low) / arguments.acceleration + 2.0
-    legs = max(math.ceil(arguments.duration / leg), 1)
-    schedule = AirspeedSchedule(
-        tuple(high if k % 2 == 0 else low for k in range(legs)),
-        (arguments.acceleration,) * legs,
-        (2.0,) * legs,
-        start=low,
-    )
+
+    def flight(legs: int) -> AirspeedSchedule:
+        targets = tuple(high if k % 2 == 0 else low for k in range(legs))
+        return AirspeedSchedule(targets, (arguments.acceleration,) * legs, (2.0,) * legs, start=low)
+
+    first, leg = flight(1).duration, flight(2).duration - flight(1).duration
+    schedule = flight(max(math.ceil((arguments.duration - first) / leg), 0) + 1)
     inner = symheli.flight.gain_scheduled_lqr(heli, 0.0, high + 1.0, PERIOD).scheduled_controller
-    samples = round(legs * (leg + 2.0) / inner.dt)
+    samples = math.ceil(schedule.duration / inner.dt) + 1
     added = np.zeros((samples, 4))
     if arguments.excitation:
         sizes = {name: arguments.excitation * size for name, size in AMPLITUDES.items()}
@@ -89,7 +88,7 @@ def run(arguments: argparse.Namespace) -> Output:
         lines.append(MavlinkLine(arguments.mavlink))
     wire = OnTheWire(inner, lines, heli.travel, arguments.speed, added)
     progress(
-        f"{arguments.vehicle} flies for {arguments.duration:g} s; X-Plane's UDP on 127.0.0.1:"
+        f"{arguments.vehicle} flies for {schedule.duration:.0f} s; X-Plane's UDP on 127.0.0.1:"
         f"{lines[0].port}"  # type: ignore[attr-defined]
         + (f", MAVLink to {arguments.mavlink}" if arguments.mavlink else "")
         + "; Ctrl-C ends"

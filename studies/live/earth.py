@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
+from symheli.logs.xplane import body_velocity
+
 
 def earth_velocity(
     u: float, v: float, w: float, phi: float, theta: float, psi: float
@@ -24,3 +28,12 @@ def earth_velocity(
         math.sin(psi) * ahead + math.cos(psi) * right,
         down,
     )
+
+
+def in_body(
+    north: float, east: float, down: float, phi: float, theta: float, psi: float
+) -> dict[str, float]:
+    """Return u, v, w (m/s) of a velocity over ground (m/s); NaN where a number is not finite."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        body = body_velocity(*map(np.asarray, (north, east, down, phi, theta, psi)))
+    return dict(zip("uvw", map(float, body), strict=True))

@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 import re
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -21,8 +21,9 @@ from identification.structure.kinematic_arx import INCREMENTS
 from studies.live.stream import Row
 from symheli import FlightRecord
 from symheli.values.arrays import Array
-from symheli.values.kinematics import RIGID_BODY
+from symheli.values.kinematics import RIGID_BODY, VELOCITIES
 from symheli.values.signal import Signal
+from symheli.values.units import per_second
 
 STATES = tuple(map(str, RIGID_BODY))
 SLOW_AIRSPEED = Signal("airspeed_slow", "m/s")
@@ -44,13 +45,13 @@ KEPT = 6.0
 HORIZON = 1.0
 """Seconds ahead of the predictions."""
 POWERS = {"p": "lat", "q": "lon", "w": "col", "r": "ped"}
-"""Control power of each axis: the increment of this velocity by the input whose name ends so."""
+"""Control power of each axis: the acceleration of this velocity by the input whose name ends so."""
 TERM = re.compile(r"(?P<signal>\w+)\(k-(?P<lag>\d+)\)(?: f(?P<function>\d+)\(.*)?$")
 
 
 class ControlPower(NamedTuple):
-    """Increment of a velocity by its control, summed over the lags, at an airspeed (m/s), with its
-    standard error: per second and unit of the control.
+    """Acceleration by a control with all velocities held, once a flapping rotor has followed, at an
+    airspeed (m/s), with its standard error: in `unit`.
     """
 
     output: str
@@ -58,6 +59,7 @@ class ControlPower(NamedTuple):
     airspeed: float
     value: float
     error: float
+    unit: str
 
 
 class Cell(NamedTuple):
@@ -132,11 +134,17 @@ class LiveIdentifier:
         self._samples = np.zeros(count, int)
         self._squares = np.zeros((count, len(self.inputs)))
         self._slow, self._means = math.nan, np.zeros(len(self.inputs))
+        self._time = math.nan
         self._recent: deque[Array] = deque(maxlen=round(KEPT / dt))
         self._seen = np.zeros((3, len(STATES)))  # number, sum and sum of squares
 
     def take(self, row: Row) -> bool:
-        """Take in a row of `signals`; return whether it taught something."""
+        """Take in a row, a start where it is not `dt` after the last; return whether it taught."""
+        if not abs(row.time - self._time - self.dt) <= 0.01 * self.dt:
+            self.online.forget_past()
+            self._recent.clear()
+            self._slow = math.nan
+        self._time = row.time
         y, u, V = np.split(row.values, [len(STATES), len(STATES) + len(self.inputs)])
         p = self._lagged(float(V[0]))
         inside = self.low <= p <= self.high
@@ -186,14 +194,15 @@ class LiveIdentifier:
         return out
 
     def next_to_fly(self) -> str:
-        """Return what would teach most: the airspeed that has been flown least, and the inputs that
-        have not moved there.
+        """Return what to fly: the nearest airspeed that is not covered, and the inputs that have
+        not moved enough there.
         """
         open_cells = [(cell, cell.missing(self.largest)) for cell in self.coverage()]
         left = [(cell, names) for cell, names in open_cells if names]
         if not left:
             return "every airspeed is covered"
-        cell, names = min(left, key=lambda one: one[0].samples)
+        now = self.low if math.isnan(self._slow) else self._slow
+        cell, names = min(left, key=lambda one: abs(one[0].low + 0.5 * BIN - now))
         what = "all inputs" if len(names) == len(self.inputs) else ", ".join(names)
         return f"fly at {cell.low:g} to {cell.low + BIN:g} m/s and move {what}"
 
@@ -228,29 +237,37 @@ class LiveIdentifier:
         regression = self.structure.aerodynamics
         theta, n = state.solve(), regression.n_regressors
         R = state.factor[:n, :n]
-        noise = np.sqrt(np.diag(state.residual_covariance))
-        outputs = [str(name) for name in regression.outputs]
+        names, moving = regression.regressor_names, regression.inputs[: len(VELOCITIES)]
         out = []
         for velocity, ending in POWERS.items():
             control = next((u for u in self.inputs if u.endswith(ending)), None)
-            column = next((k for k, y in enumerate(outputs) if y.split("_")[0] == velocity), None)
-            if control is None or column is None:
+            if control is None:
                 continue
+            row = moving.index(velocity)
+            by = Signal(control).unit
+            unit = f"{per_second(Signal(velocity).unit)} per {'unit' if by == '1' else by}"
             for V in airspeeds:
-                g = self._functional(regression.regressor_names, control, V) / self.dt
-                spread = solve_triangular(R.T, g, lower=True)
-                error = float(np.linalg.norm(spread) * noise[column])
-                out.append(ControlPower(velocity, control, V, float(g @ theta[:, column]), error))
+                # z(k-i) = z(k-1) - (i-1) T, so that (I + sum (i-1) A_i) T = sum_j B_j u
+                g = self._functional(names, control, V, lambda lag: 1.0 / self.dt)
+                older = [self._functional(names, z, V, lambda lag: lag - 1.0) for z in moving]
+                N = np.linalg.inv(np.eye(len(moving)) + theta.T @ np.transpose(older))
+                power = N @ theta.T @ g
+                spread = solve_triangular(R.T, g - power @ older, lower=True)
+                noise = math.sqrt(N[row] @ state.residual_covariance @ N[row])
+                error = float(np.linalg.norm(spread)) * noise
+                out.append(ControlPower(velocity, control, V, float(power[row]), error, unit))
         return out
 
-    def _functional(self, names: Sequence[str], control: str, V: float) -> Array:
-        """Factors of the regressors that sum the lags of a control at an airspeed."""
+    def _functional(
+        self, names: Sequence[str], signal: str, V: float, weight: Callable[[int], float]
+    ) -> Array:
+        """Factors of the regressors that sum the lags of a signal, weighted, at an airspeed."""
         values = np.atleast_1d(self.structure.basis(V))
         g = np.zeros(len(names))
         for k, name in enumerate(names):
             found = TERM.match(name)
-            if found and found["signal"] == control:
-                g[k] = values[int(found["function"] or 0)]
+            if found and found["signal"] == signal:
+                g[k] = values[int(found["function"] or 0)] * weight(int(found["lag"]))
         return g
 
     def prediction(self) -> Prediction | None:
@@ -261,8 +278,6 @@ class LiveIdentifier:
         rows = np.array(self._recent) if self._recent else np.zeros((0, 1))
         model = self.model() if len(rows) > 2 * horizon else None
         if model is None or not np.isfinite(rows).all():
-            return None
-        if np.abs(np.diff(rows[:, 0]) - self.dt).max() > 0.01 * self.dt:
             return None
         signals = (*RIGID_BODY, *map(Signal, self.inputs), SLOW_AIRSPEED)
         time = rows[0, 0] + self.dt * np.arange(len(rows))

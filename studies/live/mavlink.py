@@ -11,11 +11,11 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from studies.live.earth import earth_velocity
+from studies.live.earth import earth_velocity, in_body
 from studies.live.sample import Sample
+from studies.live.xplane import AT_ONCE, bound
 from symheli.errors import InputError
 from symheli.extras import extra
-from symheli.logs.xplane import body_velocity
 
 PORT = 14550
 """UDP port on which ground stations listen."""
@@ -34,6 +34,23 @@ def library() -> Any:
     return mavutil
 
 
+def opened(address: str, **options: Any) -> Any:
+    """Return pymavlink's connection to an address. Raises `InputError` where it cannot be had: a
+    port that another listens on would take its messages away.
+    """
+    kind, _, place = address.partition(":")
+    try:
+        if kind in ("udp", "udpin"):
+            host, _, port = place.rpartition(":")
+            bound(host, int(port)).close()
+        return library().mavlink_connection(address, **options)
+    except (OSError, ValueError, OverflowError) as error:
+        raise InputError(f"MAVLink at {address} cannot be opened: {error}") from error
+    except ImportError as error:
+        hint = "a serial line needs `pip install pyserial`; a port begins with udpin:"
+        raise InputError(f"MAVLink at {address} cannot be opened: {hint}") from error
+
+
 class MavlinkSource:
     """A vehicle that speaks MAVLink.
 
@@ -50,12 +67,12 @@ class MavlinkSource:
         Without pymavlink, and for an address that cannot be opened.
     """
 
+    signals = (*"uvwpqr", "phi", "theta", "psi", "airspeed", *STICKS)
+    rate = 50
+
     def __init__(self, address: str = f"udpin:127.0.0.1:{PORT}", baud: int = 57600):
         self.name = f"MAVLink at {address}"
-        try:
-            self._link = library().mavlink_connection(address, baud=baud, robust_parsing=True)
-        except (OSError, ValueError) as error:
-            raise InputError(f"{self.name} cannot be opened: {error}") from error
+        self._link = opened(address, baud=baud, robust_parsing=True)
         self._latest: dict[tuple[int, str], tuple[float, dict[str, float]]] = {}
         self._clock: dict[int, float] = {}
 
@@ -63,7 +80,9 @@ class MavlinkSource:
         """Return a sample for each ATTITUDE that has come."""
         found: list[Sample] = []
         message = self._link.recv_match(blocking=True, timeout=timeout)
-        while message is not None:
+        for _ in range(AT_ONCE):
+            if message is None:
+                break
             found += self._taken(message)
             message = self._link.recv_match(blocking=False)
         return found
@@ -78,10 +97,9 @@ class MavlinkSource:
         return []
 
     def _time(self, message: Any, system: int) -> float:
-        """Time of a message, s; of one without a clock that of the last one that has it."""
-        for field, unit in (("time_boot_ms", 1e-3), ("time_usec", 1e-6)):
-            if hasattr(message, field):
-                self._clock[system] = unit * getattr(message, field)
+        """Time of a message since boot, s, or the last (microseconds in 32 bits do not count)."""
+        if hasattr(message, "time_boot_ms"):
+            self._clock[system] = 1e-3 * message.time_boot_ms
         return self._clock.get(system, -math.inf)
 
     def _sample(self, attitude: Any, system: int) -> Sample:
@@ -100,9 +118,7 @@ class MavlinkSource:
                 values |= found
         if "north" in values:
             earth = [values.pop(name) for name in ("north", "east", "down")]
-            angles = (values[name] for name in ("phi", "theta", "psi"))
-            body = body_velocity(*earth, *angles)  # type: ignore[arg-type]
-            values |= dict(zip("uvw", map(float, body), strict=True))
+            values |= in_body(*earth, *(values[name] for name in ("phi", "theta", "psi")))
         return Sample(time, values, f"system {system}")
 
     def close(self) -> None:
@@ -116,7 +132,10 @@ def _velocity(message: Any) -> dict[str, float]:
 
 def _servos(message: Any) -> dict[str, float]:
     raw = [getattr(message, f"servo{k + 1}_raw") for k in range(len(STICKS))]
-    return {name: (us - CENTRE) / TRAVEL for name, us in zip(STICKS, raw, strict=True)}
+    return {
+        name: (us - CENTRE) / TRAVEL if 0 < us < 2**16 - 1 else math.nan  # 0: not in use
+        for name, us in zip(STICKS, raw, strict=True)
+    }
 
 
 READ = {

@@ -4,9 +4,9 @@ takes commands from there.
 
 from __future__ import annotations
 
+import contextlib
 import math
 import select
-import socket
 import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
@@ -15,7 +15,6 @@ import numpy as np
 
 from studies.live import mavlink, xplane
 from studies.live.earth import earth_velocity
-from symheli.errors import InputError
 from symheli.values.arrays import Array
 from symheli.values.kinematics import INPUTS
 from symheli.values.named_vector import NamedVector
@@ -23,6 +22,8 @@ from symheli.values.named_vector import NamedVector
 STICKS = mavlink.STICKS
 FRESH = 0.5
 """Seconds after which a command from the wire is too old, and the autopilot has the stick again."""
+MOST_REQUESTS = 10_000
+"""Requests of all clients, at most: one more drops the client that came first."""
 MEASURED = ("u", "v", "w", "p", "q", "r", "phi", "theta", "airspeed")
 
 
@@ -47,7 +48,7 @@ class XPlaneLine:
     """
 
     def __init__(self, host: str = "127.0.0.1", port: int = xplane.PORT):
-        self._socket = bound(host, port)
+        self._socket = xplane.bound(host, port)
         self.port = self._socket.getsockname()[1]
         self._asked: dict[Any, dict[int, xplane.Request]] = {}
         self._due: dict[Any, float] = {}
@@ -63,7 +64,9 @@ class XPlaneLine:
             frequency = max(one.frequency for one in requests.values())
             self._due[client] = at + 1.0 / frequency
             found = {k: shown.get(one.dataref, 0.0) for k, one in requests.items()}
-            self._socket.sendto(xplane.answer(found), client)
+            for datagram in xplane.answers(found):
+                with contextlib.suppress(OSError):  # no way there
+                    self._socket.sendto(datagram, client)
 
     def _shown(self, at: float, values: Mapping[str, float]) -> dict[str, float]:
         """Datarefs by name, in X-Plane's units."""
@@ -80,7 +83,9 @@ class XPlaneLine:
         """Serve requests for so long (s); return the sticks that were set."""
         sticks: dict[str, float] = {}
         end = time.monotonic() + timeout
-        while select.select([self._socket], [], [], max(end - time.monotonic(), 0.0))[0]:
+        for _ in range(xplane.AT_ONCE):
+            if not select.select([self._socket], [], [], max(end - time.monotonic(), 0.0))[0]:
+                break
             try:
                 datagram, client = self._socket.recvfrom(xplane.LARGEST)
             except ConnectionError:  # a client that has gone
@@ -90,6 +95,7 @@ class XPlaneLine:
                 self._take(client, request)
             elif setting is not None and (name := self._names.get(setting[0])) in STICKS:
                 sticks[str(name)] = setting[1]
+        time.sleep(max(end - time.monotonic(), 0.0))
         return sticks
 
     def _take(self, client: Any, request: xplane.Request) -> None:
@@ -98,8 +104,11 @@ class XPlaneLine:
             requests[request.number] = request
         else:
             requests.pop(request.number, None)
-        if not requests:
-            del self._asked[client]
+        crowded = sum(map(len, self._asked.values())) > MOST_REQUESTS
+        leaving = next(iter(self._asked)) if crowded else client
+        if crowded or not requests:
+            del self._asked[leaving]
+            self._due.pop(leaving, None)
 
     def close(self) -> None:
         """Close the socket."""
@@ -114,7 +123,7 @@ class MavlinkLine:
 
     def __init__(self, address: str = f"udpout:127.0.0.1:{mavlink.PORT}"):
         self._library = mavlink.library()
-        self._link = self._library.mavlink_connection(
+        self._link = mavlink.opened(
             address, source_system=mavlink.SYSTEM, source_component=mavlink.COMPONENT
         )
         self._beat = -math.inf
@@ -150,17 +159,6 @@ class MavlinkLine:
     def close(self) -> None:
         """Close the socket."""
         self._link.close()
-
-
-def bound(host: str, port: int) -> socket.socket:
-    """Return a UDP socket at this address. Raises `InputError` where it is taken."""
-    made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    try:
-        made.bind((host, port))
-    except OSError as error:
-        made.close()
-        raise InputError(f"port {port} of {host} cannot be had ({error}): give another") from error
-    return made
 
 
 class OnTheWire:
@@ -212,11 +210,11 @@ class OnTheWire:
         u = np.array(u, float)
         if self.samples < len(self._added):
             u += self._added[self.samples]
-        u = np.clip(u, -self.travel, self.travel)
         for k, name in enumerate(STICKS):
             value, when = self._set.get(name, (0.0, -math.inf))
             if at - when <= FRESH:
                 u[k] = value * self.travel[k]
+        u = np.clip(u, -self.travel, self.travel)
         values = {name: float(measured[name]) for name in MEASURED}
         values["psi"] = self._heading(values)
         values |= dict(zip(STICKS, (u / self.travel).tolist(), strict=True))

@@ -50,6 +50,8 @@ class Recorder:
             self._file = open(self.path, "xb", buffering=0)
         except FileExistsError:
             raise InputError(f"{path} is there already: name another file") from None
+        except FileNotFoundError:
+            raise InputError(f"{path}: make the folder {self.path.parent} first") from None
         except OSError as error:
             raise InputError(f"{path} cannot be written: {error}") from error
         names = (f"{name} [{Signal(name).unit}]" for name in self.signals)
@@ -94,6 +96,8 @@ class Recorder:
             pass
 
     def close(self) -> None:
-        """Write what waits and close the file."""
+        """Write what waits and close the file; without a sample there is none."""
         self._write()
         self._file.close()
+        if not self.written:
+            self.path.unlink()

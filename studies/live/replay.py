@@ -34,7 +34,7 @@ class RecordSource:
     ):
         self.name, self._record, self._speed, self._clock = name, record, speed, clock
         self._next, self._begun = 0, math.nan
-        self._names = [str(signal) for signal in record.signals]
+        self.signals, self.rate = tuple(map(str, record.signals)), 1.0 / record.dt
 
     def receive(self, timeout: float) -> Sequence[Sample]:
         """Return the samples that are due, waiting for the next at most so long (s)."""
@@ -57,7 +57,7 @@ class RecordSource:
         return [self._sample(k) for k in rows]
 
     def _sample(self, k: int) -> Sample:
-        values = dict(zip(self._names, self._record.values[k].tolist(), strict=True))
+        values = dict(zip(self.signals, self._record.values[k].tolist(), strict=True))
         return Sample(float(self._record.time[k]), values, self.name)
 
     def close(self) -> None:

@@ -5,7 +5,7 @@ a number, or of another vehicle is named, and never learnt from.
 from __future__ import annotations
 
 import math
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Iterator, Sequence
 from enum import Enum
 from typing import NamedTuple
@@ -20,6 +20,10 @@ LONGEST_GAP = 2.5
 """Sample periods between two samples up to which rows between them are interpolated."""
 JUMP = 2.0
 """Seconds by which the sender's clock may leave that of this machine between two samples."""
+HOLE = 5.0
+"""Seconds without a sample after which rows begin anew instead of being unknown one by one."""
+LARGEST = 1e4
+"""Value in SI beyond which a signal of a vehicle is taken for damage."""
 ROUNDING = 1e-6
 """Fraction of a period by which a time may miss a row's."""
 
@@ -31,10 +35,11 @@ class StreamState(Enum):
     GOOD = "samples come as they should"
     SILENT = "no sample for more than half a second"
     LOST = "samples are missing: rows between them are unknown"
-    REPEATED = "the same sample came again and is left out"
+    REPEATED = "the sender's clock stands still (paused, or a sample came again): left out"
     REORDERED = "a sample came after a later one and is left out"
     CLOCK_JUMP = "the sender's clock jumped: the recursion starts with new lags"
-    NOT_A_NUMBER = "a value is missing or no finite number: the row is unknown"
+    NOT_A_NUMBER = "a value is missing, not finite or beyond 1e4: the row is unknown"
+    COARSE_CLOCK = "the sender's clock has too few digits: begin its flight anew"
     OTHER_VEHICLE = "another sender is heard and left out"
 
 
@@ -72,6 +77,18 @@ class Stream:
         self._start = math.nan
         self._last: tuple[float, Array] | None = None
         self._received = -math.inf
+        self._seen = np.zeros(len(self.signals), bool)
+        self._steps: deque[float] = deque([dt], maxlen=50)
+
+    @property
+    def period(self) -> float:
+        """Median time between the last samples on the sender's clock, s."""
+        return float(np.median(self._steps))
+
+    @property
+    def missing(self) -> list[str]:
+        """Signals of which no number has come yet."""
+        return [name for name, seen in zip(self.signals, self._seen, strict=True) if not seen]
 
     def take(self, sample: Sample, received: float) -> list[Row]:
         """Return the rows that the sample completes; `received` (s) on this machine's clock."""
@@ -82,26 +99,37 @@ class Stream:
         if not math.isfinite(time):
             return self._is(StreamState.NOT_A_NUMBER)
         values = np.array([float(sample.values.get(name, math.nan)) for name in self.signals])
-        values[~np.isfinite(values)] = math.nan
+        values[~(np.abs(values) <= LARGEST)] = math.nan
+        self._seen |= np.isfinite(values)
         if self._last is None:
             return self._begin(time, values, received)
         before, old = self._last
         step, waited = time - before, received - self._received
         if step == 0.0:
+            self._received = received
             return self._is(StreamState.REPEATED)
-        if abs(step - waited) > JUMP:
+        if abs(step - waited) > JUMP or step > HOLE:
             self._begin(time, values, received)
-            return [*self._is(StreamState.CLOCK_JUMP), Row(time, values)]
+            lost = abs(step - waited) <= JUMP
+            self._is(StreamState.LOST if lost else StreamState.CLOCK_JUMP)
+            return [Row(time, values)]
         if step < 0.0:
             return self._is(StreamState.REORDERED)
         self._last, self._received = (time, values), received
+        self._steps.append(step)
         rows = list(self._between(before, old, time, values))
         if any(np.isnan(row.values).any() for row in rows):
             known = bool(np.isfinite(old).all() and np.isfinite(values).all())
             self._is(StreamState.LOST if known else StreamState.NOT_A_NUMBER)
         else:
-            self._is(StreamState.GOOD)
+            coarse = all(self._coarse(t) for t in (before, time))
+            self._is(StreamState.COARSE_CLOCK if coarse else StreamState.GOOD)
         return rows
+
+    def _coarse(self, time: float) -> bool:
+        """Whether a time is in single precision, with too few digits for the period."""
+        single = np.float32(time)
+        return float(single) == time and bool(np.spacing(single) > 0.2 * self.dt)
 
     def idle(self, now: float) -> None:
         """Say that nothing came until `now` (s), on this machine's clock."""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import signal
+import threading
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -19,6 +21,8 @@ PATIENCE = 0.05
 """Longest time without a look at the clock, s."""
 EVERY = 1.0
 """Seconds between two lines."""
+SLOWER = 1.2
+"""Times the period of the rows that samples may be apart before it is said."""
 
 
 @dataclass
@@ -33,6 +37,7 @@ class Watch:
     received: int = 0
     last: float = math.nan
     airspeed: float = math.nan
+    _stopped: bool = False
 
     def run(
         self,
@@ -44,8 +49,12 @@ class Watch:
         is recorded and identified from then.
         """
         begun = said = clock()
+        alone = threading.current_thread() is threading.main_thread()
+        heard = alone and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        if heard:
+            signal.signal(signal.SIGINT, self._interrupted)
         try:
-            while (now := clock()) - begun < seconds:
+            while (now := clock()) - begun < seconds and not self._stopped:
                 for sample in self.source.receive(PATIENCE):
                     self.take(sample, clock())
                 self.stream.idle(now)
@@ -53,20 +62,32 @@ class Watch:
                     said = now
                     self.prediction = self.identifier.prediction()
                     say(self.line())
-        except (EOFError, KeyboardInterrupt):
+        except EOFError:
             pass
+        except OSError as error:
+            say(f"{self.source.name} has ended: {error}")
         finally:
+            if heard:
+                signal.signal(signal.SIGINT, signal.default_int_handler)
             self.prediction = self.identifier.prediction() or self.prediction
             self.source.close()
             if self.recorder is not None:
                 self.recorder.close()
 
+    def _interrupted(self, *_: Any) -> None:
+        """End at the next look at the clock; a second Ctrl-C does not wait for it."""
+        self._stopped = True
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
     def take(self, sample: Sample, now: float) -> None:
-        """Record a sample and identify from it; `now` (s) is when it came."""
+        """Record and learn a sample that came at `now` (s), unless another vehicle sent it."""
+        rows = self.stream.take(sample, now)
+        if sample.sender != self.stream.sender:
+            return
         self.received += 1
         if self.recorder is not None:
             self.recorder.add(sample, now)
-        for row in self.stream.take(sample, now):
+        for row in rows:
             self.identifier.take(row)
         self.last = sample.time
         self.airspeed = float(sample.values.get("airspeed", math.nan))
@@ -79,11 +100,11 @@ class Watch:
         whole = sum(not cell.missing(self.identifier.largest) for cell in cells)
         parts = [
             f"{self.last:8.1f} s",
-            f"{self.airspeed:5.1f} m/s",
-            f"learnt {self.identifier.learnt}",
-            f"covered {whole} of {len(cells)}",
+            f"airspeed {self.airspeed:4.1f} m/s",
+            f"{self.identifier.learnt} samples learnt",
+            f"{whole} of {len(cells)} airspeeds covered",
             *self._predicted(),
-            self.identifier.next_to_fly(),
+            *(self.problems() or [self.identifier.next_to_fly()]),
         ]
         if self.stream.state is not StreamState.GOOD:
             parts.append(f"{self.stream.state.name}: {self.stream.state.value}")
@@ -91,11 +112,22 @@ class Watch:
             parts.append(f"RECORD: {self.recorder.problem}")
         return "; ".join(parts)
 
+    def problems(self) -> list[str]:
+        """Return what keeps the stream from teaching, and what to do."""
+        found, rate = [], 1.0 / self.stream.period
+        if self.stream.missing:
+            names = ", ".join(self.stream.missing)
+            found.append(f"nothing can be learnt: no number has come of {names}")
+        if rate * SLOWER * self.stream.dt < 1.0:
+            found.append(f"only {rate:.3g} samples come a second: give --rate {max(rate, 1):.0f}")
+        return found
+
     def _predicted(self) -> list[str]:
         if self.prediction is None:
             return []
         worst, fit = min(self.prediction.fit.items(), key=lambda item: item[1])
-        return [f"1 s ahead: worst {worst} {fit:.0f} %"]
+        fits = f"{fit:.0f} %" if fit >= 0 else "worse than the mean"
+        return [f"1 s prediction: worst {worst}, {fits}"]
 
     def data(self) -> Mapping[str, Any]:
         """Return the numbers for a program."""

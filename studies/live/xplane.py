@@ -9,6 +9,7 @@ Source: "Exchanging data with X-Plane" in the folder Instructions of X-Plane 11 
 
 from __future__ import annotations
 
+import contextlib
 import math
 import select
 import socket
@@ -17,9 +18,9 @@ import time
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+from studies.live.earth import in_body
 from studies.live.sample import Sample
 from symheli.errors import InputError
-from symheli.logs.xplane import body_velocity
 
 PORT = 49000
 """UDP port on which X-Plane listens."""
@@ -37,6 +38,10 @@ an aircraft.
 """
 LARGEST = 65535
 """Bytes of a datagram, at most."""
+AT_ONCE = 1000
+"""Datagrams that are read in one go, at most: a flood stops nothing else."""
+PER_ANSWER = 180
+"""Values in an answer, at most: more do not pass an Ethernet in one piece."""
 
 DEG, KNOT = math.pi / 180.0, 0.514444
 DATAREFS: Mapping[str, tuple[str, float]] = {
@@ -78,9 +83,11 @@ def setting(dataref: str, value: float) -> bytes:
     return SETTING.pack(b"DREF\0", value, dataref.encode("ascii"))
 
 
-def answer(values: Mapping[int, float]) -> bytes:
-    """Return the datagram with values by their numbers."""
-    return ANSWER + b"".join(ENTRY.pack(number, value) for number, value in values.items())
+def answers(values: Mapping[int, float]) -> list[bytes]:
+    """Return the datagrams with values by their numbers."""
+    packed = [ENTRY.pack(number, value) for number, value in values.items()]
+    firsts = range(0, len(packed), PER_ANSWER)
+    return [ANSWER + b"".join(packed[k : k + PER_ANSWER]) for k in firsts]
 
 
 def requested(datagram: bytes) -> Request | None:
@@ -112,6 +119,17 @@ def _text(field: bytes) -> str:
     return field.split(b"\0")[0].decode("ascii", "replace").strip()
 
 
+def bound(host: str, port: int) -> socket.socket:
+    """Return a UDP socket at this address. Raises `InputError` where it is taken."""
+    made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        made.bind((host, port))
+    except (OSError, OverflowError) as error:
+        made.close()
+        raise InputError(f"port {port} of {host} cannot be had ({error}): give another") from error
+    return made
+
+
 class XPlaneSource:
     """X-Plane, or what speaks like it, at an address.
 
@@ -127,7 +145,7 @@ class XPlaneSource:
     Raises
     ------
     InputError
-        For a host that has no address.
+        For a host that has no address, and a port or rate out of range.
     """
 
     def __init__(
@@ -140,6 +158,9 @@ class XPlaneSource:
         self.name = f"X-Plane at {host}:{port}"
         self.rate, self.datarefs = rate, {**DATAREFS, **(datarefs or {})}
         self._quantities = list(self.datarefs)
+        self.signals = (*"uvw", *self._quantities)
+        if not 0 < port < 2**16:
+            raise InputError(f"port: expected 1 to 65535, got {port}")
         try:
             self._peer = (socket.gethostbyname(host), port)
         except OSError as error:
@@ -156,11 +177,11 @@ class XPlaneSource:
             self._ask(self.rate)
             self._asked = now
         found: list[Sample] = []
-        ready, _, _ = select.select([self._socket], [], [], timeout)
-        while ready:
+        select.select([self._socket], [], [], timeout)
+        for _ in range(AT_ONCE):
             try:
                 datagram, (host, port) = self._socket.recvfrom(LARGEST)
-            except (BlockingIOError, ConnectionError):  # nobody listens there yet
+            except OSError:  # nothing more, or nobody listens there yet
                 break
             values = answered(datagram)
             if values is not None:
@@ -178,18 +199,15 @@ class XPlaneSource:
             return []
         if all(name in raw for name in (*EARTH, "phi", "theta", "psi")):
             east, up, south = (raw.pop(name) for name in EARTH)
-            body = body_velocity(-south, east, -up, raw["phi"], raw["theta"], raw["psi"])  # type: ignore[arg-type]
-            raw |= dict(zip("uvw", map(float, body), strict=True))
+            raw |= in_body(-south, east, -up, raw["phi"], raw["theta"], raw["psi"])
         return [Sample(raw.pop("time"), raw, sender)]
 
     def _ask(self, frequency: int) -> None:
-        for k, name in enumerate(self._quantities):
-            self._socket.sendto(request(frequency, k, self.datarefs[name][0]), self._peer)
+        with contextlib.suppress(OSError):  # no way there now: it is asked again
+            for k, name in enumerate(self._quantities):
+                self._socket.sendto(request(frequency, k, self.datarefs[name][0]), self._peer)
 
     def close(self) -> None:
         """Ask X-Plane to send no more."""
-        try:
-            self._ask(0)
-        except OSError:
-            pass
+        self._ask(0)
         self._socket.close()

@@ -2,6 +2,8 @@
 
 import math
 import os
+import random
+import select
 import signal
 import socket
 import struct
@@ -14,10 +16,12 @@ import numpy as np
 import pytest
 
 import symheli
+from studies.live import mavlink, peer, xplane
 from studies.live.earth import earth_velocity
 from studies.live.peer import MavlinkLine, OnTheWire, XPlaneLine
 from studies.live.recorder import Recorder
 from studies.live.sample import Sample
+from studies.live.stream import Stream
 from studies.live.xplane import XPlaneSource
 from symheli import FlightRecord
 from symheli.errors import InputError
@@ -100,6 +104,68 @@ def test_a_port_that_is_taken_is_refused(line):
         XPlaneLine(port=line.port)
 
 
+def test_an_answer_fits_into_datagrams(line, client):
+    for number in range(1000):
+        client.send(struct.pack("<4sxii400s", b"RREF", 1000, number, b"sim/no"))
+        line.wait(0.0)
+    line.send(0.0, STATE)
+    client.setblocking(False)
+    found = [k for one in drained(client) for k, _ in struct.iter_unpack("<if", one[5:])]
+    assert sorted(found) == list(range(1000))
+
+
+def test_clients_that_never_leave_are_dropped(line, monkeypatch):
+    """The first of them, when there are too many requests; a negative frequency asks nothing."""
+    monkeypatch.setattr(peer, "MOST_REQUESTS", 5)
+    for number in range(20):
+        line._take(("127.0.0.1", 1000 + number), xplane.Request(50, 1, "sim/no"))
+        line._take(("127.0.0.1", 9), xplane.Request(-50, number, "sim/no"))
+        line.send(float(number), STATE)
+    assert [port for _, port in line._asked] == list(range(1015, 1020))
+    assert len(line._due) == 5
+
+
+def test_a_flood_neither_stops_nor_hurries_the_flight(line):
+    """Another process sends as fast as it can."""
+    code = "import socket, sys\ns = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)\n"
+    code += "while True: s.sendto(b'DREF' + bytes(30), ('127.0.0.1', int(sys.argv[1])))"
+    flood = subprocess.Popen([sys.executable, "-c", code, str(line.port)])
+    try:
+        select.select([line._socket], [], [], 10.0)
+        begun = time.monotonic()
+        line.wait(0.3)
+        assert 0.3 <= time.monotonic() - begun < 3.0
+    finally:
+        flood.kill()
+        flood.wait()
+
+
+@pytest.mark.parametrize("port", [0, 70000])
+def test_a_port_out_of_range_is_refused(port):
+    with pytest.raises(InputError, match="expected 1 to 65535"):
+        XPlaneSource(port=port)
+
+
+def test_noise_from_the_network_is_left_out(line):
+    """Random bytes, and answers with random numbers; the next answer is read as ever."""
+    rng, source = random.Random(0), XPlaneSource(port=line.port)
+    source.receive(0.0)
+    line.wait(0.05)
+    (address,) = line._asked
+    for _ in range(100):
+        line._socket.sendto(rng.randbytes(rng.randint(0, 300)), address)
+        line._socket.sendto(b"RREF," + rng.randbytes(8 * rng.randint(0, 40)), address)
+    for bad in (math.nan, math.inf, -1e30):
+        line._socket.sendto(b"".join(xplane.answers(dict.fromkeys(range(15), bad))), address)
+    stream = Stream(tuple(STATE), 0.02)
+    for sample in source.receive(0.1):
+        assert all(np.isnan(row.values).any() for row in stream.take(sample, 0.0))
+    line.send(12.5, STATE)
+    (found,) = source.receive(1.0)
+    assert found.values["q"] == pytest.approx(STATE["q"])
+    source.close()
+
+
 def test_the_source_reads_what_the_line_sends(line):
     source = XPlaneSource(port=line.port)
     assert list(source.receive(0.0)) == []
@@ -147,6 +213,47 @@ def test_mavlink_both_ways():
     assert line.wait(0.5) == {"stick_lon": 0.5, "stick_ped": -0.2}
     for each in (source, line, other):
         each.close()
+
+
+@pytest.fixture
+def mavlink_pair():
+    pytest.importorskip("pymavlink")
+    port = free_port()
+    pair = mavlink.MavlinkSource(f"udpin:127.0.0.1:{port}"), MavlinkLine(f"udpout:127.0.0.1:{port}")
+    yield pair
+    for each in pair:
+        each.close()
+
+
+def test_a_mavlink_port_is_not_shared(mavlink_pair):
+    """A second listener would take the messages away without a word."""
+    with pytest.raises(InputError, match="cannot be had"):
+        mavlink.MavlinkSource(mavlink_pair[0].name.removeprefix("MAVLink at "))
+
+
+@pytest.mark.parametrize("address", ["udpin:127.0.0.1", "udpin:127.0.0.1:x", "udpout:127.0.0.1"])
+def test_a_mavlink_address_that_is_none_is_refused(address):
+    pytest.importorskip("pymavlink")
+    with pytest.raises(InputError, match="cannot be opened"):
+        mavlink.opened(address)
+
+
+def test_mavlink_goes_on_after_71_minutes(mavlink_pair):
+    """Where the microseconds of its servo outputs begin again from 0."""
+    source, line = mavlink_pair
+    line.send(2.0**32 * 1e-6 + 1.0, STATE)
+    (found,) = source.receive(1.0)
+    assert found.values["stick_col"] == pytest.approx(0.6)
+
+
+def test_a_servo_that_is_not_in_use_is_no_stick(mavlink_pair):
+    source, line = mavlink_pair
+    line.send(0.0, STATE)
+    line._link.mav.servo_output_raw_send(0, 0, 0, 65535, 1500, 1000, *[0] * 4)
+    line._link.mav.attitude_send(0, *[0.0] * 6)
+    *_, found = source.receive(1.0)
+    sticks = [found.values[name] for name in mavlink.STICKS]
+    np.testing.assert_array_equal(sticks, [math.nan, math.nan, 0.0, -1.0])
 
 
 def free_port():
@@ -220,6 +327,12 @@ def test_a_stick_from_the_wire_is_flown_until_it_is_old(heli):
     assert (record["d_col"] == quiet["d_col"]).all()  # no number moves nothing
 
 
+def test_a_stick_beyond_its_stop_stays_there(heli):
+    """A command of 1e9 is one of the full travel."""
+    _, record = flown(heli, Script({5: {"stick_ped": 1e9}}))
+    assert record["d_ped"].max() == pytest.approx(heli.travel[3])
+
+
 def test_real_time_is_kept(heli):
     wire = OnTheWire(Hold(), [XPlaneLine(port=0)], heli.travel, 4.0)
     hover = symheli.AirspeedSchedule((4.0,), (1.0,), (2.0,), start=4.0, lead=0.0)
@@ -248,6 +361,11 @@ def test_a_record_is_read_back_to_the_last_bit(tmp_path):
     np.testing.assert_array_equal(found.values, values)
     with pytest.raises(InputError, match="is there already"):
         Recorder(tmp_path / "a.csv", ("q",))
+
+
+def test_a_record_of_nothing_leaves_no_file(tmp_path):
+    Recorder(tmp_path / "a.csv", ("q",)).close()
+    assert list(tmp_path.iterdir()) == []
 
 
 class Full:

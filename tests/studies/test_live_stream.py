@@ -121,6 +121,54 @@ def test_a_vehicle_that_falls_silent_is_named_and_goes_on():
     assert rows[-1].values[0] == pytest.approx(line(1.0))
 
 
+@pytest.mark.parametrize("bad", [1e30, -1e5])
+def test_a_value_beyond_any_vehicle_makes_its_row_unknown(bad):
+    _, rows = rows_of([sample(0.0), sample(0.02, bad), sample(0.04)])
+    assert [math.isnan(row.values[0]) for row in rows] == [False, True, False]
+
+
+@pytest.mark.parametrize("waited", [600.0, 0.02])
+def test_a_long_hole_costs_one_row(waited):
+    """Whether the vehicle was silent or its clock was set: rows begin anew."""
+    stream = Stream(["x"], DT)
+    stream.take(sample(0.0), 0.0)
+    (row,) = stream.take(sample(600.0), waited)
+    assert row.time == 600.0
+    assert stream.state is (StreamState.LOST if waited > 1.0 else StreamState.CLOCK_JUMP)
+
+
+def test_a_paused_simulator_goes_on_without_a_jump():
+    stream = Stream(["x"], DT)
+    for received in (0.0, 300.0, 600.0):
+        stream.take(sample(0.0), received)
+    (row,) = stream.take(sample(0.02), 600.02)
+    assert row.values[0] == pytest.approx(line(0.02))
+    assert stream.counts[StreamState.REPEATED] == 2
+    assert stream.state is StreamState.GOOD
+
+
+@pytest.mark.parametrize(
+    ("start", "kind", "state"),
+    [
+        (1e3, np.float32, StreamState.GOOD),
+        (1e5, np.float32, StreamState.COARSE_CLOCK),
+        (1e5, np.float64, StreamState.GOOD),
+    ],
+)
+def test_a_clock_with_too_few_digits_is_said(start, kind, state):
+    """X-Plane sends its time in single precision."""
+    stream, _ = rows_of([sample(float(kind(start + DT * k)), 0.0) for k in range(50)])
+    assert stream.state is state
+
+
+@pytest.mark.parametrize("pace", [0.5, 2.0])
+def test_slow_motion_is_no_fault(pace):
+    samples = [sample(DT * k) for k in range(500)]
+    stream, rows = rows_of(samples, received=[one.time / pace for one in samples])
+    assert set(stream.counts) == {StreamState.GOOD}
+    assert len(rows) == 500
+
+
 def test_a_period_that_is_none_is_refused():
     with pytest.raises(InputError, match="expected a period > 0 s"):
         Stream(["x"], 0.0)
