@@ -10,6 +10,7 @@ import hashlib
 import os
 import platform
 import shutil
+import signal
 import subprocess
 import tempfile
 import warnings
@@ -33,6 +34,9 @@ FLAGS = (
 only errno and exception flags are given up. Pairs of scalars are not packed into vectors:
 one flight takes 1.3 times as long with that.
 """
+
+LONGEST = 300.0
+"""Seconds after which a compilation is given up."""
 
 
 def cache_directory() -> Path:
@@ -113,12 +117,7 @@ def library(source: str, name: str) -> Path | None:
             with tempfile.TemporaryDirectory(prefix="symheli-") as scratch:
                 code, built = Path(scratch) / "code.c", Path(scratch) / "code.so"
                 code.write_text(source)
-                subprocess.run(
-                    [cc, *FLAGS, str(code), "-o", str(built), "-lm"],
-                    check=True,
-                    capture_output=True,
-                    timeout=300,
-                )
+                _run([cc, *FLAGS, str(code), "-o", str(built), "-lm"])
                 with tempfile.NamedTemporaryFile(dir=kept.parent, delete=False) as target:
                     target.write(built.read_bytes())
             os.replace(target.name, kept)
@@ -131,6 +130,23 @@ def library(source: str, name: str) -> Path | None:
         )
         _not_compiled(f"compiling {name} failed ({detail.strip()})")
         return None
+
+
+def _run(command: list[str]) -> None:
+    """Run the compiler; where it takes too long, or is interrupted, end what it has started too.
+
+    Raises `CalledProcessError` with what it said where it fails, `TimeoutExpired` after `LONGEST`.
+    """
+    with subprocess.Popen(
+        command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True
+    ) as made:
+        try:
+            _, said = made.communicate(timeout=LONGEST)
+        except BaseException:
+            os.killpg(made.pid, signal.SIGKILL)
+            raise
+    if made.returncode:
+        raise subprocess.CalledProcessError(made.returncode, command, stderr=said)
 
 
 def loaded(path: Path) -> ctypes.CDLL:
