@@ -8,7 +8,7 @@ import math
 import re
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +17,7 @@ from scipy.linalg import solve_triangular
 from identification import KinematicARX, Polynomial, RecursiveLeastSquares
 from identification.forgetting import Directional
 from identification.model import KinematicModel, LPVARXModel
+from identification.model.kinematic_fit import mean_trim
 from identification.structure.kinematic_arx import INCREMENTS
 from studies.live.stream import Row
 from symheli import FlightRecord
@@ -42,6 +43,10 @@ SLOW = 2.0
 """Time constant over which the mean of an input is taken, s."""
 KEPT = 6.0
 """Seconds of samples that are kept for predictions."""
+THIN = 0.2
+"""Seconds between the samples that the trim of a model is the mean of."""
+MOST = 36_000
+"""Number of them that is kept: two hours."""
 HORIZON = 1.0
 """Seconds ahead of the predictions."""
 POWERS = {"p": "lat", "q": "lon", "w": "col", "r": "ped"}
@@ -128,6 +133,7 @@ class LiveIdentifier:
         self.estimator = RecursiveLeastSquares(self.structure, way)
         self.online = self.estimator.online(dt=dt)
         self.signals = (*STATES, *self.inputs, "airspeed")
+        self._columns = (*RIGID_BODY, *map(Signal, self.inputs), SLOW_AIRSPEED)
         self.learnt, self.outside = 0, 0
         self.largest = dict.fromkeys(self.inputs, 0.0)
         count = max(math.ceil((high - low) / BIN), 1)
@@ -136,6 +142,8 @@ class LiveIdentifier:
         self._slow, self._means = math.nan, np.zeros(len(self.inputs))
         self._time = math.nan
         self._recent: deque[Array] = deque(maxlen=round(KEPT / dt))
+        self._every, self._rows = max(round(THIN / dt), 1), 0
+        self._flown: deque[Array] = deque(maxlen=MOST)
         self._seen = np.zeros((3, len(STATES)))  # number, sum and sum of squares
 
     def take(self, row: Row) -> bool:
@@ -144,7 +152,8 @@ class LiveIdentifier:
             self.online.forget_past()
             self._recent.clear()
             self._slow = math.nan
-        self._time = row.time
+            self._rows += 10 * self._every  # a gap in the record of the flight
+        self._time, self._rows = row.time, self._rows + 1
         y, u, V = np.split(row.values, [len(STATES), len(STATES) + len(self.inputs)])
         p = self._lagged(float(V[0]))
         inside = self.low <= p <= self.high
@@ -159,6 +168,8 @@ class LiveIdentifier:
         if learnt:
             self._seen += np.array([np.ones(len(y)), y, y**2])
         self._recent.append(np.array([row.time, *y, *u, p]))
+        if self._rows % self._every == 0 and np.isfinite(self._recent[-1]).all():
+            self._flown.append(np.array([self._rows * self.dt, *y, *u, p]))
         if learnt:
             self._count(u, p)
         return learnt
@@ -207,7 +218,18 @@ class LiveIdentifier:
         return f"fly at {cell.low:g} to {cell.low + BIN:g} m/s and move {what}"
 
     def model(self) -> KinematicModel | None:
-        """The model as it is now; None while the data do not determine every coefficient."""
+        """The model as it is now, the mean flight its trim; None while the data do not determine
+        every coefficient, or too little was flown for a trim.
+        """
+        found = self._predictor()
+        if found is None or len(self._flown) < 4 * self.structure.basis.size:
+            return None
+        rows = np.array(self._flown)
+        record = FlightRecord(rows[:, 0], rows[:, 1:], self._columns)
+        return replace(found, trim=mean_trim(self.structure, [record]))
+
+    def _predictor(self) -> KinematicModel | None:
+        """The model as it is now without its trim, which predictions do not need."""
         state = self.online.state
         if not state.determined:
             return None
@@ -276,12 +298,11 @@ class LiveIdentifier:
         """
         horizon = round(HORIZON / self.dt)
         rows = np.array(self._recent) if self._recent else np.zeros((0, 1))
-        model = self.model() if len(rows) > 2 * horizon else None
+        model = self._predictor() if len(rows) > 2 * horizon else None
         if model is None or not np.isfinite(rows).all():
             return None
-        signals = (*RIGID_BODY, *map(Signal, self.inputs), SLOW_AIRSPEED)
         time = rows[0, 0] + self.dt * np.arange(len(rows))
-        found = model.predict(FlightRecord(time, rows[:, 1:], signals), horizon)
+        found = model.predict(FlightRecord(time, rows[:, 1:], self._columns), horizon)
         there = np.isfinite(found).all(axis=1)
         if there.sum() < horizon:
             return None

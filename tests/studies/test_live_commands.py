@@ -55,6 +55,32 @@ def test_live_coefficients_are_those_of_the_batch_fit(flight):
     )
 
 
+@pytest.mark.parametrize("lost", [False, True])
+def test_the_trim_of_a_live_model_is_that_of_the_flight(flight, lost):
+    """It is what the kinematics are linearized about; rows lost in bursts move it little."""
+    _, record = flight
+    rows = np.ones(len(record), bool)
+    if lost:
+        for k in np.random.default_rng(0).integers(0, len(record) - 20, len(record) // 200):
+            rows[k : k + 10] = False
+    live = learnt(record, rows)
+    slow = [record["airspeed"][0]]
+    for V in record["airspeed"][1:]:
+        slow.append(slow[-1] + (1.0 - math.exp(-record.dt / LAG)) * (V - slow[-1]))
+    lagged = record.with_signals({"airspeed_slow": "m/s"}, airspeed_slow=np.array(slow))
+    batch = identification.fit(live.structure, lagged, method="ls")
+    model = live.model()
+    sizes = np.array([1.0] * 3 + [0.1] * 5)
+    speeds = np.linspace(1.0, 5.0, 9)
+    off = (live.structure.basis(speeds) @ (model.trim - batch.trim)) / sizes
+    assert np.abs(off).max() < 0.2  # means of an excited motion over a tenth of its samples
+    u = (live.structure.basis(speeds) @ model.trim)[:, 0]
+    np.testing.assert_allclose(u, speeds, rtol=0.01)  # level flight, not rest
+    for V in (2.0, 4.0):
+        A, B = np.asarray(model.at(V).A), np.asarray(batch.at(V).A)
+        assert np.abs(A - B).max() < 0.03 * np.abs(B).max()
+
+
 def test_control_powers_are_those_of_the_linearization(flight):
     """With its flapping settled, to the damping within a sample."""
     heli, record = flight
