@@ -20,14 +20,12 @@ import numpy as np  # noqa: E402
 from benchmarks.race import Ratio, present, table  # noqa: E402
 from benchmarks.timing import arguments  # noqa: E402
 from studies.live import mavlink, xplane  # noqa: E402
-from studies.live.earth import earth_velocity  # noqa: E402
 from studies.live.identifier import STATES, LiveIdentifier  # noqa: E402
-from studies.live.sample import Sample  # noqa: E402
+from studies.live.sample import STICKS, Sample  # noqa: E402
 from studies.live.stream import Stream  # noqa: E402
 from symheli.errors import InputError  # noqa: E402
 
 DT = 0.02
-STICKS = mavlink.STICKS
 SHARE = 0.2
 """Goal: share of a core at 50 Hz."""
 
@@ -48,16 +46,8 @@ def values_of(count: int) -> list[dict[str, float]]:
 
 def datagrams(samples: list[dict[str, float]]) -> list[bytes]:
     """The answers of X-Plane that hold these samples."""
-    out = []
-    for k, values in enumerate(samples):
-        angles = [values[name] for name in ("phi", "theta", "psi")]
-        north, east, down = earth_velocity(*(values[name] for name in "uvw"), *angles)
-        raw = {**values, "time": DT * k, "east": east, "up": -down, "south": -north}
-        found = {
-            n: raw[name] / factor for n, (name, (_, factor)) in enumerate(xplane.DATAREFS.items())
-        }
-        out.append(xplane.answer(found))
-    return out
+    shown = (xplane.shown(DT * k, values).values() for k, values in enumerate(samples))
+    return [xplane.answers(dict(enumerate(found)))[0] for found in shown]
 
 
 def each(work, items) -> np.ndarray:

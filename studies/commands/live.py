@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from studies.commands import options
 from studies.commands.arguments import option, positional, several
+from studies.live.sample import STICKS
 from studies.output import Output, columns, progress
 from symheli.errors import InputError
 
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from studies.live.xplane import XPlaneSource
 
 HELP = "identify while a vehicle flies: X-Plane, MAVLink, or a record that comes again"
-STICKS = ("stick_lon", "stick_lat", "stick_col", "stick_ped")
 LEGEND = """\
 motion: standard deviation of the input about its mean of 2 s, as a fraction of its largest value;
   still to move: inputs that have moved too little there; all where fewer than 250 samples came"""

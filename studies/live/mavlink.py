@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from studies.live.earth import earth_velocity, in_body
-from studies.live.sample import Sample
+from studies.live.sample import STICKS, Sample
 from studies.live.xplane import AT_ONCE, bound
 from symheli.errors import InputError
 from symheli.extras import extra
@@ -21,7 +21,6 @@ PORT = 14550
 """UDP port on which ground stations listen."""
 CENTRE, TRAVEL = 1500.0, 500.0
 """Servo output in the middle, and from there to a stop, us."""
-STICKS = ("stick_lon", "stick_lat", "stick_col", "stick_ped")
 OLD = 0.5
 """Seconds on the sender's clock after which the last velocity or servo output is too old."""
 SYSTEM, COMPONENT = 1, 1

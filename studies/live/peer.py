@@ -14,12 +14,11 @@ from typing import Any, Protocol
 import numpy as np
 
 from studies.live import mavlink, xplane
-from studies.live.earth import earth_velocity
+from studies.live.sample import STICKS
 from symheli.values.arrays import Array
 from symheli.values.kinematics import INPUTS
 from symheli.values.named_vector import NamedVector
 
-STICKS = mavlink.STICKS
 FRESH = 0.5
 """Seconds after which a command from the wire is too old, and the autopilot has the stick again."""
 MOST_REQUESTS = 10_000
@@ -57,7 +56,7 @@ class XPlaneLine:
 
     def send(self, at: float, values: Mapping[str, float]) -> None:
         """Send each client what it asked for, at the rate of its fastest request."""
-        shown = self._shown(at, values)
+        shown = xplane.shown(at, values)
         for client, requests in list(self._asked.items()):
             if at < self._due.get(client, -math.inf) - 1e-9:
                 continue
@@ -67,17 +66,6 @@ class XPlaneLine:
             for datagram in xplane.answers(found):
                 with contextlib.suppress(OSError):  # no way there
                     self._socket.sendto(datagram, client)
-
-    def _shown(self, at: float, values: Mapping[str, float]) -> dict[str, float]:
-        """Datarefs by name, in X-Plane's units."""
-        angles = [values[name] for name in ("phi", "theta", "psi")]
-        north, east, down = earth_velocity(*(values[name] for name in "uvw"), *angles)
-        raw = {**values, "time": at, "east": east, "up": -down, "south": -north}
-        return {
-            dataref: raw[name] / factor
-            for name, (dataref, factor) in xplane.DATAREFS.items()
-            if name in raw
-        }
 
     def wait(self, timeout: float) -> dict[str, float]:
         """Serve requests for so long (s); return the sticks that were set."""

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Protocol
 
+STICKS = ("stick_lon", "stick_lat", "stick_col", "stick_ped")
+"""Controls of a vehicle whose deflections are not sent, each -1 to 1."""
+
 
 class Sample(NamedTuple):
     """One set of values of a vehicle: `time` (s) on its own clock, `values` in SI by signal, and

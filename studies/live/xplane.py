@@ -18,7 +18,7 @@ import time
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from studies.live.earth import in_body
+from studies.live.earth import earth_velocity, in_body
 from studies.live.sample import Sample
 from symheli.errors import InputError
 
@@ -88,6 +88,16 @@ def answers(values: Mapping[int, float]) -> list[bytes]:
     packed = [ENTRY.pack(number, value) for number, value in values.items()]
     firsts = range(0, len(packed), PER_ANSWER)
     return [ANSWER + b"".join(packed[k : k + PER_ANSWER]) for k in firsts]
+
+
+def shown(at: float, values: Mapping[str, float]) -> dict[str, float]:
+    """Return the datarefs of a vehicle at a time (s), in X-Plane's units, from its signals."""
+    angles = [values[name] for name in ("phi", "theta", "psi")]
+    north, east, down = earth_velocity(*(values[name] for name in "uvw"), *angles)
+    raw = {**values, "time": at, "east": east, "up": -down, "south": -north}
+    return {
+        dataref: raw[name] / factor for name, (dataref, factor) in DATAREFS.items() if name in raw
+    }
 
 
 def requested(datagram: bytes) -> Request | None:

@@ -39,13 +39,18 @@ def learnt(record, rows=slice(None)):
     return identifier
 
 
+def with_slow_airspeed(record):
+    """The record with the lagged airspeed, sample by sample."""
+    slow = [record["airspeed"][0]]
+    for V in record["airspeed"][1:]:
+        slow.append(slow[-1] + (1.0 - math.exp(-record.dt / LAG)) * (V - slow[-1]))
+    return record.with_signals({"airspeed_slow": "m/s"}, airspeed_slow=np.array(slow))
+
+
 def test_live_coefficients_are_those_of_the_batch_fit(flight):
     """Of the same rows, with the lagged airspeed as the schedule."""
     _, record = flight
-    live, slow = learnt(record), [record["airspeed"][0]]
-    for V in record["airspeed"][1:]:
-        slow.append(slow[-1] + (1.0 - math.exp(-record.dt / LAG)) * (V - slow[-1]))
-    lagged = record.with_signals({"airspeed_slow": "m/s"}, airspeed_slow=np.array(slow))
+    live, lagged = learnt(record), with_slow_airspeed(record)
     batch = identification.fit(live.structure, lagged, method="ls").aerodynamics
     found = live.model().aerodynamics
     assert found.rows_used == batch.rows_used
@@ -64,11 +69,7 @@ def test_the_trim_of_a_live_model_is_that_of_the_flight(flight, lost):
         for k in np.random.default_rng(0).integers(0, len(record) - 20, len(record) // 200):
             rows[k : k + 10] = False
     live = learnt(record, rows)
-    slow = [record["airspeed"][0]]
-    for V in record["airspeed"][1:]:
-        slow.append(slow[-1] + (1.0 - math.exp(-record.dt / LAG)) * (V - slow[-1]))
-    lagged = record.with_signals({"airspeed_slow": "m/s"}, airspeed_slow=np.array(slow))
-    batch = identification.fit(live.structure, lagged, method="ls")
+    batch = identification.fit(live.structure, with_slow_airspeed(record), method="ls")
     model = live.model()
     sizes = np.array([1.0] * 3 + [0.1] * 5)
     speeds = np.linspace(1.0, 5.0, 9)
