@@ -8,6 +8,7 @@ from symheli.flight.controller import ScheduledController
 from symheli.flight.excitation import Excitation
 from symheli.flight.flight_dataset import FlightDataset
 from symheli.flight.fly import fly
+from symheli.flight.parameter_change import ParameterChange
 from symheli.flight.parameter_monitor import ParameterMonitor
 from symheli.flight.plan import FlightPlan
 from symheli.flight.schedule import AirspeedSchedule
@@ -28,6 +29,7 @@ __all__ = [
     "FlightDataset",
     "FlightPlan",
     "HelicopterLoops",
+    "ParameterChange",
     "ParameterMonitor",
     "Pilot",
     "PureController",

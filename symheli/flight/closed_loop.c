@@ -19,6 +19,7 @@ struct loops {
   const double *added; long added_flight, added_sample; /* 4 */
   const double *white, *white_air; /* 8, and 1 for the airspeed; NULL: no noise */
   const double *p; long p_flight;                       /* NP */
+  const double *changed; const long *change_at; /* NP after this sample of each flight; NULL: as p */
   /* Sensors, SEEN each, the noise by flight; delay and period in samples. */
   const double *noise; long noise_flight;
   const double *bias, *quantum;
@@ -266,6 +267,11 @@ static void servos(const struct loops *f, struct block *b, const lane *effective
 static void advance(const struct loops *f, struct block *b, long k)
 {
   lane u[4], kept[NK];
+  for (int l = 0; f->changed && l < LANES; ++l) {
+    const long flight = b->first + (l < b->lanes ? l : b->lanes - 1);
+    if (k == f->change_at[flight])
+      for (int i = 0; i < NP; ++i) b->parameters[i][l] = f->changed[flight * NP + i];
+  }
   for (int i = 0; i < 4; ++i)
     for (int l = 0; l < LANES; ++l) {
       const long flight = b->first + (l < b->lanes ? l : b->lanes - 1);

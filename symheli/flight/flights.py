@@ -16,7 +16,7 @@ from symheli.flight.course import Clock, Course
 from symheli.flight.disturbance import Disturbances
 from symheli.flight.equipment import Equipment
 from symheli.flight.flight_data import FlightData
-from symheli.flight.loops import LoopResults, Loops
+from symheli.flight.loops import Changes, LoopResults, Loops
 from symheli.flight.plan import READ, FlightPlan
 from symheli.helicopter import Helicopter
 from symheli.values.arrays import Array
@@ -98,6 +98,7 @@ class Flights:
             [position[id(course)] for course in flown],
             Disturbances.of(plans, flown, equipment.readings),
             equipment.readings.noise[None],
+            Changes.of(self.heli, [plan.change for plan in plans], self.clock(plans[0]).dt),
         )
 
     def stop(self) -> None:

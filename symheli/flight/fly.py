@@ -33,8 +33,8 @@ def fly(
     schedule : AirspeedSchedule or FlightPlan
         What is commanded; or a whole plan, as a record keeps it in `meta["plan"]`.
     **options
-        dt, controller, excitation, noise_db, seed, wind, servos, sensors, delay, trims: see
-        `FlightPlan`.
+        dt, controller, excitation, noise_db, seed, wind, servos, sensors, delay, trims, change:
+        see `FlightPlan`.
 
     Returns
     -------

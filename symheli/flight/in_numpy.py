@@ -66,6 +66,8 @@ class InNumpy:
     def command(self, k: int, u: Array) -> None:
         """Apply the commands and integrate to the next sample."""
         loops = self._loops
+        if loops.changes is not None and k == loops.changes.samples[self._i]:
+            self._p = loops.changes.parameters[self._i]
         clock, servos, late = loops.clock, loops.equipment.servos, loops.equipment.late
         u = np.clip(
             u + self._added[min(k, len(self._added) - 1)], -loops.heli.travel, loops.heli.travel

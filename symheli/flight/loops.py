@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from symheli.flight.course import Clock, Course
 from symheli.flight.disturbance import Disturbances
 from symheli.flight.equipment import Equipment
 from symheli.flight.in_numpy import MAX_BANK, InNumpy
+from symheli.flight.parameter_change import ParameterChange
 from symheli.flight.plan import READ
 from symheli.helicopter import Helicopter
 from symheli.integrate.equations import equations
@@ -40,6 +42,24 @@ class LoopResults:
     lost: Array
 
 
+class Changes(NamedTuple):
+    """Parameters (N, NP) of each of N flights from a sample (N,) on; -1: never."""
+
+    parameters: Array
+    samples: Array
+
+    @classmethod
+    def of(
+        cls, heli: Helicopter, changes: Sequence[ParameterChange | None], dt: float
+    ) -> Changes | None:
+        """Those of flights whose controller is sampled every `dt` s; None where nothing changes."""
+        if not any(changes):
+            return None
+        after = [heli.parameters.array if one is None else one.of(heli) for one in changes]
+        samples = [-1 if one is None else one.sample(dt) for one in changes]
+        return cls(np.array(after), np.array(samples, np.int_))
+
+
 class Loops:
     """N flights with one equipment and clock, along the courses they choose."""
 
@@ -52,13 +72,14 @@ class Loops:
         chosen: Sequence[int],
         disturbances: Disturbances,
         noise: Array,
+        changes: Changes | None = None,
     ):
         """Flight i flies courses[chosen[i]] under its disturbances; `noise` (N or 1, 9) are the
         standard deviations of its sensors.
         """
         self.heli, self.clock, self.equipment = heli, clock, equipment
         self.courses, self.chosen, self.disturbances = courses, list(chosen), disturbances
-        self.noise = noise
+        self.noise, self.changes = noise, changes
         self.samples = np.array([len(courses[i].time) for i in self.chosen], np.int_)
         self._stop = np.zeros(1, np.intc)
 
@@ -123,6 +144,8 @@ class Loops:
             "white_air": d.white_air,
             "p": self.heli.parameters.array[None].copy(),
             "p_flight": 0,
+            "changed": None if self.changes is None else self.changes.parameters,
+            "change_at": None if self.changes is None else self.changes.samples,
             "noise": self.noise,
             "noise_flight": self.noise.shape[1] if len(self.noise) > 1 else 0,
             "bias": e.readings.bias,

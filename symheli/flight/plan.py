@@ -14,6 +14,7 @@ from symheli.environment import Wind
 from symheli.errors import InputError, UnknownNameError
 from symheli.flight.controller import MEASURED
 from symheli.flight.excitation import Excitation
+from symheli.flight.parameter_change import ParameterChange
 from symheli.flight.schedule import AirspeedSchedule
 from symheli.flight.sensor import Sensor
 from symheli.flight.servo import Servo, one_each
@@ -53,6 +54,7 @@ class Options(TypedDict, total=False):
     sensors: Mapping[str, Sensor] | None
     delay: float
     trims: Trims
+    change: ParameterChange | None
 
 
 @dataclass(frozen=True)
@@ -91,6 +93,8 @@ class FlightPlan:
         What the flight is held to: the trims of the commanded airspeed and acceleration, or those
         of the commanded airspeed alone, whose drift the controller has to answer. Both in the
         steady wind.
+    change : ParameterChange, optional
+        What becomes of the helicopter in flight, as where a load is dropped.
 
     Raises
     ------
@@ -122,6 +126,7 @@ class FlightPlan:
     sensors: Mapping[str, Sensor] | None = None
     delay: float = 0.0
     trims: Trims = "quasi-steady"
+    change: ParameterChange | None = None
 
     def __post_init__(self) -> None:
         _expect("schedule", self.schedule, AirspeedSchedule)
@@ -158,6 +163,8 @@ class FlightPlan:
         object.__setattr__(self, "servos", actuation.servos)
         object.__setattr__(self, "delay", actuation.delay)
         _sensors(self.sensors)
+        if self.change is not None:
+            _expect("change", self.change, ParameterChange)
         if self.delay > LONGEST_DELAY:
             raise InputError(
                 f"delay: {self.delay:g} s is implausibly long; delay is in seconds: {self.delay:g}"

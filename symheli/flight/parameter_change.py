@@ -1,0 +1,58 @@
+"""A change of the helicopter in flight: a load that is taken up or dropped, a blade that is damaged."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from symheli.errors import InputError
+from symheli.helicopter import Helicopter
+from symheli.values.arrays import Array
+from symheli.values.numbers import by_name
+
+
+@dataclass(frozen=True)
+class ParameterChange:
+    """Parameters of the helicopter that change at an instant of a flight; references and controller
+    do not know.
+
+    Parameters
+    ----------
+    at : float
+        Time of the flight from which they hold, s: the next sample of the controller.
+    values : mapping of str to float
+        As of `Helicopter.with_parameters`: {"body.mass": 9.0}, SI.
+
+    Raises
+    ------
+    InputError
+        A time that is negative or not finite, no values.
+
+    Examples
+    --------
+    >>> load = symheli.flight.ParameterChange(2.0, {"body.mass": 9.0})
+    >>> hover = symheli.AirspeedSchedule((2.0,), (1.0,), (4.0,))
+    >>> sunk = symheli.fly(heli, hover, change=load)["w"][-1]
+    >>> bool(sunk > symheli.fly(heli, hover)["w"][-1] + 0.1)
+    True
+    """
+
+    at: float
+    values: Mapping[str, float]
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.at) and self.at >= 0):
+            raise InputError(f"at: expected a time of the flight >= 0 s, got {self.at!r}")
+        if not by_name(self.values, "values", '{"body.mass": 9.0}'):
+            raise InputError('values: name what changes, such as {"body.mass": 9.0}')
+
+    def of(self, heli: Helicopter) -> Array:
+        """Return all parameters (NP,) after it; raises `InputError` for names and values that the
+        helicopter cannot have.
+        """
+        return heli.with_parameters(self.values).parameters.array
+
+    def sample(self, dt: float) -> int:
+        """Return the sample of a controller with this period (s) from which it holds."""
+        return math.ceil(self.at / dt - 1e-9)
