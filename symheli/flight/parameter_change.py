@@ -1,4 +1,4 @@
-"""A change of the helicopter in flight: a load that is taken up or dropped, a blade that is damaged."""
+"""A change of the helicopter in flight, as where a load is taken up or dropped."""
 
 from __future__ import annotations
 

@@ -94,7 +94,7 @@ def test_what_is_no_change_is_refused(at, values, said):
 
 def test_parameters_that_the_helicopter_has_not_are_refused(heli):
     """Before it flies."""
-    with pytest.raises(InputError, match="body.mas"):
+    with pytest.raises(InputError, match=r"body\.mas"):
         symheli.fly(heli, HOVER, change=ParameterChange(1.0, {"body.mas": 9.0}))
     with pytest.raises(InputError, match="change: expected a ParameterChange"):
         symheli.fly(heli, HOVER, change={"body.mass": 9.0})
