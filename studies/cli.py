@@ -38,6 +38,7 @@ VERBS = (
     "compare",
     "experiment",
     "live",
+    "circle",
     "serve",
     "doctor",
     "completion",

@@ -184,7 +184,8 @@ def from_flights(
     (found,) = design(IDENTIFIED, make, plant)
     if record is None or found.controller is None:
         return [found]
-    return [replace(found, remark=verdict(identified, found.controller, record, simulator))]
+    judged = judged_by_flight(identified, found.controller, record, simulator)
+    return [replace(found, remark=verdict_in_words(judged))]
 
 
 def design(name: str, make: Callable[[], Controller | LPVStateSpace], plant: Plant) -> list[Design]:
@@ -212,22 +213,21 @@ def design(name: str, make: Callable[[], Controller | LPVStateSpace], plant: Pla
     ]
 
 
-def verdict(
+def judged_by_flight(
     identified: KinematicModel,
     controller: LPVStateSpace,
     record: FlightRecord,
     simulator: Helicopter,
-) -> str:
+) -> FitForControl:
     """Decide whether the identified model is fit for a loop with this controller, by its
-    identification flight and a simulator of another helicopter, and return the objections in a
-    sentence.
+    identification flight and a simulator of another helicopter.
     """
     rest = (0.0,) * (len(identified.parameters) - 1)
     exact = {
         (v, *rest) if rest else v: linearize(simulator, airspeed=v).discretize(PERIOD)
         for v in JUDGED_AT
     }
-    found = fit_for_control(
+    return fit_for_control(
         identified,
         record,
         lambda p: controller.at(p[0] if rest else p),
@@ -235,7 +235,6 @@ def verdict(
         bias=structure_bias(identified, record, SimulatedFlight(simulator), exact),
         draws=DRAWS,
     )
-    return verdict_in_words(found)
 
 
 def verdict_in_words(found: FitForControl) -> str:

@@ -47,6 +47,7 @@ THIN = 0.2
 """Seconds between the samples that the trim of a model is the mean of."""
 MOST = 36_000
 """Number of them that is kept: two hours."""
+EVERYTHING = "every airspeed is covered"
 HORIZON = 1.0
 """Seconds ahead of the predictions."""
 POWERS = {"p": "lat", "q": "lon", "w": "col", "r": "ped"}
@@ -125,6 +126,7 @@ class LiveIdentifier:
         degree: int = 2,
         forgetting: float = 1.0,
     ):
+        self._options = (tuple(inputs), low, high, dt, degree, forgetting)
         self.inputs, self.dt, self.low, self.high = tuple(inputs), dt, low, high
         self.structure = KinematicARX(
             self.inputs, str(SLOW_AIRSPEED), basis=Polynomial(degree, low, high)
@@ -145,6 +147,10 @@ class LiveIdentifier:
         self._every, self._rows = max(round(THIN / dt), 1), 0
         self._flown: deque[Array] = deque(maxlen=MOST)
         self._seen = np.zeros((3, len(STATES)))  # number, sum and sum of squares
+
+    def afresh(self) -> LiveIdentifier:
+        """Return one with the same options that knows nothing."""
+        return LiveIdentifier(*self._options)
 
     def take(self, row: Row) -> bool:
         """Take in a row, a start where it is not `dt` after the last; return whether it taught."""
@@ -211,7 +217,7 @@ class LiveIdentifier:
         open_cells = [(cell, cell.missing(self.largest)) for cell in self.coverage()]
         left = [(cell, names) for cell, names in open_cells if names]
         if not left:
-            return "every airspeed is covered"
+            return EVERYTHING
         now = self.low if math.isnan(self._slow) else self._slow
         cell, names = min(left, key=lambda one: abs(one[0].low + 0.5 * BIN - now))
         what = "all inputs" if len(names) == len(self.inputs) else ", ".join(names)

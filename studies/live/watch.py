@@ -10,7 +10,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from studies.live.identifier import LiveIdentifier, Prediction
+from studies.live.identifier import EVERYTHING, LiveIdentifier, Prediction
+from studies.live.lamp import Lamp, Pilot
 from studies.live.recorder import Recorder
 from studies.live.sample import Sample, Source
 from studies.live.stream import Stream, StreamState
@@ -21,18 +22,21 @@ PATIENCE = 0.05
 """Longest time without a look at the clock, s."""
 EVERY = 1.0
 """Seconds between two lines."""
+NOBODY = ("no certified controller is given: symheli circle designs one",)
+"""Why the lamp is not green where nobody flies."""
 SLOWER = 1.2
 """Times the period of the rows that samples may be apart before it is said."""
 
 
 @dataclass
 class Watch:
-    """A source that is watched: samples that came, and the model they give."""
+    """A source that is watched: samples that came, the model they give, and who flies."""
 
     source: Source
     identifier: LiveIdentifier
     stream: Stream
     recorder: Recorder | None = None
+    pilot: Pilot | None = None
     prediction: Prediction | None = None
     received: int = 0
     last: float = math.nan
@@ -44,9 +48,10 @@ class Watch:
         seconds: float,
         say: Callable[[str], None],
         clock: Callable[[], float] = time.monotonic,
+        over: Callable[[], bool] = lambda: False,
     ) -> None:
-        """Watch for so long (s), or until nothing more can come or Ctrl-C; everything that came
-        is recorded and identified from then.
+        """Watch for so long (s), or until nothing more can come, it is `over`, or Ctrl-C; what
+        came is recorded and identified from then.
         """
         begun = said = clock()
         alone = threading.current_thread() is threading.main_thread()
@@ -54,7 +59,7 @@ class Watch:
         if heard:
             signal.signal(signal.SIGINT, self._interrupted)
         try:
-            while (now := clock()) - begun < seconds and not self._stopped:
+            while (now := clock()) - begun < seconds and not (self._stopped or over()):
                 for sample in self.source.receive(PATIENCE):
                     self.take(sample, clock())
                 self.stream.idle(now)
@@ -89,6 +94,8 @@ class Watch:
             self.recorder.add(sample, now)
         for row in rows:
             self.identifier.take(row)
+            if self.pilot is not None and self.pilot.take(row):
+                self.identifier = self.identifier.afresh()
         self.last = sample.time
         self.airspeed = float(sample.values.get("airspeed", math.nan))
 
@@ -111,6 +118,19 @@ class Watch:
         if self.recorder is not None and self.recorder.problem:
             parts.append(f"RECORD: {self.recorder.problem}")
         return "; ".join(parts)
+
+    @property
+    def lamp(self) -> Lamp:
+        """Green only where samples come as they should, every airspeed is covered, and the pilot
+        has nothing against its controller.
+        """
+        found = list(self.problems())
+        if self.stream.state is not StreamState.GOOD:
+            found.append(f"{self.stream.state.name}: {self.stream.state.value}")
+        if (left := self.identifier.next_to_fly()) != EVERYTHING:
+            found.append(left)
+        reasons = NOBODY if self.pilot is None else self.pilot.reasons()
+        return Lamp((*found, *reasons))
 
     def problems(self) -> list[str]:
         """Return what keeps the stream from teaching, and what to do."""
@@ -151,6 +171,9 @@ class Watch:
             "next": identifier.next_to_fly(),
             "prediction": None if self.prediction is None else self.prediction.fit,
             "control_power": [p._asdict() for p in identifier.control_powers(middles)],
+            "lamp": {"green": self.lamp.green, "reasons": list(self.lamp.reasons)},
+            "alarm": None if self.pilot is None else self.pilot.alarm,
+            "pilot": None if self.pilot is None else self.pilot.data(),
             "record": None if self.recorder is None else self.recorder.path,
             "units": {"airspeed": "m/s", "prediction": "%"},
         }

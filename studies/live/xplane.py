@@ -217,6 +217,12 @@ class XPlaneSource:
             for k, name in enumerate(self._quantities):
                 self._socket.sendto(request(frequency, k, self.datarefs[name][0]), self._peer)
 
+    def command(self, sticks: Mapping[str, float]) -> None:
+        """Set the datarefs of sticks, each -1 to 1."""
+        with contextlib.suppress(OSError):  # nobody listens there now
+            for name, value in sticks.items():
+                self._socket.sendto(setting(self.datarefs[name][0], value), self._peer)
+
     def close(self) -> None:
         """Ask X-Plane to send no more."""
         self._ask(0)

@@ -1,0 +1,271 @@
+"""The circle: identify while the vehicle's own autopilot flies, design and certify beside it, take
+the controls where the lamp is green, give them back where the vehicle has changed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor, Future
+from dataclasses import asdict, dataclass, replace
+from enum import Enum
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from studies.circle.alarm import HORIZON, VehicleAlarm
+from studies.circle.designed import Designed, designed
+from studies.circle.vehicle import Vehicle
+from studies.known_kinematics.models import SCHEDULING
+from studies.live.identifier import STATES
+from studies.live.sample import STICKS
+from studies.live.stream import Row
+from symheli import FlightRecord
+from symheli.flight import StepEvents, TableState
+from symheli.values.arrays import Array
+from symheli.values.kinematics import INPUTS
+from symheli.values.signal import Signal
+
+LEARN = 240.0
+"""Seconds of a flight that a model is identified from, at least."""
+MORE = 60.0
+"""Seconds more after a model that was not fit."""
+KEPT = 10.0
+"""Seconds of rows that are kept while the controller flies."""
+AROUND = 0.5
+"""Seconds before and after the switch over which the steps of the commands are looked at."""
+SIGNALS = (
+    *map(Signal, (*STATES, *map(str, INPUTS), "airspeed", SCHEDULING[0])),
+    Signal(SCHEDULING[1], "m/s^2"),
+)
+
+
+class Phase(Enum):
+    """What the circle is doing."""
+
+    IDENTIFYING = "the vehicle's own autopilot flies and excites"
+    DESIGNING = "a controller is designed, certified and judged; the vehicle's own autopilot flies"
+    CONTROLLING = "the certified controller flies"
+
+
+class Event(NamedTuple):
+    """What happened at a time of the flight, s."""
+
+    time: float
+    what: str
+
+
+@dataclass
+class Switch:
+    """Largest step of a command from a sample to the next, as a part of its travel: `at` the
+    switch, in the half second `before`, under the autopilot, and `after`.
+    """
+
+    at: float
+    before: float
+    after: float = 0.0
+
+
+class Commanded(Protocol):
+    """Where commands go."""
+
+    def command(self, sticks: Mapping[str, float]) -> None:
+        """Send the sticks, each -1 to 1."""
+
+
+class Circle:
+    """The pilot of a `Watch`: takes its rows, commands its vehicle where the lamp is green.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        Whose plan is flown; its change is not looked at.
+    source : Commanded
+        Where commands go.
+    executor : Executor
+        Where designs are made.
+    say : callable
+        Takes a sentence about what happens.
+    make : callable
+        (record, name of the vehicle) -> `Designed` or a sentence.
+    """
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        source: Commanded,
+        executor: Executor,
+        say: Callable[[str], None],
+        make: Callable[[FlightRecord, str], Designed | str] = designed,
+    ):
+        self.vehicle, self._source, self._executor = vehicle, source, executor
+        self._say, self._make = say, make
+        heli = vehicle.helicopter
+        self._plan = replace(vehicle.plan(heli), change=None)
+        self._dt, self._travel = self._plan.dt, np.asarray(heli.travel)
+        self.phase, self.events = Phase.IDENTIFYING, list[Event]()
+        self.designs: list[Designed] = []
+        self.alarm: str | None = None
+        self.switches: list[Switch] = []
+        self._rows: dict[int, Array] = {}
+        self._last, self._enough = -1, LEARN
+        self._future: Future[Designed | str] | None = None
+        self._state: TableState | None = None
+        self._alarm: VehicleAlarm | None = None
+        self._switched = 0
+        self._saturated = False
+
+    # --- row by row -------------------------------------------------------------------------------
+
+    def take(self, row: Row) -> bool:
+        """Take in a row of states, sticks and airspeed, and command where it is this circle's turn;
+        return whether it is another vehicle from now on.
+        """
+        k = round(row.time / self._dt)
+        if k <= self._last:
+            return False
+        values = np.array(row.values)
+        values[len(STATES) : len(STATES) + 4] *= self._travel
+        self._rows[k], self._last = values, k
+        if self.phase is Phase.CONTROLLING:
+            self._fly(k, values)
+            self._look_at_steps(k)
+        if k % round(HORIZON / self._dt) == 0:
+            self._look(k)
+        return not self._rows  # begun anew
+
+    def _fly(self, k: int, values: Array) -> None:
+        design, state = self.designs[-1], self._state
+        assert state is not None  # noqa: S101
+        V, a = (float(x[0]) for x in self._plan.schedule(np.array([k * self._dt])))
+        x, u = design.at_rest(V, a)
+        command, self._state = design.table.update(state, values[: len(STATES)], x, u, V)
+        self._saturated = StepEvents.SATURATED in self._state.status
+        if np.isfinite(command).all():
+            sticks = (command / self._travel).tolist()
+            self._source.command(dict(zip(STICKS, sticks, strict=True)))
+
+    def _look_at_steps(self, k: int) -> None:
+        """Keep what the commands do after the switch."""
+        since, step = k - self._switched, self._step(k)
+        if since == 1:
+            self.switches[-1].at = step
+        elif 1 < since <= AROUND / self._dt and math.isfinite(step):
+            self.switches[-1].after = max(self.switches[-1].after, step)
+
+    def _step(self, k: int) -> float:
+        """Largest step of a command before sample k, as a part of its travel; NaN where a row is
+        unknown.
+        """
+        if k not in self._rows or k - 1 not in self._rows:
+            return math.nan
+        change = (self._rows[k] - self._rows[k - 1])[len(STATES) : len(STATES) + 4]
+        return float(np.max(np.abs(change) / self._travel))
+
+    # --- once a second ----------------------------------------------------------------------------
+
+    def _look(self, k: int) -> None:
+        flown = len(self._rows) * self._dt
+        if self.phase is Phase.IDENTIFYING and flown >= self._enough:
+            self._happens(k, "the flight is identified, a controller is designed beside it")
+            self._record = self.record()
+            self._future = self._executor.submit(self._make, self._record, self.vehicle.name)
+            self.phase = Phase.DESIGNING
+        elif self.phase is Phase.DESIGNING and self._future is not None and self._future.done():
+            self._judge(k, self._future.result())
+        elif self.phase is Phase.CONTROLLING and self._alarm is not None:
+            self.alarm = self._alarm.take(self.record(2.0 * HORIZON + 0.5))
+            self._rows = {j: row for j, row in self._rows.items() if j > k - KEPT / self._dt}
+            if self.alarm is not None:
+                self._give_back(k)
+
+    def _judge(self, k: int, found: Designed | str) -> None:
+        objections = [found] if isinstance(found, str) else found.objections
+        if isinstance(found, str) or objections:
+            self._enough = len(self._rows) * self._dt + MORE
+            self.phase = Phase.IDENTIFYING
+            self._happens(k, f"not fit to fly, {MORE:g} s more are flown: {'; '.join(objections)}")
+            return
+        now = self._rows[k][len(STATES) : len(STATES) + 4]
+        if not np.isfinite(now).all():
+            return  # at the next look
+        self.designs.append(found)
+        self._alarm, self.alarm = VehicleAlarm(found.model, self._record), None
+        self._state = found.table.init(command=now)
+        self._switched = k
+        before = [self._step(j) for j in range(k - round(AROUND / self._dt), k + 1)]
+        self.switches.append(Switch(math.nan, float(np.nanmax([0.0, *before]))))
+        self.phase = Phase.CONTROLLING
+        self._happens(
+            k,
+            f"the certified controller has the sticks: gain {found.certificate.bound:.3g} proven"
+            f" to {found.table.rate:g} m/s^2, nu-gap bound {found.share:.2f} of the margin",
+        )
+        self._fly(k, self._rows[k])
+
+    def _give_back(self, k: int) -> None:
+        """Leave the sticks to the vehicle's own autopilot, and begin to identify anew."""
+        self._happens(
+            k, f"the vehicle has changed ({self.alarm}): its own autopilot has the sticks"
+        )
+        self.phase, self._enough = Phase.IDENTIFYING, LEARN
+        self._rows, self._state, self._alarm = {}, None, None
+
+    def _happens(self, k: int, what: str) -> None:
+        self.events.append(Event(k * self._dt, what))
+        self._say(f"{k * self._dt:8.1f} s; {what}")
+
+    # --- what is known ----------------------------------------------------------------------------
+
+    def record(self, seconds: float = math.inf) -> FlightRecord:
+        """Return the rows since the circle began anew, or of the last seconds (s), with the plan;
+        unknown rows are NaN.
+        """
+        first = max(min(self._rows), self._last - seconds / self._dt)
+        numbers = range(math.ceil(first), self._last + 1)
+        none = np.full(len(SIGNALS) - len(SCHEDULING), math.nan)
+        seen = np.array([self._rows.get(k, none) for k in numbers])
+        time = np.array(numbers) * self._dt
+        return FlightRecord(
+            time,
+            np.column_stack([seen, *self._plan.schedule(time)]),
+            SIGNALS,
+            meta={"plan": self._plan},
+        )
+
+    def reasons(self) -> list[str]:
+        """Return why the lamp is not green; empty where every hypothesis holds."""
+        if self.alarm is not None:
+            return [f"the vehicle has changed: {self.alarm}"]
+        if self.phase is not Phase.CONTROLLING:
+            return [f"no controller flies yet: {self.phase.value}"]
+        design, found = self.designs[-1], []
+        V, a = (float(x[0]) for x in self._plan.schedule(np.array([self._last * self._dt])))
+        low, high = (float(v) for v in design.table.knots[[0, -1]])
+        if not low <= V <= high:
+            found.append(f"commanded airspeed {V:.1f} m/s outside {low:g} to {high:g} m/s")
+        if abs(a) > design.table.rate * (1 + 1e-9):
+            found.append(f"commanded acceleration {a:.2f} above {design.table.rate:g} m/s^2")
+        if self._saturated:
+            found.append("a command is at its limit")
+        return found + design.objections
+
+    def data(self) -> Mapping[str, Any]:
+        """Return the numbers for a program."""
+        return {
+            "phase": self.phase.name,
+            "events": [event._asdict() for event in self.events],
+            "designs": [
+                {
+                    "proven": one.certificate.bound,
+                    "verified": one.certificate.verified,
+                    "rate": one.table.rate,
+                    "nu_gap_over_margin": one.share,
+                    "verdict": one.verdict.verdict,
+                    "order": one.table.order,
+                    "seconds": dict(one.seconds),
+                }
+                for one in self.designs
+            ],
+            "switches": [asdict(switch) for switch in self.switches],
+        }
