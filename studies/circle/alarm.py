@@ -15,7 +15,7 @@ HORIZON = 1.0
 """Seconds ahead, and between two looks, so that each looks at other samples."""
 ALLOWED = 1.5
 """Miss, in standard deviations over the flight that was identified, that is taken for chance."""
-THRESHOLD = 8.0
+THRESHOLD = 10.0
 """Sum of what is beyond, in standard deviations, at which the vehicle has changed."""
 
 

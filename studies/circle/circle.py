@@ -5,6 +5,7 @@ the controls where the lamp is green, give them back where the vehicle has chang
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, Future
 from dataclasses import asdict, dataclass, replace
@@ -30,6 +31,12 @@ LEARN = 240.0
 """Seconds of a flight that a model is identified from, at least."""
 MORE = 60.0
 """Seconds more after a model that was not fit."""
+LATE, TOO_LATE = 5, 25
+"""Commands of the last second that the vehicle did not have a sample later: so many are said, at so
+many the sticks are given back.
+"""
+SAME = 1e-4
+"""Difference of a command and what is flown, as a part of its travel, that is rounding."""
 KEPT = 10.0
 """Seconds of rows that are kept while the controller flies."""
 AROUND = 0.5
@@ -114,6 +121,8 @@ class Circle:
         self._alarm: VehicleAlarm | None = None
         self._switched = 0
         self._saturated = False
+        self._sent: dict[int, Array] = {}
+        self._late: deque[bool] = deque(maxlen=round(1.0 / self._dt))
 
     # --- row by row -------------------------------------------------------------------------------
 
@@ -127,6 +136,8 @@ class Circle:
         values = np.array(row.values)
         values[len(STATES) : len(STATES) + 4] *= self._travel
         self._rows[k], self._last = values, k
+        if self.phase is Phase.CONTROLLING:
+            self._look_at_delay(k, values)
         if self.phase is Phase.CONTROLLING:
             self._fly(k, values)
             self._look_at_steps(k)
@@ -142,16 +153,26 @@ class Circle:
         command, self._state = design.table.update(state, values[: len(STATES)], x, u, V)
         self._saturated = StepEvents.SATURATED in self._state.status
         if np.isfinite(command).all():
-            sticks = (command / self._travel).tolist()
-            self._source.command(dict(zip(STICKS, sticks, strict=True)))
+            sticks = command / self._travel
+            self._source.command(dict(zip(STICKS, sticks.tolist(), strict=True)))
+            self._sent = {k: sticks}
+
+    def _look_at_delay(self, k: int, values: Array) -> None:
+        """Keep whether the vehicle flies what was commanded a sample ago, as the design has it."""
+        sent, flown = self._sent.get(k - 1), values[len(STATES) : len(STATES) + 4] / self._travel
+        if sent is not None and np.isfinite(flown).all():
+            self._late.append(bool(np.abs(flown - np.clip(sent, -1, 1)).max() > SAME))
+        if sum(self._late) >= TOO_LATE:
+            self.alarm = None
+            self._give_back(k, f"commands arrive later than a sample of {self._dt:g} s")
 
     def _look_at_steps(self, k: int) -> None:
         """Keep what the commands do after the switch."""
-        since, step = k - self._switched, self._step(k)
-        if since == 1:
-            self.switches[-1].at = step
-        elif 1 < since <= AROUND / self._dt and math.isfinite(step):
-            self.switches[-1].after = max(self.switches[-1].after, step)
+        last, step = self.switches[-1], self._step(k)
+        if math.isnan(last.at) and self._late and not self._late[-1]:
+            last.at = step  # the first command that is flown
+        elif math.isfinite(last.at + step) and k - self._switched <= AROUND / self._dt:
+            last.after = max(last.after, step)
 
     def _step(self, k: int) -> float:
         """Largest step of a command before sample k, as a part of its travel; NaN where a row is
@@ -177,7 +198,7 @@ class Circle:
             self.alarm = self._alarm.take(self.record(2.0 * HORIZON + 0.5))
             self._rows = {j: row for j, row in self._rows.items() if j > k - KEPT / self._dt}
             if self.alarm is not None:
-                self._give_back(k)
+                self._give_back(k, f"the vehicle has changed ({self.alarm})")
 
     def _judge(self, k: int, found: Designed | str) -> None:
         objections = [found] if isinstance(found, str) else found.objections
@@ -203,13 +224,13 @@ class Circle:
         )
         self._fly(k, self._rows[k])
 
-    def _give_back(self, k: int) -> None:
+    def _give_back(self, k: int, why: str) -> None:
         """Leave the sticks to the vehicle's own autopilot, and begin to identify anew."""
-        self._happens(
-            k, f"the vehicle has changed ({self.alarm}): its own autopilot has the sticks"
-        )
+        self._happens(k, f"{why}: its own autopilot has the sticks")
         self.phase, self._enough = Phase.IDENTIFYING, LEARN
         self._rows, self._state, self._alarm = {}, None, None
+        self._sent = {}
+        self._late.clear()
 
     def _happens(self, k: int, what: str) -> None:
         self.events.append(Event(k * self._dt, what))
@@ -246,6 +267,8 @@ class Circle:
             found.append(f"commanded airspeed {V:.1f} m/s outside {low:g} to {high:g} m/s")
         if abs(a) > design.table.rate * (1 + 1e-9):
             found.append(f"commanded acceleration {a:.2f} above {design.table.rate:g} m/s^2")
+        if sum(self._late) >= LATE:
+            found.append(f"commands arrive later than a sample of {self._dt:g} s")
         if self._saturated:
             found.append("a command is at its limit")
         return found + design.objections

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from studies.commands import options
 from studies.commands.arguments import flag, option
 from studies.output import Output, progress
-from symheli.errors import InputError
+from symheli.errors import InputError, SymheliError
 
 if TYPE_CHECKING:
     from studies.circle.circle import Circle
@@ -51,6 +51,7 @@ def run(arguments: argparse.Namespace) -> Output:
         arguments.heavier,
         arguments.change,
     )
+    plan = vehicle.plan(vehicle.helicopter)  # what cannot fly is refused here
     identifier = LiveIdentifier(STICKS, 0.0, TOP, PERIOD)
     recorder = None if out is None else Recorder(out / "flight.csv", (*SIGNALS, *STICKS))
     with VehicleProcess(vehicle, arguments.speed) as process, Processes(1) as workers:
@@ -58,13 +59,15 @@ def run(arguments: argparse.Namespace) -> Output:
         pilot = Circle(vehicle, source, workers, progress)
         stream = Stream(identifier.signals, PERIOD)
         watch = Watch(source, identifier, stream, recorder, pilot)
-        progress(f"{vehicle.name} flies {vehicle.duration:g} s at {source.name}; Ctrl-C ends")
+        progress(
+            f"{vehicle.name} flies {plan.schedule.duration:.0f} s at {source.name}; Ctrl-C ends"
+        )
         watch.run(
             (arguments.duration + 30.0) / arguments.speed, progress, over=lambda: process.over
         )
         workers.end()
     if process.error is not None:
-        raise process.error
+        raise SymheliError(str(process.error)) from process.error
     data = {**watch.data(), "written": [] if out is None else _written(pilot, out)}
     return Output("\n".join(_report(watch, pilot)), data, status=int(not pilot.designs))
 

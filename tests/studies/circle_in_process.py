@@ -1,5 +1,6 @@
 """The circle around a helicopter in one process, sample by sample, without sockets or clocks."""
 
+from collections import deque
 from concurrent.futures import Future
 from types import SimpleNamespace
 
@@ -31,10 +32,11 @@ class AtOnce:
 
 
 class InProcess:
-    """A line whose samples the circle takes at once; those `lost` are unknown rows."""
+    """A line whose samples the circle takes at once; `lost` ones are unknown, commands `late`."""
 
-    def __init__(self, lost=lambda k: False):
-        self.circle, self.lost, self.sticks, self.samples = None, lost, {}, 0
+    def __init__(self, lost=lambda k: False, late=0):
+        self.circle, self.lost, self.samples = None, lost, 0
+        self.sticks, self.under_way = {}, deque([{}] * late)
 
     def send(self, at, values):
         names = (*map(str, RIGID_BODY), *STICKS, "airspeed")
@@ -45,8 +47,9 @@ class InProcess:
         self.circle.take(Row(at, row))
 
     def wait(self, timeout):
-        sticks, self.sticks = self.sticks, {}
-        return sticks
+        self.under_way.append(self.sticks)
+        self.sticks = {}
+        return self.under_way.popleft()
 
     def command(self, sticks):
         self.sticks = dict(sticks)
@@ -55,9 +58,9 @@ class InProcess:
         pass
 
 
-def flown(vehicle, make, lost=lambda k: False, watched=lambda circle: None):
+def flown(vehicle, make, lost=lambda k: False, watched=lambda circle: None, late=0):
     """The circle and the record of the whole flight; `watched` sees the circle at each sample."""
-    heli, said, line = vehicle.helicopter, [], InProcess(lost)
+    heli, said, line = vehicle.helicopter, [], InProcess(lost, late)
     plan = vehicle.plan(heli)
     line.circle = Circle(vehicle, line, AtOnce(), said.append, make)
     take = line.circle.take

@@ -153,3 +153,13 @@ def test_a_command_at_its_limit_is_no_green_lamp(design):
 
     flown(CALM, squeezed, watched=lambda found: reasons.extend(found.reasons()))
     assert "a command is at its limit" in reasons
+
+
+def test_commands_that_arrive_late_are_given_back(design, monkeypatch):
+    """The design has one sample from measurement to control; two are another loop."""
+    monkeypatch.setattr(circle, "LEARN", 55.0)
+    found, record = flown(SHORT, lambda record, vehicle: design, late=1)
+    given_back = next(event for event in found.events if "arrive later" in event.what)
+    assert given_back.time <= found.events[1].time + 1.0
+    assert found.phase is Phase.IDENTIFYING
+    assert np.abs(record["phi"]).max() < 0.7

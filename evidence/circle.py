@@ -1,0 +1,80 @@
+"""How soon `symheli circle` notices that the mass has changed, and how often it is mistaken."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+import symheli
+from evidence.tables import DOCS, keep, markdown, parsed
+from studies.circle.alarm import HORIZON, VehicleAlarm
+from studies.circle.circle import LEARN
+from studies.circle.vehicle import MASS, Vehicle
+from studies.known_kinematics.models import identified, simulator_of
+from symheli import FlightRecord
+from symheli.flight import ParameterChange
+
+PAGE, SECTION = DOCS / "howto" / "live.md", "alarm"
+FLOWN, CHANGE = 600.0, 300.0
+"""Length of a flight, and when the mass changes, s."""
+FACTORS = (1.0, 1.05, 1.1, 0.9, 1.2)
+"""Of the mass; 1: it does not change."""
+
+
+def alarmed(alarm: VehicleAlarm, flight: FlightRecord, since: float) -> float:
+    """Return after how many seconds from `since` (s) on the alarm is given; NaN where it is not."""
+    seconds = np.arange(since + HORIZON, flight.time[-1], HORIZON)
+    for t in seconds:
+        if alarm.take(flight.between(t - 2.5 * HORIZON, t)) is not None:
+            return float(t - since)
+    return math.nan
+
+
+def of_seed(seed: int) -> list[float]:
+    """Return the seconds to the alarm for each of `FACTORS`, of the flight of a seed."""
+    vehicle = Vehicle(duration=FLOWN, seed=seed)
+    heli = vehicle.helicopter
+    plan, found = vehicle.plan(heli), []
+    model, first = None, None
+    for factor in FACTORS:
+        changed = ParameterChange(CHANGE, {MASS: factor * float(heli.parameters[MASS])})
+        flight = symheli.fly(heli, plan, change=changed if factor != 1.0 else None)
+        if model is None or first is None:
+            first = flight.between(0.0, LEARN)
+            model = identified(first, simulator_of(vehicle.name, heli)[1])
+        since = LEARN if factor == 1.0 else CHANGE
+        found.append(alarmed(VehicleAlarm(model, first), flight, since))
+    return found
+
+
+def table(found: Sequence[Sequence[float]]) -> str:
+    """The table in Markdown."""
+    rows = []
+    for factor, seconds in zip(FACTORS, np.transpose(found), strict=True):
+        seen = seconds[np.isfinite(seconds)]
+        numbers = [f"{np.median(seen):.0f}", f"{seen.max():.0f}"] if len(seen) else ["", ""]
+        rows.append([f"{factor:g}", f"{len(seen)} of {len(seconds)}", *numbers])
+    return markdown(["mass times", "alarms", "after, median, s", "worst, s"], rows)
+
+
+def main() -> None:
+    """Print the table, and write it where it stands."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, default=21, help="how many")
+    parser.add_argument("--first", type=int, default=100, help="the first of them")
+    arguments = parsed(parser, "docs/howto/live.md", timed=False)
+    found = []
+    for seed in range(arguments.first, arguments.first + arguments.seeds):
+        found.append(of_seed(seed))
+        print(seed, *(f"{s:g}" for s in found[-1]), flush=True)
+    text = table(found)
+    print(text)
+    if arguments.write:
+        keep(PAGE, SECTION, text)
+
+
+if __name__ == "__main__":
+    main()
