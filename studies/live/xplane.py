@@ -126,7 +126,8 @@ def answered(datagram: bytes) -> dict[int, float] | None:
 
 
 def _text(field: bytes) -> str:
-    return field.split(b"\0")[0].decode("ascii", "replace").strip()
+    """A dataref; its first and only element is the dataref itself."""
+    return field.split(b"\0")[0].decode("ascii", "replace").strip().removesuffix("[0]")
 
 
 def bound(host: str, port: int) -> socket.socket:

@@ -20,7 +20,7 @@ from studies.live import mavlink, peer, xplane
 from studies.live.earth import earth_velocity
 from studies.live.peer import MavlinkLine, OnTheWire, XPlaneLine
 from studies.live.recorder import Recorder
-from studies.live.sample import Sample
+from studies.live.sample import STICKS, Sample
 from studies.live.stream import Stream
 from studies.live.xplane import XPlaneSource
 from symheli import FlightRecord
@@ -452,3 +452,48 @@ def test_a_flight_over_the_wire_is_identified(heli, tmp_path):
     assert found["p", "stick_lat"].value > 10 * found["p", "stick_lat"].error
     assert len(FlightRecord.from_csv(tmp_path / "a.csv")) == watch.received
     assert "learnt" in said[-1]
+
+
+@pytest.mark.slow
+def test_a_client_of_x_plane_by_other_hands_flies_the_vehicle():
+    """pyxpudpserver, unchanged: it reads datarefs, sets a stick, and is forgotten when it quits."""
+    package = pytest.importorskip("pyxpudpserver")
+    client = package.XPlaneUDPServer()
+    line, sticks, over = XPlaneLine(port=0), {}, threading.Event()
+    values = dict.fromkeys(("u", "v", "w", "p", "q", "r", "phi", "theta", "psi", *STICKS), 0.0)
+    values |= {"u": 5.0, "airspeed": 5.0, "phi": 0.2, "stick_lat": -0.5}
+
+    def serve():
+        at = 0.0
+        while not over.is_set():
+            line.send(at, values)
+            sticks.update(line.wait(0.02))
+            at += 0.02
+
+    serving = threading.Thread(target=serve)
+    serving.start()
+    try:
+        client.initialiseUDP(("127.0.0.1", 0), ("127.0.0.1", line.port), "this machine")
+        client.start()
+        names = [xplane.DATAREFS[name][0] for name in ("phi", "airspeed", "stick_lat")]
+        for name in names:
+            client.requestXPDref(name)
+        client.sendXPDref(xplane.DATAREFS["stick_lon"][0], 0, 0.25)
+        end = time.monotonic() + 20.0
+        while time.monotonic() < end and not (
+            "stick_lon" in sticks and all(client.getData(name) for name in names)
+        ):
+            time.sleep(0.05)
+        read = [client.getData(name) for name in names]
+        assert read == pytest.approx([math.degrees(0.2), 5.0, -0.5], rel=1e-6)
+        assert sticks == {"stick_lon": pytest.approx(0.25)}
+        client.quit()
+        while time.monotonic() < end and line._asked:
+            time.sleep(0.05)
+        assert not line._asked
+    finally:
+        over.set()
+        serving.join()
+        line.close()
+        for made in (client, package.pyXPUDPServer):
+            made.sendSock.close()  # it does not itself
