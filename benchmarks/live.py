@@ -4,6 +4,9 @@ axes, beside pymavlink's own decoding of one vehicle's messages and the recursio
 
 from __future__ import annotations
 
+import json
+import pickle
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -23,6 +26,7 @@ from studies.live import mavlink, xplane  # noqa: E402
 from studies.live.identifier import STATES, LiveIdentifier  # noqa: E402
 from studies.live.sample import STICKS, Sample  # noqa: E402
 from studies.live.stream import Stream  # noqa: E402
+from studies.live.watch import Watch  # noqa: E402
 from symheli.errors import InputError  # noqa: E402
 
 DT = 0.02
@@ -70,6 +74,51 @@ class ByHand:
         gain = self.P @ phi / (1.0 + phi @ self.P @ phi)
         self.theta += np.outer(gain, y - self.theta.T @ phi)
         self.P -= np.outer(gain, phi @ self.P)
+
+
+SENDER = """
+import json, pickle, socket, sys, time
+port, packets, dt = pickle.load(sys.stdin.buffer)
+out, begin, sent = socket.socket(socket.AF_INET, socket.SOCK_DGRAM), time.monotonic() + 0.5, []
+for k, packet in enumerate(packets):
+    time.sleep(max(begin + k * dt - time.monotonic(), 0.0))
+    sent.append(time.monotonic())
+    out.sendto(packet, ("127.0.0.1", port))
+print(json.dumps(sent))
+"""
+"""Another process that sends, and says when."""
+
+
+def latencies(wire: list[bytes], busy: bool) -> np.ndarray:
+    """Seconds from a packet's sending to the coefficients that know it, at 50 Hz, while a program
+    keeps the other core busy or not.
+    """
+    source = xplane.XPlaneSource()
+    identifier = LiveIdentifier(STICKS, 0.0, 12.0)
+    learnt: dict[int, float] = {}
+    watch = Watch(source, identifier, Stream(identifier.signals, DT))
+    take = watch.take
+
+    def taken(sample: Sample, now: float) -> None:
+        take(sample, now)
+        learnt[round(sample.time / DT)] = time.monotonic()
+
+    watch.take = taken  # type: ignore[method-assign]
+    loads = [subprocess.Popen([sys.executable, "-c", "while True: pass"])] if busy else []
+    sender = subprocess.Popen(
+        [sys.executable, "-c", SENDER], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    try:
+        assert sender.stdin is not None
+        pickle.dump((source._socket.getsockname()[1], wire, DT), sender.stdin)
+        sender.stdin.close()
+        watch.run(len(wire) * DT + 2.0, lambda line: None)
+        sent = json.loads(sender.stdout.read() if sender.stdout else b"[]")
+    finally:
+        for process in (*loads, sender):
+            process.kill()
+            process.wait()
+    return np.array([learnt[k] - at for k, at in enumerate(sent) if k in learnt])
 
 
 def main() -> None:
@@ -121,10 +170,29 @@ def main() -> None:
     a_second = float(np.mean(times["bytes to coefficients, all axes"])) / DT + summary[0]
     head = ("a sample", "median, us", "99.9 %, us", "% of a core at 50 Hz")
     tables = [table("### A sample at 50 Hz, seconds of processor", rows, head)]
+    late = [("", "samples", "median, ms", "99.9 %, ms", "largest, ms")]
+    for busy in (False, True):
+        seconds = latencies(wire[: 500 if options.quick else 6000], busy)
+        late.append(
+            (
+                "the other core busy" if busy else "alone",
+                f"{len(seconds)}",
+                *(f"{1e3 * np.quantile(seconds, q):.2f}" for q in (0.5, 0.999, 1.0)),
+            )
+        )
+    tables.append(table("### From a packet to the coefficients at 50 Hz", late[1:], late[0]))
     ratios = [
         Ratio("share of a core, 1 s predictions once a second among it", a_second, SHARE, True)
     ]
+    ratios.append(
+        Ratio("99.9 % of latencies, beside a busy core, in samples", late_share(seconds), 1.0, True)
+    )
     present("live", options, tables, ratios, [])
+
+
+def late_share(seconds: np.ndarray) -> float:
+    """The latency that 99.9 % keep to, in periods."""
+    return float(np.quantile(seconds, 0.999)) / DT
 
 
 def packed_messages(link, samples: list[dict[str, float]]) -> list[bytes]:

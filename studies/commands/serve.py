@@ -85,7 +85,8 @@ def run(arguments: argparse.Namespace) -> Output:
         added = np.column_stack([signals[str(u)] for u in heli.inputs])
     lines: list[Line] = [XPlaneLine(port=arguments.xplane)]
     if arguments.mavlink:
-        lines.append(MavlinkLine(arguments.mavlink))
+        numbers = {str(name): heli.parameters[name] for name in heli.parameters}
+        lines.append(MavlinkLine(arguments.mavlink, numbers))
     wire = OnTheWire(inner, lines, heli.travel, arguments.speed, added)
     progress(
         f"{arguments.vehicle} flies for {schedule.duration:.0f} s; X-Plane's UDP on 127.0.0.1:"

@@ -157,3 +157,28 @@ def sent(link: Any, time: float, values: Mapping[str, float]) -> None:
     link.vfr_hud_send(values["airspeed"], math.hypot(*velocity[:2]), heading, 0, 0.0, -velocity[2])
     rates = (values[name] for name in "pqr")
     link.attitude_send(ms, *angles, *rates)
+
+
+SHORT = {
+    "main_rotor": "MR",
+    "tail_rotor": "TR",
+    "horizontal_tail": "HT",
+    "vertical_fin": "VF",
+    "drivetrain": "DT",
+}
+"""Parts of a helicopter in names of parameters, which have 16 letters."""
+
+
+def parameters(values: Mapping[str, float]) -> dict[str, float]:
+    """Return parameters by the names that they have in MAVLink: main_rotor.radius is MR_RADIUS.
+
+    Raises `InputError` where two have one name.
+    """
+    found: dict[str, float] = {}
+    for name, value in values.items():
+        part, _, own = name.rpartition(".")
+        short = f"{SHORT.get(part, part)}_{own}".strip("_").upper()[:16]
+        if short in found:
+            raise InputError(f"two parameters are called {short} in 16 letters; one is {name}")
+        found[short] = float(value)
+    return found

@@ -8,6 +8,7 @@ import contextlib
 import math
 import select
 import time
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 
@@ -23,6 +24,10 @@ FRESH = 0.5
 """Seconds after which a command from the wire is too old, and the autopilot has the stick again."""
 MOST_REQUESTS = 10_000
 """Requests of all clients, at most: one more drops the client that came first."""
+TAKEN = ("RC_CHANNELS_OVERRIDE", "PARAM_REQUEST_LIST", "PARAM_REQUEST_READ", "PARAM_SET")
+"""Messages that a vehicle takes."""
+PARAMETERS_A_SAMPLE = 2
+"""Parameters that are sent with a sample, at most: 100 a second."""
 MEASURED = ("u", "v", "w", "p", "q", "r", "phi", "theta", "airspeed")
 
 
@@ -106,10 +111,17 @@ class XPlaneLine:
 class MavlinkLine:
     """A vehicle's side of MAVLink over UDP: a heartbeat a second, and the messages of a sample.
 
-    Takes RC_CHANNELS_OVERRIDE: channels 1 to 4 are the sticks, 1000 to 2000 us.
+    Takes RC_CHANNELS_OVERRIDE: channels 1 to 4 are the sticks, 1000 to 2000 us. Answers requests
+    for its `parameters`, {name: number in SI}, which nobody sets from there.
     """
 
-    def __init__(self, address: str = f"udpout:127.0.0.1:{mavlink.PORT}"):
+    def __init__(
+        self,
+        address: str = f"udpout:127.0.0.1:{mavlink.PORT}",
+        parameters: Mapping[str, float] | None = None,
+    ):
+        self._parameters = mavlink.parameters(parameters or {})
+        self._asked: deque[int] = deque(maxlen=MOST_REQUESTS)
         self._library = mavlink.library()
         self._link = mavlink.opened(
             address, source_system=mavlink.SYSTEM, source_component=mavlink.COMPONENT
@@ -125,6 +137,8 @@ class MavlinkLine:
                 m = self._library.mavlink
                 link.heartbeat_send(m.MAV_TYPE_HELICOPTER, m.MAV_AUTOPILOT_GENERIC, 0, 0, 0)
             mavlink.sent(link, at, values)
+            for _ in range(min(PARAMETERS_A_SAMPLE, len(self._asked))):
+                self._send_parameter(self._asked.popleft())
         except OSError:  # nobody listens
             pass
 
@@ -135,10 +149,13 @@ class MavlinkLine:
         while True:
             left = end - time.monotonic()
             message = self._link.recv_match(
-                type="RC_CHANNELS_OVERRIDE", blocking=left > 0, timeout=max(left, 0.0)
+                type=list(TAKEN), blocking=left > 0, timeout=max(left, 0.0)
             )
             if message is None:
                 return sticks
+            if message.get_type() != "RC_CHANNELS_OVERRIDE":
+                self._ask(message)
+                continue
             for k, name in enumerate(STICKS):
                 us = getattr(message, f"chan{k + 1}_raw")
                 if 0 < us < 2**16 - 1:
@@ -147,6 +164,27 @@ class MavlinkLine:
     def close(self) -> None:
         """Close the socket."""
         self._link.close()
+
+    def _ask(self, message: Any) -> None:
+        """Note which parameters are asked for; who would set one is told what it is."""
+        names = list(self._parameters)
+        if message.get_type() == "PARAM_REQUEST_LIST":
+            self._asked.extend(k for k in range(len(names)) if k not in self._asked)
+        elif getattr(message, "param_index", -1) >= 0:
+            self._asked.append(message.param_index)
+        elif message.param_id in names:
+            self._asked.append(names.index(message.param_id))
+
+    def _send_parameter(self, index: int) -> None:
+        names = list(self._parameters)
+        if index < len(names):
+            self._link.mav.param_value_send(
+                names[index].encode(),
+                self._parameters[names[index]],
+                self._library.mavlink.MAV_PARAM_TYPE_REAL32,
+                len(names),
+                index,
+            )
 
 
 class OnTheWire:

@@ -215,6 +215,42 @@ def test_mavlink_both_ways():
         each.close()
 
 
+def test_a_ground_station_reads_the_parameters_of_the_vehicle():
+    """By pymavlink's own requests: all of them, one by name, one by number; none is set."""
+    mavutil = pytest.importorskip("pymavlink.mavutil")
+    heli = symheli.Helicopter.load("xcell60", governor="pi")
+    numbers = {str(name): heli.parameters[name] for name in heli.parameters}
+    port = free_port()
+    station = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}")
+    line = MavlinkLine(f"udpout:127.0.0.1:{port}", numbers)
+    values = {**STATE, **dict.fromkeys(STICKS, 0.0)}
+    line.send(0.0, values)
+    assert station.wait_heartbeat(timeout=5.0) is not None
+
+    def answers(ask, count):
+        ask()
+        found = {}
+        for k in range(1, 200):
+            line.wait(0.005)
+            line.send(0.02 * k, values)
+            while (message := station.recv_match(type="PARAM_VALUE")) is not None:
+                found[message.param_id] = message.param_value
+            if len(found) == count:
+                return found
+        raise AssertionError(f"{len(found)} of {count} came")
+
+    found = answers(station.param_fetch_all, len(numbers))
+    assert found["BODY_MASS"] == pytest.approx(numbers["body.mass"])
+    assert found["MR_RADIUS"] == pytest.approx(numbers["main_rotor.radius"])
+    assert sorted(found.values()) == pytest.approx(sorted(numbers.values()), rel=1e-6)
+    one = {"BODY_MASS": pytest.approx(numbers["body.mass"])}
+    assert answers(lambda: station.param_fetch_one("BODY_MASS"), 1) == one
+    assert answers(lambda: station.param_set_send("BODY_MASS", 99.0), 1) == one
+    assert len(answers(lambda: station.param_fetch_one(3), 1)) == 1
+    for each in (station, line):
+        each.close()
+
+
 @pytest.fixture
 def mavlink_pair():
     pytest.importorskip("pymavlink")
