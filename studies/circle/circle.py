@@ -48,7 +48,7 @@ SIGNALS = (
 
 
 class Phase(Enum):
-    """What the circle is doing."""
+    """A phase of the circle."""
 
     IDENTIFYING = "the vehicle's own autopilot flies and excites"
     DESIGNING = "a controller is designed, certified and judged; the vehicle's own autopilot flies"
@@ -56,7 +56,7 @@ class Phase(Enum):
 
 
 class Event(NamedTuple):
-    """What happened at a time of the flight, s."""
+    """An event at a time of the flight, s."""
 
     time: float
     what: str
@@ -74,7 +74,7 @@ class Switch:
 
 
 class Commanded(Protocol):
-    """Where commands go."""
+    """A line to the sticks of a vehicle."""
 
     def command(self, sticks: Mapping[str, float]) -> None:
         """Send the sticks, each -1 to 1."""

@@ -13,8 +13,9 @@ from identification.model import KinematicModel
 from studies.circle.vehicle import PERIOD, Vehicle
 from studies.controllers.design_choices import DesignChoices
 from studies.controllers.designs import judged_by_flight
+from studies.controllers.starting import for_model, state_space
 from studies.controllers.synthesized import synthesized
-from studies.known_kinematics.models import SCHEDULING, identified, simulator_of
+from studies.known_kinematics.models import PAIRS, SCHEDULING, identified, simulator_of
 from studies.live.identifier import STATES
 from symheli import FlightRecord, TableController
 from symheli.errors import SymheliError
@@ -76,12 +77,11 @@ def designed(record: FlightRecord, vehicle: str) -> Designed | str:
     """
     begin = time.perf_counter()
     simulator = simulator_of(vehicle, Vehicle(vehicle).helicopter)[1]
-    choices = DesignChoices(vehicle="", model="flown", servos={}, delay=PERIOD, period=PERIOD)
     seconds: dict[str, float] = {}
     try:
         model = identified(record, simulator)
         seconds["identifying"] = time.perf_counter() - begin
-        made = synthesized(choices, model)
+        made = synthesized(choices_for(vehicle, model), model)
         judging = time.perf_counter()
         verdict = judged_by_flight(model, made.table.model, record, simulator)
         seconds |= made.seconds
@@ -98,6 +98,14 @@ def designed(record: FlightRecord, vehicle: str) -> Designed | str:
         trim=with_controls(model, record),
         seconds=seconds,
     )
+
+
+def choices_for(vehicle: str, model: KinematicModel) -> DesignChoices:
+    """Return the choices of a design: of a packaged X-Cell those of the study, of another vehicle
+    with sizes of commands from its identified model; without servos, one sample late.
+    """
+    usual = DesignChoices(vehicle="", model="flown", servos={}, delay=PERIOD, period=PERIOD)
+    return usual if vehicle in PAIRS else for_model(usual, state_space(model), model, "")
 
 
 def with_controls(model: KinematicModel, record: FlightRecord) -> Array:

@@ -26,7 +26,7 @@ class Pilot(Protocol):
     """Who flies the vehicle that is watched."""
 
     alarm: str | None
-    """What of the vehicle has changed, None while nothing has."""
+    """Change of the vehicle that was noticed, in words; None without one."""
 
     def take(self, row: Row) -> bool:
         """Take in a row, and command; return whether it is another vehicle from now on."""

@@ -111,13 +111,19 @@ class Watch:
             f"{self.identifier.learnt} samples learnt",
             f"{whole} of {len(cells)} airspeeds covered",
             *self._predicted(),
-            *(self.problems() or [self.identifier.next_to_fly()]),
+            *self._said(),
         ]
         if self.stream.state is not StreamState.GOOD:
             parts.append(f"{self.stream.state.name}: {self.stream.state.value}")
         if self.recorder is not None and self.recorder.problem:
             parts.append(f"RECORD: {self.recorder.problem}")
         return "; ".join(parts)
+
+    def _said(self) -> list[str]:
+        """What to do or, where a pilot flies, whether it may be relied on."""
+        if self.pilot is not None:
+            return [f"lamp {self.lamp}"]
+        return self.problems() or [self.identifier.next_to_fly()]
 
     @property
     def lamp(self) -> Lamp:

@@ -52,7 +52,7 @@ class Changes(NamedTuple):
     def of(
         cls, heli: Helicopter, changes: Sequence[ParameterChange | None], dt: float
     ) -> Changes | None:
-        """Those of flights whose controller is sampled every `dt` s; None where nothing changes."""
+        """Collect the changes of flights whose controller has this period (s); None without any."""
         if not any(changes):
             return None
         after = [heli.parameters.array if one is None else one.of(heli) for one in changes]
