@@ -7,14 +7,14 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from studies.commands import given_model, identifier, options
+from studies.commands import given_model, identifier, monitor, options
 from studies.commands.arguments import group, option, positional, renamed, several
 from studies.output import Output
 from symheli.errors import InputError
 
 HELP = (
-    "C code of the equations of motion, of a recursive identification, of an identified model or of"
-    " a controller, a MATLAB file, or equations in print"
+    "C code of the equations of motion, of a recursive identification, of an identified model, of a"
+    " controller or of the monitor of its certificate, a MATLAB file, or equations in print"
 )
 
 ARGUMENTS = (
@@ -22,18 +22,25 @@ ARGUMENTS = (
         "format",
         "c: equations of motion and header; identifier: recursive identification as C for an"
         " autopilot; model: an identified model (--model) as C; controller: one in a table over"
-        " airspeed (--model) as C; mat: linear models along airspeed, or what --model holds; latex,"
+        " airspeed (--model) as C; monitor: whether the hypotheses of its certificate are met, as"
+        " C; mat: linear models along airspeed, or what --model holds; latex,"
         " markdown: every component's equations to read",
         type=renamed({"estimator": "identifier"}, "symheli export"),
-        choices=("c", "identifier", "model", "controller", "mat", "latex", "markdown"),
+        choices=("c", "identifier", "model", "controller", "monitor", "mat", "latex", "markdown"),
     ),
     *options.HELICOPTER,
     option(
         "--out",
         "PATH",
         "file (default: NAME_rhs.c, NAME_family.mat, NAME_equations.tex or .md) or folder"
-        " (identifier, model, controller)",
+        " (identifier, model, controller, monitor)",
         Path,
+    ),
+    option(
+        "--target",
+        ("cortex-m4", "cortex-m7"),
+        "identifier, model, controller, monitor: a Makefile for this bare core beside the C code,"
+        " with a check in qemu-system-arm",
     ),
     several(
         "--airspeeds",
@@ -44,8 +51,9 @@ ARGUMENTS = (
     ),
     option("--points", "N", "airspeeds of the family", options.at_least_one, 14),
     *identifier.ARGUMENTS,
+    *monitor.ARGUMENTS,
     group(
-        "model, controller, mat",
+        "model, controller, monitor, mat",
         "C code that predicts and simulates what symheli identify --save kept (--single applies),"
         " or that flies what TableController.save kept; a MATLAB file of an identified model or a"
         " family of linear models",
@@ -63,11 +71,13 @@ IDENTIFIER = {
     *("outputs", "inputs", "na", "nb", "delay", "degree", "offset"),
     *("forgetting", "directional", "single"),
 }
+MONITOR = {"certificate", "reading_error", "rate_window"}
 EFFECTIVE: dict[str, set[str]] = {
     "c": {*options.OF_A_VEHICLE},
-    "identifier": {*options.OF_A_VEHICLE, *IDENTIFIER, "airspeeds"},
-    "model": {"single"},
-    "controller": set(),
+    "identifier": {*options.OF_A_VEHICLE, *IDENTIFIER, "airspeeds", "target"},
+    "model": {"single", "target"},
+    "controller": {"target"},
+    "monitor": {*MONITOR, "target"},
     "mat": {*options.OF_A_VEHICLE, "airspeeds", "points"},
     "latex": {*options.OF_A_VEHICLE},
     "markdown": {*options.OF_A_VEHICLE},
@@ -84,16 +94,14 @@ def run(arguments: argparse.Namespace) -> Output:
     if arguments.model and arguments.format == "mat":
         idle |= {*options.OF_A_VEHICLE, "airspeeds", "points"}
     options.refuse(arguments, sorted(idle), f"on the format {arguments.format}")
-    if arguments.format == "model":
-        return _list(_model(arguments))
-    if arguments.format == "controller":
-        return _list(_controller(arguments))
+    if arguments.format in OF_A_FILE:
+        return _list(_on_board(arguments, OF_A_FILE[arguments.format](arguments)))
     if arguments.model and arguments.format == "mat":
         return _list(_mat(arguments))
     if arguments.model:
         raise InputError(
-            f"--model applies to the formats model, controller and mat; {arguments.format} is"
-            " written for a vehicle"
+            f"--model applies to the formats model, controller, monitor and mat; {arguments.format}"
+            " is written for a vehicle"
         )
     heli = options.helicopter(arguments)
     name = Path(arguments.vehicle).stem
@@ -102,7 +110,7 @@ def run(arguments: argparse.Namespace) -> Output:
 
         written = write_c(heli, arguments.out or Path(f"{name}_rhs.c"))
     elif arguments.format == "identifier":
-        written = identifier.write(arguments, heli)
+        written = _on_board(arguments, identifier.write(arguments, heli))
     elif arguments.format == "mat":
         from symheli.export import write_mat
 
@@ -164,10 +172,28 @@ def _controller(arguments: argparse.Namespace) -> tuple[Path, ...]:
     return write_controller(controller, arguments.out or Path("controller"))
 
 
+def _monitor(arguments: argparse.Namespace) -> tuple[Path, ...]:
+    return monitor.write(arguments, _named(arguments, "as TableController.save writes it"))
+
+
+OF_A_FILE = {"model": _model, "controller": _controller, "monitor": _monitor}
+"""What writes the formats of C code that --model is for."""
+
+
+def _on_board(arguments: argparse.Namespace, written: tuple[Path, ...]) -> tuple[Path, ...]:
+    """The files, with what --target adds beside them."""
+    if arguments.target is None:
+        return written
+    from symheli.export import write_board
+
+    return (*written, *write_board(written[0].parent, arguments.target))
+
+
 def _named(arguments: argparse.Namespace, how: str) -> Path:
     """The file of --model."""
     if arguments.model is None:
-        raise InputError(f"name the {arguments.format}: --model FILE.json, {how}")
+        what = "controller" if arguments.format == "monitor" else arguments.format
+        raise InputError(f"name the {what}: --model FILE.json, {how}")
     return arguments.model
 
 
