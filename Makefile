@@ -64,6 +64,7 @@ bench: $(STAMP)
 	$(BIN)/python benchmarks/designs_near_optimum.py --write
 	$(BIN)/python benchmarks/gains_of_loops.py --write
 	$(BIN)/python benchmarks/controller_step.py --write
+	$(BIN)/python benchmarks/board.py --write
 	$(BIN)/python benchmarks/campaigns.py --write
 
 clean:

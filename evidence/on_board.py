@@ -36,6 +36,15 @@ def missing() -> str:
     return f"not installed: {', '.join(absent)}" if absent else ""
 
 
+def versions() -> str:
+    """Compiler and emulator, as they call themselves."""
+    lines = (
+        subprocess.run([tool, "--version"], check=True, capture_output=True, text=True).stdout
+        for tool in TOOLS[:2]
+    )
+    return "; ".join(text.splitlines()[0] for text in lines)
+
+
 @dataclass(frozen=True)
 class Run:
     """What a check program printed in the emulator, and what a step took.
