@@ -7,14 +7,14 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from studies.commands import given_model, identifier, monitor, options
+from studies.commands import fmu, given_model, identifier, monitor, options
 from studies.commands.arguments import group, option, positional, renamed, several
 from studies.output import Output
 from symheli.errors import InputError
 
 HELP = (
     "C code of the equations of motion, of a recursive identification, of an identified model, of a"
-    " controller or of the monitor of its certificate, a MATLAB file, or equations in print"
+    " controller or of the monitor of its certificate, FMUs, a MATLAB file, or equations in print"
 )
 
 ARGUMENTS = (
@@ -23,17 +23,28 @@ ARGUMENTS = (
         "c: equations of motion and header; identifier: recursive identification as C for an"
         " autopilot; model: an identified model (--model) as C; controller: one in a table over"
         " airspeed (--model) as C; monitor: whether the hypotheses of its certificate are met, as"
-        " C; mat: linear models along airspeed, or what --model holds; latex,"
+        " C; fmu: the helicopter, a controller or an identifier for co-simulation; mat: linear"
+        " models along airspeed, or what --model holds; latex,"
         " markdown: every component's equations to read",
         type=renamed({"estimator": "identifier"}, "symheli export"),
-        choices=("c", "identifier", "model", "controller", "monitor", "mat", "latex", "markdown"),
+        choices=(
+            "c",
+            "identifier",
+            "model",
+            "controller",
+            "monitor",
+            "fmu",
+            "mat",
+            "latex",
+            "markdown",
+        ),
     ),
     *options.HELICOPTER,
     option(
         "--out",
         "PATH",
-        "file (default: NAME_rhs.c, NAME_family.mat, NAME_equations.tex or .md) or folder"
-        " (identifier, model, controller, monitor)",
+        "file (default: NAME_rhs.c, NAME_family.mat, NAME_equations.tex or .md, helicopter.fmu,"
+        " ...) or folder (identifier, model, controller, monitor)",
         Path,
     ),
     option(
@@ -52,8 +63,9 @@ ARGUMENTS = (
     option("--points", "N", "airspeeds of the family", options.at_least_one, 14),
     *identifier.ARGUMENTS,
     *monitor.ARGUMENTS,
+    *fmu.ARGUMENTS,
     group(
-        "model, controller, monitor, mat",
+        "model, controller, monitor, fmu, mat",
         "C code that predicts and simulates what symheli identify --save kept (--single applies),"
         " or that flies what TableController.save kept; a MATLAB file of an identified model or a"
         " family of linear models",
@@ -67,23 +79,20 @@ ARGUMENTS = (
 )
 
 
-IDENTIFIER = {
-    *("outputs", "inputs", "na", "nb", "delay", "degree", "offset"),
-    *("forgetting", "directional", "single"),
-}
 MONITOR = {"certificate", "reading_error", "rate_window"}
 EFFECTIVE: dict[str, set[str]] = {
     "c": {*options.OF_A_VEHICLE},
-    "identifier": {*options.OF_A_VEHICLE, *IDENTIFIER, "airspeeds", "target"},
+    "identifier": {*options.OF_A_VEHICLE, *identifier.OPTIONS, "airspeeds", "target"},
     "model": {"single", "target"},
     "controller": {"target"},
     "monitor": {*MONITOR, "target"},
+    "fmu": {"of"},
     "mat": {*options.OF_A_VEHICLE, "airspeeds", "points"},
     "latex": {*options.OF_A_VEHICLE},
     "markdown": {*options.OF_A_VEHICLE},
 }
 """Options that have an effect on a format, beside --out and --model."""
-OPTIONS = set[str]().union(*EFFECTIVE.values())
+OPTIONS = set[str]().union(*EFFECTIVE.values(), *fmu.EFFECTIVE.values())
 
 
 def run(arguments: argparse.Namespace) -> Output:
@@ -91,17 +100,21 @@ def run(arguments: argparse.Namespace) -> Output:
     them.
     """
     idle = OPTIONS - EFFECTIVE[arguments.format] - {"model"}
+    if arguments.format == "fmu" and arguments.of:
+        idle = OPTIONS - {"of"} - fmu.EFFECTIVE[arguments.of]
     if arguments.model and arguments.format == "mat":
         idle |= {*options.OF_A_VEHICLE, "airspeeds", "points"}
     options.refuse(arguments, sorted(idle), f"on the format {arguments.format}")
+    if arguments.format == "fmu":
+        return _list(fmu.write(arguments))
     if arguments.format in OF_A_FILE:
         return _list(_on_board(arguments, OF_A_FILE[arguments.format](arguments)))
     if arguments.model and arguments.format == "mat":
         return _list(_mat(arguments))
     if arguments.model:
         raise InputError(
-            f"--model applies to the formats model, controller, monitor and mat; {arguments.format}"
-            " is written for a vehicle"
+            "--model applies to the formats model, controller, monitor, fmu and mat;"
+            f" {arguments.format} is written for a vehicle"
         )
     heli = options.helicopter(arguments)
     name = Path(arguments.vehicle).stem

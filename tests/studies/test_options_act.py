@@ -64,6 +64,8 @@ VALUES = {
     "--certificate": ["certificate.json"],
     "--reading-error": ["0.1"],
     "--rate-window": ["0.5"],
+    "--of": ["controller"],
+    "--period": ["0.01"],
 }
 """A value of each option that is not its default."""
 
@@ -91,6 +93,8 @@ MODES = {
     **{f"export {kind}": ["export", kind] for kind in ("c", "identifier", "mat", "latex")},
     "export model": ["export", "model", "--model", "model.json"],
     "export monitor": ["export", "monitor", "--model", "table.json"],
+    **{f"export fmu of {of}": ["export", "fmu", "--of", of] for of in ("helicopter", "identifier")},
+    "export fmu": ["export", "fmu", "--model", "table.json"],
     "export mat of a model": ["export", "mat", "--model", "model.json"],
     "margins": ["margins"],
     "margins of a model": ["margins", "--model", "model.json", "--feedback", "u=y:-0.1"],
@@ -195,11 +199,13 @@ def stubbed(monkeypatch, folder):
     monkeypatch.setattr(idn, "calibrate", reached)
     writers = (
         (exports, ("write_c", "write_mat", "write_board", "write_monitor")),
+        (exports, ("write_helicopter_fmu", "write_controller_fmu")),
         (identifiers, ("write_estimator", "write_model")),
     )
     for module, names in writers:
         for name in names:
             monkeypatch.setattr(module, name, lambda *_, **__: (Path("written.c"),))
+    monkeypatch.setattr(identifiers, "write_identifier_fmu", lambda *_: Path("written.fmu"))
 
 
 def vanished(words):
