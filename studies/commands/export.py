@@ -79,7 +79,7 @@ ARGUMENTS = (
 )
 
 
-MONITOR = {"certificate", "reading_error", "rate_window"}
+MONITOR = {"certificate", "reading_error", "rate_window", "jitter"}
 EFFECTIVE: dict[str, set[str]] = {
     "c": {*options.OF_A_VEHICLE},
     "identifier": {*options.OF_A_VEHICLE, *identifier.OPTIONS, "airspeeds", "target"},

@@ -38,6 +38,13 @@ ARGUMENTS = (
             options.number,
             0.2,
         ),
+        option(
+            "--jitter",
+            "F",
+            "fraction by which a sample period may be off (default: 0.05)",
+            options.number,
+            0.05,
+        ),
     ),
 )
 
@@ -52,7 +59,11 @@ def write(arguments: argparse.Namespace, file: Path) -> tuple[Path, ...]:
     if arguments.certificate is not None:
         proven = _proven(arguments.certificate, table.dt)
     monitor = HypothesisMonitor.of(
-        table, proven, noise=arguments.reading_error, window=arguments.rate_window
+        table,
+        proven,
+        noise=arguments.reading_error,
+        window=arguments.rate_window,
+        jitter=arguments.jitter,
     )
     return write_monitor(monitor, arguments.out or Path("monitor"))
 

@@ -254,9 +254,10 @@ def test_the_command_takes_range_and_rate_from_a_certificate(tmp_path, capsys):
     assert "range     2 to 9" in header
     assert "<= 1.25 (t(k) - t(k-j))" in header
     assert "MONITOR_Y_d_lat 0 /* rad, -0.1 to 0.1 */" in header
-    assert main([*words, "--reading-error", "0.3", "--rate-window", "0.5"]) == 0
+    assert main([*words, "--reading-error", "0.3", "--rate-window", "0.5", "--jitter", "0.2"]) == 0
     header = (tmp_path / "monitor.h").read_text()
     assert "<= 2 (t(k) - t(k-j)) + 0.3   for j = 1 .. 25" in header
+    assert "0.016 to 0.024 s since" in header
     synthesis.l2_gain(lag.discretize(0.05)).save(tmp_path / "other.json")
     assert main([*words, "--certificate", str(tmp_path / "other.json")]) == 1
     assert "sample period of 0.05 s" in capsys.readouterr().err

@@ -64,6 +64,7 @@ VALUES = {
     "--certificate": ["certificate.json"],
     "--reading-error": ["0.1"],
     "--rate-window": ["0.5"],
+    "--jitter": ["0.1"],
     "--of": ["controller"],
     "--period": ["0.01"],
 }
