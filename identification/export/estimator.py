@@ -92,7 +92,7 @@ def write_estimator(
 
 
 def program(rls: RecursiveLeastSquares, units: Mapping[str, str], name: str) -> CProgram:
-    """What `write_estimator` writes."""
+    """Return the files of `write_estimator`."""
     if rls.structure is not rls.regression:
         raise InputError("a KinematicARX is written by write_kinematic_estimator, with its dt")
     arx = rls.regression

@@ -190,7 +190,7 @@ def _monitor(arguments: argparse.Namespace) -> tuple[Path, ...]:
 
 
 OF_A_FILE = {"model": _model, "controller": _controller, "monitor": _monitor}
-"""What writes the formats of C code that --model is for."""
+"""Writers of the formats of C code that --model is for."""
 
 
 def _on_board(arguments: argparse.Namespace, written: tuple[Path, ...]) -> tuple[Path, ...]:

@@ -92,7 +92,7 @@ def write_c(heli: Helicopter, path: str | os.PathLike[str]) -> tuple[Path, ...]:
 
 
 def program(heli: Helicopter, stem: str) -> CProgram:
-    """What `write_c` writes, the source called STEM.c."""
+    """Return the files of `write_c`, the source called STEM.c."""
     guard = re.sub(r"\W", "_", f"{stem}_h").upper()
     project = re.sub(r"[^A-Za-z0-9_]", "_", stem)
     return CProgram(

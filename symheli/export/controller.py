@@ -89,7 +89,7 @@ def write_controller(
 
 
 def program(controller: TableController, name: str) -> CProgram:
-    """What `write_controller` writes."""
+    """Return the files of `write_controller`."""
     if not isinstance(controller, TableController):
         raise InputError(
             f"expected a TableController, got {type(controller).__name__}; make one with"
