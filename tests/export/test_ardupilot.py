@@ -13,7 +13,7 @@ from export.test_exported_controller import TABLES
 
 from evidence import on_board
 from symheli.export import write_controller, write_monitor
-from symheli.flight import HypothesisEvents, HypothesisMonitor
+from symheli.flight import HypothesisEvents, HypothesisMonitor, StepEvents
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "ardupilot"
 STRICT = ("-O2", "-Wall", "-Wextra", "-Werror", "-ffp-contract=off")
@@ -45,7 +45,12 @@ bool AP_AHRS::get_velocity_NED(Vector3f &vec) const
     vec = Vector3f(0.02f, 0.03f, 0.01f);
     return sample != 7;
 }
-bool AP_AHRS::airspeed_TAS(float &speed) const { speed = 5; return sample != 12; }
+bool AP_AHRS::airspeed_TAS(float &speed) const 
+{
+    // stuck in the end
+    speed = sample < 200 ? 5 + 0.01f * sample : 7;
+    return sample != 12;
+}
 AP_AHRS &AP::ahrs() { static AP_AHRS own; return own; }
 int main()
 {
@@ -57,7 +62,7 @@ int main()
         gyro = Vector3f(0.0001f * sample, 0.01f, -0.01f);
         if (!own.update(reference, trim)) continue;
         for (int i = 0; i < CONTROLLER_NY; i++) printf("%a ", (double)own.command()[i]);
-        printf("%d %d %u\\n", own.status(), own.hypotheses(), (unsigned)now);
+        printf("%d %d %d %u\\n", own.certified(), own.status(), own.hypotheses(), (unsigned)now);
         sample++;
     }
 }
@@ -89,13 +94,14 @@ def test_it_flies_the_controller_by_its_own_clock(library):
     subprocess.run([*command, *sources], cwd=library, check=True)
     done = subprocess.run([str(library / "flight")], capture_output=True, text=True, check=True)
     rows = [line.split() for line in done.stdout.splitlines()]
-    said = np.array([[float.fromhex(x) for x in row[:-3]] for row in rows], np.float32)
+    said = np.array([[float.fromhex(x) for x in row[:-4]] for row in rows], np.float32)
     events = [HypothesisEvents(int(row[-2])) for row in rows]
     times = np.array([int(row[-1]) for row in rows], np.uint32)
 
     table = TABLES["position"]()
     monitor = HypothesisMonitor.of(table, jitter=JITTER)
     state, watched, expected, hypotheses = table.init(), monitor.init(), [], []
+    certified = []
     before = np.concatenate([[0], times[:-1]]).astype(np.uint32)
     elapsed = (times - before).astype(np.float32) * np.float32(1e-6)
     one = np.float32(1e-4)
@@ -105,12 +111,17 @@ def test_it_flies_the_controller_by_its_own_clock(library):
         if k == 7:
             where |= dict.fromkeys("uvw", np.nan)
         measured = np.array([where[str(s)] for s in table.inputs], np.float32)
-        u, state = table.update(state, measured, np.zeros(8), np.zeros(4), 5.0, valid=k != 12)
-        event, watched = monitor.update(watched, 5.0, elapsed[k], u, valid=k != 12)
+        V = np.float32(7) if k >= 200 else np.float32(5) + np.float32(0.01) * np.float32(k)
+        u, state = table.update(state, measured, np.zeros(8), np.zeros(4), V, valid=k != 12)
+        valid = StepEvents.PARAMETER not in state.status
+        event, watched = monitor.update(watched, V, elapsed[k], u, valid=valid)
+        certified.append(event == HypothesisEvents.MET and not state.status)
         expected.append(u)
         hypotheses.append(event)
     np.testing.assert_array_equal(said, np.array(expected))
     assert events == hypotheses
+    assert [int(row[-4]) for row in rows] == certified
+    assert 100 < sum(certified) < 230  # not of a sensor that is stuck
     periods = np.diff(times).astype(np.int64)  # of 32 bits: the overflow is none
     assert abs(periods.mean() - 20000) < 20
     assert periods.min() >= 20000 - 2600

@@ -83,7 +83,9 @@ bool AP_LPVControl::update(const float *reference, const float *trim)
     measure(measured);
     _status = controller_update(&_controller, measured, reference, trim, nullptr, airspeed, known,
                                 _command);
-    _hypotheses = monitor_update(&_monitor, airspeed, known, elapsed, _command);
+    // a reading that the controller does not follow, as one that is stuck, is none
+    _hypotheses = monitor_update(&_monitor, airspeed, known && !(_status & CONTROLLER_PARAMETER),
+                                 elapsed, _command);
     // a late sample does not make the next one early
     _due_us = _running && now - _due_us < PERIOD_US ? _due_us + PERIOD_US : now + PERIOD_US;
     _last_us = now;

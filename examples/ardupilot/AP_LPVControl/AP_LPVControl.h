@@ -31,8 +31,8 @@ public:
     int status() const { return _status; }
     int hypotheses() const { return _hypotheses; }
 
-    // all hypotheses of the certificate are met
-    bool certified() const { return _hypotheses == MONITOR_MET; }
+    // all hypotheses of the certificate are met, and the controller met with nothing
+    bool certified() const { return _hypotheses == MONITOR_MET && _status == 0; }
 
 private:
     void measure(float *measured) const;
