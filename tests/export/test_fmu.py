@@ -293,6 +293,9 @@ def test_a_state_that_is_none_and_an_attitude_that_is_none_are_errors(opened):
         slave.set(u=1.0)
     slave.fmu.reset()
     slave.started().step(0.0, DT)
+    with pytest.raises(fmpy.fmi1.FMICallException):
+        slave.set(u=1.0)
+    assert "u cannot be set now" in slave.said[-1]
 
 
 @needs_compiler
