@@ -400,6 +400,7 @@ def test_what_cannot_be_written_is_refused(ideal, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_the_command_writes_all_three(table, tmp_path, capsys):
     table.save(tmp_path / "c.json")
