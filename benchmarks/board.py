@@ -29,8 +29,10 @@ from identification.export import (  # noqa: E402
     write_estimator,
     write_kinematic_estimator,
     write_kinematic_model,
+    write_kinematic_observer,
     write_model,
 )
+from identification.model.kinematic_observer import KinematicObserver  # noqa: E402
 from identification.structure.kinematic_arx import INCREMENTS  # noqa: E402
 from symheli.errors import InputError  # noqa: E402
 from symheli.export import write_board, write_controller, write_monitor  # noqa: E402
@@ -83,6 +85,11 @@ def kinematic_model() -> idn.model.KinematicModel:
     return idn.model.KinematicModel(structure=KINEMATIC, aerodynamics=inner, trim=trim)
 
 
+def observer() -> KinematicObserver:
+    """The filter around it."""
+    return kinematic_model().observer(dict.fromkeys(KINEMATIC.outputs, 0.05), process=0.02)
+
+
 def artefacts() -> dict[str, Writer]:
     """What is exported, by what it is."""
     own, found = controller(), {}
@@ -103,6 +110,9 @@ def artefacts() -> dict[str, Writer]:
             ),
             f"kinematic model, 6 of {inner}, {precision}": lambda folder, kind=precision: (
                 write_kinematic_model(kinematic_model(), folder, precision=kind)
+            ),
+            f"kinematic observer, 8 states, {precision}": lambda folder, kind=precision: (
+                write_kinematic_observer(observer(), folder, precision=kind)
             ),
         }
     return found

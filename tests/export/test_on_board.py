@@ -14,7 +14,12 @@ import identification as idn
 import symheli
 from evidence import on_board
 from evidence.on_board import checked
-from identification.export import write_estimator, write_kinematic_estimator, write_kinematic_model
+from identification.export import (
+    write_estimator,
+    write_kinematic_estimator,
+    write_kinematic_model,
+    write_kinematic_observer,
+)
 from studies.cli import main
 from symheli.errors import UnknownNameError
 from symheli.export import write_board, write_controller, write_monitor
@@ -46,6 +51,12 @@ def kinematic_model(precision):
     return lambda folder: write_kinematic_model(model, folder, precision=precision)
 
 
+def kinematic_observer(precision):
+    kin = STRUCTURES["airspeed"]
+    observer = model_of(kin).observer(dict.fromkeys(kin.outputs, 0.05), process=0.02)
+    return lambda folder: write_kinematic_observer(observer, folder, precision=precision)
+
+
 WRITTEN = {
     "estimator, single": estimator("longitudinal, single"),
     "estimator, double": estimator("longitudinal"),
@@ -55,6 +66,8 @@ WRITTEN = {
     "kinematic estimator, double": kinematic("double"),
     "kinematic model, single": kinematic_model("single"),
     "kinematic model, double": kinematic_model("double"),
+    "kinematic observer, single": kinematic_observer("single"),
+    "kinematic observer, double": kinematic_observer("double"),
     "controller": lambda folder: write_controller(TABLES["position"](), folder),
     "controller of rates": lambda folder: write_controller(TABLES["rates"](), folder),
     "monitor": lambda folder: write_monitor(monitor(noise=0.05), folder),
@@ -113,6 +126,8 @@ ROUNDED = {
     "kinematic estimator, double": 1e-12,
     "kinematic model, single": 1e-6,
     "kinematic model, double": 1e-14,
+    "kinematic observer, single": 1e-6,
+    "kinematic observer, double": 1e-12,
 }
 """sin, cos and tan are those of newlib, and the model's sums run in another order than NumPy's."""
 
