@@ -108,10 +108,14 @@ static void invert(real M[WIDE][WIDE], real I[WIDE][WIDE])
     }
 }
 
-/* Entry j of row i of what x becomes: the first WIDE rows of A, below them what is remembered. */
-static real next_row(const observer_state *s, int i, int j)
+/* Row i of A times a column v with so many numbers to its next entry; A has s->A on top, and below
+   it what is remembered. */
+static real next(const observer_state *s, int i, const real *v, int stride)
 {
-    return i < WIDE ? s->A[i][j] : (real)(remembered[i - WIDE] == j);
+    real sum = 0;
+    if (i >= WIDE) return remembered[i - WIDE] < NX ? v[remembered[i - WIDE] * stride] : 0;
+    for (int k = 0; k < NX; k++) sum += s->A[i][k] * v[k * stride];
+    return sum;
 }
 
 /* A = d x(k) / d x(k-1) in its first rows, from y before and now; solved: (1 - J(now))^-1. */
@@ -140,15 +144,9 @@ static void linearize(observer_state *s, const real *before, const real *now,
 static void spread(observer_state *s, real solved[WIDE][WIDE])
 {
     for (int i = 0; i < NX; i++)
-        for (int j = 0; j < NX; j++) {
-            s->work[i][j] = 0;
-            for (int k = 0; k < NX; k++) s->work[i][j] += next_row(s, i, k) * s->P[k][j];
-        }
+        for (int j = 0; j < NX; j++) s->work[i][j] = next(s, i, &s->P[0][j], NX);
     for (int i = 0; i < NX; i++)
-        for (int j = 0; j < NX; j++) {
-            s->P[i][j] = 0;
-            for (int k = 0; k < NX; k++) s->P[i][j] += s->work[i][k] * next_row(s, j, k);
-        }
+        for (int j = 0; j < NX; j++) s->P[i][j] = next(s, j, s->work[i], 1);
     for (int i = 0; i < WIDE; i++)
         for (int j = 0; j < WIDE; j++)
             for (int k = 0; k < FAST; k++) s->P[i][j] += solved[i][k] * process[k] * solved[j][k];
@@ -156,7 +154,7 @@ static void spread(observer_state *s, real solved[WIDE][WIDE])
 
 static int predicted(observer_state *s, const real *p)
 {
-    real added[FAST] = {0}, y[WIDE], solved[WIDE][WIDE], next[NX];
+    real added[FAST] = {0}, y[WIDE], solved[WIDE][WIDE], moved[NX];
     const real *known = s->coefficients + LAGGED * FAST;
     if (!observer_aero_coefficients(p, s->coefficients)) return OBSERVER_REFUSED;
     for (int k = 0; k < FAST; k++) {
@@ -170,12 +168,12 @@ static int predicted(observer_state *s, const real *p)
     if (!observer_body_step(s->x, added, y)) return OBSERVER_LOST;
     linearize(s, s->x, y, solved);
     spread(s, solved);
-    for (int i = 0; i < WIDE; i++) next[i] = y[i];
+    for (int i = 0; i < WIDE; i++) moved[i] = y[i];
     for (int i = 0; i < REMEMBERED; i++) {
         const int from = remembered[i];
-        next[WIDE + i] = from < NX ? s->x[from] : s->u[from - NX];
+        moved[WIDE + i] = from < NX ? s->x[from] : s->u[from - NX];
     }
-    for (int i = 0; i < NX; i++) s->x[i] = next[i];
+    for (int i = 0; i < NX; i++) s->x[i] = moved[i];
     return OBSERVER_ESTIMATED;
 }
 
