@@ -166,7 +166,7 @@ def _cases(observer: KinematicObserver, up: str, precision: Literal["double", "s
 
 
 def _estimates(observer: KinematicObserver, given: Array) -> tuple[Array, int]:
-    """What an observer of its own says along the rows, and how often it estimates."""
+    """Return the answers of an observer of its own along the rows, and how often it estimates."""
     model = observer.model
     ny, nu = len(model.outputs), len(model.inputs)
     own = observer.anew()
