@@ -42,10 +42,11 @@ def medians(
 
 
 def arguments(
-    description: str | None, plot: bool = False, write: bool = False
+    description: str | None, plot: bool = False, write: bool = False, *, timed: bool = True
 ) -> argparse.Namespace:
     """--quick and --json, as every benchmark has them; --plot where there is something to draw,
-    --write to keep it in the documentation.
+    --write to keep it in the documentation, on a busy machine too where it counts and nothing is
+    `timed`.
     """
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--quick", action="store_true", help="shorter runs, under 40 s")
@@ -54,7 +55,7 @@ def arguments(
         parser.add_argument(
             "--plot", type=Path, metavar="FILE", help="draw the result (needs matplotlib)"
         )
-    return parsed(parser, "benchmarks.md") if write else parser.parse_args()
+    return parsed(parser, "benchmarks.md", timed=timed) if write else parser.parse_args()
 
 
 def lines(times: dict[str, float], ratios: dict[str, float]) -> list[str]:

@@ -1130,7 +1130,7 @@ WORDS = (
     (
         "export c --model model.json",
         1,
-        "--model applies to the formats model, controller and mat",
+        "--model applies to the formats model, controller, monitor, fmu and mat",
         "c is written for a vehicle",
     ),
     (

@@ -88,6 +88,11 @@ def write_estimator(
     ['estimator.h', 'estimator.c', 'estimator_check.c']
     >>> folder.cleanup()
     """
+    return program(rls, units, name).write(folder)
+
+
+def program(rls: RecursiveLeastSquares, units: Mapping[str, str], name: str) -> CProgram:
+    """Return the files of `write_estimator`."""
     if rls.structure is not rls.regression:
         raise InputError("a KinematicARX is written by write_kinematic_estimator, with its dt")
     arx = rls.regression
@@ -111,7 +116,7 @@ def write_estimator(
             "rls.c": (KERNEL / "rls.c").read_text(encoding="utf-8"),
         },
         cmake=(HERE / "CMakeLists.txt", {"name": name}),
-    ).write(folder)
+    )
 
 
 def _rls_header(precision: str) -> str:

@@ -52,6 +52,19 @@ static real regressor(const model_state *s, int e)
     }
 }
 
+int model_coefficients(const real *p, real *c)
+{
+    real f[MODEL_NF];
+    if (!functions(p, f)) return 0;
+    for (int e = 0; e < ENTRIES; e++)
+        for (int o = 0; o < MODEL_NY; o++) {
+            real sum = 0;
+            for (int j = 0; j < MODEL_NF; j++) sum += theta[e * MODEL_NF + j][o] * f[j];
+            c[e * MODEL_NY + o] = sum;
+        }
+    return 1;
+}
+
 void model_init(model_state *s) { s->filled = s->fit = 0; }
 
 int model_predict(model_state *s, const real *u, const real *p, real *y)

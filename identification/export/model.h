@@ -37,6 +37,9 @@ void model_init(model_state *s);
    MODEL_REFUSED: a number that is not finite, or p outside the range of the model; y is left alone
    and the past starts afresh. */
 int model_predict(model_state *s, const model_real *u, const model_real *p, model_real *y);
+/* c[MODEL_ENTRIES * MODEL_NY] at p[MODEL_NP], row by row: what each signal in phi is multiplied by.
+   0 where p is outside the range of the model; c is then left alone. */
+int model_coefficients(const model_real *p, model_real *c);
 /* What y was at this instant. A number that is not finite marks a missing sample: the past starts
    afresh. */
 void model_observe(model_state *s, const model_real *y);

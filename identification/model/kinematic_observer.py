@@ -69,6 +69,34 @@ class KinematicObserver:
         self._A, self._B = A[0], B[0]  # below the first rows, what is remembered, at any p
         self.reset()
 
+    @property
+    def model(self) -> KinematicModel:
+        """Kinematics and aerodynamics."""
+        return self._model
+
+    @property
+    def variances(self) -> tuple[Array, Array]:
+        """Variances (8,) of the sensors and (6,) of what one sample adds beyond the model."""
+        return self._R, self._Q
+
+    @property
+    def selections(self) -> tuple[list[int], list[int]]:
+        """Places in x and u side by side: of the signals that coefficients multiply, and of what
+        the states below the first eight become.
+        """
+        lagged = np.hstack([self._X, self._U])
+        below = np.hstack([self._A[WIDE:], self._B[WIDE:]])
+        return lagged.argmax(axis=1).tolist(), below.argmax(axis=1).tolist()
+
+    @property
+    def running(self) -> bool:
+        """Whether the past is full: the next sample is estimated."""
+        return self._x is not None
+
+    def anew(self) -> KinematicObserver:
+        """The same observer at its start."""
+        return KinematicObserver(self._model, np.sqrt(self._R), np.sqrt(self._Q))
+
     def reset(self) -> None:
         """Delete the state: the next samples fill the past."""
         self._start: list[tuple[Array, Array]] = []

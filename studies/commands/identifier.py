@@ -10,6 +10,7 @@ from studies.commands import options
 from studies.commands.arguments import flag, group, option
 
 if TYPE_CHECKING:
+    from identification import RecursiveLeastSquares
     from symheli import Helicopter
 
 ARGUMENTS = (
@@ -45,10 +46,24 @@ ARGUMENTS = (
 )
 
 
+OPTIONS = {
+    *("outputs", "inputs", "na", "nb", "delay", "degree", "offset"),
+    *("forgetting", "directional", "single"),
+}
+
+
 def write(arguments: argparse.Namespace, heli: Helicopter) -> tuple[Path, ...]:
     """Write the files into the folder --out (default: estimator)."""
-    from identification import LPVARX, Polynomial, RecursiveLeastSquares
     from identification.export import write_estimator
+
+    return write_estimator(*estimator(arguments, heli), arguments.out or Path("estimator"))
+
+
+def estimator(
+    arguments: argparse.Namespace, heli: Helicopter
+) -> tuple[RecursiveLeastSquares, dict[str, str]]:
+    """The estimator that is asked for, and the units of its signals."""
+    from identification import LPVARX, Polynomial, RecursiveLeastSquares
     from identification.forgetting import Constant, Directional
     from symheli.errors import UnknownNameError
 
@@ -71,5 +86,5 @@ def write(arguments: argparse.Namespace, heli: Helicopter) -> tuple[Path, ...]:
         if arguments.directional
         else Constant(arguments.forgetting)
     )
-    rls = RecursiveLeastSquares(arx, way, precision="single" if arguments.single else "double")
-    return write_estimator(rls, units, arguments.out or Path("estimator"))
+    precision = "single" if arguments.single else "double"
+    return RecursiveLeastSquares(arx, way, precision=precision), units

@@ -87,18 +87,22 @@ def write_c(heli: Helicopter, path: str | os.PathLike[str]) -> tuple[Path, ...]:
     path = Path(path)
     if path.suffix != ".c":
         raise InputError(f"{path}: expected a name that ends in .c")
-    stem = path.stem
+    header, source, *others = program(heli, path.stem).write(path.parent)
+    return (source, header, *others)
+
+
+def program(heli: Helicopter, stem: str) -> CProgram:
+    """Return the files of `write_c`, the source called STEM.c."""
     guard = re.sub(r"\W", "_", f"{stem}_h").upper()
     project = re.sub(r"[^A-Za-z0-9_]", "_", stem)
-    header, source, *others = CProgram(
+    return CProgram(
         template=HERE / "heli",
         name=stem,
         header={"guard": guard, **_declarations(heli)},
         source={"stem": stem, **_source(heli)},
         check={"stem": stem, "cases": _cases(heli)},
         cmake=(HERE / "CMakeLists.txt", {"project": project, "stem": stem}),
-    ).write(path.parent)
-    return (source, header, *others)
+    )
 
 
 def _source(heli: Helicopter) -> dict[str, str]:

@@ -85,6 +85,11 @@ def write_controller(
     ['lqr.h', 'lqr.c', 'lqr_check.c']
     >>> folder.cleanup()
     """
+    return program(controller, name).write(folder)
+
+
+def program(controller: TableController, name: str) -> CProgram:
+    """Return the files of `write_controller`."""
     if not isinstance(controller, TableController):
         raise InputError(
             f"expected a TableController, got {type(controller).__name__}; make one with"
@@ -98,7 +103,7 @@ def write_controller(
         header=_header(controller, up),
         source={"tables": _tables(controller)},
         check={"cases": _cases(controller, up)},
-    ).write(folder)
+    )
 
 
 def _header(controller: TableController, up: str) -> dict[str, object]:

@@ -8,6 +8,11 @@ from symheli.flight.controller import ScheduledController
 from symheli.flight.excitation import Excitation
 from symheli.flight.flight_dataset import FlightDataset
 from symheli.flight.fly import fly
+from symheli.flight.hypothesis_monitor import (
+    HypothesisEvents,
+    HypothesisMonitor,
+    HypothesisState,
+)
 from symheli.flight.parameter_change import ParameterChange
 from symheli.flight.parameter_monitor import ParameterMonitor
 from symheli.flight.plan import FlightPlan
@@ -29,6 +34,9 @@ __all__ = [
     "FlightDataset",
     "FlightPlan",
     "HelicopterLoops",
+    "HypothesisEvents",
+    "HypothesisMonitor",
+    "HypothesisState",
     "ParameterChange",
     "ParameterMonitor",
     "Pilot",

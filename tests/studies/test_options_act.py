@@ -3,6 +3,7 @@
 import argparse
 from functools import cache
 from itertools import combinations
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -59,6 +60,13 @@ VALUES = {
     "--start": ["1"],
     "--stop": ["20"],
     "--parameters": ["body.mass"],
+    "--target": ["cortex-m7"],
+    "--certificate": ["certificate.json"],
+    "--reading-error": ["0.1"],
+    "--rate-window": ["0.5"],
+    "--jitter": ["0.1"],
+    "--of": ["controller"],
+    "--period": ["0.01"],
 }
 """A value of each option that is not its default."""
 
@@ -85,6 +93,9 @@ MODES = {
     "reference of vehicles": ["vehicles", "--reference"],
     **{f"export {kind}": ["export", kind] for kind in ("c", "identifier", "mat", "latex")},
     "export model": ["export", "model", "--model", "model.json"],
+    "export monitor": ["export", "monitor", "--model", "table.json"],
+    **{f"export fmu of {of}": ["export", "fmu", "--of", of] for of in ("helicopter", "identifier")},
+    "export fmu": ["export", "fmu", "--model", "table.json"],
     "export mat of a model": ["export", "mat", "--model", "model.json"],
     "margins": ["margins"],
     "margins of a model": ["margins", "--model", "model.json", "--feedback", "u=y:-0.1"],
@@ -152,6 +163,9 @@ def folder(tmp_path_factory):
     )
     arx = idn.LPVARX("y", "u", "p", na=1, nb=1, basis=idn.Polynomial(1, -1.0, 1.0))
     idn.fit(arx, record).save(found / "model.json")
+    symheli.TableController((0.0, 13.0), np.zeros((2, 1, 2)), (), ("p",), ("d_lat",), 0.02).save(
+        found / "table.json"
+    )
     (found / "log.csv").write_text("t,y\n0,1\n1,2\n")
     return found
 
@@ -185,12 +199,14 @@ def stubbed(monkeypatch, folder):
     monkeypatch.setattr(calibrate, "record_of", lambda a, _: (a.map, a.start, a.stop))
     monkeypatch.setattr(idn, "calibrate", reached)
     writers = (
-        (exports, ("write_c", "write_mat")),
+        (exports, ("write_c", "write_mat", "write_board", "write_monitor")),
+        (exports, ("write_helicopter_fmu", "write_controller_fmu")),
         (identifiers, ("write_estimator", "write_model")),
     )
     for module, names in writers:
         for name in names:
-            monkeypatch.setattr(module, name, lambda *_, **__: ())
+            monkeypatch.setattr(module, name, lambda *_, **__: (Path("written.c"),))
+    monkeypatch.setattr(identifiers, "write_identifier_fmu", lambda *_: Path("written.fmu"))
 
 
 def vanished(words):
