@@ -10,7 +10,7 @@ import numpy as np
 
 import symheli
 from evidence.tables import DOCS, keep, markdown, parsed
-from studies.circle.alarm import HORIZON, VehicleAlarm
+from studies.circle.alarm import HORIZON, VehicleAlarm, deviations
 from studies.circle.circle import LEARN
 from studies.circle.vehicle import MASS, Vehicle
 from studies.known_kinematics.models import identified, simulator_of
@@ -38,15 +38,16 @@ def of_seed(seed: int) -> list[float]:
     vehicle = Vehicle(duration=FLOWN, seed=seed)
     heli = vehicle.helicopter
     plan, found = vehicle.plan(heli), []
-    model, first = None, None
+    model, usual = None, None
     for factor in FACTORS:
         changed = ParameterChange(CHANGE, {MASS: factor * float(heli.parameters[MASS])})
         flight = symheli.fly(heli, plan, change=changed if factor != 1.0 else None)
-        if model is None or first is None:
+        if model is None or usual is None:
             first = flight.between(0.0, LEARN)
             model = identified(first, simulator_of(vehicle.name, heli)[1])
+            usual = deviations(model, first)
         since = LEARN if factor == 1.0 else CHANGE
-        found.append(alarmed(VehicleAlarm(model, first), flight, since))
+        found.append(alarmed(VehicleAlarm(model, usual), flight, since))
     return found
 
 

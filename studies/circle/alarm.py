@@ -19,34 +19,38 @@ THRESHOLD = 10.0
 """Sum of what is beyond, in standard deviations, at which the vehicle has changed."""
 
 
+def errors(model: KinematicModel, record: FlightRecord) -> Array:
+    """Return the errors (n, 8) of 1 s predictions; NaN where one is not known."""
+    found = record.columns(STATES) - model.predict(record, round(HORIZON / record.dt))
+    return np.where(np.isfinite(found), found, math.nan)
+
+
+def deviations(model: KinematicModel, record: FlightRecord) -> Array:
+    """Return the standard deviations (8,) of these errors over a record."""
+    return np.sqrt(np.nanmean(errors(model, record) ** 2, axis=0))
+
+
 class VehicleAlarm:
     """Two-sided cumulative sums (Page, 1954) of the 1 s prediction errors of every state, each in
-    its standard deviation over the record that the model was identified from.
+    its standard deviation.
 
     Parameters
     ----------
     model : KinematicModel
         What the vehicle was.
-    record : FlightRecord
-        What it was identified from.
+    deviations : array (8,)
+        Standard deviations over the record that it was identified from.
     """
 
-    def __init__(self, model: KinematicModel, record: FlightRecord):
-        self.model, self._ahead = model, round(HORIZON / record.dt)
-        errors = self._errors(record)
-        self.deviations = np.sqrt(np.nanmean(errors**2, axis=0))
+    def __init__(self, model: KinematicModel, deviations: Array):
+        self.model, self.deviations = model, deviations
         self.sums = np.zeros((2, len(STATES)))
-
-    def _errors(self, record: FlightRecord) -> Array:
-        found = self.model.predict(record, self._ahead)
-        errors = record.columns(STATES) - found
-        return np.where(np.isfinite(errors), errors, math.nan)
 
     def take(self, record: FlightRecord) -> str | None:
         """Look at the last second of the last rows of a flight; return what has changed, None while
         nothing has. Unknown samples say nothing.
         """
-        error = self._errors(record)[-1]
+        error = errors(self.model, record)[-1]
         if np.isfinite(error).all():
             z = error / self.deviations
             self.sums = np.maximum(self.sums + np.array([z, -z]) - ALLOWED, 0.0)

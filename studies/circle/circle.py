@@ -189,8 +189,7 @@ class Circle:
         flown = len(self._rows) * self._dt
         if self.phase is Phase.IDENTIFYING and flown >= self._enough:
             self._happens(k, "the flight is identified, a controller is designed beside it")
-            self._record = self.record()
-            self._future = self._executor.submit(self._make, self._record, self.vehicle.name)
+            self._future = self._executor.submit(self._make, self.record(), self.vehicle.name)
             self.phase = Phase.DESIGNING
         elif self.phase is Phase.DESIGNING and self._future is not None and self._future.done():
             self._judge(k, self._future.result())
@@ -211,7 +210,7 @@ class Circle:
         if not np.isfinite(now).all():
             return  # at the next look
         self.designs.append(found)
-        self._alarm, self.alarm = VehicleAlarm(found.model, self._record), None
+        self._alarm, self.alarm = VehicleAlarm(found.model, found.deviations), None
         self._state = found.table.init(command=now)
         self._switched = k
         before = [self._step(j) for j in range(k - round(AROUND / self._dt), k + 1)]

@@ -10,6 +10,7 @@ import numpy as np
 
 from identification.judge.fit_for_control import FitForControl
 from identification.model import KinematicModel
+from studies.circle.alarm import deviations
 from studies.circle.vehicle import PERIOD, Vehicle
 from studies.controllers.design_choices import DesignChoices
 from studies.controllers.designs import judged_by_flight
@@ -28,7 +29,7 @@ from synthesis import Certificate
 class Designed:
     """A controller from a flight: `model`, what was identified; `table`, what flies; `certificate`
     of its loop; `verdict` on the model in this loop; `trim` (functions of the model, 12) of states
-    and controls; `seconds` of each step.
+    and controls; `deviations` (8,) of its 1 s predictions; `seconds` of each step.
     """
 
     model: KinematicModel
@@ -36,6 +37,7 @@ class Designed:
     certificate: Certificate
     verdict: FitForControl
     trim: Array
+    deviations: Array
     seconds: Mapping[str, float]
 
     @property
@@ -96,6 +98,7 @@ def designed(record: FlightRecord, vehicle: str) -> Designed | str:
         certificate=made.sampled.certificate,
         verdict=verdict,
         trim=with_controls(model, record),
+        deviations=deviations(model, record),
         seconds=seconds,
     )
 

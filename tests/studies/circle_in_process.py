@@ -8,6 +8,7 @@ import numpy as np
 
 import identification
 import symheli
+from studies.circle.alarm import deviations
 from studies.circle.circle import Circle
 from studies.circle.designed import Designed, with_controls
 from studies.circle.vehicle import PERIOD, excitation_of
@@ -98,6 +99,7 @@ def quick(record, vehicle):
         model=model,
         table=TableController.of(lqr.with_scheduling(RATE)),
         trim=with_controls(model, record),
+        deviations=deviations(model, record),
         seconds={},
         **judged(),
     )
