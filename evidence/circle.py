@@ -1,4 +1,4 @@
-"""How soon `symheli circle` notices that the mass has changed, and how often it is mistaken."""
+"""How soon `symheli circle` notices that the vehicle has changed, and how often it is mistaken."""
 
 from __future__ import annotations
 
@@ -19,9 +19,18 @@ from symheli.flight import ParameterChange
 
 PAGE, SECTION = DOCS / "howto" / "live.md", "alarm"
 FLOWN, CHANGE = 600.0, 300.0
-"""Length of a flight, and when the mass changes, s."""
-FACTORS = (1.0, 1.05, 1.1, 0.9, 1.2)
-"""Of the mass; 1: it does not change."""
+"""Length of a flight, and when the vehicle changes, s."""
+LATERAL, TAIL = "main_rotor.lateral_gain", "tail_rotor.lift_slope"
+CASES = (
+    ("nothing", MASS, 1.0),
+    ("mass + 5 %", MASS, 1.05),
+    ("mass + 10 %", MASS, 1.1),
+    ("mass - 10 %", MASS, 0.9),
+    ("mass + 20 %", MASS, 1.2),
+    ("lateral cyclic - 30 %", LATERAL, 0.7),
+    ("tail rotor - 30 %", TAIL, 0.7),
+)
+"""What changes, its parameter, and by which factor."""
 
 
 def alarmed(alarm: VehicleAlarm, flight: FlightRecord, since: float) -> float:
@@ -34,13 +43,13 @@ def alarmed(alarm: VehicleAlarm, flight: FlightRecord, since: float) -> float:
 
 
 def of_seed(seed: int) -> list[float]:
-    """Return the seconds to the alarm for each of `FACTORS`, of the flight of a seed."""
+    """Return the seconds to the alarm for each of `CASES`, of the flight of a seed."""
     vehicle = Vehicle(duration=FLOWN, seed=seed)
     heli = vehicle.helicopter
     plan, found = vehicle.plan(heli), []
     model, usual = None, None
-    for factor in FACTORS:
-        changed = ParameterChange(CHANGE, {MASS: factor * float(heli.parameters[MASS])})
+    for _, name, factor in CASES:
+        changed = ParameterChange(CHANGE, {name: factor * float(heli.parameters[name])})
         flight = symheli.fly(heli, plan, change=changed if factor != 1.0 else None)
         if model is None or usual is None:
             first = flight.between(0.0, LEARN)
@@ -54,11 +63,11 @@ def of_seed(seed: int) -> list[float]:
 def table(found: Sequence[Sequence[float]]) -> str:
     """The table in Markdown."""
     rows = []
-    for factor, seconds in zip(FACTORS, np.transpose(found), strict=True):
+    for (what, *_), seconds in zip(CASES, np.transpose(found), strict=True):
         seen = seconds[np.isfinite(seconds)]
         numbers = [f"{np.median(seen):.0f}", f"{seen.max():.0f}"] if len(seen) else ["", ""]
-        rows.append([f"{factor:g}", f"{len(seen)} of {len(seconds)}", *numbers])
-    return markdown(["mass times", "alarms", "after, median, s", "worst, s"], rows)
+        rows.append([what, f"{len(seen)} of {len(seconds)}", *numbers])
+    return markdown(["what changes", "alarms", "after, median, s", "worst, s"], rows)
 
 
 def main() -> None:

@@ -22,7 +22,7 @@ from studies.live.identifier import STATES
 from studies.live.sample import STICKS
 from studies.live.stream import Row
 from symheli import FlightRecord
-from symheli.flight import StepEvents, TableState
+from symheli.flight import HypothesisEvents, HypothesisMonitor, TableState
 from symheli.values.arrays import Array
 from symheli.values.kinematics import INPUTS
 from symheli.values.signal import Signal
@@ -35,6 +35,16 @@ LATE, TOO_LATE = 5, 25
 """Commands of the last second that the vehicle did not have a sample later: so many are said, at so
 many the sticks are given back.
 """
+HYPOTHESES = {
+    HypothesisEvents.RANGE: "the commanded airspeed is outside what is proven",
+    HypothesisEvents.RATE: "the commanded airspeed changes faster than is proven",
+    HypothesisEvents.SATURATED: "a command is at its limit",
+    HypothesisEvents.PERIOD: "a sample did not come in its time",
+    HypothesisEvents.MISSING: "a measurement is missing",
+    HypothesisEvents.UNKNOWN: "the hypotheses are not known yet: the last samples were not whole",
+}
+COMMAND_ERROR = 1e-3
+"""Rounding of a commanded airspeed, m/s."""
 SAME = 1e-4
 """Difference of a command and what is flown, as a part of its travel, that is rounding."""
 KEPT = 10.0
@@ -120,7 +130,7 @@ class Circle:
         self._state: TableState | None = None
         self._alarm: VehicleAlarm | None = None
         self._switched = 0
-        self._saturated = False
+        self._events = HypothesisEvents.UNKNOWN
         self._sent: dict[int, Array] = {}
         self._late: deque[bool] = deque(maxlen=round(1.0 / self._dt))
 
@@ -135,23 +145,26 @@ class Circle:
             return False
         values = np.array(row.values)
         values[len(STATES) : len(STATES) + 4] *= self._travel
+        elapsed = (k - self._last) * self._dt
         self._rows[k], self._last = values, k
         if self.phase is Phase.CONTROLLING:
             self._look_at_delay(k, values)
         if self.phase is Phase.CONTROLLING:
-            self._fly(k, values)
+            self._fly(k, values, elapsed)
             self._look_at_steps(k)
         if k % round(HORIZON / self._dt) == 0:
             self._look(k)
         return not self._rows  # begun anew
 
-    def _fly(self, k: int, values: Array) -> None:
+    def _fly(self, k: int, values: Array, elapsed: float) -> None:
         design, state = self.designs[-1], self._state
         assert state is not None  # noqa: S101
         V, a = (float(x[0]) for x in self._plan.schedule(np.array([k * self._dt])))
         x, u = design.at_rest(V, a)
         command, self._state = design.table.update(state, values[: len(STATES)], x, u, V)
-        self._saturated = StepEvents.SATURATED in self._state.status
+        self._events, self._monitored = self._monitor.update(
+            self._monitored, V, elapsed, command, valid=bool(np.isfinite(values).all())
+        )
         if np.isfinite(command).all():
             sticks = command / self._travel
             self._source.command(dict(zip(STICKS, sticks.tolist(), strict=True)))
@@ -212,6 +225,8 @@ class Circle:
         self.designs.append(found)
         self._alarm, self.alarm = VehicleAlarm(found.model, found.deviations), None
         self._state = found.table.init(command=now)
+        self._monitor = HypothesisMonitor.of(found.table, found.proven, noise=COMMAND_ERROR)
+        self._monitored = self._monitor.init()
         self._switched = k
         before = [self._step(j) for j in range(k - round(AROUND / self._dt), k + 1)]
         self.switches.append(Switch(math.nan, float(np.nanmax([0.0, *before]))))
@@ -219,9 +234,9 @@ class Circle:
         self._happens(
             k,
             f"the certified controller has the sticks: gain {found.certificate.bound:.3g} proven"
-            f" to {found.table.rate:g} m/s^2, nu-gap bound {found.share:.2f} of the margin",
+            f" to {found.proven.rate:g} m/s^2, nu-gap bound {found.share:.2f} of the margin",
         )
-        self._fly(k, self._rows[k])
+        self._fly(k, self._rows[k], self._dt)
 
     def _give_back(self, k: int, why: str) -> None:
         """Leave the sticks to the vehicle's own autopilot, and begin to identify anew."""
@@ -259,17 +274,10 @@ class Circle:
             return [f"the vehicle has changed: {self.alarm}"]
         if self.phase is not Phase.CONTROLLING:
             return [f"no controller flies yet: {self.phase.value}"]
-        design, found = self.designs[-1], []
-        V, a = (float(x[0]) for x in self._plan.schedule(np.array([self._last * self._dt])))
-        low, high = (float(v) for v in design.table.knots[[0, -1]])
-        if not low <= V <= high:
-            found.append(f"commanded airspeed {V:.1f} m/s outside {low:g} to {high:g} m/s")
-        if abs(a) > design.table.rate * (1 + 1e-9):
-            found.append(f"commanded acceleration {a:.2f} above {design.table.rate:g} m/s^2")
+        design = self.designs[-1]
+        found = [words for event, words in HYPOTHESES.items() if event in self._events]
         if sum(self._late) >= LATE:
             found.append(f"commands arrive later than a sample of {self._dt:g} s")
-        if self._saturated:
-            found.append("a command is at its limit")
         return found + design.objections
 
     def data(self) -> Mapping[str, Any]:
@@ -281,7 +289,7 @@ class Circle:
                 {
                     "proven": one.certificate.bound,
                     "verified": one.certificate.verified,
-                    "rate": one.table.rate,
+                    "rate": one.proven.rate,
                     "nu_gap_over_margin": one.share,
                     "verdict": one.verdict.verdict,
                     "order": one.table.order,

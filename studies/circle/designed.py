@@ -18,7 +18,7 @@ from studies.controllers.starting import for_model, state_space
 from studies.controllers.synthesized import synthesized
 from studies.known_kinematics.models import PAIRS, SCHEDULING, identified, simulator_of
 from studies.live.identifier import STATES
-from symheli import FlightRecord, TableController
+from symheli import FlightRecord, Scheduling, TableController
 from symheli.errors import SymheliError
 from symheli.values.arrays import Array
 from symheli.values.kinematics import INPUTS
@@ -28,13 +28,15 @@ from synthesis import Certificate
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Designed:
     """A controller from a flight: `model`, what was identified; `table`, what flies; `certificate`
-    of its loop; `verdict` on the model in this loop; `trim` (functions of the model, 12) of states
-    and controls; `deviations` (8,) of its 1 s predictions; `seconds` of each step.
+    of its loop; `proven`, range and rate that it holds for; `verdict` on the model in this loop;
+    `trim` (functions of the model, 12) of states and controls; `deviations` (8,) of its 1 s
+    predictions; `seconds` of each step.
     """
 
     model: KinematicModel
     table: TableController
     certificate: Certificate
+    proven: Scheduling
     verdict: FitForControl
     trim: Array
     deviations: Array
@@ -92,10 +94,15 @@ def designed(record: FlightRecord, vehicle: str) -> Designed | str:
         return str(error)
     travel = Vehicle(vehicle).helicopter.travel
     limits = {str(u): (-float(t), float(t)) for u, t in zip(INPUTS, travel, strict=True)}
+    certificate = made.sampled.certificate
+    if certificate.proof is None:
+        return f"nothing is proven of the loop: {certificate.why}"
+    proven = replace(certificate.proof.evidence.parameters[0], rate=certificate.rates[0])
     return Designed(
         model=model,
         table=replace(made.table, limits=limits),
-        certificate=made.sampled.certificate,
+        certificate=certificate,
+        proven=proven,
         verdict=verdict,
         trim=with_controls(model, record),
         deviations=deviations(model, record),

@@ -100,7 +100,7 @@ def _report(watch: Watch, pilot: Circle) -> list[str]:
         lines += [
             "",
             f"controller {k}: {one.table.order} states, gain {one.certificate.bound:.3g} proven of"
-            f" the identified model to {one.table.rate:g} m/s^2; model {one.verdict.verdict},"
+            f" the identified model to {one.proven.rate:g} m/s^2; model {one.verdict.verdict},"
             f" nu-gap bound {one.share:.2f} of the margin b(P, C)",
             f"largest step of a command from a sample to the next, of its travel: at the switch"
             f" {100 * switch.at:.2g} %, in the half second before {100 * switch.before:.2g} %,"

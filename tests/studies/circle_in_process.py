@@ -85,7 +85,8 @@ def judged(fit="fit", share=0.5, verified=True):
         criteria=[SimpleNamespace(decides=True, verdict=fit, name="J")],
         verdict=fit,
     )
-    return {"verdict": verdict, "certificate": SimpleNamespace(bound=2.0, verified=verified)}
+    certificate = SimpleNamespace(bound=2.0, verified=verified)
+    return {"verdict": verdict, "certificate": certificate, "proven": RATE}
 
 
 def quick(record, vehicle):

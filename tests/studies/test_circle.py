@@ -10,8 +10,9 @@ from circle_in_process import flown, judged, quick
 
 import symheli
 from studies.circle import circle
-from studies.circle.circle import Phase
+from studies.circle.circle import HYPOTHESES, Phase
 from studies.circle.vehicle import PERIOD, Vehicle
+from symheli.flight import HypothesisEvents
 from symheli.values.kinematics import INPUTS
 
 SHORT = Vehicle(duration=75.0, noise=False)
@@ -130,8 +131,12 @@ def test_a_design_that_fails_says_why(monkeypatch):
 @pytest.mark.slow
 def test_rows_that_are_lost_are_flown_over(design):
     """The controller keeps its command; no number is invented."""
+    reasons = []
     found, record = flown(
-        CALM, lambda record, vehicle: design, lost=lambda k: 5000 < k and k % 40 < 2
+        CALM,
+        lambda record, vehicle: design,
+        lost=lambda k: 7000 < k and k % 40 < 2,
+        watched=lambda found: reasons.append(found.reasons()),
     )
     assert found.phase is Phase.CONTROLLING
     after = record.time > found.events[1].time + 1.0
@@ -139,6 +144,10 @@ def test_rows_that_are_lost_are_flown_over(design):
     window = found.record(5.0)
     assert np.isnan(window["u"]).any()
     assert np.isfinite(window["u"]).any()
+    assert reasons[6900] == []
+    assert "a measurement is missing" in reasons[7040]
+    assert reasons[7045] == [HYPOTHESES[HypothesisEvents.UNKNOWN]]
+    assert reasons[7065] == []
 
 
 def test_a_command_at_its_limit_is_no_green_lamp(design):
