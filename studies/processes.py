@@ -46,14 +46,18 @@ class Processes(ThreadPoolExecutor):
         trace: TracebackType | None,
     ) -> None:
         if kind is not None:
-            self.shutdown(wait=False, cancel_futures=True)
-            with self._lock:
-                self._leaving = True
-                for worker in self._workers:
-                    worker.kill()
+            self.end()
         self.shutdown()
         for worker in self._workers:
             worker.__exit__(None, None, None)
+
+    def end(self) -> None:
+        """End all processes at once, in the middle of what they compute."""
+        self.shutdown(wait=False, cancel_futures=True)
+        with self._lock:
+            self._leaving = True
+            for worker in self._workers:
+                worker.kill()
 
     def _computed(self, call: bytes) -> Any:
         """The result, by the process of this thread."""

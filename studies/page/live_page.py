@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
 from markupsafe import Markup
 
+from studies.page.elements import html, page_of, section
 from studies.page.motion import Motion
-from studies.page.server import PageServer, resource
+from studies.page.server import PageServer
 from studies.page.snapshot import MOTION_EVERY, Published
 from symheli.extras import extra
 
 SECTIONS = (
     ("lamp", "Lamp", "narrow"),
     ("next", "What to fly next", "broad next"),
-    ("state", "Stream", ""),
     ("coverage", "Coverage of airspeed", ""),
+    ("state", "Stream", ""),
     ("prediction", "Predictions 1 s ahead", ""),
     ("powers", "Control powers", "wide"),
 )
@@ -41,37 +40,16 @@ def live_page(published: Published, title: str, port: int = 0) -> PageServer:
         with extra("live", "a page in the browser"):
             from nicegui import ui
         shown = _Shown(published)
-        ui.add_css(resource("style.css"))
-        with ui.element("div").classes("sheet"):
-            with ui.element("header"):
-                html(Markup("<h1>{}</h1>").format(title))
-            for name, heading, style in SECTIONS[:4]:
+        with page_of(title):
+            for name, heading, style in SECTIONS[:3]:
                 shown.section(name, heading, style)
             with section("Attitude and path", ""):
                 shown.build_scene()
-            for name, heading, style in SECTIONS[4:]:
+            for name, heading, style in SECTIONS[3:]:
                 shown.section(name, heading, style)
         ui.timer(MOTION_EVERY, shown.update)
 
     return PageServer(build, title, port)
-
-
-def html(content: str) -> Any:
-    """An element of HTML that this package has written, and escaped."""
-    with extra("live", "a page in the browser"):
-        from nicegui import ui
-    return ui.html(content, sanitize=False)
-
-
-@contextmanager
-def section(heading: str, style: str) -> Iterator[None]:
-    """A part of a page under a heading."""
-    with extra("live", "a page in the browser"):
-        from nicegui import ui
-    name = heading.lower().replace(" ", "-")
-    with ui.element("section").classes(style).props(f'aria-labelledby="{name}"'):
-        html(Markup('<h2 id="{}">{}</h2>').format(name, heading))
-        yield
 
 
 @dataclass

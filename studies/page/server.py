@@ -7,7 +7,6 @@ import secrets
 import socket
 import threading
 from collections.abc import Callable
-from importlib import resources
 from typing import Any
 
 from studies.page.gate import Gate
@@ -87,11 +86,6 @@ def bound(port: int) -> socket.socket:
         else:
             return made
     raise InputError(f"--page: port {wanted[0]} of {HOST} cannot be had: give another")
-
-
-def resource(name: str) -> str:
-    """Return the text of a file beside this one."""
-    return (resources.files("studies.page") / name).read_text(encoding="utf-8")
 
 
 def _server(build: Callable[[], None], title: str, token: str, port: int) -> Any:

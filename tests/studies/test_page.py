@@ -5,6 +5,9 @@ import asyncio
 import math
 import subprocess
 import sys
+import time
+from concurrent.futures import Future
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,18 +15,31 @@ import pytest
 
 import symheli
 from studies import cli
+from studies.controllers import starting
+from studies.controllers.design_choices import DesignChoices
+from studies.controllers.plant import design_plant
+from studies.controllers.synthesized import model_of, smooth
 from studies.live.identifier import LiveIdentifier
 from studies.live.sample import Sample
 from studies.live.stream import Stream
 from studies.live.watch import Watch
 from studies.page import charts
+from studies.page.frozen import Computing, Frozen, frozen, points
 from studies.page.gate import Gate
 from studies.page.motion import GAP, MOST, Track
 from studies.page.powers import baseline
+from studies.page.proving import Proving
 from studies.page.server import bound
+from studies.page.sizes import Moved, sizes_of
+from studies.page.sizes import parts as sizes_parts
+from studies.page.sizes import proof as proof_words
 from studies.page.snapshot import Published, airspeeds, lamp, parts
 from symheli import FlightRecord
 from symheli.errors import InputError
+from synthesis.design.loops.margins import margins, open_loop
+from synthesis.design.lti.h2 import h2
+from synthesis.design.lti.point_design import design_at
+from synthesis.sheet.evaluation import driven_plant
 
 ROOT = Path(__file__).resolve().parents[2]
 INPUTS = ("d_lon", "d_lat", "d_col", "d_ped")
@@ -370,3 +386,242 @@ def test_a_curve_is_where_its_numbers_are():
     assert frame.at(0.0, 0.0) == (charts.LEFT, charts.HEIGHT - charts.BOTTOM)
     assert frame.at(1.0, 1.0) == (charts.WIDTH - charts.RIGHT, charts.TOP)
     assert frame.path([0, 0.5, 1], [0, math.nan, 1]).count("M") == 2
+
+
+# --- sizes ------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def tuned():
+    """The choices for the X-Cell, and what their sizes act on."""
+    choices = starting.for_vehicle(DesignChoices(degree=2, points=5))
+    return choices, points(choices)
+
+
+def test_sizes_scale_the_plant_and_nothing_else(tuned):
+    """The scaled model is the plant that the synthesis would make of these sizes."""
+    choices, found = tuned
+    sizes = {**choices.sizes, "u": 5.0, "d_ped": 0.01, "v_w": 4.0}
+    other = replace(choices, sizes=sizes, noise={**choices.noise, "q": 0.3})
+    whole = design_plant(smooth(model_of(other)), other.period / 2, other)
+    point = found[1]
+    expected, scaled = whole.nominal.at(point.airspeed), point.sized(other)
+    for name in "ABCD":
+        np.testing.assert_allclose(
+            getattr(scaled, name), getattr(expected, name), rtol=1e-12, atol=1e-14
+        )
+    assert np.abs(np.array(scaled.B) - np.array(point.design.B)).max() > 0.1
+
+
+def test_numbers_of_a_frozen_loop_are_those_of_its_design(tuned):
+    """The design of the synthesis at this airspeed, its margins by the library's own functions."""
+    choices, found = tuned
+    point = found[1]
+    own = frozen(point, choices)
+    whole = design_plant(smooth(model_of(choices)), choices.period / 2, choices)
+    K = design_at(whole, [point.airspeed], h2).controller.discretize(choices.period)
+    heli = symheli.Helicopter.load(choices.vehicle, governor="ideal")
+    bare = symheli.sweep(heli, [point.airspeed], inputs=choices.controls).at(point.airspeed)
+    plant = driven_plant(bare, K, choices.actuation)
+    for axis, control in (("pitch", "d_lon"), ("yaw", "d_ped")):
+        expected = margins(open_loop(plant, K, control))
+        assert own.measures[axis]["gain"] == pytest.approx(expected.gain_margin, rel=1e-3)
+        assert own.measures[axis]["crossover"] == pytest.approx(
+            expected.highest_crossover, rel=1e-3
+        )
+    assert set(own.gusts) == {"u_w", "v_w", "w_w"}
+    assert own.steps["pitch"].time[-1] == pytest.approx(4.0)
+
+
+def test_a_measurement_that_follows_a_command_is_an_error_inside_and_itself_outside():
+    """Of the same controller either way: the loop is stable, the response follows."""
+    choices = starting.for_vehicle(DesignChoices(degree=2, points=5, references=("theta",)))
+    own = frozen(points(choices)[1], choices)
+    assert not own.failure
+    assert own.steps["pitch"].values[:, 0].max() > 0.3
+    assert "theta_reference" in own.gusts
+
+
+def test_there_is_a_slider_for_each_size_that_acts(tuned):
+    choices, _ = tuned
+    names = [(size.table, size.name, size.unit) for size in sizes_of(choices)]
+    assert ("sizes", "d_ped", "rad") in names
+    assert ("noise", "q", "rad/s") in names
+    assert len(names) == len(choices.sizes) + len(choices.noise)
+    fewer = replace(choices, measurements=("q", "theta"), disturbances=("u_w",))
+    assert {size.name for size in sizes_of(fewer)} == {"u_w", "q", "theta", *INPUTS}
+
+
+def test_a_size_moves_by_powers_of_ten_and_back(tuned):
+    choices, _ = tuned
+    asked = []
+    moved = Moved(choices, asked.append)
+    size = next(size for size in moved.sizes if size.name == "d_lon")
+    moved.move(size, 1.0)
+    assert asked[-1].sizes["d_lon"] == pytest.approx(10 * choices.sizes["d_lon"])
+    moved.move(size, 5.0)
+    assert len(asked) == 1  # no further than that
+    moved.move(size, 0.0)
+    assert asked[-1] == choices
+
+
+class ByHand:
+    """Processes whose answers come when they are told to."""
+
+    def __init__(self):
+        self.calls = []
+
+    def submit(self, function, *arguments):
+        future = Future()
+        self.calls.append((future, function, arguments))
+        return future
+
+    def answer(self, k):
+        future, function, arguments = self.calls[k]
+        if future.set_running_or_notify_cancel():
+            future.set_result(function(*arguments))
+
+
+def test_what_was_overtaken_is_dropped(tuned, monkeypatch):
+    choices, found = tuned
+    monkeypatch.setattr(
+        "studies.page.frozen.frozen", lambda p, c: Frozen(p.airspeed, failure=c.out)
+    )
+    hands = ByHand()
+    computing = Computing(found, hands)
+    computing.request(replace(choices, out="first"))
+    hands.calls[0][0].set_running_or_notify_cancel()  # under way: it cannot be cancelled
+    second = computing.request(replace(choices, out="second"))
+    assert all(future.cancelled() for future, *_ in hands.calls[1 : len(found)])
+    hands.calls[0][0].set_result(Frozen(found[0].airspeed, failure="first"))
+    assert not computing.latest.designs
+    for k in range(len(found), 2 * len(found)):
+        hands.answer(k)
+    assert computing.shown.number == second
+    assert {one.failure for one in computing.shown.designs.values()} == {"second"}
+    assert "second" in sizes_parts(computing.shown, found)["state"]
+
+
+def test_a_sheet_is_judged_once_it_is_whole(tuned):
+    choices, found = tuned
+    two = found[1:3]
+    hands = ByHand()
+    computing = Computing(two, hands)
+    computing.request(choices)
+    hands.answer(0)
+    assert not computing.shown.designs
+    hands.answer(1)
+    assert len(hands.calls) == 2 + 2 * 4
+    assert sizes_parts(computing.shown, two)["sheet"].endswith("being computed</p>")
+    for k in range(2, 10):
+        hands.answer(k)
+    table = computing.shown.table(two)
+    expected = computing.shown.designs[two[0].airspeed].measures["yaw"]["gain"]
+    assert table.over("controller", "yaw", "gain margin")[0] == pytest.approx(expected)
+    shown = sizes_parts(computing.shown, two)
+    assert "entries that count are in Level 1" in shown["sheet"]
+    assert "Nothing of this is proven" in shown["state"]
+    assert shown["margins"].count("<svg") == 3
+
+
+SMALL = """
+vehicle = ""
+model = "family.json"
+out = "made"
+airspeeds = [0.0, 8.0]
+acceleration = 2.0
+degree = 1
+controls = ["d_lat"]
+measurements = ["v"]
+disturbances = ["v_w", "d_lat"]
+delay = 0.0
+sizes = { v = 1.0, d_lat = 0.05, v_w = 1.0 }
+noise = { v = 0.3 }
+servos = {}
+"""
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory):
+    """A file of choices for a lag over airspeed, and its model."""
+    folder = tmp_path_factory.mktemp("small")
+    models = [
+        symheli.LinearModel(
+            [[0.2 - 0.1 * V]], [[5.0, 1.0]], [[1.0]], [[0.0, 0.0]], ["v"], ["d_lat", "v_w"], ["v"]
+        )
+        for V in (0.0, 4.0, 8.0)
+    ]
+    family = symheli.LinearFamily.from_models([0.0, 4.0, 8.0], models)
+    family.save(folder / "family.json")
+    (folder / "small.toml").write_text(SMALL)
+    return folder / "small.toml", family
+
+
+def test_choices_of_which_nothing_is_proven_are_saved_beside(small, tmp_path):
+    """`synthesize` reads what is saved, and finds the same sizes."""
+    path, family = small
+    choices = replace(DesignChoices.read(path, {}), out=tmp_path / "out")
+    moved = Moved(choices, lambda _: None)
+    moved.move(next(s for s in moved.sizes if s.name == "v_w"), 0.5)
+    proving = Proving(family)
+    (written,) = proving.save(moved.choices)
+    proving.close()
+    assert written == tmp_path / "out" / "sizes.toml"
+    again = DesignChoices.read(written, {})
+    assert again.sizes == {"v": 1.0, "d_lat": 0.05, "v_w": 3.16}
+    assert again.noise == choices.noise
+
+
+@pytest.mark.slow
+def test_a_proof_is_saved_with_its_table_and_its_c(small, tmp_path):
+    """What is written verifies, and is of the sizes that were proven."""
+    path, family = small
+    choices = replace(DesignChoices.read(path, {}), out=tmp_path / "out")
+    proving = Proving(family)
+    proving.begin(choices)
+    until(lambda: not proving.running)
+    assert proving.proof is not None, proving.said
+    shown = proof_words(proving, choices)
+    assert "keeps a gain of" in shown
+    assert "of other sizes" not in shown
+    other = replace(choices, noise={"v": 0.5})
+    assert "of other sizes" in proof_words(proving, other)
+    assert [p.name for p in proving.save(other)] == ["sizes.toml"]
+    names = {written.name for written in proving.save(choices)}
+    proving.close()
+    assert {"controller.json", "certificate.json", "synthesize.toml", "controller.c"} <= names
+    again = DesignChoices.read(tmp_path / "out" / "synthesize.toml", {})
+    assert again.sizes == choices.sizes
+    assert cli.main(["verify", str(tmp_path / "out" / "certificate.json")]) == 0
+
+
+@pytest.mark.slow
+def test_a_proof_is_given_up_at_once(tuned):
+    choices, _ = tuned
+    proving = Proving()
+    proving.begin(choices)
+    until(lambda: "begins" not in proving.progress)
+    begun = time.monotonic()
+    proving.cancel()
+    until(lambda: not proving.running)
+    assert time.monotonic() - begun < 2.0
+    assert proving.proof is None
+    assert "given up" in proof_words(proving, choices)
+    proving.close()
+
+
+@pytest.mark.slow
+def test_a_design_that_is_impossible_says_why(tuned):
+    choices, _ = tuned
+    proving = Proving()
+    proving.begin(replace(choices, gain=0.01))
+    until(lambda: not proving.running)
+    assert "no controller" in proof_words(proving, choices)
+    proving.close()
+
+
+def until(true, seconds=120.0):
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end
+        time.sleep(0.05)
