@@ -75,7 +75,7 @@ def _page(choices: DesignChoices, port: int) -> Output:
 
     title = f"Sizes of a controller for {choices.vehicle or choices.model}"
     with sizes_page(choices, _given(choices), title, port) as (page, session):
-        progress(f"page: {page.address}; Ctrl-C ends")
+        progress(f"page: {page.address}\nCtrl-C ends")
         with suppress(KeyboardInterrupt):
             while True:
                 time.sleep(0.2)

@@ -26,6 +26,7 @@ from symheli.lpv.tools import Actuation
 from symheli.values.arrays import Array
 from symheli.values.signal import Signal
 from synthesis.design.loops.loop_measures import LoopMeasures
+from synthesis.design.loops.margins import Margins, margins
 from synthesis.design.lti.h2 import h2
 from synthesis.design.lti.hinf import hinf
 from synthesis.sheet.evaluation import SpecificationTable, axis_loops, driven_plant
@@ -33,6 +34,7 @@ from synthesis.sheet.measures import MEASURES, AxisLoop
 from synthesis.sheet.sheet import Sheet
 
 AIRSPEEDS = 4
+UNSTABLE = "sampled behind its servos the loop is unstable"
 STEP_WINDOW, GUST_WINDOW = 4.0, 6.0
 """Lengths of the responses to a command and to a disturbance, s."""
 
@@ -82,12 +84,14 @@ class Point:
 class Frozen:
     """A point design at one airspeed (m/s), and what its loop does.
 
-    `controller`: sampled; None where there is none or its loop is not stable, for `failure`.
-    `measures` by axis; `steps`: response and control after a command of 1 by axis; `gusts`: size of
-    all deviations and of all commands after a step of each disturbance of its size.
+    `method` of the design; `controller`: sampled; None where there is none or its loop is not
+    stable, for `failure`. `measures` by axis; `steps`: response and control after a command of 1 by
+    axis; `gusts`: size of all deviations and of all commands after a step of each disturbance of
+    its size.
     """
 
     airspeed: float
+    method: str = ""
     controller: LinearModel | None = None
     failure: str = ""
     measures: Mapping[str, LoopMeasures] = field(default_factory=dict)
@@ -140,19 +144,21 @@ def frozen(point: Point, choices: DesignChoices) -> Frozen:
     w, z = map(len, scales(choices))
     names = choices.controls, [choices.error(y) for y in choices.measurements]
     channels: Any = {"disturbances": plant.inputs[:w], "performance": plant.outputs[:z]}
-    found = h2(plant, *names, **channels)
+    method, found = "LQG", h2(plant, *names, **channels)
     if found.controller is None:
+        method = "H-infinity"
         found = hinf(plant, *names, **channels, back_off=choices.back_off[0])
     if found.controller is None or found.loop is None:
         return Frozen(point.airspeed, failure="; ".join(found.reasons) or found.status.value)
     K = _measuring(found.controller.discretize(choices.period), choices)
     loops = point.loops(K)
     if loops and not next(iter(loops.values())).stable:
-        return Frozen(point.airspeed, failure="sampled behind its servos the loop is unstable")
+        return Frozen(point.airspeed, method, failure=UNSTABLE)
     return Frozen(
         point.airspeed,
+        method,
         K,
-        measures={name: LoopMeasures.of(margins=loop.margins) for name, loop in loops.items()},
+        measures={name: LoopMeasures.of(_margins(loop)) for name, loop in loops.items()},
         steps={name: _step(loop) for name, loop in loops.items()},
         gusts=_gusts(found.loop, choices),
     )
@@ -163,6 +169,11 @@ def _measuring(K: LinearModel, choices: DesignChoices) -> LinearModel:
     signs = np.array([-1.0 if y in choices.references else 1.0 for y in choices.measurements])
     names = tuple(Signal(y) for y in choices.measurements)
     return replace(K, B=K.B * signs, D=K.D * signs, inputs=names)
+
+
+def _margins(loop: AxisLoop) -> Margins:
+    """Margins without the disk, which takes longer than all the rest and is in the sheet."""
+    return margins(loop.broken, disk=False)
 
 
 def _step(loop: AxisLoop) -> Response:

@@ -24,7 +24,7 @@ NOISE = "Noise of measurements"
 DECADES, STEP = 1.0, 0.02
 """How far a size may be moved to either side, and a step of the keyboard: powers of ten."""
 COMPUTED = (
-    "Computed at {n} airspeeds held, by point designs (LQG) in these sizes. Nothing of this is"
+    "Computed at {n} airspeeds held, by point designs ({how}) in these sizes. Nothing of this is"
     " proven, and the controller that is proven is another one: the LPV design in the same sizes."
 )
 SHOWN = ("gain", "phase", "crossover")
@@ -133,7 +133,9 @@ def parts(numbers: Numbers, points: Sequence[Point]) -> dict[str, str]:
 
 def state(numbers: Numbers, designs: Sequence[Frozen], points: Sequence[Point]) -> str:
     """Return what the numbers are, how long they took, and where there is no design."""
-    words = Markup('<p class="quiet">{}</p>').format(COMPUTED.format(n=len(points)))
+    how = " and ".join(dict.fromkeys(one.method for one in designs if one.method)) or "LQG"
+    said = COMPUTED.format(n=len(points), how=how)
+    words = Markup('<p class="quiet">{}</p>').format(said)
     if math.isnan(numbers.designed):
         return words + Markup('<p class="quiet">computing...</p>')
     took = f"Margins and responses {numbers.designed:.2f} s after the change"

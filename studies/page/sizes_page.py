@@ -24,6 +24,8 @@ from symheli.extras import extra
 
 LOOK = 0.05
 """Seconds between two looks of a browser at what has changed."""
+VALUE = "(event) => emit(event.target.valueAsNumber)"
+"""What a slider sends."""
 FEW = 4
 """Processes of the frozen designs, at most."""
 
@@ -108,8 +110,7 @@ def _build(session: Session, title: str) -> None:
                 shown.part("steps")
             with section("Responses to a disturbance of its size", ""):
                 shown.part("gusts")
-    shown.update()
-    ui.timer(LOOK, shown.update)
+    ui.timer(LOOK, shown.update)  # from when the browser is there: its sliders are set by scripts
 
 
 def button(words: str, act: Any, label: str = "") -> Any:
@@ -128,6 +129,7 @@ class _Shown:
     pieces: dict[str, Any] = field(default_factory=dict)
     sliders: dict[Size, Any] = field(default_factory=dict)
     values: dict[Size, Any] = field(default_factory=dict)
+    there: dict[Size, float] = field(default_factory=dict)
     prove: Any = None
     cancel: Any = None
     save: Any = None
@@ -160,13 +162,13 @@ class _Shown:
         moved = self.session.moved
         with ui.element("div").classes("size"):
             self.values[size] = html("")
-            self.sliders[size] = ui.slider(
-                min=-DECADES,
-                max=DECADES,
-                step=STEP,
-                value=moved.at[size],
-                on_change=lambda e: moved.move(size, float(e.value or 0.0)),
-            ).props(f'aria-label="{size.label}, {size.unit}"')
+            # a native one: it is itself what the keyboard reaches and a screen reader names
+            self.sliders[size] = (
+                ui.element("input")
+                .props(f"type=range min={-DECADES} max={DECADES} step={STEP}")
+                .props(f'aria-label="{size.label}, {size.unit}"')
+                .on("input", lambda e: self._slid(size, e.args), throttle=LOOK, js_handler=VALUE)
+            )
             button("reset", lambda: moved.move(size, 0.0), f"reset {size.label}")
 
     def update(self) -> None:
@@ -191,12 +193,18 @@ class _Shown:
         self.save.set_enabled(not running)
         self.saved.set_content(Markup('<p role="status">{}</p>').format(session.saved))
 
+    def _slid(self, size: Size, to: float) -> None:
+        self.there[size] = float(to)
+        self.session.moved.move(size, float(to))
+
     def _show(self, size: Size, slider: Any) -> None:
+        """Show a size; its slider is moved only where another browser or a button moved it."""
         moved = self.session.moved
         value = f"{moved.value(size):.3g} {size.unit}"
         self.values[size].set_content(
             Markup("<p><b>{}</b><output>{}</output></p>").format(size.label, value)
         )
-        if abs((slider.value or 0.0) - moved.at[size]) > 1e-9:
-            slider.set_value(moved.at[size])
         slider.props(f'aria-valuetext="{value}"')
+        if self.there.get(size) != moved.at[size]:
+            self.there[size] = moved.at[size]
+            slider.client.run_javascript(f"getHtmlElement({slider.id}).value = {moved.at[size]}")

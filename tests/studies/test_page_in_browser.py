@@ -262,3 +262,156 @@ def test_ctrl_c_ends_it_with_a_browser_open(log, opened, tmp_path):
         assert len((tmp_path / "record.csv").read_text().splitlines()) > 100
     finally:
         command.close()
+
+
+# --- sizes ------------------------------------------------------------------------------------
+
+
+FAST = """
+vehicle = "xcell60"
+out = "made"
+airspeeds = [0.0, 8.0]
+points = 5
+degree = 2
+"""
+SMALL = """
+vehicle = ""
+model = "family.json"
+out = "made"
+airspeeds = [0.0, 8.0]
+acceleration = 2.0
+degree = 1
+controls = ["d_lat"]
+measurements = ["v"]
+disturbances = ["v_w", "d_lat"]
+delay = 0.0
+sizes = { v = 1.0, d_lat = 0.05, v_w = 1.0 }
+noise = { v = 0.3 }
+servos = {}
+"""
+VALUE = ".size:has([aria-label^='d_ped,']) output"
+SHOWN = f'document.querySelector("{VALUE}").innerText'
+JUDGED = "text=entries that count are in Level 1"
+
+
+def tuning(text, folder):
+    (folder / "file.toml").write_text(text)
+    return Command(["synthesize", "file.toml"], folder)
+
+
+@pytest.fixture(scope="module")
+def sizes(tmp_path_factory):
+    command = tuning(FAST, tmp_path_factory.mktemp("sizes"))
+    yield command
+    command.close()
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+def test_sizes_are_shown_and_the_console_is_silent(sizes, opened, width):
+    page, said = opened(sizes.address, width)
+    page.wait_for_selector(JUDGED, timeout=15_000)
+    assert page.locator("svg.chart").count() == 3 + 4 + 2 * 3
+    assert page.locator("text=Nothing of this is proven").is_visible()
+    assert fits(page)
+    assert said == []
+
+
+def test_a_size_moves_by_the_keyboard_and_the_loops_follow(sizes, opened):
+    page, said = opened(sizes.address, 1280)
+    page.wait_for_selector(JUDGED, timeout=15_000)
+    other, _ = opened(sizes.address, 390)
+    before = page.locator("svg.chart").nth(2).inner_html()
+    slider = page.get_by_role("slider", name="d_ped, rad")
+    value = page.locator(VALUE)
+    was = value.inner_text()
+    slider.focus()
+    for _ in range(15):
+        page.keyboard.press("ArrowRight")
+    page.wait_for_function(f"was => {SHOWN} !== was", arg=was)
+    page.wait_for_function(
+        "was => document.querySelectorAll('svg.chart')[2].innerHTML !== was", arg=before
+    )
+    page.wait_for_timeout(500)
+    there = other.locator(VALUE).inner_text()
+    assert there == value.inner_text() != was  # the same in every browser
+    page.get_by_role("button", name="reset d_ped").press("Enter")
+    page.wait_for_function(f"was => {SHOWN} === was", arg=was)
+    page.wait_for_function(
+        "was => document.querySelectorAll('svg.chart')[2].innerHTML === was", arg=before
+    )
+    assert said == []
+
+
+def test_every_control_has_a_name_and_is_reached_by_the_keyboard(sizes, opened):
+    page, _ = opened(sizes.address, 1280)
+    page.wait_for_selector(JUDGED, timeout=15_000)
+    page.locator("summary", has_text="Noise").press("Enter")
+    sliders = page.get_by_role("slider")
+    assert sliders.count() == 3 + 8 + 4 + 8
+    names = sliders.evaluate_all("all => all.map(e => e.getAttribute('aria-label'))")
+    assert len(set(names)) == len(names)
+    page.locator("summary").first.focus()
+    reached = set()
+    for _ in range(2 * len(names) + 10):
+        page.keyboard.press("Tab")
+        reached.add(page.evaluate("document.activeElement.getAttribute('aria-label')"))
+        reached.add(page.evaluate("document.activeElement.innerText.trim()"))
+    assert set(names) | {f"reset {n}" for n in ("u", "d_ped", "q noise")} <= reached
+    assert {"Prove", "Save"} <= reached
+
+
+def test_a_proof_is_begun_and_given_up(sizes, opened):
+    page, said = opened(sizes.address, 1280)
+    page.get_by_role("button", name="Prove").press("Enter")
+    page.wait_for_selector("text=under way: designing", timeout=30_000)
+    page.get_by_role("button", name="Cancel").press("Enter")
+    page.wait_for_selector("text=given up: nothing is proven", timeout=5_000)
+    assert said == []
+
+
+def test_a_proof_is_shown_and_saved(opened, tmp_path):
+    models = [
+        symheli.LinearModel(
+            [[0.2 - 0.1 * V]], [[5.0, 1.0]], [[1.0]], [[0.0, 0.0]], ["v"], ["d_lat", "v_w"], ["v"]
+        )
+        for V in (0.0, 4.0, 8.0)
+    ]
+    symheli.LinearFamily.from_models([0.0, 4.0, 8.0], models).save(tmp_path / "family.json")
+    command = tuning(SMALL, tmp_path)
+    try:
+        page, said = opened(command.address, 390)
+        page.get_by_role("button", name="Prove").click()
+        page.wait_for_selector("text=keeps a gain of", timeout=30_000)
+        page.get_by_role("button", name="Save").click()
+        page.wait_for_selector("text=certificate.json", timeout=30_000)
+        assert fits(page)
+        made = {path.name for path in (tmp_path / "made").iterdir()}
+        assert {"controller.json", "certificate.json", "synthesize.toml", "c"} <= made
+        assert said == []
+        assert command.interrupt() < ENDED
+        assert command.process.returncode == 0
+    finally:
+        command.close()
+
+
+def children(process):
+    """Processes that one has started, and what they have."""
+    found = subprocess.run(["pgrep", "-P", str(process)], capture_output=True, text=True)
+    own = [int(word) for word in found.stdout.split()]
+    return own + [one for child in own for one in children(child)]
+
+
+@pytest.mark.skipif(shutil.which("pgrep") is None, reason="wants pgrep")
+def test_ctrl_c_ends_a_proof_under_way_and_every_process(opened, tmp_path):
+    command = tuning(FAST, tmp_path)
+    try:
+        page, _ = opened(command.address, 390)
+        page.get_by_role("button", name="Prove").click()
+        page.wait_for_selector("text=under way: designing", timeout=30_000)
+        begun = children(command.process.pid)
+        assert len(begun) >= 2
+        assert command.interrupt() < ENDED
+        assert not [one for one in begun if Path(f"/proc/{one}").exists()]
+        assert "nothing was saved" in command.said.read_text()
+    finally:
+        command.close()
