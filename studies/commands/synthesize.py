@@ -55,6 +55,8 @@ def run(arguments: argparse.Namespace) -> Output:
     choices = DesignChoices.read(arguments.file, {k: v for k, v in given.items() if v is not None})
     if arguments.file is None:
         choices = _starting(choices, arguments.vehicle)
+    if arguments.write_config is not None and arguments.page is not None:
+        raise InputError("--page shows sizes, --write-config writes them: give one of the two")
     if arguments.write_config is not None:
         return options.choices_written(choices.text, arguments.write_config)
     if arguments.page is not None:

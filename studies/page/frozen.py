@@ -26,7 +26,7 @@ from symheli.lpv.tools import Actuation
 from symheli.values.arrays import Array
 from symheli.values.signal import Signal
 from synthesis.design.loops.loop_measures import LoopMeasures
-from synthesis.design.loops.margins import Margins, margins
+from synthesis.design.loops.margins import Margins, margins, open_loop
 from synthesis.design.lti.h2 import h2
 from synthesis.design.lti.hinf import hinf
 from synthesis.sheet.evaluation import SpecificationTable, axis_loops, driven_plant
@@ -48,8 +48,8 @@ class Response(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """What does not move with the sizes, at one airspeed (m/s): the design plant in the sizes of
-    `choices` as one model, and the plant behind its servos, sampled.
+    """The models at one airspeed (m/s), which do not move with the sizes: the design plant in the
+    sizes of `choices`, and what is controlled, with the actuation before it.
     """
 
     airspeed: float
@@ -152,7 +152,8 @@ def frozen(point: Point, choices: DesignChoices) -> Frozen:
         return Frozen(point.airspeed, failure="; ".join(found.reasons) or found.status.value)
     K = _measuring(found.controller.discretize(choices.period), choices)
     loops = point.loops(K)
-    if loops and not next(iter(loops.values())).stable:
+    broken = open_loop(driven_plant(point.bare, K, point.actuation), K, choices.controls[0])
+    if not margins(broken, disk=False).stable:
         return Frozen(point.airspeed, method, failure=UNSTABLE)
     return Frozen(
         point.airspeed,
@@ -203,7 +204,7 @@ def entries(point: Point, K: LinearModel, axis: str) -> dict[str, float]:
 
 @dataclass(frozen=True, eq=False)
 class Numbers:
-    """What is known of the sizes `choices`, request `number`: designs by airspeed, entries of the
+    """Numbers of the sizes `choices`, request `number`: designs by airspeed, entries of the
     sheet by (airspeed, axis), seconds from the request to all designs and to the whole sheet.
     """
 

@@ -1,4 +1,4 @@
-"""What stands before a page: the token of its address, and the name under which it is asked for."""
+"""The gate of a page: the token of its address, and the name under which it is asked for."""
 
 from __future__ import annotations
 

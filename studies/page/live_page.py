@@ -29,7 +29,9 @@ LINE, POINT, BELOW = 0.08, 0.4, 3.0
 lowest of it, m.
 """
 GROUND, PATH, SKY = "#8a97a3", "#b85c00", "#dfe6ec"
-SIZE = (360, 260)
+PATH_EVERY = 3
+"""Motions after which the path is drawn anew."""
+SIZE = (360, 320)
 """Size of the picture in three dimensions before it is fitted, pixels."""
 
 
@@ -66,6 +68,7 @@ class _Shown:
     words: Any = None
     motion: Motion | None = None
     drawn: int = -1
+    moved: int = 0
 
     def section(self, name: str, heading: str, style: str) -> None:
         """A part of the snapshot under its heading."""
@@ -98,8 +101,6 @@ class _Shown:
             self.drawn = self.published.count
             for name, element in self.parts.items():
                 element.set_content(self.published.parts.get(name, ""))
-            if self.motion is not None:
-                self._draw_path(self.motion)
         motion = self.published.motion
         if motion is None or motion is self.motion:
             return
@@ -109,13 +110,16 @@ class _Shown:
         self.path.move(-x, -y, -z)
         lowest = min(up for _, _, up in motion.path)
         self.ground.move(-(x % CELL), -(y % CELL), lowest - BELOW - z)
+        self.moved += 1
+        if self.moved % PATH_EVERY == 0:
+            self._draw_path(motion)
         self.words.set_content(Markup("<p>{}</p>").format(motion.words))
 
     def _draw_path(self, motion: Motion) -> None:
         """Draw the path anew: points that are only moved stay where a browser first saw them."""
         old = self.points
         with self.scene, self.path:
-            points = [list(point) for point in motion.path]
+            points = [[round(at, 2) for at in point] for point in motion.path]
             self.points = self.scene.point_cloud(points, point_size=POINT).material(PATH)
         old.delete()
 

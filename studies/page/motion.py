@@ -12,7 +12,7 @@ Vector = tuple[float, float, float]
 
 APART = 0.5
 """Distance of two points of the path, m, at first; it doubles whenever there are `MOST`."""
-MOST = 600
+MOST = 400
 GAP = 1.0
 """Seconds between two samples above which the way between them is not known."""
 
@@ -42,7 +42,7 @@ class Motion(NamedTuple):
 
     @property
     def words(self) -> str:
-        """What a reader wants of it."""
+        """One line for a reader."""
         degrees = (math.degrees(angle) for angle in (self.phi, self.theta, self.psi % math.tau))
         bank, pitch, heading = (f"{angle:.0f} deg" for angle in degrees)
         up = self.position[2]

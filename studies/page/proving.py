@@ -27,7 +27,7 @@ C, SIZES = "c", "sizes.toml"
 
 @dataclass(frozen=True)
 class Proof:
-    """What a page says of a design: its sentences, tables and numbers, as the report has them."""
+    """Sentences, tables and numbers of a design, as its report has them."""
 
     choices: DesignChoices
     verified: bool
@@ -57,7 +57,7 @@ class Proving:
         self._given_up = False
         self.proof: Proof | None = None
         self.said = ""
-        """What came of the last one, where that is no proof."""
+        """Reason why the last one is no proof."""
         self.changes = 0
         """Number of changes of all this."""
 

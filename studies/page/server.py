@@ -55,7 +55,7 @@ class PageServer:
 
     @property
     def address(self) -> str:
-        """What to open in a browser."""
+        """Address to open in a browser."""
         return f"http://{HOST}:{self.port}/{self.token}/"
 
     def _serve(self) -> None:

@@ -47,7 +47,7 @@ class Size(NamedTuple):
 
     @property
     def label(self) -> str:
-        """What a reader calls it."""
+        """Name for a reader."""
         return f"{self.name} noise" if self.table == "noise" else self.name
 
 
@@ -205,6 +205,8 @@ def sheet(table: SpecificationTable | None) -> str:
     )
     verdict = Markup("<p>{}</p>").format(table.verdict(NAME))
     levels = html_table(margin_rows(table))
+    if not levels:
+        return verdict
     return f'{verdict}{levels}<p class="quiet">{IN_BRACKETS}</p>{missed}'
 
 
@@ -279,7 +281,7 @@ def _proven(found: Proof, moved: bool) -> str:
 
 def html_table(rows: Sequence[Sequence[str]]) -> Markup:
     """Return a table whose first row is its head, in a box that scrolls."""
-    if not rows:
+    if len(rows) < 2:
         return Markup("")
     head = Markup("").join(Markup('<th scope="col">{}</th>').format(cell) for cell in rows[0])
     body = Markup("")

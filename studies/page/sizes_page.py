@@ -25,7 +25,7 @@ from symheli.extras import extra
 LOOK = 0.05
 """Seconds between two looks of a browser at what has changed."""
 VALUE = "(event) => emit(event.target.valueAsNumber)"
-"""What a slider sends."""
+"""Script that sends the value of a slider."""
 FEW = 4
 """Processes of the frozen designs, at most."""
 

@@ -1,4 +1,4 @@
-"""What a page shows of a watch: made once in the thread that receives, for all browsers."""
+"""Snapshots of a watch for a page: made once in the thread that receives, for all browsers."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from studies.page.powers import Baseline
 MOTION_EVERY, NUMBERS_EVERY = 0.1, 1.0
 """Seconds between two snapshots of the motion, and of the numbers."""
 AXES = {"p": "roll", "q": "pitch", "w": "heave", "r": "yaw"}
-"""What the acceleration of a velocity is called."""
+"""Name of the acceleration of each velocity."""
 BANDS = 2.0
 """Standard errors of half a band."""
 AT_MOST = 9
@@ -144,7 +144,7 @@ def coverage(watch: Watch, data: Mapping[str, Any]) -> str:
         watch.airspeed,
         said,
     )
-    more = f"; {sum(few)} have fewer than {ENOUGH_SAMPLES} samples" if any(few) else ""
+    more = f"; fewer than {ENOUGH_SAMPLES} samples at {sum(few)}" if any(few) else ""
     return f"{picture}<p>{said}{more}.</p>"
 
 

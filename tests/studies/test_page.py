@@ -192,6 +192,13 @@ def test_options_that_cannot_be_are_refused(log, words, message, capsys):
     assert message in capsys.readouterr().err
 
 
+def test_a_page_is_not_opened_where_choices_are_only_written(tmp_path, capsys):
+    config = tmp_path / "my.toml"
+    assert cli.main(["synthesize", "--page", "--write-config", str(config)]) == 1
+    assert "give one of the two" in capsys.readouterr().err
+    assert not config.exists()
+
+
 # --- motion -----------------------------------------------------------------------------------
 
 

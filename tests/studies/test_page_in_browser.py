@@ -68,6 +68,7 @@ class Command:
         if self.process.poll() is None:
             self.process.kill()
             self.process.wait()
+        assert "Traceback" not in self.said.read_text()
 
 
 @pytest.fixture(scope="module")
