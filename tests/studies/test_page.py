@@ -441,6 +441,7 @@ def test_numbers_of_a_frozen_loop_are_those_of_its_design(tuned):
     assert own.steps["pitch"].time[-1] == pytest.approx(4.0)
 
 
+@pytest.mark.slow
 def test_what_follows_a_command_has_the_sign_of_the_table_that_flies():
     """The controller is of measured minus reference, as a `TableController` of the same design."""
     choices = starting.for_vehicle(DesignChoices(degree=2, points=5, references=("theta",)))
@@ -521,6 +522,7 @@ def test_what_was_overtaken_is_dropped(tuned, monkeypatch):
     assert "second" in sizes_parts(computing.shown, found)["state"]
 
 
+@pytest.mark.slow
 def test_a_sheet_is_judged_once_it_is_whole(tuned):
     choices, found = tuned
     two = found[1:3]
