@@ -26,6 +26,7 @@ LOOK = 0.05
 """Seconds between two looks of a browser at what has changed."""
 VALUE = "(event) => emit(event.target.valueAsNumber)"
 """Script that sends the value of a slider."""
+BEFORE = "being computed; this is of the sizes before"
 FEW = 4
 """Processes of the frozen designs, at most."""
 
@@ -42,6 +43,7 @@ class Session:
         self.moved = Moved(choices, self.computing.request)
         self.proving = Proving(given)
         self.saved = ""
+        self._sheet = ""
         self._parts: tuple[object, dict[str, str]] = (None, {})
         self.computing.request(choices)
 
@@ -50,7 +52,12 @@ class Session:
         shown = self.computing.shown
         key = (shown.number, len(shown.designs), shown.judged == shown.judged)
         if self._parts[0] != key:
-            self._parts = key, parts(shown, self.computing.points)
+            made = parts(shown, self.computing.points)
+            if key[-1]:
+                self._sheet = made["sheet"]
+            elif self._sheet:
+                made["sheet"] = f'<div class="old"><p>{BEFORE}</p>{self._sheet}</div>'
+            self._parts = key, made
         return self._parts
 
     def save(self) -> None:
