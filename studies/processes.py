@@ -52,7 +52,7 @@ class Processes(ThreadPoolExecutor):
             worker.__exit__(None, None, None)
 
     def end(self) -> None:
-        """End all processes at once, in the middle of what they compute."""
+        """End all processes at once; calls that are under way fail."""
         self.shutdown(wait=False, cancel_futures=True)
         with self._lock:
             self._leaving = True

@@ -317,7 +317,7 @@ def test_the_parts_say_what_the_watch_knows():
     watch = watch_of(50)
     watch.run(60.0, print)
     found = parts(watch)
-    assert "no lamp yet" in found["lamp"]
+    assert found["lamp"] == lamp(watch.data())
     assert watch.identifier.next_to_fly() in found["next"]
     assert "<b>known" not in found["state"]
     assert "&lt;b&gt;known" in found["state"]
@@ -334,6 +334,7 @@ def test_the_lamp_is_that_of_the_watch():
     assert 'role="alert"' in red
     assert "too fast" in red
     assert 'class="lamp green"' in lamp({"lamp": {"green": True, "reasons": []}})
+    assert "no lamp yet" in lamp({})
 
 
 @pytest.fixture(scope="module")

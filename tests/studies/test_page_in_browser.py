@@ -153,7 +153,7 @@ def test_the_flight_is_shown_and_the_console_is_silent(live, opened, width):
     page, said = opened(live.address, width)
     page.wait_for_selector(BAND, state="attached", timeout=20_000)
     assert page.locator("svg.chart").count() == 5
-    assert page.locator("text=no lamp yet").is_visible()
+    assert page.locator(".lamp").is_visible()
     assert page.locator(".next").inner_text().startswith("What to fly next\n")
     assert fits(page)
     assert page.locator("canvas").evaluate("e => e.width") > 100
