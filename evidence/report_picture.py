@@ -1,6 +1,8 @@
-"""The first screen of a study's report as the first picture of the README.
+"""The first screen of a study's report as the first picture of the README; that of a page of
+`symheli live --page`.
 
     python -m evidence.report_picture study/report.html           write docs/report.png
+    python -m evidence.report_picture ADDRESS --picture docs/live-page.png
 
 Chromium draws it: playwright's own, or the command that CHROMIUM names.
 """
@@ -17,10 +19,16 @@ from symheli.extras import extra
 PICTURE = Path(__file__).resolve().parents[1] / "docs" / "report.png"
 SCREEN = {"width": 1280, "height": 900}
 """Pixels of the screen."""
+OPTIONS = ["--no-sandbox", "--use-gl=swiftshader", "--enable-unsafe-swiftshader"]
+"""For a computer without a graphics card: pages with a picture in three dimensions."""
+SETTLED = 6000
+"""Milliseconds after which a page that is served shows its numbers."""
 
 
-def taken(page: Path, picture: Path) -> Path:
-    """Write the first screen of a page as a picture of few colours and return its path."""
+def taken(page: str, picture: Path) -> Path:
+    """Write the first screen of a page, a file or an address, as a picture of few colours and
+    return its path.
+    """
     from PIL import Image
 
     with extra("test", "the picture of a report"):
@@ -28,10 +36,12 @@ def taken(page: Path, picture: Path) -> Path:
 
     command = os.environ.get("CHROMIUM") or shutil.which("chromium")
     with sync_playwright() as run:
-        browser = run.chromium.launch(executable_path=command, args=["--no-sandbox"])
+        browser = run.chromium.launch(executable_path=command, args=OPTIONS)
         try:
             screen = browser.new_page(viewport=SCREEN)  # type: ignore[arg-type]
-            screen.goto(page.resolve().as_uri())
+            served = page.startswith("http://")
+            screen.goto(page if served else Path(page).resolve().as_uri())
+            screen.wait_for_timeout(SETTLED if served else 0)
             screen.screenshot(path=picture)
         finally:
             browser.close()
@@ -43,8 +53,10 @@ def taken(page: Path, picture: Path) -> Path:
 def main() -> None:
     """Take the picture of the report that is named."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("report", type=Path, help="report.html of a study")
-    print(f"wrote {taken(parser.parse_args().report, PICTURE)}")
+    parser.add_argument("report", help="report.html of a study, or the address of a page")
+    parser.add_argument("--picture", type=Path, default=PICTURE, help="file that is written")
+    arguments = parser.parse_args()
+    print(f"wrote {taken(arguments.report, arguments.picture)}")
 
 
 if __name__ == "__main__":

@@ -40,6 +40,7 @@ OPTIONAL = {
     "shtab": "completion in a shell: symheli completion bash|zsh|tcsh",
     "ipywidgets": "sliders in notebooks",
     "python-flint": "balls over frequency and the stand-alone checker, in less time",
+    "nicegui": "pages in a browser: symheli live --page, symheli synthesize --page",
     "scs": "a second solver to cross-check",
     "jsbsim": "flying the AH-1S, a helicopter from elsewhere",
 }

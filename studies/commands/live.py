@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,8 +16,10 @@ from studies.output import Output, columns, progress
 from symheli.errors import InputError
 
 if TYPE_CHECKING:
+    from studies.live.identifier import LiveIdentifier
     from studies.live.mavlink import MavlinkSource
     from studies.live.replay import RecordSource
+    from studies.live.sample import Source
     from studies.live.watch import Watch
     from studies.live.xplane import XPlaneSource
 
@@ -56,6 +60,12 @@ ARGUMENTS = (
     option("--record", "FILE", "write every sample as it comes, as CSV", Path),
     option("--speed", "X", "times its own pace, of a file", options.positive, 1.0),
     option("--save", "FILE", "write the model at the end", options.model_file),
+    *options.page("the flight"),
+    option(
+        "--baseline",
+        "VEHICLE",
+        "helicopter with whose linearization --page compares control powers",
+    ),
 )
 
 
@@ -69,6 +79,8 @@ def run(arguments: argparse.Namespace) -> Output:
     low, high = arguments.airspeeds
     if not 0 <= low < high:
         raise InputError(f"--airspeeds: expected 0 <= LOW < HIGH, got {low:g} and {high:g}")
+    if arguments.baseline is not None and arguments.page is None:
+        raise InputError("--baseline is compared on the page: give --page too")
     if arguments.rate is not None and arguments.rate > FASTEST:
         raise InputError(f"--rate: expected 1 to {FASTEST:g} Hz, got {arguments.rate}")
     found = source(arguments)
@@ -83,12 +95,14 @@ def run(arguments: argparse.Namespace) -> Output:
             f"{found.name} has no {', '.join(missing)}: --inputs names the controls,"
             f" the other signals must be there; it has {', '.join(found.signals)}"
         )
-    recorder = None
-    if arguments.record is not None:
-        recorder = Recorder(arguments.record, (*SIGNALS, *arguments.inputs))
-    watch = Watch(found, identifier, Stream(identifier.signals, dt), recorder)
-    progress(f"listening to {watch.source.name}; Ctrl-C ends")
-    watch.run(arguments.duration or math.inf, progress)
+    with _page(arguments, identifier, found) as looks:
+        recorder = None
+        if arguments.record is not None:
+            recorder = Recorder(arguments.record, (*SIGNALS, *arguments.inputs))
+        stream = Stream(identifier.signals, dt)
+        watch = Watch(found, identifier, stream, recorder, looks=looks)
+        progress(f"listening to {watch.source.name}; Ctrl-C ends")
+        watch.run(arguments.duration or math.inf, progress)
     if not watch.received:
         raise InputError(
             f"nothing came from {watch.source.name}: check that it sends, its address and port"
@@ -103,6 +117,35 @@ def run(arguments: argparse.Namespace) -> Output:
         status = 1
         lines.append("no model is saved: the data do not determine every coefficient")
     return Output("\n".join(lines), data, status)
+
+
+@contextmanager
+def _page(
+    arguments: argparse.Namespace, identifier: LiveIdentifier, found: Source
+) -> Iterator[list[Callable[[Watch], None]]]:
+    """Yield what looks at the watch: the page within this context, where one is asked for."""
+    if arguments.page is None:
+        yield []
+        return
+    from studies.page.live_page import live_page
+    from studies.page.powers import baseline
+    from studies.page.snapshot import Published, airspeeds
+
+    try:
+        beside = None
+        if arguments.baseline is not None:
+            speeds = airspeeds(identifier.low, identifier.high)
+            beside = baseline(arguments.baseline, identifier.inputs, speeds)
+        published = Published(beside)
+        page = live_page(published, f"Flight from {found.name}", arguments.page)
+    except BaseException:
+        found.close()
+        raise
+    progress(f"page: {page.address}")
+    try:
+        yield [published]
+    finally:
+        page.close()
 
 
 def source(arguments: argparse.Namespace) -> XPlaneSource | MavlinkSource | RecordSource:

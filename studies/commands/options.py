@@ -158,6 +158,29 @@ ALLOW_CODE = flag(
 )
 
 
+def page(what: str) -> tuple[Argument, ...]:
+    """The option that shows something on a page in a browser."""
+    return (
+        option(
+            "--page",
+            "PORT",
+            f"show {what} in a browser on this machine, at the printed address (default port: the"
+            " first free one from 8400)",
+            port,
+            nargs="?",
+            const=0,
+        ),
+    )
+
+
+def port(text: str) -> int:
+    """A port that needs no rights."""
+    value = count(text)
+    if not 1024 <= value < 2**16:
+        raise argparse.ArgumentTypeError(f"expected a port from 1024 to 65535, got {text!r}")
+    return value
+
+
 class _OneVehicle(argparse.Action):
     """Takes the vehicle from its place or from --vehicle, and refuses two different ones."""
 

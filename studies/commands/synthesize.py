@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import time
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from studies.commands import options
 from studies.commands.arguments import option, positional
-from studies.output import Output
+from studies.output import Output, progress
 from symheli.errors import InputError
 
 if TYPE_CHECKING:
@@ -40,6 +42,7 @@ ARGUMENTS = (
         "--out", "DIR", "folder of table, certificate, numbers and page (default: controller)", Path
     ),
     options.write_config("the choices"),
+    *options.page("sliders for the sizes, what they do to frozen loops, and a button that proves"),
 )
 
 
@@ -52,8 +55,12 @@ def run(arguments: argparse.Namespace) -> Output:
     choices = DesignChoices.read(arguments.file, {k: v for k, v in given.items() if v is not None})
     if arguments.file is None:
         choices = _starting(choices, arguments.vehicle)
+    if arguments.write_config is not None and arguments.page is not None:
+        raise InputError("--page shows sizes, --write-config writes them: give one of the two")
     if arguments.write_config is not None:
         return options.choices_written(choices.text, arguments.write_config)
+    if arguments.page is not None:
+        return _page(choices, arguments.page)
     from studies.controllers import synthesized_report as report
     from studies.controllers.synthesized import synthesized
 
@@ -62,6 +69,20 @@ def run(arguments: argparse.Namespace) -> Output:
     failed = not found.sampled.certificate.verified or found.lost > 0
     data = {**report.data(found), "written": written}
     return Output(report.text(found, written), data, status=int(failed))
+
+
+def _page(choices: DesignChoices, port: int) -> Output:
+    """Show the sizes in a browser until Ctrl-C."""
+    from studies.page.sizes_page import sizes_page
+
+    title = f"Sizes of a controller for {choices.vehicle or choices.model}"
+    with sizes_page(choices, _given(choices), title, port) as (page, session):
+        progress(f"page: {page.address}\nCtrl-C ends")
+        with suppress(KeyboardInterrupt):
+            while True:
+                time.sleep(0.2)
+        said = session.saved or "nothing was saved"
+    return Output(said, {"saved": session.saved})
 
 
 def _starting(choices: DesignChoices, vehicle: str | None) -> DesignChoices:

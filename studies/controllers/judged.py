@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 import symheli
 from studies.controllers.design_choices import SERVO_RATE, DesignChoices
 from studies.controllers.plant import behind_servos
-from symheli import Helicopter, LinearModel, LPVStateSpace, TableController
+from symheli import Helicopter, LinearFamily, LinearModel, LPVStateSpace, TableController
 from symheli.lpv.tools import Actuation
 from symheli.values.arrays import Array
 from synthesis.sheet.evaluation import (
@@ -45,26 +46,16 @@ def judged(
 
     `exact`: the vehicle is linearized at every airspeed; otherwise the loop is that of the model.
     """
-    sheet = Sheet.load()
+    low, high = choices.airspeeds
+    speeds = np.linspace(low, high, POINTS).tolist()
+    travel = travel_of(choices)
+    sheet = sheet_of(choices)
     if not any(
         axis.control in table.outputs and axis.response in table.inputs
         for axis in sheet.axes.values()
     ):
         return None
-    low, high = choices.airspeeds
-    speeds = np.linspace(low, high, POINTS).tolist()
-    travel = travel_of(choices)
-    if choices.vehicle:
-        heli = Helicopter.load(choices.vehicle, governor="ideal")
-        sheet = sheet.at_length(heli.vehicle.sections["main_rotor"]["radius"].value)
-    actuation = Actuation()
-    if exact:
-        family = symheli.sweep(heli, speeds, inputs=choices.controls)
-        plant = family.select(choices.states) if choices.states else family
-        actuation = choices.actuation
-    else:
-        plant = behind_servos(model, replace(choices, references=())).nominal
-        plant = plant.select(inputs=choices.controls, outputs=choices.measurements)
+    plant, actuation = controlled(model, choices, speeds, exact=exact)
     found = specifications(
         plant,
         {NAME: table.model},
@@ -84,6 +75,29 @@ def judged(
                 made = loop.closed.step_response(WINDOW)
                 steps.setdefault(name, {})[v] = made.time, *made.values[:, :2, 0].T
     return Judged(table=found, steps=steps)
+
+
+def sheet_of(choices: DesignChoices) -> Sheet:
+    """Return the specification sheet, at the size of the vehicle where there is one."""
+    sheet = Sheet.load()
+    if not choices.vehicle:
+        return sheet
+    heli = Helicopter.load(choices.vehicle, governor="ideal")
+    return sheet.at_length(heli.vehicle.sections["main_rotor"]["radius"].value)
+
+
+def controlled(
+    model: LPVStateSpace, choices: DesignChoices, speeds: Sequence[float], *, exact: bool
+) -> tuple[LinearFamily | LPVStateSpace, Actuation]:
+    """Return what is controlled, from controls to measurements, and what stands before it: the
+    linearizations of the vehicle at airspeeds (m/s), or the model behind its servos.
+    """
+    if exact:
+        heli = Helicopter.load(choices.vehicle, governor="ideal")
+        family = symheli.sweep(heli, list(speeds), inputs=choices.controls)
+        return family.select(choices.states) if choices.states else family, choices.actuation
+    plant = behind_servos(model, replace(choices, references=())).nominal
+    return plant.select(inputs=choices.controls, outputs=choices.measurements), Actuation()
 
 
 def travel_of(choices: DesignChoices) -> dict[str, float]:

@@ -164,11 +164,13 @@ def _of_sheet(table: SpecificationTable) -> Iterator[str]:
 
 def margins(found: Synthesized) -> list[list[str]]:
     """Return the worst margins and bandwidths over airspeed, a row an axis, each with its Level."""
+    return [] if found.judged is None else margin_rows(found.judged.table)
+
+
+def margin_rows(table: SpecificationTable) -> list[list[str]]:
+    """Return the same of a sheet of one controller."""
     from synthesis.sheet.evaluation import worst
 
-    if found.judged is None:
-        return []
-    table = found.judged.table
     (name,) = table.controllers
     cells: dict[str, dict[str, str]] = {}
     for r in table.reached(name):

@@ -37,3 +37,8 @@ def in_body(
     with np.errstate(invalid="ignore", over="ignore"):
         body = body_velocity(*map(np.asarray, (north, east, down, phi, theta, psi)))
     return dict(zip("uvw", map(float, body), strict=True))
+
+
+def turn_rate(q: float, r: float, phi: float, theta: float) -> float:
+    """Return the rate of the heading, rad/s, by rates (rad/s) and attitude (rad)."""
+    return (q * math.sin(phi) + r * math.cos(phi)) / math.cos(theta)

@@ -6,8 +6,8 @@ import math
 import signal
 import threading
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 from studies.live.identifier import EVERYTHING, LiveIdentifier, Prediction
@@ -41,6 +41,9 @@ class Watch:
     received: int = 0
     last: float = math.nan
     airspeed: float = math.nan
+    latest: Sequence[Sample] = ()
+    looks: list[Callable[[Watch], None]] = field(default_factory=list)
+    """Called after each receive, whose samples are `latest`, in the thread that receives."""
     _stopped: bool = False
 
     def run(
@@ -60,9 +63,12 @@ class Watch:
             signal.signal(signal.SIGINT, self._interrupted)
         try:
             while (now := clock()) - begun < seconds and not (self._stopped or over()):
-                for sample in self.source.receive(PATIENCE):
+                self.latest = self.source.receive(PATIENCE)
+                for sample in self.latest:
                     self.take(sample, clock())
                 self.stream.idle(now)
+                for look in self.looks:
+                    look(self)
                 if now - said >= EVERY:
                     said = now
                     self.prediction = self.identifier.prediction()

@@ -109,3 +109,16 @@ def test_an_answer_that_cannot_be_read_is_said_and_does_not_hang(tmp_path, monke
         with pytest.raises(SymheliError, match="cannot be read here"):
             bad.result(timeout=60)
         assert good.result(timeout=60) == 7
+
+
+def test_processes_that_are_ended_answer_nothing_more():
+    """At once, in the middle of a call; what waits is cancelled."""
+    with Processes(1) as processes:
+        under_way, waiting = submitted(processes, [partial(time.sleep, 60), partial(pow, 2, 3)])
+        until = time.monotonic() + 10
+        while not processes._workers and time.monotonic() < until:
+            time.sleep(0.01)
+        processes.end()
+        with pytest.raises(SymheliError, match="has ended"):
+            under_way.result(timeout=5)
+        assert waiting.cancelled()

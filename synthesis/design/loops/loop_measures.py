@@ -83,14 +83,16 @@ class LoopMeasures:
 
     @staticmethod
     def _of_margins(margins: Margins) -> dict[str, float]:
-        return {
+        values = {
             "gain": min(margins.gain_margin, LARGEST),
             "phase": min(margins.phase_margin, 180.0),
             "delay": 1e3 * margins.delay,
-            "disk_gain": min(decibels(margins.disk_gain[1]), LARGEST),
-            "disk_phase": math.degrees(margins.disk_phase),
             "crossover": margins.highest_crossover,
         }
+        if not math.isnan(margins.disk):
+            values["disk_gain"] = min(decibels(margins.disk_gain[1]), LARGEST)
+            values["disk_phase"] = math.degrees(margins.disk_phase)
+        return values
 
     def __getitem__(self, name: str) -> float:
         return self.values[name]

@@ -24,8 +24,9 @@ class Margins:
     there is none.
 
     gain: factors (below 1, above 1) between which the loop gain may be changed. phase (rad) may be
-    lost or gained, delay (s) added. disk: radius of the largest balanced disk, alpha: gain within
-    `disk_gain` and phase within `disk_phase` (rad) may change together, at any frequency.
+    lost or gained, delay (s) added. disk: radius of the largest balanced disk, alpha, NaN where it
+    was not asked for: gain within `disk_gain` and phase within `disk_phase` (rad) may change
+    together, at any frequency.
     crossover: frequencies of unit gain (rad/s). A loop that is unstable as it is has `stable` False
     and no margin.
     """
@@ -41,7 +42,7 @@ class Margins:
     def disk_gain(self) -> tuple[float, float]:
         """Gain factors inside the disk margin."""
         return max((2 - self.disk) / (2 + self.disk), 0.0), (
-            (2 + self.disk) / (2 - self.disk) if self.disk < 2 else math.inf
+            math.inf if self.disk >= 2 else (2 + self.disk) / (2 - self.disk)
         )
 
     @property
@@ -176,7 +177,7 @@ def _dynamic_loop(plant: LinearModel, controller: LinearModel, at: str) -> Linea
     )
 
 
-def margins(loop: LinearModel) -> Margins:
+def margins(loop: LinearModel, *, disk: bool = True) -> Margins:
     """Compute gain, phase, delay and disk margins of a scalar loop L under negative feedback.
 
     Without a frequency grid: unit-gain crossings are eigenvalues of a Hamiltonian matrix, phase
@@ -187,6 +188,8 @@ def margins(loop: LinearModel) -> Margins:
     ----------
     loop : LinearModel
         L, one input and one output.
+    disk : bool
+        False leaves the disk out (NaN), which is three quarters of the work.
 
     Returns
     -------
@@ -263,7 +266,7 @@ def margins(loop: LinearModel) -> Margins:
         ),
         float(np.abs(lag).min(initial=math.inf)),
         float(delays.min(initial=math.inf)),
-        disk_margin(loop),
+        disk_margin(loop) if disk else math.nan,
         tuple(float(w) for w in physical(unit)),
     )
 

@@ -26,6 +26,11 @@ def test_an_integrating_loop_has_its_closed_form():
     assert [found.cell(name) for name in ("gain", "phase", "delay")] == ["40.0", "90.0", "785"]
 
 
+def test_a_disk_that_was_not_asked_for_has_no_number():
+    found = LoopMeasures.of(margins(open_loop(INTEGRATOR, {("u", "y"): -2.0}, "u"), disk=False))
+    assert set(found.values) == {"gain", "phase", "delay", "crossover"}
+
+
 def test_the_gain_margin_is_the_nearer_of_both_directions():
     """k (s + 2)/(s (s - 1)): stable for k > 1, so k = 1.5 may fall by 3.52 dB, and rise freely."""
     plant = LinearModel(

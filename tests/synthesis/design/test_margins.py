@@ -36,6 +36,14 @@ def test_a_third_order_loop_has_its_textbook_margins():
     assert m.delay == pytest.approx(m.phase / w)
 
 
+def test_margins_without_the_disk_are_the_same_and_the_disk_is_not_known():
+    L = model([1], [1, 3, 2, 0])
+    whole, bare = margins(L), margins(L, disk=False)
+    assert (bare.gain, bare.phase, bare.crossover) == (whole.gain, whole.phase, whole.crossover)
+    assert math.isnan(bare.disk)
+    assert all(map(math.isnan, (*bare.disk_gain, bare.disk_phase)))
+
+
 def test_an_unstable_plant_has_a_lower_gain_margin_and_an_integrator_none():
     """L = k/(s - 1) needs k > 1; L = 1/s stands any gain, and 90 deg."""
     m = margins(model([4], [1, -1]))
