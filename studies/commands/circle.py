@@ -25,6 +25,7 @@ ARGUMENTS = (
     option("--heavier", "X", "times the mass after --change", options.positive, 1.15),
     option("--change", "S", "when the mass changes (default: never)", options.positive),
     flag("--quiet-sensors", "no noise of its sensors"),
+    *options.page("the flight"),
     option("--out", "DIR", "folder of record, models, controllers and certificates", Path),
 )
 
@@ -58,13 +59,12 @@ def run(arguments: argparse.Namespace) -> Output:
         source = XPlaneSource(port=process.port)
         pilot = Circle(vehicle, source, workers, progress)
         stream = Stream(identifier.signals, PERIOD)
-        watch = Watch(source, identifier, stream, recorder, pilot)
-        progress(
-            f"{vehicle.name} flies {plan.schedule.duration:.0f} s at {source.name}; Ctrl-C ends"
-        )
-        watch.run(
-            (arguments.duration + 30.0) / arguments.speed, progress, over=lambda: process.over
-        )
+        longest = (arguments.duration + 30.0) / arguments.speed
+        seconds = plan.schedule.duration
+        progress(f"{vehicle.name} flies {seconds:.0f} s at {source.name}; Ctrl-C ends")
+        with options.on_page(arguments.page, identifier, source, vehicle.name) as looks:
+            watch = Watch(source, identifier, stream, recorder, pilot, looks=looks)
+            watch.run(longest, progress, over=lambda: process.over)
         workers.end()
     if process.error is not None:
         raise SymheliError(str(process.error)) from process.error

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,10 +14,8 @@ from studies.output import Output, columns, progress
 from symheli.errors import InputError
 
 if TYPE_CHECKING:
-    from studies.live.identifier import LiveIdentifier
     from studies.live.mavlink import MavlinkSource
     from studies.live.replay import RecordSource
-    from studies.live.sample import Source
     from studies.live.watch import Watch
     from studies.live.xplane import XPlaneSource
 
@@ -95,7 +91,7 @@ def run(arguments: argparse.Namespace) -> Output:
             f"{found.name} has no {', '.join(missing)}: --inputs names the controls,"
             f" the other signals must be there; it has {', '.join(found.signals)}"
         )
-    with _page(arguments, identifier, found) as looks:
+    with options.on_page(arguments.page, identifier, found, arguments.baseline) as looks:
         recorder = None
         if arguments.record is not None:
             recorder = Recorder(arguments.record, (*SIGNALS, *arguments.inputs))
@@ -117,35 +113,6 @@ def run(arguments: argparse.Namespace) -> Output:
         status = 1
         lines.append("no model is saved: the data do not determine every coefficient")
     return Output("\n".join(lines), data, status)
-
-
-@contextmanager
-def _page(
-    arguments: argparse.Namespace, identifier: LiveIdentifier, found: Source
-) -> Iterator[list[Callable[[Watch], None]]]:
-    """Yield what looks at the watch: the page within this context, where one is asked for."""
-    if arguments.page is None:
-        yield []
-        return
-    from studies.page.live_page import live_page
-    from studies.page.powers import baseline
-    from studies.page.snapshot import Published, airspeeds
-
-    try:
-        beside = None
-        if arguments.baseline is not None:
-            speeds = airspeeds(identifier.low, identifier.high)
-            beside = baseline(arguments.baseline, identifier.inputs, speeds)
-        published = Published(beside)
-        page = live_page(published, f"Flight from {found.name}", arguments.page)
-    except BaseException:
-        found.close()
-        raise
-    progress(f"page: {page.address}")
-    try:
-        yield [published]
-    finally:
-        page.close()
 
 
 def source(arguments: argparse.Namespace) -> XPlaneSource | MavlinkSource | RecordSource:

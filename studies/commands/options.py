@@ -6,6 +6,7 @@ import argparse
 import math
 import tomllib
 from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,9 @@ from symheli.errors import InputError
 from symheli.values.whole_files import write_text
 
 if TYPE_CHECKING:
+    from studies.live.identifier import LiveIdentifier
+    from studies.live.sample import Source
+    from studies.live.watch import Watch
     from symheli import Helicopter
     from symheli.steady.equilibrium import TrimPoint
 
@@ -171,6 +175,19 @@ def page(what: str) -> tuple[Argument, ...]:
             const=0,
         ),
     )
+
+
+def on_page(
+    port: int | None, identifier: LiveIdentifier, found: Source, vehicle: str | None
+) -> AbstractContextManager[list[Callable[[Watch], None]]]:
+    """Return the context of what looks at a watch: a page at a port, beside a `vehicle`, where one
+    is given; else nothing.
+    """
+    if port is None:
+        return nullcontext([])
+    from studies.page.live_page import watched
+
+    return watched(port, identifier, found, vehicle)
 
 
 def port(text: str) -> int:

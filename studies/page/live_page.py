@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
 from markupsafe import Markup
 
+from studies.live.identifier import LiveIdentifier
+from studies.live.sample import Source
+from studies.live.watch import Watch
+from studies.output import progress
 from studies.page.elements import html, page_of, section
 from studies.page.motion import Motion
+from studies.page.powers import baseline
 from studies.page.server import PageServer
-from studies.page.snapshot import MOTION_EVERY, Published
+from studies.page.snapshot import MOTION_EVERY, Published, airspeeds
 from symheli.extras import extra
 
 SECTIONS = (
@@ -52,6 +59,31 @@ def live_page(published: Published, title: str, port: int = 0) -> PageServer:
         ui.timer(MOTION_EVERY, shown.update)
 
     return PageServer(build, title, port)
+
+
+@contextmanager
+def watched(
+    port: int, identifier: LiveIdentifier, found: Source, vehicle: str | None
+) -> Iterator[list[Callable[[Watch], None]]]:
+    """Yield what looks at the watch of a source: the page, within this context, at a port (0: the
+    first free one), beside the linearization of a `vehicle`. Closes the source where there is no
+    page.
+    """
+    try:
+        beside = None
+        if vehicle is not None:
+            speeds = airspeeds(identifier.low, identifier.high)
+            beside = baseline(vehicle, identifier.inputs, speeds)
+        published = Published(beside)
+        page = live_page(published, f"Flight from {found.name}", port)
+    except BaseException:
+        found.close()
+        raise
+    progress(f"page: {page.address}")
+    try:
+        yield [published]
+    finally:
+        page.close()
 
 
 @dataclass
