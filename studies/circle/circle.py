@@ -19,7 +19,7 @@ from studies.circle.designed import Designed, designed
 from studies.circle.vehicle import Vehicle
 from studies.known_kinematics.models import SCHEDULING
 from studies.live.identifier import STATES
-from studies.live.sample import STICKS
+from studies.live.sample import EXCITATION, STICKS
 from studies.live.stream import Row
 from symheli import FlightRecord
 from symheli.flight import HypothesisEvents, HypothesisMonitor, TableState
@@ -49,6 +49,8 @@ SAME = 1e-4
 """Difference of a command and what is flown, as a part of its travel, that is rounding."""
 KEPT = 10.0
 """Seconds of rows that are kept while the controller flies."""
+QUIET = 2.0
+"""Seconds without excitation before the switch: what is in force then would fade as a push."""
 AROUND = 0.5
 """Seconds before and after the switch over which the steps of the commands are looked at."""
 SIGNALS = (
@@ -62,6 +64,7 @@ class Phase(Enum):
 
     IDENTIFYING = "the vehicle's own autopilot flies and excites"
     DESIGNING = "a controller is designed, certified and judged; the vehicle's own autopilot flies"
+    SETTLING = "a controller may fly; the vehicle's own autopilot ends its excitation"
     CONTROLLING = "the certified controller flies"
 
 
@@ -87,7 +90,7 @@ class Commanded(Protocol):
     """A line to the sticks of a vehicle."""
 
     def command(self, sticks: Mapping[str, float]) -> None:
-        """Send the sticks, each -1 to 1."""
+        """Send the sticks, each -1 to 1, or whether the vehicle excites itself."""
 
 
 class Circle:
@@ -206,6 +209,10 @@ class Circle:
             self.phase = Phase.DESIGNING
         elif self.phase is Phase.DESIGNING and self._future is not None and self._future.done():
             self._judge(k, self._future.result())
+        elif self.phase is Phase.SETTLING:
+            self._source.command({EXCITATION: 0.0})  # again: one may have been lost
+            if k >= self._switched:
+                self._switch(k)
         elif self.phase is Phase.CONTROLLING and self._alarm is not None:
             self.alarm = self._alarm.take(self.record(2.0 * HORIZON + 0.5))
             self._rows = {j: row for j, row in self._rows.items() if j > k - KEPT / self._dt}
@@ -219,7 +226,13 @@ class Circle:
             self.phase = Phase.IDENTIFYING
             self._happens(k, f"not fit to fly, {MORE:g} s more are flown: {'; '.join(objections)}")
             return
-        now = self._rows[k][len(STATES) : len(STATES) + 4]
+        self._ready = found
+        self.phase, self._switched = Phase.SETTLING, k + round(QUIET / self._dt)
+        self._source.command({EXCITATION: 0.0})
+
+    def _switch(self, k: int) -> None:
+        """Take the sticks, beginning at the commands in force."""
+        found, now = self._ready, self._rows[k][len(STATES) : len(STATES) + 4]
         if not np.isfinite(now).all():
             return  # at the next look
         self.designs.append(found)
@@ -245,6 +258,7 @@ class Circle:
         self._rows, self._state, self._alarm = {}, None, None
         self._sent = {}
         self._late.clear()
+        self._source.command({EXCITATION: 1.0})
 
     def _happens(self, k: int, what: str) -> None:
         self.events.append(Event(k * self._dt, what))

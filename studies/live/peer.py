@@ -15,7 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from studies.live import mavlink, xplane
-from studies.live.sample import STICKS
+from studies.live.sample import EXCITATION, STICKS
 from symheli.values.arrays import Array
 from symheli.values.kinematics import INPUTS
 from symheli.values.named_vector import NamedVector
@@ -57,7 +57,8 @@ class XPlaneLine:
         self._asked: dict[Any, dict[int, xplane.Request]] = {}
         self._due: dict[Any, float] = {}
         self._factors = dict(xplane.DATAREFS.values())
-        self._names = {dataref: name for name, (dataref, _) in xplane.DATAREFS.items()}
+        self._names = {xplane.DATAREFS[name][0]: name for name in STICKS}
+        self._names[xplane.EXCITES] = EXCITATION
 
     def send(self, at: float, values: Mapping[str, float]) -> None:
         """Send each client what it asked for, at the rate of its fastest request."""
@@ -86,8 +87,8 @@ class XPlaneLine:
             request, setting = xplane.requested(datagram), xplane.set_by(datagram)
             if request is not None:
                 self._take(client, request)
-            elif setting is not None and (name := self._names.get(setting[0])) in STICKS:
-                sticks[str(name)] = setting[1]
+            elif setting is not None and (name := self._names.get(setting[0])):
+                sticks[name] = setting[1]
         time.sleep(max(end - time.monotonic(), 0.0))
         return sticks
 
@@ -191,7 +192,7 @@ class OnTheWire:
     """A controller that flies as `inner` does, in real time, while each sample goes over lines.
 
     Sticks that are set from there, as fractions of the travel of each control, replace the command
-    of `inner` until they are older than `FRESH`.
+    of `inner` until they are older than `FRESH`. What is set of the excitation stays.
 
     Parameters
     ----------
@@ -235,7 +236,8 @@ class OnTheWire:
         u, self._state = self.inner.step(self._state, measured, reference, p)
         u = np.array(u, float)
         if self.samples < len(self._added):
-            u += self._added[self.samples]
+            excites, _ = self._set.get(EXCITATION, (1.0, at))
+            u += float(excites > 0) * self._added[self.samples]
         for k, name in enumerate(STICKS):
             value, when = self._set.get(name, (0.0, -math.inf))
             if at - when <= FRESH:

@@ -9,6 +9,10 @@ STICKS = ("stick_lon", "stick_lat", "stick_col", "stick_ped")
 """Controls of a vehicle whose deflections are not sent, each -1 to 1."""
 
 
+EXCITATION = "excitation"
+"""Whether a simulated vehicle excites itself, 1 or 0; set like a stick, it stays."""
+
+
 class Sample(NamedTuple):
     """One set of values of a vehicle: `time` (s) on its own clock, `values` in SI by signal, and
     `sender`, by which another vehicle on the same port is told apart.

@@ -19,7 +19,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from studies.live.earth import earth_velocity, in_body
-from studies.live.sample import Sample
+from studies.live.sample import EXCITATION, Sample
 from symheli.errors import InputError
 
 PORT = 49000
@@ -62,6 +62,8 @@ DATAREFS: Mapping[str, tuple[str, float]] = {
     "stick_ped": ("sim/joystick/yoke_heading_ratio", 1.0),
 }
 """Dataref of each quantity, and its unit in SI."""
+EXCITES = "symheli/excitation"
+"""Dataref of a simulated vehicle's own: whether its autopilot excites it."""
 EARTH = ("east", "up", "south")
 
 
@@ -219,10 +221,13 @@ class XPlaneSource:
                 self._socket.sendto(request(frequency, k, self.datarefs[name][0]), self._peer)
 
     def command(self, sticks: Mapping[str, float]) -> None:
-        """Set the datarefs of sticks, each -1 to 1."""
+        """Set the datarefs of sticks, each -1 to 1, and whether a vehicle of symheli serve excites
+        itself.
+        """
         with contextlib.suppress(OSError):  # nobody listens there now
             for name, value in sticks.items():
-                self._socket.sendto(setting(self.datarefs[name][0], value), self._peer)
+                dataref = EXCITES if name == EXCITATION else self.datarefs[name][0]
+                self._socket.sendto(setting(dataref, value), self._peer)
 
     def close(self) -> None:
         """Ask X-Plane to send no more."""

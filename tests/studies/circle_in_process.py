@@ -53,7 +53,7 @@ class InProcess:
         return self.under_way.popleft()
 
     def command(self, sticks):
-        self.sticks = dict(sticks)
+        self.sticks = {**self.sticks, **sticks}
 
     def close(self):
         pass

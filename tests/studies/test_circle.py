@@ -56,7 +56,11 @@ def test_the_controls_change_hands_without_a_bump(design):
     ]
     (switch,) = found.switches
     assert switch.at < 0.02
-    assert 0.0 < switch.after < 1.5 * switch.before
+    assert switch.before < 0.02
+    assert switch.after < 0.02
+    after = (record.time > found.events[1].time) & (record.time < found.events[1].time + 3.0)
+    pushed = np.abs(record["theta"] - record["theta_reference"])[after]
+    assert pushed.max() < 0.1
     after = record.time > found.events[1].time + 1.0
     assert np.abs(record["airspeed"] - record["airspeed_command"])[after].max() < 1.5
     assert found.reasons() == []
