@@ -126,7 +126,7 @@ class Watch:
         return "; ".join(parts)
 
     def _said(self) -> list[str]:
-        """What to do or, where a pilot flies, whether it may be relied on."""
+        """Return what to do or, where a pilot flies, whether it may be relied on."""
         if self.pilot is not None:
             return [f"lamp {self.lamp}"]
         return self.problems() or [self.identifier.next_to_fly()]
