@@ -298,6 +298,7 @@ class Circle:
         """Return the numbers for a program."""
         return {
             "phase": self.phase.name,
+            "doing": self.phase.value,
             "events": [event._asdict() for event in self.events],
             "designs": [
                 {

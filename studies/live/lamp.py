@@ -37,5 +37,7 @@ class Pilot(Protocol):
         ...
 
     def data(self) -> Mapping[str, Any]:
-        """Return the numbers for a program."""
+        """Return the numbers for a program: among them what it is `doing`, in words, and `events`,
+        each with `time` (s) and `what`.
+        """
         ...

@@ -25,6 +25,9 @@ BANDS = 2.0
 AT_MOST = 9
 """Airspeeds at which control powers are shown, at most."""
 
+EVENTS = 4
+"""Events of a pilot that are shown, the last ones."""
+
 Parts = Mapping[str, str]
 
 
@@ -101,10 +104,15 @@ def lamp(data: Mapping[str, Any]) -> str:
 
 
 def next_to_fly(watch: Watch, data: Mapping[str, Any]) -> str:
-    """Return what to do next: what keeps the stream from teaching, or what to fly."""
+    """Return what to do next: what keeps the stream from teaching, or what to fly; where a pilot
+    flies, what it is doing and what has happened.
+    """
     if not watch.received:
         return Markup("<p>waiting: nothing has come from {} yet</p>").format(data["source"])
     problems = watch.problems()
+    if (pilot := data.get("pilot")) is not None:
+        last = [f"{event['time']:.0f} s: {event['what']}" for event in pilot["events"][-EVENTS:]]
+        return Markup("<p>{}</p>").format(pilot["doing"]) + _list([*problems, *last])
     return _list(problems) if problems else Markup("<p>{}</p>").format(data["next"])
 
 

@@ -326,6 +326,32 @@ def test_the_parts_say_what_the_watch_knows():
     assert "0 of 6 airspeeds are covered" in found["coverage"]
 
 
+def test_a_pilot_says_what_it_does_and_what_has_happened():
+    """In place of what to fly next; the last events alone, as text."""
+
+    class Pilot:
+        alarm = None
+
+        def take(self, row):
+            return False
+
+        def reasons(self):
+            return ["<b>nobody</b> flies"]
+
+        def data(self):
+            events = [{"time": float(k), "what": f"event {k} <i>"} for k in range(9)]
+            return {"doing": "a controller & a flight", "events": events}
+
+    found = watch_of(50)
+    found.run(60.0, print)
+    found.pilot = Pilot()
+    shown = parts(found)
+    assert "a controller &amp; a flight" in shown["next"]
+    assert "8 s: event 8 &lt;i&gt;" in shown["next"]
+    assert "event 4" not in shown["next"]
+    assert "&lt;b&gt;nobody&lt;/b&gt; flies" in shown["lamp"]
+
+
 def test_the_lamp_is_that_of_the_watch():
     red = lamp({"lamp": {"green": False, "reasons": ["gusts & <noise>"]}, "alarm": "too fast"})
     assert 'class="lamp red"' in red
