@@ -24,6 +24,8 @@ HOLE = 5.0
 """Seconds without a sample after which rows begin anew instead of being unknown one by one."""
 LARGEST = 1e4
 """Value in SI beyond which a signal of a vehicle is taken for damage."""
+MOST_ROUNDED = 0.2
+"""The same of a clock in single precision, at most."""
 ROUNDING = 1e-6
 """Fraction of a period by which a time may miss a row's."""
 
@@ -126,6 +128,14 @@ class Stream:
             self._is(StreamState.COARSE_CLOCK if coarse else StreamState.GOOD)
         return rows
 
+    def _rounding(self, time: float) -> float:
+        """Return by how much, s, a time may miss a row's: both are rounded where the clock is in
+        single precision, and a row that waited for the next sample would be a sample late.
+        """
+        single = np.float32(time)
+        digits = float(np.spacing(single)) if float(single) == time else 0.0
+        return max(min(1.5 * digits, MOST_ROUNDED * self.dt), ROUNDING * self.dt)
+
     def _coarse(self, time: float) -> bool:
         """Whether a time is in single precision, with too few digits for the period."""
         single = np.float32(time)
@@ -146,9 +156,10 @@ class Stream:
     def _between(self, before: float, old: Array, time: float, new: Array) -> Iterator[Row]:
         """Yield the rows after one sample up to the next."""
         far = time - before > LONGEST_GAP * self.dt
-        while (at := self._start + self._next * self.dt) <= time + ROUNDING * self.dt:
+        near = self._rounding(time)
+        while (at := self._start + self._next * self.dt) <= time + near:
             part = min((at - before) / (time - before), 1.0)
-            if abs(part - 1.0) <= ROUNDING:
+            if abs(at - time) <= near:
                 values = new
             elif far:
                 values = np.full(len(new), math.nan)

@@ -40,6 +40,15 @@ def test_samples_at_even_times_are_rows_at_once():
     assert stream.state is StreamState.GOOD
 
 
+@pytest.mark.parametrize("begin", [0.36, 10.0, 312.0, 5000.0, 60000.0])
+def test_a_clock_in_single_precision_makes_no_row_late(begin):
+    """X-Plane's clock: each sample is a row at once, with its own values."""
+    stream = Stream(["x"], DT)
+    for k in range(round(begin / DT), round(begin / DT) + 300):
+        (row,) = stream.take(Sample(float(np.float32(DT * k)), {"x": k % 100}, "a"), DT * k)
+        assert row.values[0] == k % 100
+
+
 @settings(max_examples=200, deadline=None)
 @given(st.data())
 def test_a_row_is_the_truth_or_unknown_whatever_the_wire_does(data):
