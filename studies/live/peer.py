@@ -256,6 +256,9 @@ class OnTheWire:
     def _wait(self, due: float, at: float) -> None:
         left = due - self._clock()
         self.late += left < 0
+        if left < -self.dt / self.speed:  # time stands still: a burst would outrun every command
+            self._begun -= left
+            due -= left
         for k, line in enumerate(self.lines):
             last = k == len(self.lines) - 1
             sticks = line.wait(max(due - self._clock(), 0.0) if last else 0.0)

@@ -490,6 +490,37 @@ def test_a_flight_over_the_wire_is_identified(heli, tmp_path):
     assert "learnt" in said[-1]
 
 
+def test_a_vehicle_that_was_held_up_does_not_hurry_after():
+    """Its samples go on a period apart: a burst of them would outrun every command."""
+    now, waits = [0.0], []
+
+    class Known:
+        def send(self, at, values):
+            now[0] += 1.0 if round(at / 0.02) == 10 else 1e-3
+
+        def wait(self, timeout):
+            waits.append(timeout)
+            now[0] += timeout
+            return {}
+
+    class Level:
+        dt = 0.02
+
+        def init(self):
+            return None
+
+        def step(self, state, measured, reference, p):
+            return np.zeros(4), state
+
+    wire = OnTheWire(Level(), [Known()], np.ones(4), clock=lambda: now[0])
+    for _ in range(30):
+        wire.step(STATE, {}, {})
+    assert waits[9] == pytest.approx(0.019)
+    assert waits[10] == 0.0
+    assert waits[11:] == pytest.approx([0.019] * 19)
+    assert wire.late == 1
+
+
 @pytest.mark.slow
 def test_a_client_of_x_plane_by_other_hands_flies_the_vehicle():
     """pyxpudpserver, unchanged: it reads datarefs, sets a stick, and is forgotten when it quits."""
