@@ -22,6 +22,7 @@ from studies.live.identifier import STATES
 from studies.live.sample import STICKS
 from studies.live.stream import Row
 from symheli import FlightRecord
+from symheli.errors import SymheliError
 from symheli.flight import StepEvents, TableState
 from symheli.values.arrays import Array
 from symheli.values.kinematics import INPUTS
@@ -32,9 +33,14 @@ LEARN = 240.0
 MORE = 60.0
 """Seconds more after a model that was not fit."""
 LATE, TOO_LATE = 5, 25
-"""Commands of the last second that the vehicle did not have a sample later: so many are said, at so
-many the sticks are given back.
+"""Samples of the last second that were not known, or whose command the vehicle did not have a
+sample later: so many are said, at so many the sticks are given back.
 """
+LONGEST = 60.0
+"""Seconds from a row to the next beyond which the clock of the vehicle has jumped."""
+BLIND = 5
+"""Seconds in a row whose prediction is not known, at which a change would not be noticed."""
+LATER = "commands arrive later than a sample of {:g} s, or rows are unknown"
 SAME = 1e-4
 """Difference of a command and what is flown, as a part of its travel, that is rounding."""
 KEPT = 10.0
@@ -119,6 +125,7 @@ class Circle:
         self._future: Future[Designed | str] | None = None
         self._state: TableState | None = None
         self._alarm: VehicleAlarm | None = None
+        self._asked = 0
         self._switched = 0
         self._saturated = False
         self._sent: dict[int, Array] = {}
@@ -131,12 +138,16 @@ class Circle:
         return whether it is another vehicle from now on.
         """
         k = round(row.time / self._dt)
-        if k <= self._last:
+        if k == self._last:
             return False
+        before, self._last = self._last, k
+        if before >= 0 and not 0 < k - before <= LONGEST / self._dt:
+            self._give_back(k, "the clock of the vehicle has jumped")
         values = np.array(row.values)
         values[len(STATES) : len(STATES) + 4] *= self._travel
-        self._rows[k], self._last = values, k
+        self._rows[k] = values
         if self.phase is Phase.CONTROLLING:
+            self._late.extend([True] * (k - before - 1))
             self._look_at_delay(k, values)
         if self.phase is Phase.CONTROLLING:
             self._fly(k, values)
@@ -158,13 +169,17 @@ class Circle:
             self._sent = {k: sticks}
 
     def _look_at_delay(self, k: int, values: Array) -> None:
-        """Keep whether the vehicle flies what was commanded a sample ago, as the design has it."""
+        """Keep whether the vehicle flies what was commanded a sample ago, as the design has it; an
+        unknown row is flown by an old command.
+        """
         sent, flown = self._sent.get(k - 1), values[len(STATES) : len(STATES) + 4] / self._travel
-        if sent is not None and np.isfinite(flown).all():
+        if not np.isfinite(values[: len(STATES) + 4]).all():
+            self._late.append(True)
+        elif sent is not None:
             self._late.append(bool(np.abs(flown - np.clip(sent, -1, 1)).max() > SAME))
         if sum(self._late) >= TOO_LATE:
             self.alarm = None
-            self._give_back(k, f"commands arrive later than a sample of {self._dt:g} s")
+            self._give_back(k, LATER.format(self._dt))
 
     def _look_at_steps(self, k: int) -> None:
         """Keep what the commands do after the switch."""
@@ -190,9 +205,9 @@ class Circle:
         if self.phase is Phase.IDENTIFYING and flown >= self._enough:
             self._happens(k, "the flight is identified, a controller is designed beside it")
             self._future = self._executor.submit(self._make, self.record(), self.vehicle.name)
-            self.phase = Phase.DESIGNING
+            self.phase, self._asked = Phase.DESIGNING, k
         elif self.phase is Phase.DESIGNING and self._future is not None and self._future.done():
-            self._judge(k, self._future.result())
+            self._judge(k, _result(self._future))
         elif self.phase is Phase.CONTROLLING and self._alarm is not None:
             self.alarm = self._alarm.take(self.record(2.0 * HORIZON + 0.5))
             self._rows = {j: row for j, row in self._rows.items() if j > k - KEPT / self._dt}
@@ -207,10 +222,10 @@ class Circle:
             self._happens(k, f"not fit to fly, {MORE:g} s more are flown: {'; '.join(objections)}")
             return
         now = self._rows[k][len(STATES) : len(STATES) + 4]
-        if not np.isfinite(now).all():
+        if not self._is_still(k, found) or not np.isfinite(now).all():
             return  # at the next look
         self.designs.append(found)
-        self._alarm, self.alarm = VehicleAlarm(found.model, found.deviations), None
+        self.alarm = None
         self._state = found.table.init(command=now)
         self._switched = k
         before = [self._step(j) for j in range(k - round(AROUND / self._dt), k + 1)]
@@ -222,6 +237,19 @@ class Circle:
             f" to {found.table.rate:g} m/s^2, nu-gap bound {found.share:.2f} of the margin",
         )
         self._fly(k, self._rows[k])
+
+    def _is_still(self, k: int, found: Designed) -> bool:
+        """Whether the vehicle is the one that was identified. The flight since then is looked at a
+        second before the switch, which it would delay.
+        """
+        begun = self._alarm is not None
+        self._alarm = self._alarm or VehicleAlarm(found.model, found.deviations)
+        seconds = 1 if begun else round((k - self._asked) * self._dt / HORIZON)
+        self.alarm = self._alarm.take(self.record((seconds + 1) * HORIZON + 0.5), seconds)
+        seen = self._alarm.unknown < BLIND
+        if self.alarm is not None:
+            self._give_back(k, f"the vehicle has changed meanwhile ({self.alarm})")
+        return begun and seen and self.alarm is None
 
     def _give_back(self, k: int, why: str) -> None:
         """Leave the sticks to the vehicle's own autopilot, and begin to identify anew."""
@@ -267,7 +295,9 @@ class Circle:
         if abs(a) > design.table.rate * (1 + 1e-9):
             found.append(f"commanded acceleration {a:.2f} above {design.table.rate:g} m/s^2")
         if sum(self._late) >= LATE:
-            found.append(f"commands arrive later than a sample of {self._dt:g} s")
+            found.append(LATER.format(self._dt))
+        if self._alarm is not None and self._alarm.unknown >= BLIND:
+            found.append(f"no prediction of the last {self._alarm.unknown} s is known")
         if self._saturated:
             found.append("a command is at its limit")
         return found + design.objections
@@ -291,3 +321,11 @@ class Circle:
             ],
             "switches": [asdict(switch) for switch in self.switches],
         }
+
+
+def _result(future: Future[Designed | str]) -> Designed | str:
+    """Return the design, or in words why there is none."""
+    try:
+        return future.result()
+    except SymheliError as error:
+        return str(error)
