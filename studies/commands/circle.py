@@ -42,7 +42,6 @@ def run(arguments: argparse.Namespace) -> Output:
     from studies.processes import Processes
     from studies.setup.flights import TOP
 
-    out = _folder(arguments.out)
     vehicle = Vehicle(
         arguments.vehicle,
         arguments.duration,
@@ -52,6 +51,9 @@ def run(arguments: argparse.Namespace) -> Output:
         arguments.change,
     )
     plan = vehicle.plan(vehicle.helicopter)  # what cannot fly is refused here
+    if arguments.change is not None and arguments.change >= plan.schedule.duration:
+        raise InputError(f"--change: the flight ends at {plan.schedule.duration:.0f} s, before it")
+    out = _folder(arguments.out)
     identifier = LiveIdentifier(STICKS, 0.0, TOP, PERIOD)
     recorder = None if out is None else Recorder(out / "flight.csv", (*SIGNALS, *STICKS))
     with VehicleProcess(vehicle, arguments.speed) as process, Processes(1) as workers:
@@ -62,9 +64,8 @@ def run(arguments: argparse.Namespace) -> Output:
         progress(
             f"{vehicle.name} flies {plan.schedule.duration:.0f} s at {source.name}; Ctrl-C ends"
         )
-        watch.run(
-            (arguments.duration + 30.0) / arguments.speed, progress, over=lambda: process.over
-        )
+        seconds = plan.schedule.duration / arguments.speed + 30.0  # until a process flies
+        watch.run(seconds, progress, over=lambda: process.over)
         workers.end()
     if process.error is not None:
         raise SymheliError(str(process.error)) from process.error

@@ -11,7 +11,6 @@ from symheli.helicopter import Helicopter
 from symheli.values.arrays import Array
 from symheli.values.numbers import by_name
 
-
 NEVER = 2**53
 """Sample that no flight reaches."""
 

@@ -2,6 +2,7 @@
 back where the vehicle has changed.
 """
 
+import time
 from concurrent.futures import Future
 from dataclasses import replace
 
@@ -12,8 +13,9 @@ from circle_in_process import AtOnce, flown, judged, quick
 import symheli
 from studies.circle import alarm, circle
 from studies.circle.circle import Phase
-from studies.circle.vehicle import PERIOD, Vehicle
+from studies.circle.vehicle import PERIOD, Vehicle, VehicleProcess
 from studies.live.stream import Row
+from symheli.errors import InputError
 from symheli.values.kinematics import INPUTS
 from symheli.worker import ProcessEndedError
 
@@ -290,3 +292,40 @@ def test_a_vehicle_that_changes_while_it_is_designed_for_is_not_taken(heavier, d
     assert len(found.designs) == (heavier == 1.0)
     assert ("has changed meanwhile" in found.events[1].what) == (heavier != 1.0)
     assert "has changed" in found.reasons()[0] if found.alarm else heavier == 1.0
+
+
+def test_a_vehicle_whose_process_is_killed_is_an_error_and_one_that_is_left_is_none():
+    """It looked like the end of the flight."""
+    with VehicleProcess(SHORT) as process:
+        process._worker.kill()
+        until = time.monotonic() + 10.0
+        while not process.over and time.monotonic() < until:
+            time.sleep(0.01)
+    assert isinstance(process.error, ProcessEndedError)
+    with VehicleProcess(SHORT) as left:
+        pass
+    assert left.error is None
+
+
+@pytest.mark.parametrize("duration", [0.0, 1e6, 1e12, np.nan, np.inf])
+def test_a_flight_without_an_end_is_refused(duration):
+    """Its plan was made without a word, for hours."""
+    with pytest.raises(InputError, match="up to 36000 s"):
+        Vehicle(duration=duration)
+
+
+def test_the_schedule_is_the_shortest_that_lasts():
+    for duration in (0.1, 30.0, 601.3, 36_000.0):
+        found = Vehicle(duration=duration).schedule
+        less = (
+            replace(
+                found,
+                targets=found.targets[:-1],
+                accelerations=found.accelerations[:-1],
+                holds=found.holds[:-1],
+            )
+            if len(found.targets) > 1
+            else None
+        )
+        assert found.duration >= duration
+        assert less is None or less.duration < duration
