@@ -31,6 +31,7 @@ static const char *model_step(model *m, double *real, int *whole, double step)
 {
     rls_real given[INNOVATION], theta[COEFFICIENTS];
     const rls_real *innovation = rls_innovation(&config, m->work);
+    if (step > 1e7 * PERIOD) return "the step is too long";
     for (int i = 0; i < INNOVATION; i++) given[i] = (rls_real)real[i];
     for (; m->start + m->samples * PERIOD < real[0] + step - 1e-6 * PERIOD; m->samples++)
         whole[0] = rls_update(&config, m->state, m->work, given + Y, given + U, given + P);

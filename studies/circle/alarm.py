@@ -45,13 +45,21 @@ class VehicleAlarm:
     def __init__(self, model: KinematicModel, deviations: Array):
         self.model, self.deviations = model, deviations
         self.sums = np.zeros((2, len(STATES)))
+        self.unknown = 0
+        """Looks since the last one at a second that was known."""
 
-    def take(self, record: FlightRecord) -> str | None:
-        """Look at the last second of the last rows of a flight; return what has changed, None while
-        nothing has. Unknown samples say nothing.
+    def take(self, record: FlightRecord, seconds: int = 1) -> str | None:
+        """Look at the last seconds of a flight, one after the other; return what has changed, None
+        while nothing has. Unknown samples say nothing.
         """
-        error = errors(self.model, record)[-1]
+        every = round(HORIZON / record.dt)
+        looks = errors(self.model, record)[::-every][:seconds][::-1]
+        return next(filter(None, map(self._look, looks)), None)
+
+    def _look(self, error: Array) -> str | None:
+        self.unknown += 1
         if np.isfinite(error).all():
+            self.unknown = 0
             z = error / self.deviations
             self.sums = np.maximum(self.sums + np.array([z, -z]) - ALLOWED, 0.0)
         if self.sums.max() < THRESHOLD:

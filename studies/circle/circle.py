@@ -22,6 +22,7 @@ from studies.live.identifier import STATES
 from studies.live.sample import EXCITATION, STICKS
 from studies.live.stream import Row
 from symheli import FlightRecord
+from symheli.errors import SymheliError
 from symheli.flight import HypothesisEvents, HypothesisMonitor, TableState
 from symheli.values.arrays import Array
 from symheli.values.kinematics import INPUTS
@@ -32,9 +33,11 @@ LEARN = 240.0
 MORE = 60.0
 """Seconds more after a model that was not fit."""
 LATE, TOO_LATE = 5, 25
-"""Commands of the last second that the vehicle did not have a sample later: so many are said, at so
-many the sticks are given back.
+"""Samples of the last second that were not known, or whose command came late: so many put the lamp
+out, at so many that came later than `TOLERATED` the sticks are given back.
 """
+TOLERATED = 2
+"""Samples from a command to the vehicle that a flight goes on with; one is what is certified."""
 HYPOTHESES = {
     HypothesisEvents.RANGE: "the commanded airspeed is outside what is proven",
     HypothesisEvents.RATE: "the commanded airspeed changes faster than is proven",
@@ -45,6 +48,11 @@ HYPOTHESES = {
 }
 COMMAND_ERROR = 1e-3
 """Rounding of a commanded airspeed, m/s."""
+LONGEST = 60.0
+"""Seconds from a row to the next beyond which the clock of the vehicle has jumped."""
+BLIND = 5
+"""Seconds in a row whose prediction is not known, at which a change would not be noticed."""
+LATER = "commands arrive later than a sample of {:g} s, or rows are unknown"
 SAME = 1e-4
 """Difference of a command and what is flown, as a part of its travel, that is rounding."""
 KEPT = 10.0
@@ -132,10 +140,11 @@ class Circle:
         self._future: Future[Designed | str] | None = None
         self._state: TableState | None = None
         self._alarm: VehicleAlarm | None = None
+        self._asked = 0
         self._switched = 0
         self._events = HypothesisEvents.UNKNOWN
         self._sent: dict[int, Array] = {}
-        self._late: deque[bool] = deque(maxlen=round(1.0 / self._dt))
+        self._lags: deque[float] = deque(maxlen=round(1.0 / self._dt))
 
     # --- row by row -------------------------------------------------------------------------------
 
@@ -144,16 +153,19 @@ class Circle:
         return whether it is another vehicle from now on.
         """
         k = round(row.time / self._dt)
-        if k <= self._last:
+        if k == self._last:
             return False
+        before, self._last = self._last, k
+        if before >= 0 and not 0 < k - before <= LONGEST / self._dt:
+            self._give_back(k, "the clock of the vehicle has jumped")
         values = np.array(row.values)
         values[len(STATES) : len(STATES) + 4] *= self._travel
-        elapsed = (k - self._last) * self._dt
-        self._rows[k], self._last = values, k
+        self._rows[k] = values
         if self.phase is Phase.CONTROLLING:
+            self._lags.extend([math.inf] * (k - before - 1))
             self._look_at_delay(k, values)
         if self.phase is Phase.CONTROLLING:
-            self._fly(k, values, elapsed)
+            self._fly(k, values, (k - before) * self._dt)
             self._look_at_steps(k)
         if k % round(HORIZON / self._dt) == 0:
             self._look(k)
@@ -171,21 +183,32 @@ class Circle:
         if np.isfinite(command).all():
             sticks = command / self._travel
             self._source.command(dict(zip(STICKS, sticks.tolist(), strict=True)))
-            self._sent = {k: sticks}
+            self._sent = {j: u for j, u in self._sent.items() if j > k - TOLERATED} | {k: sticks}
 
     def _look_at_delay(self, k: int, values: Array) -> None:
-        """Keep whether the vehicle flies what was commanded a sample ago, as the design has it."""
-        sent, flown = self._sent.get(k - 1), values[len(STATES) : len(STATES) + 4] / self._travel
-        if sent is not None and np.isfinite(flown).all():
-            self._late.append(bool(np.abs(flown - np.clip(sent, -1, 1)).max() > SAME))
-        if sum(self._late) >= TOO_LATE:
+        """Keep whether the vehicle flies what was commanded a sample ago, as the design has it; an
+        unknown row is flown by an old command.
+        """
+        flown = values[len(STATES) : len(STATES) + 4] / self._travel
+        if not np.isfinite(values[: len(STATES) + 4]).all():
+            self._lags.append(math.inf)
+        elif self._sent:
+            self._lags.append(self._lag(k, flown))
+        if sum(lag > TOLERATED for lag in self._lags) >= TOO_LATE:
             self.alarm = None
-            self._give_back(k, f"commands arrive later than a sample of {self._dt:g} s")
+            self._give_back(k, LATER.format(self._dt))
+
+    def _lag(self, k: int, flown: Array) -> float:
+        """Samples since the command that is flown was computed; inf of an older one."""
+        for j in sorted(self._sent, reverse=True):
+            if np.abs(flown - np.clip(self._sent[j], -1, 1)).max() <= SAME:
+                return max(k - j, 1)
+        return math.inf
 
     def _look_at_steps(self, k: int) -> None:
         """Keep what the commands do after the switch."""
         last, step = self.switches[-1], self._step(k)
-        if math.isnan(last.at) and self._late and not self._late[-1]:
+        if math.isnan(last.at) and self._lags and math.isfinite(self._lags[-1]):
             last.at = step  # the first command that is flown
         elif math.isfinite(last.at + step) and k - self._switched <= AROUND / self._dt:
             last.after = max(last.after, step)
@@ -206,9 +229,9 @@ class Circle:
         if self.phase is Phase.IDENTIFYING and flown >= self._enough:
             self._happens(k, "the flight is identified, a controller is designed beside it")
             self._future = self._executor.submit(self._make, self.record(), self.vehicle.name)
-            self.phase = Phase.DESIGNING
+            self.phase, self._asked = Phase.DESIGNING, k
         elif self.phase is Phase.DESIGNING and self._future is not None and self._future.done():
-            self._judge(k, self._future.result())
+            self._judge(k, _result(self._future))
         elif self.phase is Phase.SETTLING:
             self._source.command({EXCITATION: 0.0})  # again: one may have been lost
             if k >= self._switched:
@@ -233,10 +256,10 @@ class Circle:
     def _switch(self, k: int) -> None:
         """Take the sticks, beginning at the commands in force."""
         found, now = self._ready, self._rows[k][len(STATES) : len(STATES) + 4]
-        if not np.isfinite(now).all():
+        if not np.isfinite(now).all() or not self._is_still(k, found):
             return  # at the next look
         self.designs.append(found)
-        self._alarm, self.alarm = VehicleAlarm(found.model, found.deviations), None
+        self.alarm = None
         self._state = found.table.init(command=now)
         self._monitor = HypothesisMonitor.of(found.table, found.proven, noise=COMMAND_ERROR)
         self._monitored = self._monitor.init()
@@ -251,13 +274,26 @@ class Circle:
         )
         self._fly(k, self._rows[k], self._dt)
 
+    def _is_still(self, k: int, found: Designed) -> bool:
+        """Whether the vehicle is the one that was identified. The flight since then is looked at a
+        second before the switch, which it would delay.
+        """
+        begun = self._alarm is not None
+        self._alarm = self._alarm or VehicleAlarm(found.model, found.deviations)
+        seconds = 1 if begun else round((k - self._asked) * self._dt / HORIZON)
+        self.alarm = self._alarm.take(self.record((seconds + 1) * HORIZON + 0.5), seconds)
+        seen = self._alarm.unknown < BLIND
+        if self.alarm is not None:
+            self._give_back(k, f"the vehicle has changed meanwhile ({self.alarm})")
+        return begun and seen and self.alarm is None
+
     def _give_back(self, k: int, why: str) -> None:
         """Leave the sticks to the vehicle's own autopilot, and begin to identify anew."""
         self._happens(k, f"{why}: its own autopilot has the sticks")
         self.phase, self._enough = Phase.IDENTIFYING, LEARN
         self._rows, self._state, self._alarm = {}, None, None
         self._sent = {}
-        self._late.clear()
+        self._lags.clear()
         self._source.command({EXCITATION: 1.0})
 
     def _happens(self, k: int, what: str) -> None:
@@ -290,8 +326,10 @@ class Circle:
             return [f"no controller flies yet: {self.phase.value}"]
         design = self.designs[-1]
         found = [words for event, words in HYPOTHESES.items() if event in self._events]
-        if sum(self._late) >= LATE:
-            found.append(f"commands arrive later than a sample of {self._dt:g} s")
+        if sum(lag > 1 for lag in self._lags) >= LATE:
+            found.append(LATER.format(self._dt))
+        if self._alarm is not None and self._alarm.unknown >= BLIND:
+            found.append(f"no prediction of the last {self._alarm.unknown} s is known")
         return found + design.objections
 
     def data(self) -> Mapping[str, Any]:
@@ -314,3 +352,11 @@ class Circle:
             ],
             "switches": [asdict(switch) for switch in self.switches],
         }
+
+
+def _result(future: Future[Designed | str]) -> Designed | str:
+    """Return the design, or in words why there is none."""
+    try:
+        return future.result()
+    except SymheliError as error:
+        return str(error)

@@ -4,8 +4,10 @@ flies, in a process of its own.
 
 from __future__ import annotations
 
+import math
 import socket
 import threading
+from bisect import bisect_left
 from dataclasses import dataclass, field
 from types import TracebackType
 
@@ -15,6 +17,7 @@ import symheli
 from studies.known_kinematics.flights import AMPLITUDE, HOLD, LINES, TARGETS
 from studies.setup.flights import TOP
 from symheli import AirspeedSchedule, Excitation, FlightPlan, Helicopter, Sensor
+from symheli.errors import InputError
 from symheli.flight import ParameterChange, gain_scheduled_lqr
 from symheli.flight.course import Clock
 from symheli.values.arrays import Array
@@ -27,6 +30,8 @@ RAMPS = (1.5, 3.0, 2.0, 2.5)
 """Peak accelerations, m/s^2, in turn: none above the rate that is certified."""
 HOVER = 10.0
 """Time in each hover, s: the slowest modes are there."""
+LONGEST = 36_000.0
+"""Longest flight, s: every sample of its plan is known before it."""
 NOISE = {
     **dict.fromkeys(("u", "v", "w"), 0.1),
     **dict.fromkeys(("p", "q", "r"), 0.01),
@@ -49,6 +54,12 @@ class Vehicle:
     heavier: float = 1.0
     change_at: float | None = None
 
+    def __post_init__(self) -> None:
+        if not 0 < self.duration <= LONGEST:
+            raise InputError(
+                f"duration: expected a flight of up to {LONGEST:g} s, got {self.duration:g}"
+            )
+
     @property
     def helicopter(self) -> Helicopter:
         """Equations, with the rotor speed held."""
@@ -57,10 +68,13 @@ class Vehicle:
     @property
     def schedule(self) -> AirspeedSchedule:
         """Its commanded airspeeds: the targets of the identification flights again and again."""
-        chosen: list[float] = []
-        while not chosen or _schedule(chosen).duration < self.duration:
-            chosen.append(TARGETS[len(chosen) % len(TARGETS)])
-        return _schedule(chosen)
+
+        def targets(count: int) -> list[float]:
+            return [TARGETS[k % len(TARGETS)] for k in range(count)]
+
+        counts = range(1, math.ceil(self.duration / min(HOVER, HOLD)) + 2)
+        least = bisect_left(counts, self.duration, key=lambda n: _schedule(targets(n)).duration)
+        return _schedule(targets(counts[least]))
 
     def plan(self, heli: Helicopter) -> FlightPlan:
         """The whole flight, as long as nobody takes the controls."""
@@ -123,6 +137,7 @@ class VehicleProcess:
     error: Exception | None = None
     over: bool = False
     _worker: Worker = field(default_factory=Worker)
+    _left: bool = False
 
     def __enter__(self) -> VehicleProcess:
         self.port = self.port or free_port()
@@ -132,10 +147,9 @@ class VehicleProcess:
     def _flown(self) -> None:
         try:
             self._worker(pickled(fly, self.vehicle, self.port, self.speed))
-        except ProcessEndedError:
-            pass  # it was left
         except Exception as error:
-            self.error = error
+            if not (self._left and isinstance(error, ProcessEndedError)):
+                self.error = error
         self.over = True
 
     def __exit__(
@@ -144,6 +158,7 @@ class VehicleProcess:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        self._left = True
         self._worker.__exit__(kind, error, trace)
 
 

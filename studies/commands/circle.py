@@ -43,7 +43,6 @@ def run(arguments: argparse.Namespace) -> Output:
     from studies.processes import Processes
     from studies.setup.flights import TOP
 
-    out = _folder(arguments.out)
     vehicle = Vehicle(
         arguments.vehicle,
         arguments.duration,
@@ -53,14 +52,17 @@ def run(arguments: argparse.Namespace) -> Output:
         arguments.change,
     )
     plan = vehicle.plan(vehicle.helicopter)  # what cannot fly is refused here
+    if arguments.change is not None and arguments.change >= plan.schedule.duration:
+        raise InputError(f"--change: the flight ends at {plan.schedule.duration:.0f} s, before it")
+    out = _folder(arguments.out)
     identifier = LiveIdentifier(STICKS, 0.0, TOP, PERIOD)
     recorder = None if out is None else Recorder(out / "flight.csv", (*SIGNALS, *STICKS))
     with VehicleProcess(vehicle, arguments.speed) as process, Processes(1) as workers:
         source = XPlaneSource(port=process.port)
         pilot = Circle(vehicle, source, workers, progress)
         stream = Stream(identifier.signals, PERIOD)
-        longest = (arguments.duration + 30.0) / arguments.speed
         seconds = plan.schedule.duration
+        longest = seconds / arguments.speed + 30.0  # until a process flies
         progress(f"{vehicle.name} flies {seconds:.0f} s at {source.name}; Ctrl-C ends")
         with options.on_page(arguments.page, identifier, source, vehicle.name) as looks:
             watch = Watch(source, identifier, stream, recorder, pilot, looks=looks)

@@ -84,6 +84,8 @@ class Watch:
             self.source.close()
             if self.recorder is not None:
                 self.recorder.close()
+                if self.recorder.problem:
+                    say(f"RECORD: {self.recorder.path} is not whole: {self.recorder.problem}")
 
     def _interrupted(self, *_: Any) -> None:
         """End at the next look at the clock; a second Ctrl-C does not wait for it."""

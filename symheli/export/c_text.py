@@ -94,11 +94,11 @@ def _wrapped(words: Iterable[str], indent: str) -> str:
     closes the last.
     """
     lines = textwrap.wrap(
-        ", ".join(words),
+        ", ".join(word.replace(" ", "\0") for word in words),
         WIDTH - 3,
         initial_indent=indent,
         subsequent_indent=indent,
         break_long_words=False,
         break_on_hyphens=False,
     )
-    return "\n".join(lines)
+    return "\n".join(lines).replace("\0", " ")

@@ -189,6 +189,8 @@ EXPORTED fmi3Status NAMED(fmi3DoStep)(fmi3Instance given, double now, double ste
         return told(i, fmi3Error, "the step does not begin where the one before ended", "");
     if (!(step > 0 && isfinite(step)))
         return told(i, fmi3Error, "the step is no positive number of seconds", "");
+    if (!(now + step > now))
+        return told(i, fmi3Error, "the step is too short for a time so large", "");
     if (result(i, model_step(&i->now.own, i->now.real, i->now.whole, step)) != fmi3OK)
         return fmi3Error;
     *reached = *time = now + step;
@@ -201,12 +203,22 @@ EXPORTED fmi3Status NAMED(fmi3GetFloat64)(fmi3Instance given, const fmi3Referenc
                                           size_t count, double *values, size_t room)
 {
     instance *i = given;
+    const double *from;
+    memory begun;
     EXPECT(INSTANTIATED, FAILED, "fmi3GetFloat64");
+    from = i->now.real;
+    if (i->now.mode == INITIALIZING) { /* outputs of what is set by now; nothing is kept */
+        const char *wrong;
+        begun = i->now;
+        if ((wrong = model_begin(&begun.own, begun.real, begun.whole)))
+            return told(i, fmi3Error, wrong, "fmi3GetFloat64: ");
+        from = begun.real;
+    }
     if (room < count) return told(i, fmi3Error, "fmi3GetFloat64: too few values", "");
     for (size_t k = 0; k < count; k++) {
         if (which[k] >= N_REAL)
             return told(i, fmi3Error, "fmi3GetFloat64: no such value reference", "");
-        values[k] = i->now.real[which[k]];
+        values[k] = from[which[k]];
     }
     return fmi3OK;
 }

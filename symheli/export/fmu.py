@@ -8,6 +8,7 @@ import hashlib
 import io
 import os
 import platform
+import re
 import subprocess
 import tempfile
 import zipfile
@@ -37,6 +38,9 @@ PLATFORMS = {
 }
 """Folder and suffix of a library, by system and processor, as FMI 3.0 names them."""
 
+NOT_XML = "[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"
+"""A character that no XML document may have."""
+
 Kind = Literal["output", "input", "state", "whole"]
 
 
@@ -60,7 +64,7 @@ class Fmu:
 
     `source` is the model around the interface, with a marked place for its variables; `parts` are
     the files that it includes or calls, by name. Raises `InputError` for a name that is no C
-    identifier and for two variables of one name.
+    identifier, two variables of one name, and a name that cannot be printed or has " or \\ in it.
     """
 
     name: str
@@ -73,7 +77,9 @@ class Fmu:
 
     def __post_init__(self) -> None:
         require_identifier(self.name)
-        signals(v.signal for v in self.variables)
+        for name in signals(["time", *(v.signal for v in self.variables)]):
+            if not name.isprintable() or set(name) & set('"\\'):
+                raise InputError(f"signal {name!r}: an FMU needs a name without such characters")
         if any(v.kind == "whole" for v in self.variables[: len(self._reals)]):
             raise ValueError("whole numbers come last: their references follow those of the others")
 
@@ -149,10 +155,11 @@ class Fmu:
     @property
     def _description(self) -> str:
         units = sorted({v.signal.unit for v in self.variables} - {"1"})
+        about = re.sub(NOT_XML, "?", self.about)
         lines = [
             '<?xml version="1.0" encoding="UTF-8"?>',
             f'<fmiModelDescription fmiVersion="3.0" modelName={quoteattr(self.name)}'
-            f" instantiationToken={quoteattr(self._token)} description={quoteattr(self.about)}"
+            f" instantiationToken={quoteattr(self._token)} description={quoteattr(about)}"
             ' generationTool="symheli" variableNamingConvention="flat">',
             f"  <CoSimulation modelIdentifier={quoteattr(self.name)}"
             ' canHandleVariableCommunicationStepSize="true" canGetAndSetFMUState="true"/>',

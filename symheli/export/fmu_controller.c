@@ -29,6 +29,7 @@ static const char *model_begin(model *m, double *real, int *whole)
 static const char *model_step(model *m, double *real, int *whole, double step)
 {
     float given[PARAMETER + 1], command[CONTROLLER_NY];
+    if (step > 1e7 * PERIOD) return "the step is too long";
     for (int i = MEASURED; i <= PARAMETER; i++) given[i] = (float)real[i];
     for (; m->start + m->samples * PERIOD < real[0] + step - 1e-6 * PERIOD; m->samples++) {
         whole[0] = controller_update(&m->state, given + MEASURED, given + REFERENCE,

@@ -15,11 +15,11 @@ from numpy.typing import ArrayLike
 
 from symheli.errors import InputError
 from symheli.flight.single_precision import MAX_NUMBER, NUMBER, checked_numbers, inward
-from symheli.flight.table_controller import TableController
+from symheli.flight.table_controller import TableController, checked_limits
 from symheli.lpv.scheduling import Scheduling
 from symheli.values.arrays import Array
 from symheli.values.numbers import finite
-from symheli.values.signal import Signal, indices, signals
+from symheli.values.signal import Signal, signals
 from symheli.values.summary import summarized
 
 ROUNDING = 4
@@ -113,7 +113,8 @@ class HypothesisMonitor:
     Raises
     ------
     InputError
-        For a rate that is another parameter, and times, noise or jitter that are not positive.
+        For a rate that is another parameter, a range beyond 32 bits, limits that are not low <
+        high, and times, noise or jitter that are not positive.
 
     See Also
     --------
@@ -145,7 +146,7 @@ class HypothesisMonitor:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "outputs", signals(self.outputs or tuple(self.limits)))
-        indices(tuple(self.limits), self.outputs, "command with a limit")
+        object.__setattr__(self, "limits", checked_limits(self.limits, self.outputs))
         for name in ("dt", "window", "noise", "jitter"):
             finite(getattr(self, name), name)
         if isinstance(self.scheduling.rate, str):
@@ -157,8 +158,16 @@ class HypothesisMonitor:
             raise InputError("dt and window: expected positive seconds, and noise >= 0")
         if not 0 < self.jitter < 1:
             raise InputError(f"jitter: expected a fraction within (0, 1), got {self.jitter:g}")
-        if self.samples > MAX_WINDOW:
-            raise InputError(f"window: expected {MAX_WINDOW} samples at most, got {self.samples}")
+        if not self.window / self.dt <= MAX_WINDOW:
+            raise InputError(
+                f"window: expected {MAX_WINDOW} samples at most, got {self.window / self.dt:g}"
+            )
+        largest = max(abs(self.scheduling.low), abs(self.scheduling.high))
+        if not largest < 0.1 * float(MAX_NUMBER):
+            raise InputError(
+                f"scheduling {self.scheduling.name}: its range ends at {largest:g}, too large for"
+                " numbers of 32 bits: give it in another unit"
+            )
 
     @classmethod
     def of(
@@ -254,8 +263,9 @@ class HypothesisMonitor:
         valid : bool
             Whether who read the parameter trusts it.
         """
-        n, p, dt = self.numbers, NUMBER(parameter), NUMBER(elapsed)
-        u = checked_numbers("command", command, len(self.outputs))
+        with np.errstate(over="ignore"):  # infinity is handled below
+            n, p, dt = self.numbers, NUMBER(parameter), NUMBER(elapsed)
+            u = checked_numbers("command", command, len(self.outputs))
         events, filled = HypothesisEvents.MET, state.filled
         known = bool(valid and np.isfinite(p))
         kept = bool(n["shortest"] <= dt <= n["longest"])

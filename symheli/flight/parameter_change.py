@@ -11,6 +11,9 @@ from symheli.helicopter import Helicopter
 from symheli.values.arrays import Array
 from symheli.values.numbers import by_name
 
+NEVER = 2**53
+"""Sample that no flight reaches."""
+
 
 @dataclass(frozen=True)
 class ParameterChange:
@@ -49,10 +52,16 @@ class ParameterChange:
 
     def of(self, heli: Helicopter) -> Array:
         """Return all parameters (NP,) after it; raises `InputError` for names and values that the
-        helicopter cannot have.
+        helicopter cannot have, and for a travel of its controls, which stays in flight.
         """
-        return heli.with_parameters(self.values).parameters.array
+        after = heli.with_parameters(self.values)
+        if (after.travel != heli.travel).any():
+            raise InputError(
+                "values: the travel of controls cannot change in flight; fly a helicopter"
+                " .with_parameters(...) for that"
+            )
+        return after.parameters.array
 
     def sample(self, dt: float) -> int:
         """Return the sample of a controller with this period (s) from which it holds."""
-        return math.ceil(self.at / dt - 1e-9)
+        return math.ceil(min(self.at / dt, NEVER) - 1e-9)

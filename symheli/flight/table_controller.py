@@ -173,7 +173,7 @@ class TableController:
             raise InputError(f"misfit: expected a number >= 0, got {self.misfit}")
         if self.follow not in get_args(Follow):
             raise UnknownNameError("way to schedule", self.follow, get_args(Follow))
-        object.__setattr__(self, "limits", _limits(self.limits, self.outputs))
+        object.__setattr__(self, "limits", checked_limits(self.limits, self.outputs))
         self.init()  # what its numbers do not allow is refused here
 
     @classmethod
@@ -526,7 +526,8 @@ class TableController:
         return int(max(min(math.floor(min(seconds / self.dt, MAX_COUNT) + 1e-9), MAX_COUNT), least))
 
 
-def _limits(given: object, outputs: Sequence[Signal]) -> Mapping[str, tuple[float, float]]:
+def checked_limits(given: object, outputs: Sequence[Signal]) -> Mapping[str, tuple[float, float]]:
+    """Return the ends of each output; raise `InputError` unless they are low < high."""
     if not isinstance(given, Mapping):
         raise InputError(f"limits: expected {{output: (low, high)}} in its unit, got {given!r:.80}")
     out = {}

@@ -4,6 +4,7 @@ import shutil
 import subprocess
 import zipfile
 from itertools import pairwise
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from studies.cli import main
 from symheli.codegen.compile import compiler
 from symheli.errors import InputError
 from symheli.export import write_controller_fmu, write_helicopter_fmu
-from symheli.export.fmu import Fmu, Variable
+from symheli.export.fmu import HERE, Fmu, Variable
 from symheli.flight.course import Clock, Course
 from symheli.values import Signal
 
@@ -246,6 +247,24 @@ def test_an_identifier_learns_what_python_learns(rls, opened):
     assert np.abs(slave.get(*names)).max() > 0.01
 
 
+@needs_compiler
+def test_outputs_before_the_start_are_those_of_what_is_set_by_then(opened):
+    """A master that initializes a loop reads them; they were zero, or of the values before."""
+    slave, half = opened("helicopter"), 0.2
+    slave.fmu.enterInitializationMode()
+    slave.set(q0=np.cos(half), u=5.0, w_n=-1.0)
+    slave.get("u")  # in between
+    slave.set(q2=np.sin(half))
+    before = slave.get("theta", "airspeed", "q2")
+    np.testing.assert_allclose(before[0], 2 * half, atol=0.01)  # q1 and q3 are those of hover
+    slave.fmu.exitInitializationMode()
+    np.testing.assert_array_equal(slave.get("theta", "airspeed", "q2"), before)
+    pilot = opened("controller")
+    pilot.fmu.enterInitializationMode()
+    pilot.set(trim_d_lon=0.1)
+    assert pilot.get("d_lon") == 0.1
+
+
 # --- what is refused ------------------------------------------------------------------------------
 
 
@@ -276,6 +295,17 @@ def test_what_is_wrong_is_an_error_with_a_message(opened, kind):
     slave.fmu.terminate()
     with pytest.raises(fmpy.fmi1.FMICallException):
         slave.step(DT, DT)
+
+
+@needs_compiler
+@pytest.mark.parametrize("kind", ["helicopter", "controller", "identifier"])
+def test_a_step_of_years_and_a_time_beyond_all_digits_are_errors(opened, kind):
+    """Instead of a call that never returns, and of a time that stands still."""
+    for start, step, message in ((0.0, 1e9, "too long"), (1e17, DT, "too short for a time")):
+        slave = opened(kind).started(start)
+        with pytest.raises(fmpy.fmi1.FMICallException):
+            slave.step(start, step)
+        assert message in slave.said[-1]
 
 
 @needs_compiler
@@ -398,6 +428,36 @@ def test_what_cannot_be_written_is_refused(ideal, tmp_path):
     with pytest.raises(InputError, match=r"\ba\b"):
         Fmu("a", "", twice, tmp_path / "x.c", {}, {}, 0.02)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("odd", ['q"', "q\\", "q\n", "q\x01"])
+def test_names_that_c_and_xml_cannot_have_are_refused(odd, tmp_path):
+    with pytest.raises(InputError, match="an FMU needs a name without"):
+        write_controller_fmu(_of_zeros((odd, "p"), "d_lat"), tmp_path / "c.fmu")
+    variables = [Variable(Signal("time"), "output")]
+    with pytest.raises(InputError, match="repeated: time"):
+        Fmu("odd", "", variables, tmp_path / "none.c", {}, {}, DT)
+
+
+def test_names_with_spaces_stay_whole():
+    """A line that ended within a name did not compile."""
+    for width in range(8, 100):
+        variables = [Variable(Signal(name), "input") for name in ("m" * width, "d lat")]
+        files = Fmu("spaces", "", variables, HERE / "fmu_controller.c", {}, {}, DT).files
+        assert '"d lat"' in files["sources/fmu.c"]
+
+
+def _of_zeros(inputs, output):
+    matrices = np.zeros((2, 1, 1 + len(inputs)))
+    return symheli.TableController((0.0, 13.0), matrices, (), inputs, (output,), DT)
+
+
+def test_a_title_with_any_characters_is_valid_xml():
+    about = 'A & B <"x"> \x01 \ufffe \ud800 \n'
+    variables = [Variable(Signal("p", 'rad/s "&<'), "input")]
+    files = Fmu("odd", about, variables, HERE / "fmu_controller.c", {}, {}, DT).files
+    found = ElementTree.fromstring(files["modelDescription.xml"])
+    assert found.get("description") == 'A & B <"x"> ? ? ? \n'
 
 
 @pytest.mark.slow

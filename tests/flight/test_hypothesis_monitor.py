@@ -264,3 +264,19 @@ def test_the_command_takes_range_and_rate_from_a_certificate(tmp_path, capsys):
     assert main([*words, "--certificate", str(tmp_path / "c.json")]) == 1
     assert main(["export", "monitor"]) == 1
     assert "name the controller" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("ends", [(np.nan, np.nan), (np.nan, 0.2), (0.2, -0.2), (1,), ("x", 2)])
+def test_limits_that_no_command_can_reach_are_refused(ends):
+    """Not a number as an end was never reached: green whatever was commanded."""
+    with pytest.raises(InputError, match=r"limits\['d_lon'\]: expected \(low, high\)"):
+        HypothesisMonitor(SPEED, DT, {"d_lon": ends})
+
+
+def test_what_32_bits_cannot_hold_is_refused_or_infinite():
+    with pytest.raises(InputError, match="in another unit"):
+        monitor(symheli.Scheduling("airspeed", "m/s", 0.0, 1e39, 3.0))
+    with pytest.raises(InputError, match="samples at most"):
+        HypothesisMonitor(SPEED, 1e-300, LIMITS, window=1e300)
+    said = flown(monitor(), np.append(steady(20), 1e300), commands=np.full((21, 3), 0.05))
+    assert Events.MISSING in said[20]

@@ -98,3 +98,17 @@ def test_parameters_that_the_helicopter_has_not_are_refused(heli):
         symheli.fly(heli, HOVER, change=ParameterChange(1.0, {"body.mas": 9.0}))
     with pytest.raises(InputError, match="change: expected a ParameterChange"):
         symheli.fly(heli, HOVER, change={"body.mass": 9.0})
+
+
+def test_the_travel_of_controls_cannot_change(heli, autopilot):
+    """It had no effect, without a word."""
+    plan = FlightPlan(HOVER, controller=autopilot)
+    with pytest.raises(InputError, match="travel of controls cannot change in flight"):
+        symheli.fly(heli, plan, change=ParameterChange(1.0, {"controls.d_col": 0.01}))
+
+
+@pytest.mark.parametrize("at", [1e6, 2.0**32 * 0.02 + 1.0, 1e300])
+def test_a_change_after_the_flight_is_none(heli, autopilot, at):
+    plan = FlightPlan(HOVER, controller=autopilot)
+    changed = symheli.fly(heli, plan, change=ParameterChange(at, HEAVIER))
+    np.testing.assert_array_equal(changed.values, symheli.fly(heli, plan).values)

@@ -115,3 +115,11 @@ def test_a_process_that_cannot_fly_says_why():
         while not process.over and time.monotonic() < end:
             time.sleep(0.05)
     assert "port 70000" in str(process.error)
+
+
+def test_a_change_after_the_flight_is_refused(tmp_path, capsys):
+    """Nothing would change; no folder is made."""
+    words = ["circle", "--duration", "20", "--change", "60", "--out", str(tmp_path / "out")]
+    assert cli.main(words) == 1
+    assert "--change: the flight ends at" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

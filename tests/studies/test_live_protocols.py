@@ -18,10 +18,12 @@ import pytest
 import symheli
 from studies.live import mavlink, peer, xplane
 from studies.live.earth import earth_velocity
+from studies.live.identifier import LiveIdentifier
 from studies.live.peer import MavlinkLine, OnTheWire, XPlaneLine
 from studies.live.recorder import Recorder
 from studies.live.sample import STICKS, Sample
 from studies.live.stream import Stream
+from studies.live.watch import Watch
 from studies.live.xplane import XPlaneSource
 from symheli import FlightRecord
 from symheli.errors import InputError
@@ -439,6 +441,28 @@ def test_a_full_disk_loses_nothing(tmp_path):
     assert lines[1:] == [*(f"{float(k)},1.0" for k in range(10)), "10.0,"]
 
 
+def test_a_record_that_is_not_whole_at_the_end_is_said(tmp_path):
+    """What waited for the disk is lost then."""
+    said = []
+
+    class Three:
+        name = "three"
+
+        def receive(self, timeout):
+            yield from (Sample(0.02 * k, {"q": 1.0}, "a") for k in range(3))
+            raise EOFError
+
+        def close(self):
+            pass
+
+    recorder = Recorder(tmp_path / "a.csv", ("q",))
+    recorder._file = Full(recorder._file, 5)
+    identifier = LiveIdentifier(STICKS, 0.0, 13.0, 0.02)
+    stream = Stream(identifier.signals, 0.02)
+    Watch(Three(), identifier, stream, recorder).run(1.0, said.append)
+    assert "a.csv is not whole" in said[-1]
+
+
 def test_a_process_that_is_killed_has_written_everything(tmp_path):
     code = (
         "import os, signal, sys; from pathlib import Path;"
@@ -455,10 +479,6 @@ def test_a_process_that_is_killed_has_written_everything(tmp_path):
 
 def test_a_flight_over_the_wire_is_identified(heli, tmp_path):
     """Real sockets, a hundred times real time: the model predicts, the record is whole."""
-    from studies.live.identifier import LiveIdentifier
-    from studies.live.stream import Stream
-    from studies.live.watch import Watch
-
     inner = symheli.flight.gain_scheduled_lqr(heli, 0.0, 6.0, 0.02).scheduled_controller
     schedule = symheli.AirspeedSchedule((5.0, 1.0), (2.0, 2.0), (4.0, 4.0), start=1.0)
     excitation = symheli.Excitation(dict.fromkeys(heli.inputs, 0.01), "multisine", (0.05, 4.0))
