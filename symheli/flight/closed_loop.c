@@ -19,7 +19,8 @@ struct loops {
   const double *added; long added_flight, added_sample; /* 4 */
   const double *white, *white_air; /* 8, and 1 for the airspeed; NULL: no noise */
   const double *p; long p_flight;                       /* NP */
-  const double *changed; const long *change_at; /* NP after this sample of each flight; NULL: as p */
+  const double *changed; /* NP of each flight from a sample on; NULL: as p */
+  const long *change_at;
   /* Sensors, SEEN each, the noise by flight; delay and period in samples. */
   const double *noise; long noise_flight;
   const double *bias, *quantum;
