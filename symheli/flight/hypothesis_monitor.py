@@ -205,6 +205,11 @@ class HypothesisMonitor:
                 f" {proven.name} ({proven.unit})"
             )
         low, high = max(own.low, proven.low), min(own.high, proven.high)
+        if not low < high:
+            raise InputError(
+                f"proven: the table is over {own.low:g} to {own.high:g} {own.unit} of {own.name},"
+                f" and what is proven over {proven.low:g} to {proven.high:g}: nothing in common"
+            )
         common = Scheduling(own.name, own.unit, low, high, proven.rate)
         return cls(common, table.dt, table.limits, table.outputs, window, noise, jitter)
 

@@ -156,6 +156,8 @@ def test_it_is_made_of_a_controller_and_of_what_is_proven():
     proven = symheli.Scheduling("airspeed", "m/s", 1.0, 20.0, 1.5)
     own = HypothesisMonitor.of(table(), proven)
     assert (own.scheduling.low, own.scheduling.high, own.scheduling.limit) == (1.0, 13.0, 1.5)
+    with pytest.raises(InputError, match="over 20 to 29: nothing in common"):
+        HypothesisMonitor.of(table(), symheli.Scheduling("airspeed", "m/s", 20.0, 29.0, 1.0))
     with pytest.raises(InputError, match=r"over airspeed \(m/s\)"):
         HypothesisMonitor.of(table(), symheli.Scheduling("mach", "1", 0.0, 0.1))
     with pytest.raises(InputError, match="as a number"):
