@@ -259,4 +259,4 @@ def test_functions_and_operators_are_one_algebra():
         for name in "ABCD":
             np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
     both = append(P, K)
-    np.testing.assert_allclose(both[:2, :2](POINTS), P(POINTS), rtol=1e-14)  # other sums, other bits
+    np.testing.assert_allclose(both[:2, :2](POINTS), P(POINTS), rtol=1e-14)
