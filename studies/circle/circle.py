@@ -341,7 +341,7 @@ class Circle:
             "designs": [
                 {
                     "proven": one.certificate.bound,
-                    "verified": one.certificate.verified,
+                    "verified": one.exact,
                     "rate": one.proven.rate,
                     "nu_gap_over_margin": one.share,
                     "verdict": one.verdict.verdict,

@@ -85,8 +85,8 @@ def judged(fit="fit", share=0.5, verified=True):
         criteria=[SimpleNamespace(decides=True, verdict=fit, name="J")],
         verdict=fit,
     )
-    certificate = SimpleNamespace(bound=2.0, verified=verified)
-    return {"verdict": verdict, "certificate": certificate, "proven": RATE}
+    certificate = SimpleNamespace(bound=2.0)
+    return {"verdict": verdict, "certificate": certificate, "exact": verified, "proven": RATE}
 
 
 def quick(record, vehicle):

@@ -117,7 +117,7 @@ def test_without_a_change_nobody_is_alarmed(design):
         ({"share": 1.2}, "nu-gap bound 1.20 times the margin"),
         ({"share": np.nan}, "nu-gap bound nan"),
         ({"fit": "not known"}, "J: not known"),
-        ({"verified": False}, "certificate of its loop is not verified"),
+        ({"verified": False}, "certificate of its loop is not verified in exact"),
     ],
 )
 def test_what_is_not_fit_never_flies(how, said, design, monkeypatch):
