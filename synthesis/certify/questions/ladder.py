@@ -83,6 +83,8 @@ class Ladder(ABC):
         where that was not computed.
         """
         self.unit = self.expect(1.0)
+        self.frozen = -math.inf
+        """Worst gain of a frozen model; of a question without a gain -inf."""
         self._begun: tuple[Found, Found | None] | None = None
 
     @cached_property
@@ -101,11 +103,10 @@ class Ladder(ABC):
 
     def believed(self, proof: Proof, bound: float) -> bool:
         """Whether floating point suffices to believe a proof that it has verified; else decide
-        exactly.
+        exactly: so where a gain is below that of a frozen model.
         """
-        return self.sampling_error <= MAX_SAMPLING_ERROR or proof.evidence.exact(
-            proof.lyapunov, bound
-        )
+        doubted = self.sampling_error > MAX_SAMPLING_ERROR or bound < self.frozen
+        return not doubted or proof.evidence.exact(proof.lyapunov, bound)
 
     @property
     def found_by(self) -> str:
@@ -167,7 +168,7 @@ class Ladder(ABC):
         whether they prove any. `limit` is the worst frozen gain.
         """
         with task("searching a proof") as self._searching:
-            self.unit = self.expect(limit)
+            self.unit, self.frozen = self.expect(limit), limit
             self._begun = self._cheapest(limit)
         return any(found and found.proof for found in self._begun)
 
@@ -188,6 +189,7 @@ class Ladder(ABC):
             return self._index(limit)
         if not self.problem.gains:
             return self._least(limit)
+        self.frozen = limit
 
         def found(expected: float) -> tuple[Found, float, float]:
             if self._begun is None:
