@@ -148,7 +148,8 @@ def certainty(at: Sequence[AtPoint]) -> tuple[Criterion, ...]:
             continue
         names = [all_.names[i] for i in matter]
         sure = Certainty.of(all_.value[matter], all_.covariance(a.covariance)[matter][:, matter])
-        pair = np.unravel_index(np.argmax(np.abs(sure.correlation)), sure.correlation.shape)
+        strongest = np.argmax(np.abs(sure.correlation))  # of two equal entries the first is named
+        pair = sorted(np.unravel_index(strongest, sure.correlation.shape))
         for name, values, which in (
             ("Cramer-Rao bound", sure.bound, names[int(np.argmax(sure.bound))]),
             ("insensitivity", sure.insensitivity, names[int(np.argmax(sure.insensitivity))]),

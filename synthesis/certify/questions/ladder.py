@@ -103,9 +103,11 @@ class Ladder(ABC):
 
     def believed(self, proof: Proof, bound: float) -> bool:
         """Whether floating point suffices to believe a proof that it has verified; else decide
-        exactly: so where a gain is below that of a frozen model.
+        exactly: so where a gain is below that of a frozen model by what may be rounding. A larger
+        contradiction is an error, which the certificate refuses.
         """
-        doubted = self.sampling_error > MAX_SAMPLING_ERROR or bound < self.frozen
+        rounded = (1 - CLOSE_TO_LOWER) * self.frozen < bound < self.frozen
+        doubted = self.sampling_error > MAX_SAMPLING_ERROR or rounded
         return not doubted or proof.evidence.exact(proof.lyapunov, bound)
 
     @property
