@@ -81,7 +81,8 @@ def designed(record: FlightRecord, vehicle: str) -> Designed | str:
     controller.
     """
     begin = time.perf_counter()
-    simulator = simulator_of(vehicle, Vehicle(vehicle).helicopter)[1]
+    heli = Vehicle(vehicle).helicopter
+    simulator = simulator_of(vehicle, heli)[1]
     seconds: dict[str, float] = {}
     try:
         model = identified(record, simulator)
@@ -93,8 +94,7 @@ def designed(record: FlightRecord, vehicle: str) -> Designed | str:
         seconds["judging"] = time.perf_counter() - judging
     except SymheliError as error:
         return str(error)
-    travel = Vehicle(vehicle).helicopter.travel
-    limits = {str(u): (-float(t), float(t)) for u, t in zip(INPUTS, travel, strict=True)}
+    limits = {str(u): (-float(t), float(t)) for u, t in zip(INPUTS, heli.travel, strict=True)}
     certificate = made.sampled.certificate
     if certificate.proof is None:
         return f"nothing is proven of the loop: {certificate.why}"

@@ -43,17 +43,6 @@ ARGUMENTS = (
     flag("--noise", "noise of small sensors on what is sent"),
     option("--seed", "N", "of excitation and noise", options.count, 0),
 )
-NOISE = {
-    "p": 0.01,
-    "q": 0.01,
-    "r": 0.01,
-    "phi": 0.005,
-    "theta": 0.005,
-    "u": 0.1,
-    "v": 0.1,
-    "w": 0.1,
-}
-"""Standard deviations of `--noise`, SI."""
 
 
 def run(arguments: argparse.Namespace) -> Output:
@@ -61,6 +50,7 @@ def run(arguments: argparse.Namespace) -> Output:
     import numpy as np
 
     import symheli
+    from studies.circle.vehicle import NOISE
     from studies.live.peer import MavlinkLine, OnTheWire, XPlaneLine
     from symheli import AirspeedSchedule, Excitation, Sensor
 
