@@ -11,8 +11,11 @@ from datetime import date
 
 import numpy as np
 
+from evidence.marks.coverage import at_points
+from evidence.marks.measured import stability_calls
 from evidence.seeds import by_name, parser_of
 from evidence.tables import DOCS, keep, kept_rows, markdown, parsed
+from identification.judge import structure_bias
 from studies.known_kinematics.conditions import (
     ALL,
     CONDITIONS,
@@ -36,14 +39,16 @@ PARTS = ("actuators", "sensors", "wind")
 
 @dataclass(frozen=True, kw_only=True)
 class Marks:
-    """Of one seed: worst nu-gap in all axes, the airspeed where (m/s), and what was found of the
-    actuators, the sensors and the wind, with its standard deviation.
+    """Of one seed: worst nu-gap in all axes, the airspeed where (m/s), what was found of the
+    actuators, the sensors and the wind, with its standard deviation, and at how many airspeeds
+    stability is called not known, and wrongly.
     """
 
     seed: int
     gap: float
     airspeed: float
     found: dict[str, dict[str, tuple[float, float]]]
+    calls: tuple[int, int] = (0, 0)
 
 
 def of_seed(name: str, seed: int, truth: str = "xcell60") -> Marks:
@@ -55,12 +60,16 @@ def of_seed(name: str, seed: int, truth: str = "xcell60") -> Marks:
         warnings.simplefilter("ignore", DataWarning)
         source = Instruments(SimulatedFlight(simulator))
         model = condition.identified(condition.structure(records[0]), records, source)
-    gap = condition.truth(heli).compare(frozen_all(model))[ALL]["model"].gap
+        there = at_points(model, condition.truth(simulator).models[ALL], range(len(SPEEDS)))
+        bias = structure_bias(model, records, source, there)
+    exact = condition.truth(heli)
+    gap = exact.compare(frozen_all(model))[ALL]["model"].gap
     return Marks(
         seed=seed,
         gap=float(gap.max()),
         airspeed=float(SPEEDS[gap.argmax()]),
         found={name: model.details[name] for name in PARTS if name in model.details},
+        calls=stability_calls(model, exact, bias),
     )
 
 
@@ -77,8 +86,15 @@ def row(name: str, marks: Sequence[Marks]) -> tuple[str, ...]:
         f"{worst.gap:.3f} ({worst.seed})",
         "met" if met else "MISSED",
         _found(condition, marks),
+        _called(marks),
         f"{marks[0].seed} to {marks[-1].seed}, {date.today():%d %B %Y}",
     )
+
+
+def _called(marks: Sequence[Marks]) -> str:
+    """Airspeeds where stability is not known, median and worst, and the sum of wrong calls."""
+    unknown, wrong = np.array([m.calls for m in marks]).T
+    return f"{np.median(unknown):.0f} ({unknown.max()}); {wrong.sum()}"
 
 
 def _found(condition: RealCondition, marks: Sequence[Marks]) -> str:
@@ -98,8 +114,9 @@ def _found(condition: RealCondition, marks: Sequence[Marks]) -> str:
     errors, inside = [], 0
     for m in winds:
         found = np.array([m.found["wind"][name] for name in ("north", "east")])
-        errors.append(float(np.hypot(*(found[:, 0] - wind_of(m.seed)))))
-        inside += int(np.sum(np.abs(found[:, 0] - wind_of(m.seed)) <= 2.0 * found[:, 1]))
+        true = wind_of(m.seed, condition.wind)
+        errors.append(float(np.hypot(*(found[:, 0] - true))))
+        inside += int(np.sum(np.abs(found[:, 0] - true) <= 2.0 * found[:, 1]))
     return (
         f"wind off by {np.median(errors):.2f} m/s, at most {max(errors):.2f}; {inside} of"
         f" {2 * len(winds)} components within two deviations"
@@ -113,6 +130,7 @@ HEAD = (
     "worst (seed)",
     "",
     "found",
+    f"stability not known, of {len(SPEEDS)} (worst); called wrongly",
     "seeds, day",
 )
 

@@ -17,7 +17,6 @@ FLIGHTS = {
     "xcell60, two flights": "the same, and a gentle flight of 230 s",
     "xcell_kahn_hudson": "Kahn and Hudson's X-Cell, one flight",
     "xcell_kahn_hudson, two flights": "the same, and a gentle flight",
-    "xcell60 in turbulence": "Gavrilets' X-Cell in a breeze and light turbulence",
 }
 """Sections of the page of tables, in words."""
 AXES = ("lateral", "longitudinal", "all axes")

@@ -225,6 +225,9 @@ class FilterError(Method):
         scores = sum(equations.scores() for equations in each) + np.diag(known)
         covariance = inverse @ scores @ inverse  # type: ignore[operator]
         covariance = 0.5 * (covariance + covariance.T)
+        if self.prior:  # nor less than the posterior where noise is white: what fits is not scored
+            grown = np.sqrt(np.maximum(np.diag(inverse) / np.diag(covariance), 1.0))
+            covariance = covariance * np.outer(grown, grown)
         beside = arx.found(z.tolist(), np.sqrt(np.diag(covariance)[6 * n :]).tolist())
         residual = np.average([s.residual(theta) for s, _ in flights], axis=0, weights=weights)
         estimate = Estimate(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -11,6 +11,8 @@ import numpy as np
 from identification.design.criterion import Criterion, Verdict, table
 from identification.judge.coefficient_covariance import drawn
 from identification.judge.frozen_plant import FrozenPlant, Model, Point, text
+from identification.judge.response_regions import StructureBias
+from symheli import LinearModel
 from symheli.errors import InputError
 from symheli.values.arrays import Array, frozen
 from symheli.values.numbers import whole
@@ -38,6 +40,8 @@ class FrozenStability:
         Values of the scheduling.
     growth, low, high : array (K,)
         Of the estimate, and the ends of the band, 1/s.
+    bias : array (K,), optional
+        Part of half the band that longer records leave as it is, 1/s; default none.
 
     Examples
     --------
@@ -51,12 +55,15 @@ class FrozenStability:
     growth: Array
     low: Array
     high: Array
+    bias: Array | None = None
 
     __repr__ = summarized
 
     def __post_init__(self) -> None:
         frozen([np.ravel(p) for p in self.points], "points")
-        for name in ("growth", "low", "high"):
+        if self.bias is None:
+            object.__setattr__(self, "bias", np.zeros(len(self.points)))
+        for name in ("growth", "low", "high", "bias"):
             object.__setattr__(self, name, frozen(getattr(self, name), name, (len(self.points),)))
 
     @property
@@ -66,6 +73,36 @@ class FrozenStability:
             "stable" if high < 0 else "unstable" if low > 0 else "not known"
             for low, high in zip(self.low, self.high, strict=True)
         )
+
+    @property
+    def longer(self) -> Array:
+        """How many times as long records of the same kind decide each point (K,), if the estimate
+        stays where it is; infinite where the bias is the larger part: then other flights do.
+        """
+        noise = 0.5 * (np.asarray(self.high) - self.low) - self.bias
+        left = np.abs(self.growth) - self.bias
+        with np.errstate(divide="ignore", over="ignore"):
+            return np.where(left > 0, np.maximum((noise / left) ** 2, 1.0), np.inf)
+
+    @property
+    def advice(self) -> str:
+        """What would decide the points that are not known; empty where there are none."""
+        unknown = np.array([call == "not known" for call in self.calls])
+        if not unknown.any():
+            return ""
+        times = self.longer[unknown]
+        by_length, parts = np.isfinite(times), []
+        if by_length.any():
+            parts.append(
+                f"records {np.median(times[by_length]):.2g} times as long decide half of"
+                f" {int(by_length.sum())} of them"
+            )
+        if not by_length.all():
+            parts.append(
+                f"at {int((~by_length).sum())} of them the structure is off by more than the growth"
+                " rate: hold each airspeed for 40 s, with half the excitation"
+            )
+        return "; ".join(parts)
 
     @property
     def criteria(self) -> tuple[Criterion, ...]:
@@ -87,7 +124,8 @@ class FrozenStability:
     def __str__(self) -> str:
         counts = (f"{call} at {self.calls.count(call)}" for call in get_args(Call))
         of = f"of {len(self.points)} points"
-        return f"with the scheduling held: {', '.join(counts)} {of}\n{table(self.criteria, '  ')}"
+        lines = [f"with the scheduling held: {', '.join(counts)} {of}", table(self.criteria, "  ")]
+        return "\n".join([*lines, *([f"  not known: {self.advice}"] if self.advice else [])])
 
 
 def frozen_stability(
@@ -96,6 +134,8 @@ def frozen_stability(
     covariance: object = None,
     draws: int = 200,
     seed: int = 0,
+    *,
+    bias: StructureBias | None = None,
 ) -> FrozenStability:
     """Return whether the model is stable at points of the scheduling, by draws of its coefficients.
 
@@ -110,16 +150,20 @@ def frozen_stability(
         as residuals show it what the structure leaves out.
     draws, seed : int
         Of a normal distribution.
+    bias : StructureBias, optional
+        From `structure_bias`, at the same points. Noise is then not all: the growth rate in the
+        simulator is off by what the structure leaves out. The largest of three neighbouring points
+        is added to the standard deviation, as if both had one sign.
 
     Returns
     -------
     FrozenStability
-        `.calls`, and `str()` that counts and shows them.
+        `.calls`, `.advice`, and `str()` that counts and shows them.
 
     Raises
     ------
     InputError
-        No covariance, or one of another shape.
+        No covariance, one of another shape, or a bias at other points.
 
     Examples
     --------
@@ -145,14 +189,31 @@ def frozen_stability(
     rates = np.array([_growth(plant, p, thetas) for p in chosen]).reshape(len(chosen), -1)
     growth = rates[:, 0]
     spread = np.sqrt(np.mean((rates[:, 1:] - growth[:, None]) ** 2, axis=1)) / SMALL
-    return FrozenStability(chosen, growth, growth - BAND * spread, growth + BAND * spread)
+    off = np.zeros(len(chosen)) if bias is None else _growth_bias(bias, plant, chosen)
+    half = BAND * (spread + off)
+    return FrozenStability(chosen, growth, growth - half, growth + half, BAND * off)
+
+
+def _growth_bias(bias: StructureBias, plant: FrozenPlant, points: Sequence[Point]) -> Array:
+    """What growth rates (K,) are off by in the simulator, the largest of three neighbours, 1/s."""
+    at = [p if isinstance(p, tuple) else (p,) for p in points]
+    if at != [p if isinstance(p, tuple) else (p,) for p in bias.exact]:
+        raise InputError(f"bias: expected one at the points {at}, got {list(bias.exact)}")
+    there = replace(plant, model=bias.model)
+    of_each = zip(at, bias.exact.values(), strict=True)
+    rates = [np.subtract(*_rates([there.at(*p), exact], plant.model.dt)) for p, exact in of_each]
+    off = np.pad(np.abs(rates), 1, mode="edge")
+    return np.asarray(np.max([off[:-2], off[1:-1], off[2:]], axis=0))
 
 
 def _growth(plant: FrozenPlant, p: Point, thetas: Array) -> Sequence[float]:
     """Growth rates of the estimate and of each draw at p, 1/s."""
     at = p if isinstance(p, tuple) else (p,)
-    models = [plant.at(*at), *plant.of_each(thetas, *at)]
-    return [float(np.log(_radius(m.A))) / plant.model.dt for m in models]
+    return _rates([plant.at(*at), *plant.of_each(thetas, *at)], plant.model.dt)
+
+
+def _rates(models: Iterable[LinearModel], dt: float) -> list[float]:
+    return [float(np.log(_radius(m.A))) / dt for m in models]
 
 
 def _radius(A: Array) -> float:

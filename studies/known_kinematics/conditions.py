@@ -18,18 +18,22 @@ from identification.model import KinematicModel
 from identification.structure import LateSensors, SteadyWind
 from identification.structure.actuators import faster
 from identification.structure.kinematic_arx import STATES
-from studies.known_kinematics.flights import aggressive
-from studies.known_kinematics.models import FASTEST, GUST, SCHEDULING, structure
+from studies.known_kinematics.flights import aggressive, held
+from studies.known_kinematics.models import FASTEST, SCHEDULING, structure
 from studies.known_kinematics.truth import AXES, SPEEDS, FrozenAxes, Truth, frozen
 from studies.setup.bounds import PERIOD
-from studies.setup.flights import ACTUATION, NOISE_DB, TOP, autopilot_for, light_turbulence
+from studies.setup.flights import ABOVE_GROUND, ACTUATION, BREEZE, NOISE_DB, TOP, autopilot_for
 from symheli import FlightPlan, FlightRecord, Helicopter, Sensor, Wind
+from symheli.environment import Dryden
 from symheli.flight import XCELL_SERVOS, SimulatedFlight, gain_scheduled_lqr
 from symheli.lpv import Product
 from symheli.lpv.tools import Actuation
 from symheli.values.arrays import Array
 
 ALL = "all axes"
+WIND, ANOTHER = 5.0, 50_000
+"""m/s; what is added to the seed for a second flight."""
+
 HALF = 75.0
 """Length of half a flight, s."""
 
@@ -65,10 +69,16 @@ class RealCondition:
         What is known of sensors that are 40 ms late.
     headings : tuple of float
         Of the flights, off the one into the wind, deg; empty: still air.
+    wind : float
+        Steady, m/s, where there are headings.
+    turbulence : Dryden, optional
+        Besides; the gust is then a hidden state of the method, as large as Dryden's along the body.
+    louder : float
+        Amplitude of the excitation over that of `aggressive`.
+    held : int
+        Number of flights that hold each airspeed in place of the aggressive one.
     prior : bool
         Whether the coefficients are taken to lie about the simulator's.
-    turbulent : bool
-        Whether a breeze and light turbulence blow; the gust is a hidden state.
     over_ground : bool
         Whether speeds are commanded, and the coefficients scheduled, over ground.
     """
@@ -82,9 +92,12 @@ class RealCondition:
     actuators: Actuators | None = None
     sensors: LateSensors | None = None
     headings: tuple[float, ...] = ()
+    wind: float = WIND
+    turbulence: Dryden | None = None
+    louder: float = 1.0
+    held: int = 0
     over_ground: bool = True
     prior: bool = False
-    turbulent: bool = False
 
     @property
     def period(self) -> float:
@@ -97,17 +110,17 @@ class RealCondition:
 
     def flights(self, heli: Helicopter, seed: int) -> list[FlightRecord]:
         """The flights for identification, as they are logged."""
+        if self.held:
+            plans = [held(seed + i * ANOTHER, autopilot_for(heli)) for i in range(self.held)]
+            return [symheli.fly(heli, plan) for plan in plans]
         if not self.headings:
             return [self.logged(symheli.fly(heli, self.plan(heli, seed)))]
         longest, out = self.longest / len(self.headings), []
         for i, off in enumerate(self.headings):
-            north, east = (
-                WIND * np.cos(np.radians(180.0 - off)),
-                WIND * np.sin(np.radians(180.0 - off)),
-            )
-            plan = replace(
-                self.plan(heli, seed + i * ANOTHER, longest), wind=Wind((north, east, 0.0))
-            )
+            own, towards = seed + i * ANOTHER, np.radians(180.0 - off)
+            steady = (self.wind * np.cos(towards), self.wind * np.sin(towards), 0.0)
+            wind = Wind(steady, turbulence=self.turbulence, seed=own)
+            plan = replace(self.plan(heli, own, longest), wind=wind)
             out.append(with_heading(symheli.fly(heli, plan), into_the_wind(seed) + off))
         return out
 
@@ -124,7 +137,7 @@ class RealCondition:
             noise_db=self.noise_db,
             servos=self.flown,
             longest=longest or self.longest,
-            wind=light_turbulence(seed) if self.turbulent else None,
+            louder=self.louder,
         )
         if self.sensors is not None:
             clean = replace(plan, noise_db=None)
@@ -147,22 +160,25 @@ class RealCondition:
         return record.rows(slice(None, None, self.decimated))
 
     def structure(self, record: FlightRecord) -> KinematicARX:
-        """Cubic in airspeed, linear in acceleration; from the commands where something stands
+        """Cubic in airspeed, linear in acceleration; in turbulence, which hides more, of
+        total degree 2; of held airspeeds that of `models`. From the commands where something stands
         between them and the rotor.
         """
-        if self.turbulent:
-            return structure(turbulent=True)
+        if self.held:
+            return structure()
         inputs = AXES[ALL].inputs
         commanded = self.actuators is not None and f"{inputs[0]}_command" in record.signals
         names = {u: f"{u}_command" if commanded else u for u in inputs}
         ground = OVER_GROUND if self.headings and self.over_ground else None
         first = SCHEDULING[0] if ground is None else ground
         low, high = (0.0, TOP) if ground is None else (-AROUND, TOP + AROUND)
+        degree = 3 if self.turbulence is None else 2
         return KinematicARX(
             tuple(names.values()),
             (first, SCHEDULING[1]),
             basis=Product(
-                (Polynomial(3, low, high), Polynomial(1, -FASTEST, FASTEST)), total_degree=3
+                (Polynomial(degree, low, high), Polynomial(1, -FASTEST, FASTEST)),
+                total_degree=degree,
             ),
             nb={names[u]: n for u, n in LAGS.items()},
             offset_rate=False,
@@ -176,7 +192,7 @@ class RealCondition:
         self, kin: KinematicARX, records: Sequence[FlightRecord], source: Instruments
     ) -> KinematicModel:
         """By the filter error method."""
-        gust = GUST if self.turbulent else 0.0
+        gust = 0.0 if self.turbulence is None else float(self.turbulence.intensities[0])
         return fit(kin, records, method=FilterError(source, gust=gust, prior=self.prior))
 
     def truth(self, heli: Helicopter, *axes: str) -> Truth:
@@ -186,9 +202,6 @@ class RealCondition:
         chosen = {name: AXES[name] for name in axes or (ALL,)}
         return Truth.of(heli, chosen, actuation=Actuation.of(self.flown, period=self.period))
 
-
-WIND, ANOTHER = 5.0, 50_000
-"""m/s; what is added to the seed for a second flight."""
 
 AROUND = 12.0
 """How far from the airspeeds that are flown a speed over ground may be, m/s."""
@@ -203,10 +216,10 @@ def into_the_wind(seed: int) -> float:
     return float(np.random.default_rng(seed).uniform(0.0, 360.0))
 
 
-def wind_of(seed: int) -> Array:
+def wind_of(seed: int, speed: float = WIND) -> Array:
     """Direction and speed of the wind of a seed: north and east, m/s."""
     towards = np.radians(into_the_wind(seed) + 180.0)
-    return WIND * np.array([np.cos(towards), np.sin(towards)])
+    return speed * np.array([np.cos(towards), np.sin(towards)])
 
 
 def with_heading(record: FlightRecord, start: float) -> FlightRecord:
@@ -244,6 +257,14 @@ where it is to find it.
 """
 
 WRONG_SERVOS = {u: faster(servo, FASTER) for u, servo in XCELL_SERVOS.items()}
+AIR = {"light": Dryden(7.7, ABOVE_GROUND), "moderate": Dryden(15.4, ABOVE_GROUND)}
+"""Mean winds of 15 and 30 kt at 20 ft."""
+
+IN_TURBULENCE = partial(
+    RealCondition, headings=(0.0,), wind=float(np.hypot(*BREEZE[:2])), louder=2.5, prior=True
+)
+"""Into the breeze, whose direction is known to a guess, with the heading measured."""
+
 NOT_QUITE = partial(Actuators, delay=ASSUMED, delay_deviation=UNSURE)
 
 CONDITIONS: Mapping[str, RealCondition] = {
@@ -263,6 +284,9 @@ CONDITIONS: Mapping[str, RealCondition] = {
     "delay": RealCondition(
         "commands 40 ms late, delay found", 0.12, Actuation(delay=0.04), actuators=NOT_QUITE()
     ),
+    "held": RealCondition(
+        "ideal; each airspeed held for 40 s, twice 400 s, for slow modes", 0.10, held=2
+    ),
     "25 Hz": RealCondition(
         "logged at 25 Hz, commanded at 50 Hz, said so",
         0.10,
@@ -281,9 +305,8 @@ CONDITIONS: Mapping[str, RealCondition] = {
     "airspeed": RealCondition(
         "the same, airspeed known", 0.08, headings=(-50.0, 50.0), over_ground=False
     ),
-    "turbulence": RealCondition(
-        "a breeze and light turbulence; the gust a hidden state", 0.15, turbulent=True
-    ),
+    "turbulence": IN_TURBULENCE("a breeze and light turbulence", 0.15, turbulence=AIR["light"]),
+    "moderate": IN_TURBULENCE("a breeze and moderate turbulence", 0.25, turbulence=AIR["moderate"]),
     "20 dB": RealCondition("20 dB of noise; simulator as prior", 0.12, noise_db=20.0, prior=True),
     "half": RealCondition("half a flight; simulator as prior", 0.10, longest=HALF, prior=True),
 }

@@ -43,6 +43,13 @@ GENTLE_LINES = (0.01, 4.0)
 hover.
 """
 
+HELD_TARGETS = (0.0, 3.0, 6.0, 9.0, 13.0, 7.0, 2.0, 0.0)
+HELD, HELD_LOUDNESS, HELD_RAMP = 40.0, 0.4, 0.5
+"""Of a flight that tells slow modes: airspeeds, how long each is held (s), amplitude over that of
+`AMPLITUDE`, and the acceleration between them (m/s^2). What a structure leaves out grows with all
+that moves; with it the growth rates are off.
+"""
+
 TEST_LINES = (0.1, 5.0)
 TEST_AMPLITUDE = STUDY_AMPLITUDE
 """Amplitudes of the flight that judges: those of the study."""
@@ -56,12 +63,14 @@ def aggressive(
     servos: Actuation | None = None,
     wind: Wind | None = None,
     longest: float = LONGEST,
+    louder: float = 1.0,
 ) -> FlightPlan:
-    """Ramps at 1.5 to 4 m/s^2 between 0 and 13 m/s, multisines on all inputs, at most `longest`
-    (s).
+    """Ramps at 1.5 to 4 m/s^2 between 0 and 13 m/s, multisines on all inputs, `louder` times as
+    large as `AMPLITUDE`, at most `longest` (s).
     """
     schedule = _ramps(RAMPS, HOLD, longest)
-    return _plan(schedule, seed, autopilot, noise_db, servos, wind)
+    amplitude = {u: louder * size for u, size in AMPLITUDE.items()}
+    return _plan(schedule, seed, autopilot, noise_db, servos, wind, amplitude=amplitude)
 
 
 def gentle(
@@ -75,6 +84,14 @@ def gentle(
     """Hover again and again, and what lies between at 1 m/s^2: long holds, lower lines, 230 s."""
     schedule = _ramps((1.0,), GENTLE_HOLD, GENTLE_LONGEST, GENTLE_TARGETS)
     return _plan(schedule, 5000 + seed, autopilot, noise_db, servos, wind, GENTLE_LINES)
+
+
+def held(seed: int, autopilot: Autopilot, *, noise_db: float | None = NOISE_DB) -> FlightPlan:
+    """Eight airspeeds from 0 to 13 m/s, each held for 40 s, with small multisines: 400 s."""
+    count = len(HELD_TARGETS)
+    schedule = AirspeedSchedule(HELD_TARGETS, (HELD_RAMP,) * count, (HELD,) * count)
+    amplitude = {u: HELD_LOUDNESS * size for u, size in AMPLITUDE.items()}
+    return _plan(schedule, 5000 + seed, autopilot, noise_db, None, None, GENTLE_LINES, amplitude)
 
 
 def transition(

@@ -19,10 +19,6 @@ SCHEDULING = ("airspeed_command", "acceleration_command")
 FASTEST = 4.0
 """Largest commanded acceleration, m/s^2."""
 
-
-GUST = 2.0
-"""Standard deviation given for what the air may do in light turbulence, m/s."""
-
 PAIRS = {"xcell60": "xcell_kahn_hudson", "xcell_kahn_hudson": "xcell60"}
 """Vehicle whose simulator flies the instruments, by the vehicle that is identified."""
 STANDARD = "xcell60"
@@ -46,12 +42,8 @@ def simulator_of(vehicle: str, heli: Helicopter) -> tuple[str, Helicopter]:
 CONSTANT, ALONE, BOTH = "constant coefficients", "over airspeed", "over airspeed and acceleration"
 
 
-def structure(turbulent: bool = False) -> KinematicARX:
-    """Cubic in airspeed, quadratic in acceleration, of total degree 3; in turbulence, where
-    less can be determined, quadratic in airspeed alone.
-    """
-    if turbulent:
-        return KinematicARX(ALL.inputs, SCHEDULING[0], basis=Polynomial(2, 0.0, TOP))
+def structure() -> KinematicARX:
+    """Cubic in airspeed, quadratic in acceleration, of total degree 3."""
     basis = Product(
         (Polynomial(3, 0.0, TOP), Polynomial(2, -FASTEST, FASTEST)),
         total_degree=3,
@@ -71,13 +63,10 @@ def structures() -> dict[str, KinematicARX]:
 def identified(
     records: FlightRecord | list[FlightRecord],
     simulator: Helicopter | SimulatedFlight,
-    turbulent: bool = False,
     kin: KinematicARX | None = None,
 ) -> KinematicModel:
-    """By the filter error method, its instruments flown in `simulator`; the gust a hidden state
-    where the air is `turbulent`. `kin`: another structure than that of `structure`. A
-    `SimulatedFlight` keeps its flights for further identifications.
+    """By the filter error method, its instruments flown in `simulator`. `kin`: another structure
+    than that of `structure`. A `SimulatedFlight` keeps its flights for further identifications.
     """
     source = SimulatedFlight(simulator) if isinstance(simulator, Helicopter) else simulator
-    method = FilterError(source, gust=GUST if turbulent else 0.0)
-    return fit(kin or structure(turbulent), records, method=method)
+    return fit(kin or structure(), records, method=FilterError(source))
