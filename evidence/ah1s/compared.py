@@ -18,6 +18,7 @@ from evidence.ah1s.truth import SLOWEST, realization
 from evidence.seeds import over_seeds, parser_of, seeds_of
 from evidence.tables import DOCS, keep, markdown, parsed
 from identification import Actuators, KinematicARX, Polynomial, compare_frozen, fit
+from identification.judge import frozen_stability, structure_bias
 from identification.judge.frozen_models import continuous_poles
 from identification.methods import FilterError, InstrumentalVariables
 from identification.model import KinematicModel
@@ -148,7 +149,7 @@ def phugoid(model: LinearModel) -> complex:
 class Judged:
     """One structure fitted to one flight: over the airspeeds nu-gaps, how fast the phugoid grows
     and truly grows (1/s, NaN where there is none); fits 1 s ahead with moving and with constant
-    coefficients by output, in percent.
+    coefficients by output, in percent; how stability is called with its band, and what it is.
     """
 
     seed: int
@@ -157,6 +158,8 @@ class Judged:
     true: tuple[float, ...]
     moving: dict[str, float]
     constant: dict[str, float]
+    calls: tuple[str, ...]
+    stable: tuple[bool, ...]
 
 
 def of_seed(structure: str, ramps: str, knots: int, method: str, seed: int) -> Judged:
@@ -170,6 +173,7 @@ def of_seed(structure: str, ramps: str, knots: int, method: str, seed: int) -> J
             fit(make(FASTEST[knots], still), record, method=METHODS[method])
             for still in (False, True)
         )
+        bias = structure_bias(model, record, CalmFlight(), dict(zip(speeds, exact, strict=True)))
     held = [model.at(speed) for speed in speeds]
     beside = compare_frozen(
         {"model": dict(zip(speeds, held, strict=True))},
@@ -183,6 +187,8 @@ def of_seed(structure: str, ramps: str, knots: int, method: str, seed: int) -> J
         true=tuple(phugoid(one).real for one in exact),
         moving=_fits(model, test),
         constant=_fits(constant, test),
+        calls=frozen_stability(model, speeds, bias=bias).calls,
+        stable=tuple(one.is_stable() for one in exact),
     )
 
 
@@ -215,7 +221,7 @@ def tables(knots: int, found: Sequence[Judged]) -> str:
             f"Worst nu-gap of a flight over the airspeeds: median {np.median(worst):.2f} (mark"
             f" {MARK}), worst {worst.max():.2f} (seed {found[int(worst.argmax())].seed}):"
             f" {'met' if reached else 'MISSED'}. The phugoid is called unstable in {unstable}"
-            f" places where it is, and called right in {right}.",
+            f" places where it is, and called right in {right}. {_with_bands(found)}",
             markdown(["m/s", *(f"{speed:.0f}" for speed in SPEEDS[knots])], by_airspeed),
             markdown(["fits 1 s ahead, %", *map(str, STATES)], by_output),
         ]
@@ -238,6 +244,23 @@ def _called(found: Sequence[Judged]) -> tuple[str, str]:
     unstable = [called for is_so, called in pairs if is_so]
     right = sum(is_so == called for is_so, called in pairs)
     return f"{right} of {len(pairs)}", f"{sum(unstable)} of {len(unstable)}"
+
+
+def _with_bands(found: Sequence[Judged]) -> str:
+    """How often stability is called rightly, wrongly and not known with its band."""
+    names = {True: "stable", False: "unstable"}
+    pairs = [
+        (call, names[is_so])
+        for one in found
+        for call, is_so in zip(one.calls, one.stable, strict=True)
+    ]
+    unknown = sum(call == "not known" for call, _ in pairs)
+    right = sum(call == true for call, true in pairs)
+    return (
+        f"With the bands of `frozen_stability`, the bias of the structure in them, it is right in"
+        f" {right} places, wrong in {len(pairs) - right - unknown}, not known in {unknown} of"
+        f" {len(pairs)}."
+    )
 
 
 def main() -> None:

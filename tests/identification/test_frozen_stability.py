@@ -1,12 +1,14 @@
 """Stability with the scheduling held, as far as the coefficients are known."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from known_systems import flown
 
 import identification as idn
+from identification.judge.response_regions import StructureBias
 from symheli.errors import InputError
 
 ARX = idn.LPVARX("y", "u", "p", na=1, nb=1, delay=1, basis=idn.Polynomial(1, -1.0, 1.0))
@@ -55,3 +57,41 @@ def test_where_the_band_crosses_the_axis_nothing_is_known(model):
 def test_a_model_without_covariance_is_refused(model):
     with pytest.raises(InputError, match="gives none"):
         idn.judge.frozen_stability(model.with_theta(model.theta), [0.0])
+
+
+def off_by(model, factor):
+    """The bias of a structure that finds the growth of y(k) = a y(k-1) `factor` times too large."""
+    points = [-0.9, 0.0, 0.9]
+    exact = {}
+    for p in points:
+        there = model.at(p)
+        exact[p] = replace(there, A=there.A ** (1 / factor))
+    return StructureBias(model, exact)
+
+
+def test_the_bias_of_the_structure_widens_the_band_by_the_largest_of_neighbours(model):
+    points = [-0.9, 0.0, 0.9]
+    plain = idn.judge.frozen_stability(model, points)
+    wide = idn.judge.frozen_stability(model, points, bias=off_by(model, 2.0))
+    off = np.abs(plain.growth) / 2
+    expected = [max(off[0], off[1]), off.max(), max(off[1], off[2])]
+    np.testing.assert_allclose(wide.bias, 1.96 * np.array(expected), rtol=1e-9)
+    np.testing.assert_allclose(wide.high - plain.high, wide.bias, rtol=1e-9)
+
+
+def test_no_longer_record_decides_where_the_structure_is_off_by_more_than_the_growth(model):
+    points = [-0.9, 0.0, 0.9]
+    found = idn.judge.frozen_stability(model, points, bias=off_by(model, 4.0))
+    assert set(found.calls) == {"not known"}
+    assert np.isinf(found.longer).all()
+    assert "hold each airspeed" in found.advice
+    assert found.advice in str(found)
+    plain = idn.judge.frozen_stability(model, points)
+    assert (plain.longer[[0, 2]] == 1.0).all()
+    assert plain.longer[1] > 1.0
+    assert "times as long" in plain.advice
+
+
+def test_a_bias_at_other_points_is_refused(model):
+    with pytest.raises(InputError, match="expected one at the points"):
+        idn.judge.frozen_stability(model, [0.0], bias=off_by(model, 2.0))
