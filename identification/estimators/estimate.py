@@ -8,6 +8,8 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import overload
 
+import numpy as np
+
 from identification.design.excitation import excitation_of
 from identification.design.leakage import warn_of_leakage
 from identification.estimators.filter_error import FilterError
@@ -20,12 +22,19 @@ from identification.model.kinematic_fit import mean_trim
 from identification.model.kinematic_model import KinematicModel
 from identification.model.lpvarx_model import LPVARXModel
 from identification.model.state_space_model import StateSpaceModel
-from identification.structure.kinematic_arx import KinematicARX
+from identification.structure.kinematic_arx import STATES, KinematicARX
 from identification.structure.lpvarx import LPVARX, require_structure
 from identification.structure.regressors import as_records, stacked, units_of
 from identification.structure.state_space import StateSpace
 from symheli.errors import ConvergenceWarning, InputError
 from symheli.records import FlightRecord
+from symheli.records.mending import bridged
+
+LOST = 0.5
+"""Longest hole that a simulated flight bridges, s."""
+
+SLOW = 0.6
+"""Share of the samples below which a sensor is slower than the others."""
 
 
 @overload
@@ -188,6 +197,7 @@ def _rigid(
             f"{', '.join(unknown)}: estimated by FilterError(...) only; give deviations of 0 for"
             f" method {method.shorthand!r}"
         )
+    records = tuple(_complete(record, method) for record in records)
     aerodynamics = _fitted(structure.aerodynamics, records, method)
     if unknown:
         known = {n: p.settled(aerodynamics.details.get(n, {})) for n, p in parts.items()}
@@ -201,6 +211,18 @@ def _rigid(
         aerodynamics=aerodynamics,
         trim=mean_trim(structure, records),
         drive=None if drive is None else _fitted(drive, records, "ls"),
+    )
+
+
+def _complete(record: FlightRecord, method: Method) -> FlightRecord:
+    """The record with its short holes bridged: by the simulator's flight where the method takes
+    what is bridged as badly measured, else those between the values of a slower sensor alone.
+    """
+    if isinstance(method, FilterError):
+        return bridged(record, STATES, LOST, method.simulator.flown)
+    there = np.isfinite(record.columns(STATES)).mean(axis=0)
+    return bridged(
+        record, [name for name, share in zip(STATES, there, strict=True) if share < SLOW]
     )
 
 

@@ -25,9 +25,10 @@ from identification.estimators.simulator_prior import Simulated, SimulatorPrior
 from identification.structure.kinematic_arx import STATES, Aerodynamics, increments
 from identification.structure.lpvarx import LPVARX
 from identification.structure.regressors import Regression, Samples, regressor_rows, stacked
-from symheli.errors import DataWarning, InputError, UnknownNameError
+from symheli.errors import DataWarning, ExcitationError, InputError, UnknownNameError
 from symheli.progress import tracked
 from symheli.records import FlightRecord
+from symheli.records.conditioning import unbroken as finite_stretches
 from symheli.values.arrays import Array
 from symheli.values.kinematics import VELOCITIES, kinematic_jacobian
 from symheli.values.numbers import whole
@@ -49,6 +50,11 @@ LINES_PER_ESTIMATE = 1.0 + 2 * (2 / 3) ** 2 + 2 * (1 / 6) ** 2
 correlated.
 """
 
+_TOO_SHORT = (
+    "no stretch of the records in which everything was measured is long enough: hold them against"
+    " record.mended(), decimate to the slowest sensor, or fly again"
+)
+
 LAGS, CHUNK = 25, 256
 """Number of samples over which scores are taken to be correlated, and of those summed at a time."""
 
@@ -60,6 +66,11 @@ DIFFERENCE = 1e-3
 
 WIND_DETERMINED = 0.5
 """Largest standard deviation of a wind that counts as determined by the flights, m/s."""
+
+FILLED, FILLED_INPUT = 1e2, 4.0
+"""Variance of a bridged sample, as a multiple of the sensor's, and of equations with a bridged
+input. Chosen on the seeds 1000 to 1005 of the study's flights, 5 % of their rows lost.
+"""
 
 FARTHEST = 4.0
 """Largest move of late sensors, in their prior deviation."""
@@ -195,10 +206,15 @@ class FilterError(Method):
         for record, R in zip(records, self._variances(records), strict=True):
             noise = Noise.of(R, left, *air)
             flights += [
-                (SmoothedStretch.of(arx, record, part), noise) for part in unbroken(arx, record)
+                (SmoothedStretch.of(arx, record, part), _of_part(noise, arx, record, part))
+                for part in unbroken(arx, record)
             ]
+        if not flights:
+            raise ExcitationError(_TOO_SHORT)
         weights = [len(s.y) for s, _ in flights]
-        R = np.average([noise.R for _, noise in flights], axis=0, weights=weights)
+        R = np.average(
+            [np.atleast_2d(noise.R).min(axis=0) for _, noise in flights], axis=0, weights=weights
+        )
         count, settled, n = 0, False, arx.n_regressors
         prior = SimulatorPrior.of(arx, simulated, unknown, believed=self.prior)
         steps = self.steps * (SLOWER if unknown else 1)
@@ -301,13 +317,41 @@ def noise_of_flight(record: FlightRecord, given: Mapping[str, float]) -> FlightN
     """Return the noise of the sensors of u v w p q r phi theta: from the given standard deviations,
     else from the spectrum of the record.
     """
-    segments = record.segments()
     found = [
-        (given[name] ** 2, 0.0) if name in given else noise_level(record[name], segments)
+        (given[name] ** 2, 0.0) if name in given else noise_level(*_measured(record, name))
         for name in STATES
     ]
     variances, errors = np.array(found).T
     return FlightNoise(variances, errors)
+
+
+def _measured(record: FlightRecord, name: str) -> tuple[Array, list[slice]]:
+    """Return a signal, NaN where it was bridged, and its stretches between longer holes."""
+    x, parts = record[name], record.segments()
+    stretches = [
+        slice(part.start + some.start, part.start + some.stop)
+        for part in parts
+        for some in finite_stretches(x[part])
+    ]
+    mask = record.meta.get("filled", {}).get(name)
+    return (x if mask is None else np.where(mask, np.nan, x)), stretches
+
+
+def _of_part(noise: Noise, arx: Aerodynamics, record: FlightRecord, part: slice) -> Noise:
+    """The noise in a part of a record: larger variances (n, 8) of sensors where a sample was
+    bridged, and of equations that an input that was bridged enters.
+    """
+    filled = record.meta.get("filled")
+    if filled is None:
+        return noise
+    R, Q = (np.tile(variances, (len(record), 1)) for variances in (noise.R, noise.Q))
+    for i, name in enumerate(STATES):
+        if name in filled:
+            R[filled[name], i] *= FILLED
+    inputs = [filled[name] for name in arx.commands if name in filled]
+    for k in np.flatnonzero(np.any(inputs, axis=0)) if inputs else ():
+        Q[k : k + arx.memory + 1] = FILLED_INPUT * noise.Q
+    return noise._replace(R=R[part], Q=Q[part])
 
 
 def noise_variance(signal: Array, segments: Sequence[slice]) -> float:
