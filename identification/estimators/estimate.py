@@ -15,7 +15,8 @@ from identification.design.leakage import warn_of_leakage
 from identification.estimators.filter_error import FilterError
 from identification.estimators.least_squares import residual_covariance
 from identification.estimators.method import Method, exported_methods, method_of
-from identification.estimators.prediction_error import OutputError
+from identification.estimators.prediction_error import BoxJenkins, OutputError
+from identification.estimators.refined_instruments import RefinedInstruments
 from identification.estimators.state_space_search import state_space_of
 from identification.model.flown_in import flown_in
 from identification.model.kinematic_fit import mean_trim
@@ -196,6 +197,11 @@ def _rigid(
         raise InputError(
             f"{', '.join(unknown)}: estimated by FilterError(...) only; give deviations of 0 for"
             f" method {method.shorthand!r}"
+        )
+    if isinstance(method, RefinedInstruments | BoxJenkins):
+        raise InputError(
+            f"method {method.shorthand!r} simulates lagged outputs, and a KinematicARX has none: its"
+            " equations give increments; take FilterError(...), or InstrumentalVariables(...)"
         )
     records = tuple(_complete(record, method) for record in records)
     aerodynamics = _fitted(structure.aerodynamics, records, method)
