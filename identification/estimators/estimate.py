@@ -200,7 +200,7 @@ def _rigid(
         )
     if isinstance(method, RefinedInstruments | BoxJenkins):
         raise InputError(
-            f"method {method.shorthand!r} simulates lagged outputs, and a KinematicARX has none: its"
+            f"method {method.shorthand!r} simulates lagged outputs; a KinematicARX has none: its"
             " equations give increments; take FilterError(...), or InstrumentalVariables(...)"
         )
     records = tuple(_complete(record, method) for record in records)
