@@ -9,7 +9,7 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -152,9 +152,12 @@ def _logs(truth: str, seed: int) -> tuple[dict[str, FlightRecord], dict[str, lis
     return logs, said
 
 
-def of_seed(name: str, seed: int, truth: str = "xcell60") -> Marks:
+def of_seed(
+    name: str, seed: int, truth: str = "xcell60", *, damages: Sequence[str] = tuple(DAMAGES)
+) -> Marks:
     """Fly, damage, read, identify by the method of this name, judge."""
     logs, said = _logs(truth, seed)
+    logs = {damage: logs[damage] for damage in (WHOLE, *damages)}
     heli, simulator = (Helicopter.load(n, governor="ideal") for n in (truth, PAIRS[truth]))
     exact, source = Truth.of(heli, {ALL: AXES[ALL]}), SimulatedFlight(simulator)
     gaps, wrong = {}, {}
@@ -209,7 +212,7 @@ def table(
     """
     rows = {(each[0], each[1]): each for each in shown}
     for name, marks in found.items():
-        rows |= {(name, DAMAGES[d][0]): row(name, d, marks) for d in DAMAGES}
+        rows |= {(name, DAMAGES[d][0]): row(name, d, marks) for d in marks[0].gaps if d != WHOLE}
     order = [(name, about) for name in METHODS for about, _ in DAMAGES.values()]
     return "\n".join(
         [
@@ -226,8 +229,10 @@ def main() -> None:
     parser = parser_of(__doc__, "0-20")
     parser.add_argument("--truth", default="xcell60", choices=sorted(PAIRS))
     parser.add_argument("--only", nargs="+", choices=METHODS, help="default: every method")
+    parser.add_argument("--damage", nargs="+", choices=DAMAGES, help="default: every damage")
     options = parsed(parser, "identified.md", timed=False)
-    found = by_name(options, of_seed, options.only or list(METHODS))
+    call = partial(of_seed, damages=tuple(options.damage or DAMAGES))
+    found = by_name(options, call, options.only or list(METHODS))
     plain = {name: [vars(m) for m in marks] for name, marks in found.items()}
     print(as_json(plain) if options.json else table(options.truth, found))
     if options.write:

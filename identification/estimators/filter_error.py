@@ -4,7 +4,7 @@ smoothing.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
@@ -28,7 +28,6 @@ from identification.structure.regressors import Regression, Samples, regressor_r
 from symheli.errors import DataWarning, ExcitationError, InputError, UnknownNameError
 from symheli.progress import tracked
 from symheli.records import FlightRecord
-from symheli.records.conditioning import unbroken as finite_stretches
 from symheli.values.arrays import Array
 from symheli.values.kinematics import VELOCITIES, kinematic_jacobian
 from symheli.values.numbers import whole
@@ -44,6 +43,9 @@ MODEL_ERROR = 1e-9
 
 NOISE_BAND = 0.8
 """Fraction of the Nyquist frequency above which a signal is taken to be noise."""
+
+HOLE = 5
+"""Longest hole of a signal across which its noise is looked at, samples."""
 
 LINES_PER_ESTIMATE = 1.0 + 2 * (2 / 3) ** 2 + 2 * (1 / 6) ** 2
 """Number of lines of a Hann window's spectrum that count as one: neighbouring lines are
@@ -206,7 +208,7 @@ class FilterError(Method):
         for record, R in zip(records, self._variances(records), strict=True):
             noise = Noise.of(R, left, *air)
             flights += [
-                (SmoothedStretch.of(arx, record, part), _of_part(noise, arx, record, part))
+                (SmoothedStretch.of(arx, record, part), noise_of_part(noise, arx, record, part))
                 for part in unbroken(arx, record)
             ]
         if not flights:
@@ -317,27 +319,22 @@ def noise_of_flight(record: FlightRecord, given: Mapping[str, float]) -> FlightN
     """Return the noise of the sensors of u v w p q r phi theta: from the given standard deviations,
     else from the spectrum of the record.
     """
+    segments = record.segments()
     found = [
-        (given[name] ** 2, 0.0) if name in given else noise_level(*_measured(record, name))
+        (given[name] ** 2, 0.0) if name in given else noise_level(_measured(record, name), segments)
         for name in STATES
     ]
     variances, errors = np.array(found).T
     return FlightNoise(variances, errors)
 
 
-def _measured(record: FlightRecord, name: str) -> tuple[Array, list[slice]]:
-    """Return a signal, NaN where it was bridged, and its stretches between longer holes."""
-    x, parts = record[name], record.segments()
-    stretches = [
-        slice(part.start + some.start, part.start + some.stop)
-        for part in parts
-        for some in finite_stretches(x[part])
-    ]
+def _measured(record: FlightRecord, name: str) -> Array:
+    """Return a signal, NaN where it was bridged."""
     mask = record.meta.get("filled", {}).get(name)
-    return (x if mask is None else np.where(mask, np.nan, x)), stretches
+    return record[name] if mask is None else np.where(mask, np.nan, record[name])
 
 
-def _of_part(noise: Noise, arx: Aerodynamics, record: FlightRecord, part: slice) -> Noise:
+def noise_of_part(noise: Noise, arx: Aerodynamics, record: FlightRecord, part: slice) -> Noise:
     """The noise in a part of a record: larger variances (n, 8) of sensors where a sample was
     bridged, and of equations that an input that was bridged enters.
     """
@@ -367,9 +364,7 @@ def noise_level(signal: Array, segments: Sequence[slice]) -> tuple[float, float]
     enough.
     """
     power, weight, spread = 0.0, 0.0, 0.0
-    for part in segments:
-        x = signal[part]
-        x = x[np.isfinite(x)]
+    for x in _between_holes(signal, segments):
         if len(x) < 32:
             continue
         window = np.hanning(len(x))
@@ -380,6 +375,15 @@ def noise_level(signal: Array, segments: Sequence[slice]) -> tuple[float, float]
         weight += len(x)
         spread += len(x) ** 2 * LINES_PER_ESTIMATE / len(high)
     return (power / weight, float(np.sqrt(spread)) / weight) if weight else (np.nan, np.inf)
+
+
+def _between_holes(signal: Array, segments: Sequence[slice]) -> Iterator[Array]:
+    """What is known of a signal between holes of more than `HOLE` samples: shorter ones are closed,
+    as those of a slower sensor.
+    """
+    for part in segments:
+        rows = part.start + np.flatnonzero(np.isfinite(signal[part]))
+        yield from np.split(signal[rows], np.flatnonzero(np.diff(rows) > HOLE + 1) + 1)
 
 
 def unbroken(arx: Aerodynamics, record: FlightRecord) -> list[slice]:
