@@ -21,7 +21,8 @@ from symheli.flight import ParameterChange
 from symheli.progress import tracked
 from symheli.values.arrays import Array
 
-PAGE, SECTION, GUSTS = DOCS / "howto" / "live.md", "alarm", "alarm in light turbulence"
+PAGE, SECTION = DOCS / "howto" / "live.md", "alarm"
+GUSTY_PAGE, GUSTS = DOCS / "identified.md", "alarm in light turbulence"
 FLOWN, CHANGE = 600.0, 300.0
 """Length of a flight, and when the vehicle changes, s."""
 LATERAL, TAIL = "main_rotor.lateral_gain", "tail_rotor.lift_slope"
@@ -152,16 +153,17 @@ def main() -> None:
     arguments = parsed(parser, "docs/howto/live.md", timed=False)
     seeds = range(arguments.first, arguments.first + arguments.seeds)
     if arguments.turbulent:
-        text, section = table_in_gusts(list(map(in_gusts, tracked("seeds", seeds)))), GUSTS
+        page, section = GUSTY_PAGE, GUSTS
+        text = table_in_gusts(list(map(in_gusts, tracked("seeds", seeds))))
     else:
         found = []
         for seed in seeds:
             found.append(of_seed(seed))
             print(seed, *(f"{s:g}" for s in found[-1]), flush=True)
-        text, section = table(found), SECTION
+        page, section, text = PAGE, SECTION, table(found)
     print(text)
     if arguments.write:
-        keep(PAGE, section, text)
+        keep(page, section, text)
 
 
 if __name__ == "__main__":

@@ -87,7 +87,8 @@ class FilterError(Method):
     For given coefficients the best x is a smoother's; the equations linearized there are linear in
     v and in the coefficients at once, so that a step is a generalized least squares with the
     banded covariance of (their error as measured). Starts from instruments flown in a simulator
-    (`InstrumentalVariables`), and learns from the same flight what the structure leaves out.
+    (`InstrumentalVariables`), and learns from the same flight what the structure leaves out. `fit`
+    fills holes up to half a second by that flight, and they count as badly measured here.
 
     Parameters
     ----------
