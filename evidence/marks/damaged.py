@@ -38,7 +38,7 @@ BURST, LOST = 8, 0.05
 """Mean number of rows lost at once; share of all rows that is lost."""
 
 CLOCK = 0.01
-"""What a stamp is off at most, as a part of a step."""
+"""Largest error of a stamp, as a part of a step."""
 
 GAP = 5.0
 """s."""

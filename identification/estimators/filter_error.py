@@ -379,7 +379,7 @@ def noise_level(signal: Array, segments: Sequence[slice]) -> tuple[float, float]
 
 
 def _between_holes(signal: Array, segments: Sequence[slice]) -> Iterator[Array]:
-    """What is known of a signal between holes of more than `HOLE` samples: shorter ones are closed,
+    """Yield what is known of a signal between holes of more than `HOLE` samples; shorter are closed,
     as those of a slower sensor.
     """
     for part in segments:
