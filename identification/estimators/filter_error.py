@@ -379,8 +379,8 @@ def noise_level(signal: Array, segments: Sequence[slice]) -> tuple[float, float]
 
 
 def _between_holes(signal: Array, segments: Sequence[slice]) -> Iterator[Array]:
-    """Yield what is known of a signal between holes of more than `HOLE` samples; shorter are closed,
-    as those of a slower sensor.
+    """Yield what is known of a signal between holes of more than `HOLE` samples. Shorter ones are
+    closed, as those of a slower sensor.
     """
     for part in segments:
         rows = part.start + np.flatnonzero(np.isfinite(signal[part]))
