@@ -34,7 +34,8 @@ class Whitening:
     @classmethod
     def of(cls, terms: Sequence[tuple[Sequence[Array], Array]]) -> Whitening:
         """Return the whitening from each term's blocks L_0, L_1, .. (m, size, inputs) and variances
-        (inputs,); raise `AccuracyError` where the sum is singular to rounding, or no longer finite.
+        (inputs,), or (n, inputs) of the last n samples; raise `AccuracyError` where the sum is
+        singular to rounding, or no longer finite.
         """
         reach = max(len(L) for L, _ in terms) - 1
         m, size = terms[0][0][0].shape[:2]
@@ -43,7 +44,11 @@ class Whitening:
             block = np.zeros((m - d, size, size))
             for L, variances in terms:
                 for i in range(d, len(L)):
-                    block += (L[i][d:] * variances) @ L[i - d][: m - d].swapaxes(1, 2)
+                    own = variances
+                    if variances.ndim == 2:
+                        ahead = len(variances) - m - i
+                        own = variances[ahead + d : ahead + m, None]
+                    block += (L[i][d:] * own) @ L[i - d][: m - d].swapaxes(1, 2)
             for column in range(size):
                 first, start = 0 if d else column, d * size - column
                 below = columns[: m - d, column, start + first : start + size]

@@ -8,24 +8,34 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import overload
 
+import numpy as np
+
 from identification.design.excitation import excitation_of
 from identification.design.leakage import warn_of_leakage
 from identification.estimators.filter_error import FilterError
 from identification.estimators.least_squares import residual_covariance
 from identification.estimators.method import Method, exported_methods, method_of
-from identification.estimators.prediction_error import OutputError
+from identification.estimators.prediction_error import BoxJenkins, OutputError
+from identification.estimators.refined_instruments import RefinedInstruments
 from identification.estimators.state_space_search import state_space_of
 from identification.model.flown_in import flown_in
 from identification.model.kinematic_fit import mean_trim
 from identification.model.kinematic_model import KinematicModel
 from identification.model.lpvarx_model import LPVARXModel
 from identification.model.state_space_model import StateSpaceModel
-from identification.structure.kinematic_arx import KinematicARX
+from identification.structure.kinematic_arx import STATES, KinematicARX
 from identification.structure.lpvarx import LPVARX, require_structure
 from identification.structure.regressors import as_records, stacked, units_of
 from identification.structure.state_space import StateSpace
 from symheli.errors import ConvergenceWarning, InputError
 from symheli.records import FlightRecord
+from symheli.records.mending import bridged
+
+LOST = 0.5
+"""Longest hole that a simulated flight bridges, s."""
+
+SLOW = 0.6
+"""Share of the samples below which a sensor is slower than the others."""
 
 
 @overload
@@ -188,6 +198,12 @@ def _rigid(
             f"{', '.join(unknown)}: estimated by FilterError(...) only; give deviations of 0 for"
             f" method {method.shorthand!r}"
         )
+    if isinstance(method, RefinedInstruments | BoxJenkins):
+        raise InputError(
+            f"method {method.shorthand!r} simulates lagged outputs; a KinematicARX has none: its"
+            " equations give increments; take FilterError(...), or InstrumentalVariables(...)"
+        )
+    records = tuple(_complete(record, method) for record in records)
     aerodynamics = _fitted(structure.aerodynamics, records, method)
     if unknown:
         known = {n: p.settled(aerodynamics.details.get(n, {})) for n, p in parts.items()}
@@ -201,6 +217,18 @@ def _rigid(
         aerodynamics=aerodynamics,
         trim=mean_trim(structure, records),
         drive=None if drive is None else _fitted(drive, records, "ls"),
+    )
+
+
+def _complete(record: FlightRecord, method: Method) -> FlightRecord:
+    """The record with its short holes bridged: by the simulator's flight where the method takes
+    what is bridged as badly measured, else those between the values of a slower sensor alone.
+    """
+    if isinstance(method, FilterError):
+        return bridged(record, STATES, LOST, method.simulator.flown)
+    there = np.isfinite(record.columns(STATES)).mean(axis=0)
+    return bridged(
+        record, [name for name, share in zip(STATES, there, strict=True) if share < SLOW]
     )
 
 

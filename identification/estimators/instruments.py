@@ -208,7 +208,7 @@ def flown_rows(arx: LPVARX, record: FlightRecord, source: FlightSource) -> Array
     past; raises `InputError` where its samples are not those of the record.
     """
     flown = source.flown(record)
-    if len(flown) != len(record) or not np.allclose(flown.time, record.time, atol=1e-3 * record.dt):
+    if len(flown) != len(record) or not np.allclose(flown.time, record.time, atol=0.02 * record.dt):
         raise InputError(
             f"{source} flew other samples than those of the record: {len(flown)} from"
             f" {flown.time[0]:.6g} s, not {len(record)} from {record.time[0]:.6g} s"

@@ -10,12 +10,19 @@ import numpy as np
 from scipy.stats import t as student
 
 from identification.design.criterion import Criterion, concluded, judged, missed
-from identification.estimators.filter_error import Noise, SmoothedStretch, noise_of_flight, unbroken
+from identification.estimators.filter_error import (
+    Noise,
+    SmoothedStretch,
+    noise_of_flight,
+    noise_of_part,
+    unbroken,
+)
 from identification.estimators.residual_power import BANDS, WINDOW, window_powers
 from identification.model.kinematic_model import KinematicModel
 from identification.structure.kinematic_arx import STATES
 from symheli.errors import InputError
 from symheli.records import FlightRecord
+from symheli.records.mending import bridged
 from symheli.values.arrays import Array
 
 SURE = 3.0
@@ -155,7 +162,7 @@ def validate(model: KinematicModel, record: FlightRecord) -> UnseenFlight:
             f"method {model.method!r} does not say how large the noise is: fit by FilterError"
         )
     aero = model.structure.aerodynamics
-    prepared = aero.prepared(record)
+    prepared = aero.prepared(bridged(record, STATES))
     model.aerodynamics.require_same_kind(prepared)
     pooled = np.array([details["sensor_noise"][s] for s in STATES]) ** 2
     given = details.get("sensor_noise_given", ())
@@ -174,7 +181,7 @@ def validate(model: KinematicModel, record: FlightRecord) -> UnseenFlight:
     errors = np.where(told, found.errors, 0.0)
     for part in unbroken(aero, prepared):
         s = SmoothedStretch.of(aero, prepared, part)
-        equations = s.linearized(model.theta, noise)
+        equations = s.linearized(model.theta, noise_of_part(noise, aero, prepared, part))
         white = equations.whitened()
         residuals.append(white)
         power += float(np.sum(white**2))
@@ -182,6 +189,7 @@ def validate(model: KinematicModel, record: FlightRecord) -> UnseenFlight:
         unknown, spread = unknown + np.trace(known), spread + np.sum(known * known.T)
         for i in np.flatnonzero(errors):
             other = Noise.of(R * (1 + errors[i] * (np.arange(len(R)) == i)), left, *air)
+            other = noise_of_part(other, aero, prepared, part)
             louder[i] += np.sum(white**2) - np.sum(s.linearized(model.theta, other).whitened() ** 2)
         count, samples = count + white.size, samples + len(white)
     if samples * model.dt < 1.0:

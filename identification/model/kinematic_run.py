@@ -118,13 +118,16 @@ def predict(run: Run, horizon: int) -> Array:
         return out
     past = [run.y[starts - i] for i in range(run.memory)]
     bad = np.zeros(len(starts), bool)
+    known = np.isfinite(past).all(axis=(0, 2))
     with np.errstate(all="ignore"):
         for j in range(1, horizon + 1):
             inputs = [run.u[starts + j - 1 - i] for i in range(run.memory)]
+            known &= np.isfinite(inputs).all(axis=(0, 2))
             new = run.step(starts + j, past, inputs)
             bad |= np.isinf(new).any(axis=1)
             past = [new, *past[:-1]]
-    out[starts + horizon] = np.where(bad[:, None], np.inf, past[0])
+    found = np.where(bad[:, None], np.inf, past[0])
+    out[starts + horizon] = np.where(known[:, None], found, np.nan)
     return out
 
 

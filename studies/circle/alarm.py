@@ -40,10 +40,12 @@ class VehicleAlarm:
         What the vehicle was.
     deviations : array (8,)
         Standard deviations over the record that it was identified from.
+    threshold : float
+        Sum at which the vehicle has changed: in still air 10; gusts reach that without a change.
     """
 
-    def __init__(self, model: KinematicModel, deviations: Array):
-        self.model, self.deviations = model, deviations
+    def __init__(self, model: KinematicModel, deviations: Array, threshold: float = THRESHOLD):
+        self.model, self.deviations, self.threshold = model, deviations, threshold
         self.sums = np.zeros((2, len(STATES)))
         self.unknown = 0
         """Looks since the last one at a second that was known."""
@@ -54,15 +56,18 @@ class VehicleAlarm:
         """
         every = round(HORIZON / record.dt)
         looks = errors(self.model, record)[::-every][:seconds][::-1]
-        return next(filter(None, map(self._look, looks)), None)
+        return next(filter(None, map(self.look, looks)), None)
 
-    def _look(self, error: Array) -> str | None:
+    def look(self, error: Array) -> str | None:
+        """Take in the errors (8,) of a prediction; return what has changed, None while nothing
+        has.
+        """
         self.unknown += 1
         if np.isfinite(error).all():
             self.unknown = 0
             z = error / self.deviations
             self.sums = np.maximum(self.sums + np.array([z, -z]) - ALLOWED, 0.0)
-        if self.sums.max() < THRESHOLD:
+        if self.sums.max() < self.threshold:
             return None
         side, state = divmod(int(self.sums.argmax()), len(STATES))
         more = "more" if side == 0 else "less"

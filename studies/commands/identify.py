@@ -510,6 +510,7 @@ def _prepared(
             units=dict(arguments.units),
             time_unit=arguments.time_unit,
         )
+    record, columns = flown.as_measured(record, signals.outputs, log)
     samples, used, seen = len(record), (), None
     if own_clocks(_log_format(arguments, log)) or arguments.segments:
         seen = _contents(arguments, log)
@@ -538,12 +539,11 @@ def _prepared(
     if arguments.smooth_scheduling:
         record = conditioning.smooth(record, scheduling, arguments.smooth_scheduling)
     shorter = conditioning.decimate(record, arguments.decimate)
-    late: dict[str, float] = {}
     if seen is not None and arguments.map:
         sources = _map(arguments).signals.items()
-        columns = {n: seen.columns[s.column] for n, s in sources if s.column in seen.columns}
-        flown.refuse_what_is_invented(columns, (*signals.outputs, *signals.inputs), shorter.dt, log)
-        late = flown.slower(columns, shorter.dt)
+        columns |= {n: seen.columns[s.column] for n, s in sources if s.column in seen.columns}
+    flown.refuse_what_is_invented(columns, (*signals.outputs, *signals.inputs), shorter.dt, log)
+    late = flown.slower(columns, shorter.dt)
     return _Prepared(shorter, scheduling, samples, kept, check, wrong, used, late)
 
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from symheli.errors import InputError
+from symheli.errors import DataWarning, InputError
 from symheli.logs.column import Column, unresolved
 from symheli.logs.segments import MIN_DURATION, Segment, serving
 from symheli.records import FlightRecord
+from symheli.records.kinematics import comparable
+from symheli.records.mending import all_repeats, frozen, without
 
 SERVING, ALL = "serving", "all"
 """Words for the segments that serve, and for the whole log."""
@@ -72,6 +75,28 @@ def slower(columns: Mapping[str, Column], dt: float) -> dict[str, float]:
     """{signal: its own step (s)} of those logged more seldom than every `dt` (s)."""
     steps = {n: _step(c) for n, c in columns.items() if c.time is not None and len(c.time) > 1}
     return {name: step for name, step in steps.items() if step > COARSE * dt}
+
+
+def as_measured(
+    record: FlightRecord, outputs: Sequence[str], log: Path
+) -> tuple[FlightRecord, dict[str, Column]]:
+    """The record without what frozen sensors repeat, which a `DataWarning` says, and with slower
+    sensors interpolated; those, with the instants of their own values.
+    """
+    found = all_repeats(record, (*outputs, *comparable(record.signals)))
+    for sentence in frozen(record, found):
+        warnings.warn(f"{log}: {sentence}", DataWarning, stacklevel=2)
+    masks = {name: one.mask for name, one in found.items() if one.mask.any()}
+    out, slow = without(record, masks), {}
+    for name in (n for n, one in found.items() if one.every > 1):
+        known = np.isfinite(out[name])
+        slow[name] = Column(record.time[known], out[name][known])
+    made = {n: np.interp(record.time, c.time, c.values) for n, c in slow.items()}  # type: ignore[arg-type]
+    for name, column in made.items():
+        for first, last in found[name].spells:
+            column[first + 1 : last + 1] = np.nan
+    units = {str(s): s.unit for s in record.signals if str(s) in made}
+    return out.with_signals(units, **made).select(list(map(str, record.signals))), slow
 
 
 def refuse_what_is_invented(

@@ -16,15 +16,10 @@ from symheli.logs.format import format_named
 from symheli.logs.signal_map import SignalMap, Source
 from symheli.records import FlightRecord
 from symheli.records.kinematics import COMPARED
+from symheli.records.mending import SCATTER, even
 from symheli.records.tied_units import POSITIONS
-from symheli.values.arrays import Array
 from symheli.values.sample_period import USUAL, units_of_step
 from symheli.values.signal import UNITS
-
-SCATTER = 0.1
-"""Part of a step by which stamps may be off an even clock and stand for it: the samples are even
-then, not their stamps.
-"""
 
 STILL = 1e-6
 """A scheduling signal that moves by less than this part of its size stays where it is."""
@@ -75,9 +70,8 @@ def on_one_step(
         pass
     else:
         return record
-    grid, period, scatter = _grid(record)
+    made, period, scatter = even(record)
     if scatter <= SCATTER * period:
-        made = replace(record, time=grid)
         told = (
             f"the stamps scatter by up to {scatter:.2g} s around steps of {period:.5g} s, now even"
         )
@@ -86,18 +80,6 @@ def on_one_step(
         told = f"the steps are uneven, the samples {made.resampled}"
     warnings.warn(f"{path}: {told}", DataWarning, stacklevel=3)
     return made
-
-
-def _grid(record: FlightRecord) -> tuple[Array, float, float]:
-    """Instants (n,) at one step nearest to the stamps, a phase for each part; that step, and by how
-    much a stamp is off at most, s.
-    """
-    parts = [np.arange(part.start, part.stop) for part in record.segments()]
-    counts = np.concatenate([part - part.mean() for part in parts])
-    centres = np.concatenate([np.full(len(part), record.time[part].mean()) for part in parts])
-    period = float(counts @ (record.time - centres) / (counts @ counts))
-    grid = centres + period * counts
-    return grid, period, float(np.abs(record.time - grid).max())
 
 
 @contextmanager

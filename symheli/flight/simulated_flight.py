@@ -14,7 +14,7 @@ from symheli.helicopter import Helicopter
 from symheli.records.flight_record import FlightRecord
 from symheli.values.arrays import Array
 
-TIME_TOLERANCE = 1e-3
+TIME_TOLERANCE = 0.02
 """Largest difference of the sample times of a record from those of its plan, as a fraction of the
 sample period.
 """

@@ -13,6 +13,7 @@ The examples of this package start from
 from symheli.records.conditioning import decimate, low_pass, smooth, split, with_norm
 from symheli.records.flight_record import FlightRecord
 from symheli.records.kinematic_check import KinematicCheck, SensorCheck, check_kinematics
+from symheli.records.mending import mended
 
 __all__ = [
     "FlightRecord",
@@ -21,6 +22,7 @@ __all__ = [
     "check_kinematics",
     "decimate",
     "low_pass",
+    "mended",
     "smooth",
     "split",
     "with_norm",

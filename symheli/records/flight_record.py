@@ -344,7 +344,8 @@ class FlightRecord:
         if np.ptp(inside) > JITTER * dt:
             raise InputError(
                 f"sampling is irregular (steps {inside.min():.4g} to {inside.max():.4g} s);"
-                f" resample first: record.resample({dt:.3g})"
+                f" resample first: record.resample({dt:.3g}); where only the"
+                " stamps are uneven: record.mended()"
             )
         return period_of(inside, self.time[-1])
 
@@ -483,6 +484,14 @@ class FlightRecord:
         from symheli.records.conditioning import decimate
 
         return decimate(self, n)
+
+    def mended(self, sensors: Sequence[str] | None = None) -> FlightRecord:
+        """Put stamps on an even clock, and mark what `sensors` only repeat as missing (default:
+        what the kinematics tie); see `symheli.records.mended`.
+        """
+        from symheli.records.mending import mended
+
+        return mended(self, sensors)
 
     def split(self, fraction: float) -> tuple[FlightRecord, FlightRecord | None]:
         """Return the first `fraction` of the time for the fit, the rest for validation (None where

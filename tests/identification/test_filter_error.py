@@ -7,7 +7,7 @@ import pytest
 from known_vehicles import STATES, Vehicle
 
 import identification as idn
-from identification.estimators import block_banded
+from identification.estimators import block_banded, estimate
 from identification.estimators.block_banded import WhitenedRegressors, Whitening
 from identification.estimators.filter_error import (
     Noise,
@@ -41,16 +41,23 @@ class Cut:
         return self.whole.rows(np.isin(np.arange(len(self.whole)), at))
 
 
+@pytest.mark.parametrize("bridged", [False, True])
 @pytest.mark.parametrize("gust", [0.0, 0.7])
-def test_a_step_is_generalized_least_squares_with_the_dense_covariance(vehicle, gust):
+def test_a_step_is_generalized_least_squares_with_the_dense_covariance(vehicle, gust, bridged):
     """X' S^-1 X and X' S^-1 e, S from finite differences of the equations by every measurement;
-    with a gust of every equation less what remains of the one before.
+    with a gust of every equation less what remains of the one before; of bridged samples, with
+    variances of their own.
     """
     record = vehicle.record(9, sensors=SENSORS)
     aero = vehicle.kin.aerodynamics
     s = SmoothedStretch.of(aero, record, slice(0, 9))
     R, Q = SENSORS**2, np.append(1e-3 * SENSORS[:6] ** 2, [1e-6, 1e-6])
     theta = vehicle.theta + 1e-3
+    each_R, each_Q = np.tile(R, (9, 1)), np.tile(Q, (9, 1))
+    if bridged:
+        each_R[3:5] *= 50.0
+        each_Q[3:6] *= 4.0
+        R, Q = each_R, each_Q
 
     def left(y):
         u, p = s.now.u, np.ravel(s.now.p)
@@ -68,7 +75,7 @@ def test_a_step_is_generalized_least_squares_with_the_dense_covariance(vehicle, 
             for e in np.eye(y0.size).reshape(-1, *y0.shape)
         ]
     )
-    S = slope @ np.diag(np.tile(R, 9)) @ slope.T + np.diag(np.tile(Q, 8))
+    S = slope @ np.diag(each_R.ravel()) @ slope.T + np.diag(each_Q[1:].ravel())
     F, _ = s._equations(theta)
     X = np.zeros((8, 8, 6, F.shape[1]))
     for i in range(6):
@@ -170,16 +177,35 @@ def test_the_order_of_records_does_not_matter_and_more_of_them_say_more(vehicle)
     assert error < alone
 
 
-def test_a_missing_sample_cuts_a_record_in_two(vehicle):
-    whole, clean = vehicle.record(320, sensors=SENSORS), vehicle.record(320)
-    columns = {s: np.where(np.arange(320) == 150, np.nan, whole[s]) for s in STATES}
+def test_a_long_hole_cuts_a_record_in_two(vehicle):
+    whole, clean = vehicle.record(380, sensors=SENSORS), vehicle.record(380)
+    k = np.arange(380)
+    hole = (k >= 150) & (k < 190)
+    columns = {s: np.where(hole, np.nan, whole[s]) for s in STATES}
     holed = whole.with_signals({s: s.unit for s in whole.signals if s in STATES}, **columns)
-    parts = [whole.rows(np.arange(320) < 150), whole.rows(np.arange(320) > 150)]
-    gap = whole.rows(np.arange(320) != 150)
+    parts, gap = [whole.rows(k < 150), whole.rows(k >= 190)], whole.rows(~hole)
     found = [fitted(vehicle, cut, Cut(clean), steps=5) for cut in (holed, parts, gap)]
     spread = np.sqrt(np.einsum("onon->no", found[0].covariance))
     for other in found[1:]:
         assert np.abs((found[0].theta - other.theta) / spread).max() < 1e-5
+
+
+def test_short_holes_cost_little(vehicle):
+    """Three rows in a row lost every 30: the simulated flight bridges them, and the model is nearer
+    that of the whole record than with holes it does not bridge.
+    """
+    whole, clean = vehicle.record(600, sensors=SENSORS), vehicle.record(600)
+    lost = whole.rows(np.arange(600) % 30 > 2)
+    of_whole, of_lost = (fitted(vehicle, r, Cut(clean), steps=5) for r in (whole, lost))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(estimate, "LOST", 0.0)
+        cut = fitted(vehicle, lost, Cut(clean), steps=5)
+    spread = np.sqrt(np.einsum("onon->no", of_whole.covariance))
+
+    def apart(found):
+        return np.sqrt(np.mean(((found.theta - of_whole.theta) / spread) ** 2))
+
+    assert apart(of_lost) < 0.7 * apart(cut)
 
 
 @pytest.mark.slow

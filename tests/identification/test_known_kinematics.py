@@ -391,3 +391,16 @@ def test_scores_are_those_of_its_predictions_at_every_horizon(vehicle, flight):
     assert own.scores.ahead == {y: found.ahead[y] for y in ("phi", "u")}
     with pytest.raises(InputError, match="hold_p: a KinematicModel"):
         idn.scores(model, flight, hold_p=True)
+
+
+@pytest.mark.parametrize("name", ["riv", "bj"])
+def test_methods_that_simulate_lagged_outputs_are_refused(vehicle, flight, name):
+    with pytest.raises(InputError, match="KinematicARX has none"):
+        idn.fit(vehicle.kin, flight, method=name)
+
+
+def test_predictions_from_an_angle_that_is_missing_are_unknown(vehicle, flight):
+    guess = vehicle.model(flight).predict(missing(flight, [300], ["phi"]), 5)
+    lost = np.flatnonzero(np.isnan(guess).any(axis=1))
+    assert {*range(305, 305 + vehicle.kin.memory)} <= {*lost.tolist()}
+    assert not np.isinf(guess).any()

@@ -10,6 +10,7 @@ from known_vehicles import Vehicle
 
 import identification as idn
 import symheli
+from identification.estimators.instrumental_variables import _faded
 from symheli.errors import InputError
 
 SENSORS = np.array([0.03] * 3 + [0.01] * 3 + [0.004] * 2)
@@ -101,3 +102,10 @@ def test_more_flights_bring_instruments_to_the_truth_and_least_squares_to_its_bi
     one_iv = np.sqrt(np.mean([error(r, iv) ** 2 for r in records]))
     assert error(records, iv) < 2 * one_iv / np.sqrt(8)
     assert error(records) > 2 * error(records, iv)
+
+
+def test_instruments_fade_beside_a_break_alone():
+    rows = np.array([0, 1, 2, 3, 4, 5, 6, 7, 20, 21, 22, 23, 24, 25, 26])
+    steps = np.arange(1, 6) / 6
+    expected = [1, 1, 1, *steps[::-1], *steps, 1, 1]
+    np.testing.assert_allclose(_faded(rows), expected)

@@ -124,3 +124,15 @@ def test_bands_refuse_one_flight_of_a_hundred_and_find_what_is_slow():
     # too few windows, or too short a flight, are not judged by bands
     assert judge._unlikely(known[:3], [slow], DT, np.zeros(8)) == ()
     assert judge._unlikely(known, [slow[:200]], DT, np.zeros(8)) == ()
+
+
+def test_a_slower_sensor_is_no_other_vehicle(vehicle, model):
+    """Every second velocity is missing: what bridges it counts as badly measured."""
+    record = vehicle.record(300, seed=11, sensors=SENSORS)
+    columns = {name: record[name].copy() for name in STATES[:3]}
+    for column in columns.values():
+        column[1::2] = np.nan
+    slow = record.with_signals(dict.fromkeys(columns, "m/s"), **columns)
+    found = idn.judge.validate(model, slow)
+    assert found.explained
+    assert found.samples > 290
