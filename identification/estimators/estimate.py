@@ -13,7 +13,6 @@ from identification.design.leakage import warn_of_leakage
 from identification.estimators.filter_error import FilterError
 from identification.estimators.least_squares import residual_covariance
 from identification.estimators.method import Method, exported_methods, method_of
-from identification.estimators.prediction_error import OutputError
 from identification.estimators.state_space_search import state_space_of
 from identification.model.flown_in import flown_in
 from identification.model.kinematic_fit import mean_trim
@@ -24,7 +23,7 @@ from identification.structure.kinematic_arx import KinematicARX
 from identification.structure.lpvarx import LPVARX, require_structure
 from identification.structure.regressors import as_records, stacked, units_of
 from identification.structure.state_space import StateSpace
-from symheli.errors import ConvergenceWarning, InputError
+from symheli.errors import InputError
 from symheli.records import FlightRecord
 
 
@@ -69,7 +68,7 @@ def fit(
         into the next.
     method : Method or str, optional
         An estimator with its options, or the shorthand of one with its defaults: "ls", of a
-        `StateSpace` "oe", which is all that it takes. Any subclass of `Method` will do. Those of
+        `StateSpace` "oe"; it takes "innovations" and "subspace" besides, and no others. Any subclass of `Method` will do. Those of
         `identification.methods`, of which noise on the outputs biases all of least squares:
 
     Returns
@@ -129,7 +128,7 @@ def fit(
     [[[-0.5]]]
     """
     if isinstance(structure, StateSpace):
-        return _states(structure, as_records(records), method_of(method or "oe"))
+        return state_space_of(structure, as_records(records), method_of(method or "oe"))
     method = method_of(method or "ls")
     if isinstance(structure, KinematicARX):
         return _rigid(structure, as_records(records), method)
@@ -157,21 +156,6 @@ def _first(method: type[Method]) -> str:
 
 
 fit.__doc__ = _with_methods(fit.__doc__)
-
-
-def _states(
-    structure: StateSpace, records: tuple[FlightRecord, ...], method: Method
-) -> StateSpaceModel:
-    """The model of states, from that of the difference equation by the same method."""
-    if type(method) is not OutputError:
-        raise InputError(
-            "a StateSpace is fitted by the closest free run: OutputError(...), got"
-            f" {method.shorthand!r}"
-        )
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ConvergenceWarning)  # of where the search begins
-        begin = _fitted(structure.regression, records, method)
-    return state_space_of(structure, records, begin, method)
 
 
 def _rigid(
