@@ -67,9 +67,10 @@ def fit(
         Of one sample period and in the same units; lags never reach across a gap or from one record
         into the next.
     method : Method or str, optional
-        An estimator with its options, or the shorthand of one with its defaults: "ls", of a
-        `StateSpace` "oe"; it takes "innovations" and "subspace" besides, and no others. Any subclass of `Method` will do. Those of
-        `identification.methods`, of which noise on the outputs biases all of least squares:
+        An estimator with its options, or the shorthand of one with its defaults: "ls"; of a
+        `StateSpace` "oe", where only "innovations" and "subspace" do besides. Any subclass of
+        `Method` will do. Those of `identification.methods`, of which noise on the outputs
+        biases all of least squares:
 
     Returns
     -------

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -36,7 +36,16 @@ GAINS = (1.0, 0.5, 0.2, 0.0)
 UNSEEN = 1e-12
 """Share of the largest information below which a direction is not seen in the response."""
 
-LARGEST_DAMPING = 1e8
+LARGEST_DAMPING = 1e6
+
+NEAR, BENT = 0.1, 0.375
+"""Part of a step over which curvature is measured; largest bend of a step, as a share of it."""
+
+HELD = 2**25
+"""Largest number of slopes that are kept to measure curvature with: 256 MB."""
+
+ROUGH = 1e-4
+"""Relative change of the cost at which a search that others follow ends."""
 
 FLOOR = 1e-6
 """Least deviation of an innovation, as a share of its output's spread, that weighs."""
@@ -82,11 +91,28 @@ def state_space_of(
 
 
 class Information(NamedTuple):
-    """Sum of squares, gradient (n,) and information (n, n) of unknowns."""
+    """Sum of squares, gradient (n,) and information (n, n) of unknowns; errors by piece, and their
+    slopes with the unknowns they belong to, where these are few enough to be held.
+    """
 
     cost: float
     gradient: Array
     square: Array
+    errors: list[Array]
+    slopes: list[tuple[int, slice, Array, Array]]
+
+    def curvature(self, problem: Problem, z: Array, step: Array) -> Array | None:
+        """Slopes (n,) times the second derivative of the errors along a step; None where it is not
+        known.
+        """
+        if not self.slopes:
+            return None
+        before, after = problem.errors(z - NEAR * step), problem.errors(z + NEAR * step)
+        out = np.zeros(len(z))
+        for i, rows, at, part in self.slopes:
+            bent = (after[i][rows] - 2.0 * self.errors[i][rows] + before[i][rows]) / NEAR**2
+            out[at] += part.T @ bent.reshape(-1)
+        return out if np.isfinite(out).all() else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +124,8 @@ class Problem:
     run: StateSpaceRun
     pieces: Sequence[Piece]
     weight: Array | None = None
+    held: bool = False
+    """Whether the gain K stays as it is."""
 
     @property
     def scale(self) -> Array:
@@ -121,37 +149,46 @@ class Problem:
         fed = y if self.run.innovations else None
         return self.run.along(z[: self.run.size], z[self.own(i)], u, p, fed)
 
-    def left(self, z: Array, i: int, found: Along | None = None) -> Array:
+    def left(self, z: Array, i: int) -> Array:
         """(m, ny) prediction errors of piece i, less their sign; NaN where y is missing."""
-        return (found or self.along(z, i)).y - self.pieces[i].y
+        return self.along(z, i).y - self.pieces[i].y
+
+    def errors(self, z: Array) -> list[Array]:
+        """Weighted errors (m, ny) of each piece, 0 where y is missing."""
+        return [self._weighted(self.along(z, i), piece) for i, piece in enumerate(self.pieces)]
+
+    def _weighted(self, found: Along, piece: Piece) -> Array:
+        with np.errstate(all="ignore"):
+            return np.where(np.isfinite(piece.y), found.y - piece.y, 0.0) @ self.weights
 
     def cost(self, z: Array) -> float:
         """The sum of squares; infinite where a run diverges."""
-        total = 0.0
         with np.errstate(all="ignore"):
-            for i in range(len(self.pieces)):
-                error = self.left(z, i)
-                total += float(
-                    np.sum((np.where(np.isnan(self.pieces[i].y), 0.0, error) @ self.weights) ** 2)
-                )
+            total = sum(float(np.sum(error**2)) for error in self.errors(z))
         return total if np.isfinite(total) else np.inf
 
     def information(self, z: Array) -> Information:
         """Cost, gradient and Gauss-Newton information, summed up block by block."""
         first, cost = self.run.size, 0.0
         square, gradient = np.zeros((len(z), len(z))), np.zeros(len(z))
+        held = sum(piece.y.size for piece in self.pieces) * len(z) < HELD
+        errors: list[Array] = []
+        kept: list[tuple[int, slice, Array, Array]] = []
         for i, piece in enumerate(self.pieces):
-            found = self.along(z, i)
-            seen = np.isfinite(piece.y)
-            error = np.where(seen, self.left(z, i, found), 0.0) @ self.weights
-            cost += float(np.sum(error**2))
+            found, seen = self.along(z, i), np.isfinite(piece.y)
+            errors.append(self._weighted(found, piece))
+            cost += float(np.sum(errors[i] ** 2))
             at = np.r_[0:first, self.own(i)]
             for rows, slopes in self.run.slopes(z[:first], found):
-                part = slopes * seen[rows, :, None]
-                part = np.matmul(self.weights.T, part).reshape(-1, len(at))
+                if self.held:
+                    slopes[:, :, self.run.gains] = 0.0
+                part = np.matmul(self.weights.T, slopes * seen[rows, :, None])
+                part = part.reshape(-1, len(at))
                 square[np.ix_(at, at)] += part.T @ part
-                gradient[at] += part.T @ error[rows].reshape(-1)
-        return Information(cost, gradient, square)
+                gradient[at] += part.T @ errors[i][rows].reshape(-1)
+                if held:
+                    kept.append((i, rows, at, part))
+        return Information(cost, gradient, square, errors, kept)
 
     def best_of(self, candidates: Sequence[Array]) -> Array:
         """The unknowns of least cost, each piece started from the state that suits it best.
@@ -176,7 +213,7 @@ class Problem:
     def weighted(self, z: Array) -> Problem:
         """The same with errors made white: the likelihood of correlated innovations."""
         covariance = self.residual_covariance(z) + np.diag((FLOOR * self.scale) ** 2)
-        return replace(self, weight=np.linalg.inv(np.linalg.cholesky(covariance)).T)
+        return replace(self, weight=np.linalg.inv(np.linalg.cholesky(covariance)).T, held=False)
 
     def residual_covariance(self, z: Array) -> Array:
         """(ny, ny) of complete rows."""
@@ -202,19 +239,24 @@ def _starts(structure: StateSpace, unknowns: Array) -> list[Array]:
 def _searched(
     problem: Problem, z: Array, method: OutputError | Innovations
 ) -> tuple[Array, Problem, dict[str, object]]:
-    """The unknowns of least cost; with innovations once more with their covariance as weight."""
-    evaluations, converged = 0, True
-    for last in (False, True) if problem.run.innovations and len(problem.scale) > 1 else (True,):
-        if last and problem.run.innovations:
+    """The unknowns of least cost; with innovations K is held at first, which errors that are nearly
+    zero do not determine, and then their covariance is the weight, twice.
+    """
+    evaluations, converged, rough = 0, True, max(method.tolerance, ROUGH)
+    phases = [(False, method.tolerance)]
+    if problem.run.innovations:
+        problem = replace(problem, held=True)
+        phases = [(False, rough), (True, rough), (True, method.tolerance)]
+    for weighted, tolerance in phases:
+        if weighted:
             problem = problem.weighted(z)
-        tolerance = method.tolerance if last else max(method.tolerance, 1e-4)
-        left = method.evaluations - evaluations
-        z, used, converged = minimized(problem, z, max(left, 1), tolerance, method.shorthand)
+        left = max(method.evaluations - evaluations, 1)
+        z, used, converged = minimized(problem, z, left, tolerance, method.shorthand)
         evaluations += used
     if not converged:
         warnings.warn(
             ConvergenceWarning(f"{method.shorthand!r} of states did not settle: {ADVICE}"),
-            stacklevel=5,
+            stacklevel=4,
         )
     message = "settled" if converged else "evaluations used up"
     return z, problem, {"evaluations": evaluations, "converged": converged, "message": message}
@@ -223,42 +265,51 @@ def _searched(
 def minimized(
     problem: Problem, z: Array, evaluations: int, tolerance: float, name: str
 ) -> tuple[Array, int, bool]:
-    """Unknowns by Levenberg-Marquardt steps, number of evaluations, whether they settled."""
-    damping, used, converged = 1e-3, 0, False
+    """Unknowns by Levenberg-Marquardt steps bent along the curvature of the response, number of
+    evaluations with slopes, whether they settled.
+
+    Source: Transtrum and Sethna (2012), Improvements to the Levenberg-Marquardt algorithm for
+    nonlinear least-squares minimization, arXiv 1201.5885, sec. 4.
+    """
+    damping, converged = 1e-3, False
     with task(f"{name}: evaluations, at most", evaluations) as search:
-        now = problem.information(z)
-        while used < evaluations and not converged:
-            step_of = _steps(now)
-            while used < evaluations:
-                used += 1
-                search.step()
-                step = step_of(damping)
-                cost = problem.cost(z + step)
-                gained = now.cost - cost
-                small = np.linalg.norm(step) <= tolerance * np.linalg.norm(z)
-                if cost < now.cost:
-                    damping = max(damping * 0.1, 1e-12)
-                    converged = bool(small or gained <= tolerance * now.cost)
-                    z = z + step
-                    break
-                damping *= 8.0
-                if small or damping > LARGEST_DAMPING:  # no step of any size is better
-                    converged = True
-                    break
-            if not converged:
-                now = problem.information(z)
+        for used in range(1, evaluations + 1):
+            search.step()
+            now = problem.information(z)
+            found = _better(problem, z, now, damping)
+            if found is None:  # no step of any size is better
+                return z, used, True
+            step, damping, cost = found
+            z = z + step
+            small = np.linalg.norm(step) <= tolerance * np.linalg.norm(z)
+            converged = bool(small or now.cost - cost <= tolerance * now.cost)
+            if converged:
+                break
     return z, used, converged
 
 
-def _steps(now: Information) -> Callable[[float], Array]:
-    """The step of a damping, along the directions that are seen."""
+def _better(
+    problem: Problem, z: Array, now: Information, damping: float
+) -> tuple[Array, float, float] | None:
+    """A step that lowers the cost, the damping of the next one, and that cost."""
     values, vectors, scale = _directions(now.square)
-    across = vectors.T @ (now.gradient / scale)
 
-    def step(damping: float) -> Array:
-        return -(vectors @ (across / (values + damping * values[-1]))) / scale  # type: ignore[no-any-return]
+    def solved(gradient: Array) -> Array:
+        across = vectors.T @ (gradient / scale)
+        return (vectors @ (across / (values + damping * values[-1]))) / scale  # type: ignore[no-any-return]
 
-    return step
+    while damping <= LARGEST_DAMPING:
+        step = -solved(now.gradient)
+        curvature = now.curvature(problem, z, step)
+        if curvature is not None:
+            bend = -0.5 * solved(curvature)
+            if np.linalg.norm(scale * bend) <= BENT * np.linalg.norm(scale * step):
+                step = step + bend
+        cost = problem.cost(z + step)
+        if cost < now.cost:
+            return step, max(damping / 3.0, 1e-14), cost
+        damping *= 2.0
+    return None
 
 
 def _directions(square: Array) -> tuple[Array, Array, Array]:

@@ -85,6 +85,11 @@ class StateSpaceRun:
             for a, b, shape in zip(ends[:-1], ends[1:], self.shapes, strict=True)
         )
 
+    @property
+    def gains(self) -> Array:
+        """Positions of K among the unknowns."""
+        return self._columns[4].reshape(-1)
+
     def outputs(
         self, unknowns: Array, start: Array, u: Array, p: Array, y: Array | None = None
     ) -> Array:
