@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import solve_discrete_are
 
 from identification.design.excitation import excitation_of
 from identification.estimators.innovations import Innovations
@@ -33,10 +34,16 @@ from symheli.values.arrays import Array
 GAINS = (1.0, 0.5, 0.2, 0.0)
 """Shares of the gain K, and of what moves with p, that the search may begin with."""
 
+RADIUS = 0.99
+"""Largest eigenvalue of the mean A of the candidate that diverges in no case."""
+
 UNSEEN = 1e-12
 """Share of the largest information below which a direction is not seen in the response."""
 
-LARGEST_DAMPING = 1e6
+LARGEST_DAMPING, FREE = 1e6, 1e-3
+"""Damping at which a search ends, and up to which a step of little gain says that it is at the
+end.
+"""
 
 NEAR, BENT = 0.1, 0.375
 """Part of a step over which curvature is measured; largest bend of a step, as a share of it."""
@@ -82,7 +89,7 @@ def state_space_of(
         raise ExcitationError(f"no unbroken stretch of more than {structure.order} samples")
     begin = subspace_start(structure, pieces, method.past if isinstance(method, Subspace) else None)
     problem = Problem(StateSpaceRun(structure, not isinstance(method, OutputError)), pieces)
-    z = problem.best_of(_starts(structure, begin.unknowns))
+    z = problem.best_of(_starts(structure, begin.unknowns, problem.scale))
     details = {"singular_values": begin.singular_values.tolist()}
     if not isinstance(method, Subspace):
         z, problem, more = _searched(problem, z, method)
@@ -222,18 +229,37 @@ class Problem:
         return errors.T @ errors / max(len(errors), 1)
 
 
-def _starts(structure: StateSpace, unknowns: Array) -> list[Array]:
-    """The unknowns with parts of their gain, and of what moves with p."""
+def _starts(structure: StateSpace, unknowns: Array, scale: Array) -> list[Array]:
+    """The unknowns with parts of their gain, and of what moves with p; with the gain of an observer
+    at the middle of p; and with what diverges in no case.
+    """
     run = StateSpaceRun(structure, innovations=True)
     A, B, C, D, K = run.matrices(unknowns)
     one = structure.basis.constant()
     still = [np.multiply.outer(one, np.tensordot(one, M, 1) / (one @ one)) for M in (A, B, K)]
+    middle = np.tensordot(structure.basis(_middle(structure)), A, 1)
+    gains = [K, still[2]]
+    try:
+        error = solve_discrete_are(middle.T, C.T, np.eye(len(middle)), np.diag(scale**2))
+    except (np.linalg.LinAlgError, ValueError):  # no such gain: the others do
+        pass
+    else:
+        fed = middle @ error @ C.T
+        fed = np.linalg.solve(C @ error @ C.T + np.diag(scale**2), fed.T).T
+        gains.insert(0, np.multiply.outer(one, fed))
     out = []
     for moving in GAINS:
-        part = [s + moving * (M - s) for s, M in zip(still, (A, B, K), strict=True)]
-        for fed in GAINS:
-            out.append(run.unknowns(part[0], part[1], C, D, fed * part[2]))
-    return out
+        part = [s + moving * (M - s) for s, M in zip(still[:2], (A, B), strict=True)]
+        out += [run.unknowns(*part, C, D, fed * gain) for gain in gains for fed in GAINS]
+    calm = np.tensordot(structure.basis(_middle(structure)), still[0], 1)
+    drawn_in = min(1.0, RADIUS / max(np.abs(np.linalg.eigvals(calm)).max(), RADIUS))
+    return [*out, run.unknowns(drawn_in * still[0], B, C, D, 0.0 * K)]
+
+
+def _middle(structure: StateSpace) -> Array | float:
+    """The middle of the range of p."""
+    middle = [0.5 * (low + high) for low, high in structure.basis.ranges]
+    return middle[0] if len(middle) == 1 else np.array(middle)
 
 
 def _searched(
@@ -282,7 +308,8 @@ def minimized(
             step, damping, cost = found
             z = z + step
             small = np.linalg.norm(step) <= tolerance * np.linalg.norm(z)
-            converged = bool(small or now.cost - cost <= tolerance * now.cost)
+            flat = now.cost - cost <= tolerance * now.cost and damping <= FREE
+            converged = bool(small or flat)
             if converged:
                 break
     return z, used, converged

@@ -131,7 +131,7 @@ def response_regions(
 
     Parameters
     ----------
-    model : LPVARXModel or KinematicModel
+    model : LPVARXModel, KinematicModel or StateSpaceModel
         With a covariance.
     points : iterable
         K values of the scheduling: numbers, or tuples of one number a parameter.
@@ -167,9 +167,7 @@ def response_regions(
             f"method {model.method!r} gives no covariance; fit by FilterError or least squares"
         )
     plant = _plant(model, outputs, inputs)
-    thetas = drawn(
-        model.theta, model.covariance, plant.regression.free, whole(draws, "draws", 3), seed
-    )
+    thetas = drawn(model.theta, model.covariance, plant.free, whole(draws, "draws", 3), seed)
     omega, centres, covariances = frozen(frequencies, "frequencies", (None,)), [], []
     chosen = _chosen(points)
     for p in chosen:

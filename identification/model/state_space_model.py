@@ -158,7 +158,7 @@ class StateSpaceModel:
             )
 
 
-def design_matrices(run: StateSpaceRun, unknowns: Array) -> dict[str, Array]:
+def design_matrices(run: StateSpaceRun, unknowns: Array) -> dict[str, Any]:
     """A, B, C and D by function, without the offset, as `LPVStateSpace` takes them."""
     A, B, C, D, _ = run.matrices(unknowns)
     one = run.structure.basis.constant()[:, None, None]

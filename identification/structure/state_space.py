@@ -99,3 +99,8 @@ class StateSpace:
             basis=self.basis,
             offset=self.offset,
         )
+
+    @property
+    def memory(self) -> int:
+        """Samples before the first prediction: none, the state it starts from is estimated."""
+        return 0
