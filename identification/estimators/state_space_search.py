@@ -40,10 +40,8 @@ RADIUS = 0.99
 UNSEEN = 1e-12
 """Share of the largest information below which a direction is not seen in the response."""
 
-LARGEST_DAMPING, FREE = 1e6, 1e-3
-"""Damping at which a search ends, and up to which a step of little gain says that it is at the
-end.
-"""
+LARGEST_DAMPING, FLAT = 1e6, 2
+"""Damping at which a search ends, and the number of steps in a row that gain too little."""
 
 NEAR, BENT = 0.1, 0.375
 """Part of a step over which curvature is measured; largest bend of a step, as a share of it."""
@@ -268,15 +266,16 @@ def _searched(
     """The unknowns of least cost; with innovations K is held at first, which errors that are nearly
     zero do not determine, and then their covariance is the weight, twice.
     """
-    evaluations, converged, rough = 0, True, max(method.tolerance, ROUGH)
-    phases = [(False, method.tolerance)]
+    evaluations, converged, all_ = 0, True, method.evaluations
+    phases = [(False, method.tolerance, all_)]
     if problem.run.innovations:
-        problem = replace(problem, held=True)
-        phases = [(False, rough), (True, rough), (True, method.tolerance)]
-    for weighted, tolerance in phases:
+        problem, rough = replace(problem, held=True), max(method.tolerance, ROUGH)
+        phases = [(False, method.tolerance, all_ // 4), (True, rough, all_ // 4)]
+        phases.append((True, method.tolerance, all_))
+    for weighted, tolerance, most in phases:
         if weighted:
             problem = problem.weighted(z)
-        left = max(method.evaluations - evaluations, 1)
+        left = max(min(most, all_ - evaluations), 1)
         z, used, converged = minimized(problem, z, left, tolerance, method.shorthand)
         evaluations += used
     if not converged:
@@ -297,7 +296,7 @@ def minimized(
     Source: Transtrum and Sethna (2012), Improvements to the Levenberg-Marquardt algorithm for
     nonlinear least-squares minimization, arXiv 1201.5885, sec. 4.
     """
-    damping, converged = 1e-3, False
+    damping, flat, converged = 1e-3, 0, False
     with task(f"{name}: evaluations, at most", evaluations) as search:
         for used in range(1, evaluations + 1):
             search.step()
@@ -308,8 +307,8 @@ def minimized(
             step, damping, cost = found
             z = z + step
             small = np.linalg.norm(step) <= tolerance * np.linalg.norm(z)
-            flat = now.cost - cost <= tolerance * now.cost and damping <= FREE
-            converged = bool(small or flat)
+            flat = flat + 1 if now.cost - cost <= tolerance * now.cost else 0
+            converged = bool(small or flat == FLAT)
             if converged:
                 break
     return z, used, converged
