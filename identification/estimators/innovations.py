@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
 from identification.estimators.method import Estimate
@@ -40,6 +40,7 @@ class Innovations(PredictionError):
     ((1, 10, 1, 10), (800, 1))
     """
 
+    tolerance: float = field(default=1e-8, kw_only=True)
     shorthand: ClassVar[str] = "innovations"
 
     @property
