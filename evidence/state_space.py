@@ -40,7 +40,7 @@ STRUCTURE = StateSpace(
     ALL.outputs, ALL.inputs, SCHEDULING, order=12, basis=Polynomial(2, 0.0, TOP), offset=True
 )
 
-EVALUATIONS, TOLERANCE = 60, 1e-6
+EVALUATIONS, TOLERANCE = 40, 1e-6
 """Of the search: an evaluation with all slopes takes seconds."""
 
 

@@ -42,6 +42,7 @@ class Innovations(PredictionError):
 
     tolerance: float = field(default=1e-8, kw_only=True)
     shorthand: ClassVar[str] = "innovations"
+    of_states: ClassVar[bool] = True
 
     @property
     def noise(self) -> tuple[int, int, Literal["output", "equation"]]:

@@ -21,7 +21,7 @@ from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 from symheli.values.numbers import whole
 
-LANDMARKS = 1200
+LANDMARKS = 600
 """Largest number of windows that span the predictor; other windows are seen through these."""
 
 MOVING = 0.15
@@ -65,11 +65,12 @@ class Subspace(Method):
     --------
     >>> found = idn.fit(idn.StateSpace("y", "u", order=2), record, idn.methods.Subspace(past=8))
     >>> len(found.details["singular_values"])
-    5
+    4
     """
 
     past: int | None = field(default=None, kw_only=True)
     shorthand: ClassVar[str] = "subspace"
+    of_states: ClassVar[bool] = True
     needs_excitation: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
