@@ -1,5 +1,5 @@
 """State-space identification beside other packages, on the same data: largest error of the frozen
-frequency responses as a share of the largest response, and seconds.
+frequency responses as a share of the largest response, and seconds of the processor.
 
 jax-sysid and nfoursid (which knows no scheduling) are raced where they are installed.
 """
@@ -14,7 +14,7 @@ import sys
 import time
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 # this folder holds scripts named like the packages they measure
@@ -27,7 +27,7 @@ one_thread()
 import numpy as np  # noqa: E402
 
 import identification as idn  # noqa: E402
-from benchmarks.race import table  # noqa: E402
+from benchmarks.race import keep, table  # noqa: E402
 from benchmarks.timing import arguments  # noqa: E402
 from symheli import FlightRecord  # noqa: E402
 from symheli.errors import ConvergenceWarning  # noqa: E402
@@ -92,7 +92,7 @@ CASES = (
 
 
 def ours(case: Case, y: Array, u: Array, p: Array, method: str) -> Callable[[float], tuple]:
-    """A fit of this package; "ls" is a difference equation as a state-space model."""
+    """A fit of this package; "ls" and "long" are difference equations as state-space models."""
     columns = dict(zip((*NAMES, *INPUTS, "p"), np.column_stack([y, u, p]).T, strict=True))
     time_ = np.arange(len(y), dtype=float)
     record = FlightRecord.from_arrays(time_, dict.fromkeys(columns, "1"), **columns)
@@ -100,6 +100,9 @@ def ours(case: Case, y: Array, u: Array, p: Array, method: str) -> Callable[[flo
     structure = idn.StateSpace(NAMES, INPUTS, "p", order=4, basis=basis)
     if method == "ls":
         lpv = idn.fit(structure.regression, record).to_state_space()
+    elif method == "long":
+        arx = replace(structure.regression, na=8, nb=8)
+        lpv = idn.fit(arx, record).truncate(4, balance="response").model
     else:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ConvergenceWarning)
@@ -148,7 +151,8 @@ def contenders(case: Case) -> dict[str, Callable[..., Callable[[float], tuple]]]
     out: dict[str, Callable[..., Callable[[float], tuple]]] = {
         name: (lambda *data, method=method: ours(*data, method))
         for name, method in {
-            "LPV-ARX, realized": "ls",
+            "LPV-ARX of 2 lags, realized": "ls",
+            "LPV-ARX of 8 lags, truncated": "long",
             "StateSpace, subspace alone": "subspace",
             "StateSpace, output error": "oe",
             "StateSpace, innovations": "innovations",
@@ -166,23 +170,25 @@ def contenders(case: Case) -> dict[str, Callable[..., Callable[[float], tuple]]]
 
 
 def main() -> None:
-    options = arguments(__doc__, timed=False)
-    n, plain = 1000 if options.quick else 4000, {}
+    options = arguments(__doc__, write=True, timed=False)
+    n, plain, texts = 1000 if options.quick else 4000, {}, []
     for case in CASES:
         data, rows = case.data(n), []
         for name, call in contenders(case).items():
-            begin = time.perf_counter()
+            begin = time.process_time()
             found = call(case, *data)
-            seconds = time.perf_counter() - begin
+            seconds = time.process_time() - begin
             error = case.error(found)
             rows.append((name, f"{error:.4f}", f"{seconds:.1f} s"))
             plain[f"{case.name}: {name}"] = {"error": error, "seconds": seconds}
         title = f"### {case.name}, {n} samples, 4 states"
-        text = table(title, rows, ("", "largest error of responses", "time"))
+        texts.append(table(title, rows, ("", "largest error of responses", "time")))
         if not options.json:
-            print(f"{text}\n", flush=True)
+            print(f"{texts[-1]}\n", flush=True)
     if options.json:
         print(json.dumps(plain))
+    if options.write:
+        keep("states", "\n\n".join(texts))
 
 
 if __name__ == "__main__":

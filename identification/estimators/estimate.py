@@ -86,6 +86,8 @@ def fit(
         - "iv" flown in a simulator, all equations with the same regressors, and `FilterError`:
           summed over residuals correlated in time, up to 25 samples, and between equations; for
           records that are long against that;
+        - of states (1, n, 1, n), of all entries, for white residuals, along the directions that
+          change the response; not "subspace";
         - of all others None: prices on coefficients move them by more than they scatter.
 
     Raises

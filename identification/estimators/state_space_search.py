@@ -13,7 +13,7 @@ from scipy.linalg import solve_discrete_are
 from identification.design.excitation import excitation_of
 from identification.estimators.innovations import Innovations
 from identification.estimators.method import Method
-from identification.estimators.prediction_error import ADVICE, OutputError
+from identification.estimators.prediction_error import ADVICE, OutputError, PredictionError
 from identification.estimators.subspace import Piece, Subspace, subspace_start
 from identification.model.state_space_model import (
     StateSpaceModel,
@@ -74,6 +74,13 @@ def state_space_of(
         raise InputError(
             "a StateSpace is fitted by the closest free run, OutputError(...), by Innovations(...)"
             f" or Subspace(...), got {method.shorthand!r}"
+        )
+    if isinstance(method, PredictionError) and (
+        method.instruments is not None or getattr(method, "initial", "estimated") != "estimated"
+    ):
+        raise InputError(
+            "instruments and initial are of difference equations: states begin with the subspace"
+            " method, and from an estimated start"
         )
     if structure.own_scheduling and not isinstance(method, OutputError):
         raise InputError(
@@ -144,7 +151,7 @@ class Problem:
         return np.diag(1.0 / self.scale) if self.weight is None else self.weight
 
     def own(self, i: int) -> slice:
-        """Where the start of piece i stands among the unknowns."""
+        """Positions of the start of piece i among the unknowns."""
         nx = self.run.structure.order
         return slice(self.run.size + i * nx, self.run.size + (i + 1) * nx)
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -32,6 +33,9 @@ DROPPED = 1e-12
 
 WEIGHTS = np.logspace(-14, 1, 31)
 """Weights of the ridge, of the largest eigenvalue, among which cross-validation chooses."""
+
+BRIDGED = 5
+"""Longest gap in an output, in samples, that the start looks across."""
 
 SMALL = 1e-4
 """Innovations below this share of an output's spread hardly enter the gain K."""
@@ -137,17 +141,18 @@ class _Data(NamedTuple):
 
     @classmethod
     def of(cls, structure: StateSpace, pieces: Sequence[Piece], past: int) -> _Data:
-        y, u = (np.concatenate([piece[i] for piece in pieces]) for i in (0, 1))
+        y = np.concatenate([_bridged(piece.y) for piece in pieces])
+        u = np.concatenate([piece.u for piece in pieces])
         p = np.concatenate([piece.p for piece in pieces])
         if structure.own_scheduling:
             p = np.clip(p, *structure.basis.ranges[0])
         f = basis_values(structure.regression, p)
         known = np.isfinite(y).all(axis=1) & np.isfinite(f).all(axis=1)
+        before = np.full(len(y), -1)  # the last sample that is not in a row with this one
         starts = np.cumsum([0, *(len(piece.y) for piece in pieces)])[:-1]
-        run = np.zeros(len(y), int)  # known samples in a row up to here
-        for k in range(len(y)):
-            fresh = k == 0 or k in set(starts.tolist())
-            run[k] = (0 if fresh else run[k - 1]) + 1 if known[k] else 0
+        before[starts] = starts - 1
+        before[~known] = np.flatnonzero(~known)
+        run = np.arange(len(y)) - np.maximum.accumulate(before)
         scale = np.where((spread := np.nanstd(y, axis=0)) > 0, spread, 1.0)
         signals = np.column_stack([np.nan_to_num(y) / scale, _scaled(u)])
         if structure.offset:
@@ -159,6 +164,17 @@ class _Data(NamedTuple):
         kept &= s > 1e-9 * np.sqrt(len(y))
         mu = np.column_stack([np.ones(len(y)), MOVING * np.sqrt(known.sum()) * U[:, kept]])
         return cls(mu, signals, y, u, f, np.flatnonzero(run > past), scale)
+
+
+def _bridged(y: Array) -> Array:
+    """Outputs (m, ny) with short gaps filled by straight lines: a slow sensor has one each time."""
+    out = y.copy()
+    for column in out.T:
+        known = np.flatnonzero(np.isfinite(column))
+        for a, b in pairwise(known.tolist()):
+            if 1 < b - a <= BRIDGED + 1:
+                column[a:b] = np.linspace(column[a], column[b], b - a + 1)[:-1]
+    return out
 
 
 def _scaled(u: Array) -> Array:

@@ -74,7 +74,7 @@ class StateSpaceModel:
 
     @cached_property
     def run(self) -> StateSpaceRun:
-        """What the unknowns mean, and how they run."""
+        """Layout of the unknowns, and their runs."""
         return StateSpaceRun(self.structure, self.method != "oe")
 
     @property

@@ -225,6 +225,18 @@ def test_gaps_in_outputs_are_run_through_and_records_are_joined():
     np.testing.assert_allclose(ahead[240:260], records[0].columns(["y0", "y1"])[240:260], atol=1e-5)
 
 
+def test_a_slow_sensor_leaves_a_gap_each_time():
+    system = System.drawn(3, 1, 2, 1, 1)
+    record = system.record(900, 0)
+    slow = np.where(np.arange(900) % 4 == 0, record["y1"], np.nan)
+    found = idn.fit(
+        system.structure,
+        record.with_signals({"y1": "1"}, y1=slow),
+        idn.methods.OutputError(tolerance=1e-13),
+    )
+    assert system.error(found) < 1e-6
+
+
 def test_predictions_h_steps_ahead_use_nothing_later():
     system = System.drawn(2, 1, 1, 1, 3)
     record = system.record(300, 0, noise=0.3)
@@ -289,6 +301,16 @@ def test_a_model_is_judged_fit_and_its_loop_is_proven():
         (lambda s, r: idn.fit(s, r, "bj"), InputError, "closest free run"),
         (lambda s, r: idn.fit(s.regression, r, "subspace"), InputError, "finds states"),
         (lambda s, r: idn.fit(s.regression, r, "innovations"), InputError, "armax"),
+        (
+            lambda s, r: idn.fit(s, r, idn.methods.OutputError("u0")),
+            InputError,
+            "of difference equations",
+        ),
+        (
+            lambda s, r: idn.fit(s, r, idn.methods.OutputError(initial="measured")),
+            InputError,
+            "estimated start",
+        ),
         (lambda s, r: idn.methods.Subspace(past=0), InputError, "past"),
         (lambda s, r: idn.methods.Innovations(evaluations=0), InputError, "evaluations"),
         (
