@@ -94,7 +94,7 @@ def state_space_of(
         raise ExcitationError(f"no unbroken stretch of more than {structure.order} samples")
     begin = subspace_start(structure, pieces, method.past if isinstance(method, Subspace) else None)
     problem = Problem(StateSpaceRun(structure, not isinstance(method, OutputError)), pieces)
-    z = problem.best_of(_starts(structure, begin.unknowns, problem.scale))
+    z = problem.best_of(_starts(problem, begin.unknowns))
     details = {"singular_values": begin.singular_values.tolist()}
     if not isinstance(method, Subspace):
         z, problem, more = _searched(problem, z, method)
@@ -234,30 +234,33 @@ class Problem:
         return errors.T @ errors / max(len(errors), 1)
 
 
-def _starts(structure: StateSpace, unknowns: Array, scale: Array) -> list[Array]:
-    """The unknowns with parts of their gain, and of what moves with p; with the gain of an observer
-    at the middle of p; and with what diverges in no case.
+def _starts(problem: Problem, unknowns: Array) -> list[Array]:
+    """The unknowns with parts of what moves with p, and with innovations of their gain; with the
+    gain of an observer at the middle of p; and with what diverges in no case.
     """
+    structure, scale = problem.run.structure, problem.scale
     run = StateSpaceRun(structure, innovations=True)
     A, B, C, D, K = run.matrices(unknowns)
     one = structure.basis.constant()
     still = [np.multiply.outer(one, np.tensordot(one, M, 1) / (one @ one)) for M in (A, B, K)]
-    middle = np.tensordot(structure.basis(_middle(structure)), A, 1)
-    gains = [K, still[2]]
-    try:
-        error = solve_discrete_are(middle.T, C.T, np.eye(len(middle)), np.diag(scale**2))
-    except (np.linalg.LinAlgError, ValueError):  # no such gain: the others do
-        pass
+    middle = structure.basis(_middle(structure))
+    calm = np.tensordot(middle, still[0], 1)
+    drawn_in = RADIUS / max(np.abs(np.linalg.eigvals(calm)).max(), RADIUS)
+    gains, shares, now = [K, still[2]], GAINS, np.tensordot(middle, A, 1)
+    if not problem.run.innovations:
+        gains, shares = [K], (0.0,)
     else:
-        fed = middle @ error @ C.T
-        fed = np.linalg.solve(C @ error @ C.T + np.diag(scale**2), fed.T).T
-        gains.insert(0, np.multiply.outer(one, fed))
+        try:
+            error = solve_discrete_are(now.T, C.T, np.eye(len(now)), np.diag(scale**2))
+        except (np.linalg.LinAlgError, ValueError):  # no such gain: the others do
+            pass
+        else:
+            fed = np.linalg.solve(C @ error @ C.T + np.diag(scale**2), C @ error @ now.T).T
+            gains.append(np.multiply.outer(one, fed))
     out = []
     for moving in GAINS:
         part = [s + moving * (M - s) for s, M in zip(still[:2], (A, B), strict=True)]
-        out += [run.unknowns(*part, C, D, fed * gain) for gain in gains for fed in GAINS]
-    calm = np.tensordot(structure.basis(_middle(structure)), still[0], 1)
-    drawn_in = min(1.0, RADIUS / max(np.abs(np.linalg.eigvals(calm)).max(), RADIUS))
+        out += [run.unknowns(*part, C, D, fed * gain) for gain in gains for fed in shares]
     return [*out, run.unknowns(drawn_in * still[0], B, C, D, 0.0 * K)]
 
 
