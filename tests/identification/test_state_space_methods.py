@@ -119,19 +119,19 @@ def test_the_subspace_start_alone_is_exact_where_nothing_moves():
 
 @pytest.mark.slow
 def test_in_closed_loop_innovations_are_consistent_and_least_squares_is_not():
-    """Noise of the system's own colour in a loop: 16 times the samples divide the error of
-    innovations by 4, and that of least squares by nothing.
+    """Noise of the system's own colour in a loop: 9 times the samples divide the error of
+    innovations by 3, and that of least squares by nothing.
     """
     system = System.drawn(2, 1, 1, 1, 5)
     arx = system.structure.regression
     errors = {"innovations": [], "ls": []}
-    for n in (500, 8000):
+    for n in (500, 4500):
         records = [system.record(n, seed, noise=1.0, gain=0.15) for seed in range(5)]
         for method, structure in (("innovations", system.structure), ("ls", arx)):
             found = [system.error(idn.fit(structure, record, method)) for record in records]
             errors[method].append(np.mean(found))
     # five seeds: the mean of an error scatters by a third
-    assert 2.5 < errors["innovations"][0] / errors["innovations"][1] < 7.0
+    assert 1.8 < errors["innovations"][0] / errors["innovations"][1] < 5.0
     assert errors["ls"][0] / errors["ls"][1] < 1.6
     assert errors["innovations"][1] < 0.2 * errors["ls"][1]
 
@@ -148,6 +148,7 @@ def test_regions_of_responses_hold_the_truth_as_often_as_they_say():
     assert 0.89 < np.mean(held) < 0.99
 
 
+@pytest.mark.slow
 def test_the_covariance_does_not_depend_on_the_states():
     """Other coordinates of the states: the unknowns and their covariance turn, regions do not."""
     system = System.drawn(2, 1, 1, 1, 5)
@@ -166,11 +167,11 @@ def test_the_covariance_does_not_depend_on_the_states():
         covariance=covariance[None, :, None, :],
     )
     mine, theirs = (
-        idn.judge.response_regions(m, POINTS, OMEGA[::6], draws=4000) for m in (found, other)
+        idn.judge.response_regions(m, POINTS, OMEGA[::6], draws=1000) for m in (found, other)
     )
     np.testing.assert_allclose(theirs.centre, mine.centre, rtol=1e-8)
-    # 4000 draws: 2 %
-    np.testing.assert_allclose(theirs.width, mine.width, rtol=0.1)
+    # 1000 draws: a standard error of 2 % each
+    np.testing.assert_allclose(theirs.width, mine.width, rtol=0.15)
 
 
 def test_sensitivities_of_the_filter_are_its_derivatives():
@@ -260,6 +261,7 @@ def test_a_trim_that_moves_with_p_is_an_offset():
     assert system.error(idn.fit(system.structure, record, "subspace")) > 1e-3
 
 
+@pytest.mark.slow
 def test_the_order_scan_finds_order_and_degree():
     system = System.drawn(3, 2, 1, 1, 4)
     records = [system.record(900, seed, noise=0.3) for seed in (0, 1)]
