@@ -68,6 +68,26 @@ def state_space_of(
     stretch long enough, or an input does not tell its functions of p.
     """
     records = tuple(structure.regression.prepared(record) for record in records)
+    method = _required(structure, method)
+    inputs = replace(structure.regression, na=0, nb=1)
+    excitation_of(inputs, stacked(inputs, records)).require()
+    pieces = [Piece(*found[1:]) for record in records for found in pieces_of(structure, record)]
+    if not pieces:
+        raise ExcitationError(f"no unbroken stretch of more than {structure.order} samples")
+    begin = subspace_start(structure, pieces, method.past if isinstance(method, Subspace) else None)
+    problem = Problem(StateSpaceRun(structure, not isinstance(method, OutputError)), pieces)
+    z = problem.best_of(_starts(problem, begin.unknowns))
+    details = {"singular_values": begin.singular_values.tolist()}
+    if not isinstance(method, Subspace):
+        z, problem, more = _searched(problem, z, method)
+        details |= more
+    return _model(problem, z, records, method.shorthand, details)
+
+
+def _required(structure: StateSpace, method: Method) -> OutputError | Innovations | Subspace:
+    """The method; raises `InputError` for one that does not find these states, or options that it
+    does not take.
+    """
     if not isinstance(method, OutputError | Innovations | Subspace) or (
         type(method).shorthand not in ("oe", "innovations", "subspace")
     ):
@@ -87,19 +107,7 @@ def state_space_of(
             "own_scheduling: the model's own free run is fitted by OutputError(...), got"
             f" {method.shorthand!r}"
         )
-    inputs = replace(structure.regression, na=0, nb=1)
-    excitation_of(inputs, stacked(inputs, records)).require()
-    pieces = [Piece(*found[1:]) for record in records for found in pieces_of(structure, record)]
-    if not pieces:
-        raise ExcitationError(f"no unbroken stretch of more than {structure.order} samples")
-    begin = subspace_start(structure, pieces, method.past if isinstance(method, Subspace) else None)
-    problem = Problem(StateSpaceRun(structure, not isinstance(method, OutputError)), pieces)
-    z = problem.best_of(_starts(problem, begin.unknowns))
-    details = {"singular_values": begin.singular_values.tolist()}
-    if not isinstance(method, Subspace):
-        z, problem, more = _searched(problem, z, method)
-        details |= more
-    return _model(problem, z, records, method.shorthand, details)
+    return method
 
 
 class Information(NamedTuple):
@@ -398,10 +406,13 @@ def _model(
 
 
 def _covariance(problem: Problem, z: Array) -> Array:
-    """(n, n) of all unknowns, residuals white: the inverse information along what is seen."""
+    """(n, n) of all unknowns, residuals white: the inverse information along what is seen, for as
+    many residuals as the unknowns leave free.
+    """
     white = problem.weighted(z)
     values, vectors, scale = _directions(white.information(z).square)
     kept = len(z) - problem.run.undetermined
     values, vectors = values[-kept:], vectors[:, -kept:]
     root = vectors / np.sqrt(values) / scale[:, None]
-    return root @ root.T  # type: ignore[no-any-return]
+    count = sum(int(np.isfinite(piece.y).sum()) for piece in problem.pieces)
+    return root @ root.T * count / max(count - len(values), 1)  # type: ignore[no-any-return]
