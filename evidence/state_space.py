@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any
@@ -64,7 +64,7 @@ def of_seed(seed: int) -> dict[str, Found]:
     autopilot = autopilot_for(heli)
     training = symheli.fly(heli, aggressive(seed, autopilot))
     test = symheli.fly(heli, transition(seed, autopilot))
-    ways = {
+    ways: Mapping[str, Callable[[], KinematicModel | StateSpaceModel]] = {
         "known kinematics, filter error": lambda: identified(training, simulator),
         "states, subspace alone": lambda: fit(STRUCTURE, training, "subspace"),
         "states, innovations": lambda: fit(

@@ -31,7 +31,7 @@ from symheli.records import FlightRecord
 from symheli.values import Signal
 from symheli.values.arrays import Array
 
-GAINS = (1.0, 0.5, 0.2, 0.0)
+GAINS: tuple[float, ...] = (1.0, 0.5, 0.2, 0.0)
 """Shares of the gain K, and of what moves with p, that the search may begin with."""
 
 RADIUS = 0.99
@@ -254,10 +254,9 @@ def _starts(problem: Problem, unknowns: Array) -> list[Array]:
     middle = structure.basis(_middle(structure))
     calm = np.tensordot(middle, still[0], 1)
     drawn_in = RADIUS / max(np.abs(np.linalg.eigvals(calm)).max(), RADIUS)
-    gains, shares, now = [K, still[2]], GAINS, np.tensordot(middle, A, 1)
-    if not problem.run.innovations:
-        gains, shares = [K], (0.0,)
-    else:
+    gains, shares, now = [0.0 * K], GAINS[:1], np.tensordot(middle, A, 1)
+    if problem.run.innovations:
+        gains, shares = [K, still[2]], GAINS
         try:
             error = solve_discrete_are(now.T, C.T, np.eye(len(now)), np.diag(scale**2))
         except (np.linalg.LinAlgError, ValueError):  # no such gain: the others do
@@ -267,8 +266,8 @@ def _starts(problem: Problem, unknowns: Array) -> list[Array]:
             gains.append(np.multiply.outer(one, fed))
     out = []
     for moving in GAINS:
-        part = [s + moving * (M - s) for s, M in zip(still[:2], (A, B), strict=True)]
-        out += [run.unknowns(*part, C, D, fed * gain) for gain in gains for fed in shares]
+        a, b = (s + moving * (M - s) for s, M in zip(still[:2], (A, B), strict=True))
+        out += [run.unknowns(a, b, C, D, share * gain) for gain in gains for share in shares]
     return [*out, run.unknowns(drawn_in * still[0], B, C, D, 0.0 * K)]
 
 

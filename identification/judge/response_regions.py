@@ -17,6 +17,7 @@ from identification.judge.coefficient_covariance import drawn
 from identification.judge.frozen_plant import FrozenPlant, Model, Point
 from identification.structure.kinematic_arx import KinematicARX
 from identification.structure.lpvarx import LPVARX
+from identification.structure.state_space import StateSpace
 from symheli import LinearModel
 from symheli.errors import InputError
 from symheli.records import FlightRecord
@@ -256,7 +257,7 @@ def structure_bias(
     return StructureBias(own, exact)  # type: ignore[arg-type]
 
 
-def _in_time(structure: LPVARX | KinematicARX) -> LPVARX | KinematicARX:
+def _in_time(structure: LPVARX | KinematicARX | StateSpace) -> LPVARX | KinematicARX | StateSpace:
     """The structure for a simulated flight, whose sensors are not late."""
     return replace(structure, sensors=None) if isinstance(structure, KinematicARX) else structure
 
