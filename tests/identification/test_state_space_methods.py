@@ -137,6 +137,28 @@ def test_in_closed_loop_innovations_are_consistent_and_least_squares_is_not():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("method", ["subspace", "innovations"])
+def test_an_unstable_plant_is_found_in_its_loop(method):
+    """Poles 1.02 to 1.06 and .7, which a free run cannot follow."""
+    rng, n = np.random.default_rng(0), 3000
+    p, x, y, u = np.sin(0.02 * np.arange(n)), np.zeros(2), np.zeros(n), np.zeros(n)
+    for k in range(n):
+        e = 0.1 * rng.normal()
+        y[k] = x[0] + e
+        u[k] = rng.choice([-1.0, 1.0]) - 1.2 * y[k]
+        A = np.array([[1.04 + 0.02 * p[k], 0.2], [0.0, 0.7]])
+        x = A @ x + np.array([0.1, 0.3]) * u[k] + np.array([0.3, 0.1]) * e
+    record = FlightRecord.from_arrays(0.1 * np.arange(n), dict.fromkeys("yup", "1"), y=y, u=u, p=p)
+    structure = idn.StateSpace("y", "u", "p", order=2, basis=idn.Polynomial(1, -1.0, 1.0))
+    found = idn.fit(structure, record, method)
+    for point in (-1.0, 1.0):
+        poles = np.sort(np.abs(found.at(point).poles()))
+        # 3000 samples: a standard error of .005 of the unstable pole
+        assert poles[1] == pytest.approx(1.04 + 0.02 * point, abs=0.02)
+        assert poles[0] == pytest.approx(0.7, abs=0.1)
+
+
+@pytest.mark.slow
 def test_regions_of_responses_hold_the_truth_as_often_as_they_say():
     system, held = System.drawn(2, 1, 1, 1, 5), []
     exact = system.responses()[:, ::6]
