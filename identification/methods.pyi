@@ -1,4 +1,5 @@
 from identification.estimators.filter_error import FilterError as FilterError
+from identification.estimators.innovations import Innovations as Innovations
 from identification.estimators.instrumental_variables import (
     InstrumentalVariables as InstrumentalVariables,
 )
@@ -14,4 +15,5 @@ from identification.estimators.prediction_error import OutputError as OutputErro
 from identification.estimators.recursion import Recursion as Recursion
 from identification.estimators.refined_instruments import RefinedInstruments as RefinedInstruments
 from identification.estimators.ridge import Ridge as Ridge
+from identification.estimators.subspace import Subspace as Subspace
 from identification.model.noise_model import NoiseModel as NoiseModel

@@ -27,7 +27,7 @@ from identification.structure.kinematic_arx import STATES, KinematicARX
 from identification.structure.lpvarx import LPVARX, require_structure
 from identification.structure.regressors import as_records, stacked, units_of
 from identification.structure.state_space import StateSpace
-from symheli.errors import ConvergenceWarning, InputError
+from symheli.errors import InputError
 from symheli.records import FlightRecord
 from symheli.records.mending import bridged
 
@@ -78,9 +78,10 @@ def fit(
         Of one sample period and in the same units; lags never reach across a gap or from one record
         into the next.
     method : Method or str, optional
-        An estimator with its options, or the shorthand of one with its defaults: "ls", of a
-        `StateSpace` "oe", which is all that it takes. Any subclass of `Method` will do. Those of
-        `identification.methods`, of which noise on the outputs biases all of least squares:
+        An estimator with its options, or the shorthand of one with its defaults: "ls"; of a
+        `StateSpace` "oe", where only "innovations" and "subspace" do besides. Any subclass of
+        `Method` will do. Those of `identification.methods`, of which noise on the outputs
+        biases all of least squares:
 
     Returns
     -------
@@ -96,6 +97,8 @@ def fit(
         - "iv" flown in a simulator, all equations with the same regressors, and `FilterError`:
           summed over residuals correlated in time, up to 25 samples, and between equations; for
           records that are long against that;
+        - of states (1, n, 1, n), of all entries, for white residuals, along the directions that
+          change the response; not "subspace";
         - of all others None: prices on coefficients move them by more than they scatter.
 
     Raises
@@ -139,7 +142,7 @@ def fit(
     [[[-0.5]]]
     """
     if isinstance(structure, StateSpace):
-        return _states(structure, as_records(records), method_of(method or "oe"))
+        return state_space_of(structure, as_records(records), method_of(method or "oe"))
     method = method_of(method or "ls")
     if isinstance(structure, KinematicARX):
         return _rigid(structure, as_records(records), method)
@@ -167,21 +170,6 @@ def _first(method: type[Method]) -> str:
 
 
 fit.__doc__ = _with_methods(fit.__doc__)
-
-
-def _states(
-    structure: StateSpace, records: tuple[FlightRecord, ...], method: Method
-) -> StateSpaceModel:
-    """The model of states, from that of the difference equation by the same method."""
-    if type(method) is not OutputError:
-        raise InputError(
-            "a StateSpace is fitted by the closest free run: OutputError(...), got"
-            f" {method.shorthand!r}"
-        )
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ConvergenceWarning)  # of where the search begins
-        begin = _fitted(structure.regression, records, method)
-    return state_space_of(structure, records, begin, method)
 
 
 def _rigid(

@@ -72,6 +72,8 @@ class Method(ABC):
     needs_excitation : bool
         The data alone must determine every coefficient, `fit` refuses them otherwise. False where a
         penalty decides what they leave open.
+    of_states : bool
+        It finds the matrices of a `StateSpace`, and no coefficients of a difference equation.
 
     Examples
     --------
@@ -87,6 +89,7 @@ class Method(ABC):
     shorthand: ClassVar[str]
     least_squares: ClassVar[bool] = False
     needs_excitation: ClassVar[bool] = True
+    of_states: ClassVar[bool] = False
 
     @abstractmethod
     def estimate(self, arx: LPVARX, records: Sequence[FlightRecord], data: Regression) -> Estimate:

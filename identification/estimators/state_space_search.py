@@ -1,131 +1,417 @@
-"""State-space models by the closest free run, from a difference equation in balanced form."""
+"""State-space models: the subspace method, then the least prediction error over all matrices."""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.linalg import solve_discrete_are
 
-from identification.estimators.prediction_error import ADVICE, OutputError
-from identification.model.lpvarx_model import LPVARXModel
-from identification.model.state_space_model import StateSpaceModel, pieces_of, start_of
-from identification.model.state_space_run import StateSpaceRun
+from identification.design.excitation import excitation_of
+from identification.estimators.innovations import Innovations
+from identification.estimators.method import Method
+from identification.estimators.prediction_error import ADVICE, OutputError, PredictionError
+from identification.estimators.subspace import Piece, Subspace, subspace_start
+from identification.model.state_space_model import (
+    StateSpaceModel,
+    design_matrices,
+    pieces_of,
+    start_of,
+)
+from identification.model.state_space_run import Along, StateSpaceRun
+from identification.structure.regressors import stacked, units_of
 from identification.structure.state_space import StateSpace
-from symheli import LPVStateSpace
+from symheli import LPVStateSpace, Scheduling
 from symheli.errors import ConvergenceWarning, ExcitationError, InputError
+from symheli.progress import task
 from symheli.records import FlightRecord
 from symheli.values import Signal
 from symheli.values.arrays import Array
 
+GAINS: tuple[float, ...] = (1.0, 0.5, 0.2, 0.0)
+"""Shares of the gain K, and of what moves with p, that the search may begin with."""
+
+RADIUS = 0.99
+"""Largest eigenvalue of the mean A of the candidate that diverges in no case."""
+
+UNSEEN = 1e-12
+"""Share of the largest information below which a direction is not seen in the response."""
+
+LARGEST_DAMPING, FLAT = 1e6, 2
+"""Damping at which a search ends, and the number of steps in a row that gain too little."""
+
+NEAR, BENT = 0.1, 0.375
+"""Part of a step over which curvature is measured; largest bend of a step, as a share of it."""
+
+HELD = 2**25
+"""Largest number of slopes that are kept to measure curvature with: 256 MB."""
+
+ROUGH = 1e-4
+"""Relative change of the cost at which a search that others follow ends."""
+
+FLOOR = 1e-6
+"""Least deviation of an innovation, as a share of its output's spread, that weighs."""
+
 
 def state_space_of(
-    structure: StateSpace,
-    records: Sequence[FlightRecord],
-    begin: LPVARXModel,
-    options: OutputError,
+    structure: StateSpace, records: Sequence[FlightRecord], method: Method
 ) -> StateSpaceModel:
-    """Minimise the error of the free run, each output divided by its spread, over all matrices and
-    the states that runs start from, from a model of the structure's regression.
+    """The model by the subspace method, and from there the least error of the free run or of the
+    innovation filter over all matrices and the states that runs start from.
 
-    Every basis of the states serves: the search goes along the directions that change the response,
-    by singular values. Raises `ExcitationError` where no record has a stretch long enough.
+    Every basis of the states serves: steps go along the directions that change the response, by
+    the eigenvectors of the information, as in the data-driven local coordinates of McKelvey,
+    Helmersson and Ribarits (2004), Automatica 40. Raises `ExcitationError` where no record has a
+    stretch long enough, or an input does not tell its functions of p.
     """
-    run = StateSpaceRun(structure)
-    parts = [piece for record in records for piece in pieces_of(structure, record)]
-    if not parts:
+    records = tuple(structure.regression.prepared(record) for record in records)
+    method = _required(structure, method)
+    inputs = replace(structure.regression, na=0, nb=1)
+    excitation_of(inputs, stacked(inputs, records)).require()
+    pieces = [Piece(*found[1:]) for record in records for found in pieces_of(structure, record)]
+    if not pieces:
         raise ExcitationError(f"no unbroken stretch of more than {structure.order} samples")
-    given = begin.to_state_space()
-    unknowns = _started(run, given)
-    spread = np.nanstd(np.concatenate([y for _, y, _, _ in parts]), axis=0)
-    scale = np.where(spread > 0, spread, 1.0)
-    nx, first = structure.order, run.size
-    starts = [start_of(run, unknowns, y, u, p) for _, y, u, p in parts]
+    begin = subspace_start(structure, pieces, method.past if isinstance(method, Subspace) else None)
+    problem = Problem(StateSpaceRun(structure, not isinstance(method, OutputError)), pieces)
+    z = problem.best_of(_starts(problem, begin.unknowns))
+    details = {"singular_values": begin.singular_values.tolist()}
+    if not isinstance(method, Subspace):
+        z, problem, more = _searched(problem, z, method)
+        details |= more
+    return _model(problem, z, records, method.shorthand, details)
 
-    def left(z: Array) -> Array:
-        own = z[first:].reshape(len(parts), nx)
-        return np.concatenate(
-            [run.outputs(z, x, u, p) - y for x, (_, y, u, p) in zip(own, parts, strict=True)]
-        )
 
-    def residuals(z: Array) -> Array:
-        scaled = left(z) / scale
-        return scaled[~np.isnan(scaled)]
-
-    def jacobian(z: Array) -> Array:
-        out = []
-        for i, (_, y, u, p) in enumerate(parts):
-            own = slice(first + i * nx, first + (i + 1) * nx)
-            full = np.zeros((*y.shape, len(z)))
-            slopes = run.sensitivities(z, z[own], u, p) / scale[None, :, None]
-            full[:, :, :first], full[:, :, own] = slopes[:, :, :first], slopes[:, :, first:]
-            out.append(full[np.isfinite(y)])
-        return np.concatenate(out)
-
-    z = np.concatenate([unknowns, *starts])
-    if not np.isfinite(residuals(z)).all():
+def _required(structure: StateSpace, method: Method) -> OutputError | Innovations | Subspace:
+    """The method; raises `InputError` for one that does not find these states, or options that it
+    does not take.
+    """
+    if not isinstance(method, OutputError | Innovations | Subspace) or (
+        type(method).shorthand not in ("oe", "innovations", "subspace")
+    ):
         raise InputError(
-            "the free run from the difference equation diverges: fit over shorter records, or with"
-            " another order"
+            "a StateSpace is fitted by the closest free run, OutputError(...), by Innovations(...)"
+            f" or Subspace(...), got {method.shorthand!r}"
         )
-    found = least_squares(
-        residuals,
-        z,
-        jac=jacobian,  # type: ignore[arg-type]
-        method="trf",
-        x_scale="jac",
-        max_nfev=options.evaluations,
-        ftol=options.tolerance,
-        xtol=options.tolerance,
-        gtol=options.tolerance,
+    if isinstance(method, PredictionError) and (
+        method.instruments is not None or getattr(method, "initial", "estimated") != "estimated"
+    ):
+        raise InputError(
+            "instruments and initial are of difference equations: states begin with the subspace"
+            " method, and from an estimated start"
+        )
+    if structure.own_scheduling and not isinstance(method, OutputError):
+        raise InputError(
+            "own_scheduling: the model's own free run is fitted by OutputError(...), got"
+            f" {method.shorthand!r}"
+        )
+    return method
+
+
+class Information(NamedTuple):
+    """Sum of squares, gradient (n,) and information (n, n) of unknowns; errors by piece, and their
+    slopes with the unknowns they belong to, where these are few enough to be held.
+    """
+
+    cost: float
+    gradient: Array
+    square: Array
+    errors: list[Array]
+    slopes: list[tuple[int, slice, Array, Array]]
+
+    def curvature(self, problem: Problem, z: Array, step: Array) -> Array | None:
+        """Slopes (n,) times the second derivative of the errors along a step; None where it is not
+        known.
+        """
+        if not self.slopes:
+            return None
+        before, after = problem.errors(z - NEAR * step), problem.errors(z + NEAR * step)
+        out = np.zeros(len(z))
+        for i, rows, at, part in self.slopes:
+            bent = (after[i][rows] - 2.0 * self.errors[i][rows] + before[i][rows]) / NEAR**2
+            out[at] += part.T @ bent.reshape(-1)
+        return out if np.isfinite(out).all() else None
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Prediction errors of all pieces, weighted by `weight` (ny, ny), over the matrices and the
+    start of each piece.
+    """
+
+    run: StateSpaceRun
+    pieces: Sequence[Piece]
+    weight: Array | None = None
+    held: bool = False
+    """Whether the gain K stays as it is."""
+
+    @property
+    def scale(self) -> Array:
+        """Spread (ny,) of the outputs."""
+        spread = np.nanstd(np.concatenate([piece.y for piece in self.pieces]), axis=0)
+        return np.where(spread > 0, spread, 1.0)
+
+    @property
+    def weights(self) -> Array:
+        """(ny, ny), by which rows of errors are multiplied."""
+        return np.diag(1.0 / self.scale) if self.weight is None else self.weight
+
+    def own(self, i: int) -> slice:
+        """Positions of the start of piece i among the unknowns."""
+        nx = self.run.structure.order
+        return slice(self.run.size + i * nx, self.run.size + (i + 1) * nx)
+
+    def along(self, z: Array, i: int) -> Along:
+        """Piece i run with the unknowns."""
+        y, u, p = self.pieces[i]
+        fed = y if self.run.innovations else None
+        return self.run.along(z[: self.run.size], z[self.own(i)], u, p, fed)
+
+    def left(self, z: Array, i: int) -> Array:
+        """(m, ny) prediction errors of piece i, less their sign; NaN where y is missing."""
+        return self.along(z, i).y - self.pieces[i].y
+
+    def errors(self, z: Array) -> list[Array]:
+        """Weighted errors (m, ny) of each piece, 0 where y is missing."""
+        return [self._weighted(self.along(z, i), piece) for i, piece in enumerate(self.pieces)]
+
+    def _weighted(self, found: Along, piece: Piece) -> Array:
+        with np.errstate(all="ignore"):
+            return np.where(np.isfinite(piece.y), found.y - piece.y, 0.0) @ self.weights
+
+    def cost(self, z: Array) -> float:
+        """The sum of squares; infinite where a run diverges."""
+        with np.errstate(all="ignore"):
+            total = sum(float(np.sum(error**2)) for error in self.errors(z))
+        return total if np.isfinite(total) else np.inf
+
+    def information(self, z: Array) -> Information:
+        """Cost, gradient and Gauss-Newton information, summed up block by block."""
+        first, cost = self.run.size, 0.0
+        square, gradient = np.zeros((len(z), len(z))), np.zeros(len(z))
+        held = sum(piece.y.size for piece in self.pieces) * len(z) < HELD
+        errors: list[Array] = []
+        kept: list[tuple[int, slice, Array, Array]] = []
+        for i, piece in enumerate(self.pieces):
+            found, seen = self.along(z, i), np.isfinite(piece.y)
+            errors.append(self._weighted(found, piece))
+            cost += float(np.sum(errors[i] ** 2))
+            at = np.r_[0:first, self.own(i)]
+            for rows, slopes in self.run.slopes(z[:first], found):
+                if self.held:
+                    slopes[:, :, self.run.gains] = 0.0
+                part = np.matmul(self.weights.T, slopes * seen[rows, :, None])
+                part = part.reshape(-1, len(at))
+                square[np.ix_(at, at)] += part.T @ part
+                gradient[at] += part.T @ errors[i][rows].reshape(-1)
+                if held:
+                    kept.append((i, rows, at, part))
+        return Information(cost, gradient, square, errors, kept)
+
+    def best_of(self, candidates: Sequence[Array]) -> Array:
+        """The unknowns of least cost, each piece started from the state that suits it best.
+
+        Raises `InputError` where every run diverges.
+        """
+        tried = []
+        for unknowns in candidates:
+            starts = [
+                start_of(self.run, unknowns[: self.run.size], *piece) for piece in self.pieces
+            ]
+            z = np.concatenate([unknowns[: self.run.size], *starts])
+            tried.append((self.cost(z), z))
+        cost, z = min(tried, key=lambda each: each[0])
+        if not np.isfinite(cost):
+            raise InputError(
+                "every run from the subspace start diverges: fit over shorter records, or with"
+                " another order"
+            )
+        return z
+
+    def weighted(self, z: Array) -> Problem:
+        """The same with errors made white: the likelihood of correlated innovations."""
+        covariance = self.residual_covariance(z) + np.diag((FLOOR * self.scale) ** 2)
+        return replace(self, weight=np.linalg.inv(np.linalg.cholesky(covariance)).T, held=False)
+
+    def residual_covariance(self, z: Array) -> Array:
+        """(ny, ny) of complete rows."""
+        errors = np.concatenate([self.left(z, i) for i in range(len(self.pieces))])
+        errors = errors[np.isfinite(errors).all(axis=1)]
+        return errors.T @ errors / max(len(errors), 1)
+
+
+def _starts(problem: Problem, unknowns: Array) -> list[Array]:
+    """The unknowns with parts of what moves with p, and with innovations of their gain; with the
+    gain of an observer at the middle of p; and with what diverges in no case.
+    """
+    structure, scale = problem.run.structure, problem.scale
+    run = StateSpaceRun(structure, innovations=True)
+    A, B, C, D, K = run.matrices(unknowns)
+    one = structure.basis.constant()
+    still = [np.multiply.outer(one, np.tensordot(one, M, 1) / (one @ one)) for M in (A, B, K)]
+    middle = structure.basis(_middle(structure))
+    calm = np.tensordot(middle, still[0], 1)
+    drawn_in = RADIUS / max(np.abs(np.linalg.eigvals(calm)).max(), RADIUS)
+    gains, shares, now = [0.0 * K], GAINS[:1], np.tensordot(middle, A, 1)
+    if problem.run.innovations:
+        gains, shares = [K, still[2]], GAINS
+        try:
+            error = solve_discrete_are(now.T, C.T, np.eye(len(now)), np.diag(scale**2))
+        except (np.linalg.LinAlgError, ValueError):  # no such gain: the others do
+            pass
+        else:
+            fed = np.linalg.solve(C @ error @ C.T + np.diag(scale**2), C @ error @ now.T).T
+            gains.append(np.multiply.outer(one, fed))
+    out = []
+    for moving in GAINS:
+        a, b = (s + moving * (M - s) for s, M in zip(still[:2], (A, B), strict=True))
+        out += [run.unknowns(a, b, C, D, share * gain) for gain in gains for share in shares]
+    return [*out, run.unknowns(drawn_in * still[0], B, C, D, 0.0 * K)]
+
+
+def _middle(structure: StateSpace) -> Array | float:
+    """The middle of the range of p."""
+    middle = [0.5 * (low + high) for low, high in structure.basis.ranges]
+    return middle[0] if len(middle) == 1 else np.array(middle)
+
+
+def _searched(
+    problem: Problem, z: Array, method: OutputError | Innovations
+) -> tuple[Array, Problem, dict[str, object]]:
+    """The unknowns of least cost; with innovations K is held at first, which errors that are nearly
+    zero do not determine, and then their covariance is the weight, twice.
+    """
+    evaluations, converged, all_ = 0, True, method.evaluations
+    phases = [(False, method.tolerance, all_)]
+    if problem.run.innovations:
+        problem, rough = replace(problem, held=True), max(method.tolerance, ROUGH)
+        phases = [(False, method.tolerance, all_ // 4), (True, rough, all_ // 4)]
+        phases.append((True, method.tolerance, all_))
+    for weighted, tolerance, most in phases:
+        if weighted:
+            problem = problem.weighted(z)
+        left = max(min(most, all_ - evaluations), 1)
+        z, used, converged = minimized(problem, z, left, tolerance, method.shorthand)
+        evaluations += used
+    if not converged:
+        warnings.warn(
+            ConvergenceWarning(f"{method.shorthand!r} of states did not settle: {ADVICE}"),
+            stacklevel=4,
+        )
+    message = "settled" if converged else "evaluations used up"
+    return z, problem, {"evaluations": evaluations, "converged": converged, "message": message}
+
+
+def minimized(
+    problem: Problem, z: Array, evaluations: int, tolerance: float, name: str
+) -> tuple[Array, int, bool]:
+    """Unknowns by Levenberg-Marquardt steps bent along the curvature of the response, number of
+    evaluations with slopes, whether they settled.
+
+    Source: Transtrum and Sethna (2012), Improvements to the Levenberg-Marquardt algorithm for
+    nonlinear least-squares minimization, arXiv 1201.5885, sec. 4.
+    """
+    damping, flat, converged = 1e-3, 0, False
+    with task(f"{name}: evaluations, at most", evaluations) as search:
+        for used in range(1, evaluations + 1):
+            search.step()
+            now = problem.information(z)
+            found = _better(problem, z, now, damping)
+            if found is None:  # no step of any size is better
+                return z, used, True
+            step, damping, cost = found
+            z = z + step
+            small = np.linalg.norm(step) <= tolerance * np.linalg.norm(z)
+            flat = flat + 1 if now.cost - cost <= tolerance * now.cost else 0
+            converged = bool(small or flat == FLAT)
+            if converged:
+                break
+    return z, used, converged
+
+
+def _better(
+    problem: Problem, z: Array, now: Information, damping: float
+) -> tuple[Array, float, float] | None:
+    """A step that lowers the cost, the damping of the next one, and that cost."""
+    values, vectors, scale = _directions(now.square)
+
+    def solved(gradient: Array) -> Array:
+        across = vectors.T @ (gradient / scale)
+        return (vectors @ (across / (values + damping * values[-1]))) / scale  # type: ignore[no-any-return]
+
+    while damping <= LARGEST_DAMPING:
+        step = -solved(now.gradient)
+        curvature = now.curvature(problem, z, step)
+        if curvature is not None:
+            bend = -0.5 * solved(curvature)
+            if np.linalg.norm(scale * bend) <= BENT * np.linalg.norm(scale * step):
+                step = step + bend
+        cost = problem.cost(z + step)
+        if cost < now.cost:
+            return step, max(damping / 3.0, 1e-14), cost
+        damping *= 2.0
+    return None
+
+
+def _directions(square: Array) -> tuple[Array, Array, Array]:
+    """Eigenvalues and eigenvectors of the information in units of `scale`, of what is seen."""
+    size = np.sqrt(np.diagonal(square))
+    scale = np.maximum(size, 1e-6 * size.max(initial=0.0) + np.finfo(float).tiny)
+    values, vectors = np.linalg.eigh(square / np.outer(scale, scale))
+    seen = values > UNSEEN * values[-1]
+    return values[seen], vectors[:, seen], scale
+
+
+def _model(
+    problem: Problem,
+    z: Array,
+    records: Sequence[FlightRecord],
+    shorthand: str,
+    details: dict[str, object],
+) -> StateSpaceModel:
+    run, structure = problem.run, problem.run.structure
+    covariance = problem.residual_covariance(z)
+    arx, unknowns = structure.regression, z[: run.size]
+    parameters = tuple(
+        Scheduling(str(p), p.unit, low, high)
+        for p, (low, high) in zip(
+            units_of(arx.parameters, records), structure.basis.ranges, strict=True
+        )
     )
-    if not found.status > 0:
-        warnings.warn(ConvergenceWarning(f"the free run did not settle: {ADVICE}"), stacklevel=3)
-    error = left(found.x)
-    error = error[np.isfinite(error).all(axis=1)]
+    design = LPVStateSpace(
+        structure.basis,
+        **design_matrices(run, unknowns),
+        parameters=parameters,
+        states=[Signal(f"x{i + 1}", "1") for i in range(structure.order)],
+        inputs=units_of(arx.inputs, records),
+        outputs=units_of(arx.outputs, records),
+        dt=records[0].dt,
+    )
+    known = None
+    if shorthand != Subspace.shorthand:
+        known = _covariance(problem, z)[: run.size, : run.size]
+        known = known.reshape(1, run.size, 1, run.size)
     return StateSpaceModel(
         structure=structure,
-        unknowns=found.x[:first],
-        state_space=_design(run, found.x, given),
-        residual_covariance=error.T @ error / max(len(error), 1),
-        details={
-            "evaluations": int(found.nfev),
-            "converged": bool(found.status > 0),
-            "message": str(found.message),
-        },
+        unknowns=unknowns,
+        state_space=design,
+        residual_covariance=covariance,
+        method=shorthand,
+        covariance=known,
+        details=details,
     )
 
 
-def _started(run: StateSpaceRun, given: LPVStateSpace) -> Array:
-    """The unknowns of a state-space model, reduced to the order where it has more states: balanced
-    for the response where it is stable, else for feedback.
+def _covariance(problem: Problem, z: Array) -> Array:
+    """(n, n) of all unknowns, residuals white: the inverse information along what is seen, for as
+    many residuals as the unknowns leave free.
     """
-    order = run.structure.order
-    if len(given.states) > order:
-        try:
-            given = given.truncate(order, balance="response").model
-        except InputError:
-            given = given.truncate(order).model
-    middle = given.basis(np.array([np.mean(r) for r in given.basis.ranges]).squeeze())
-    C, D = np.tensordot(middle, given.C, 1), np.tensordot(middle, given.D, 1)
-    parts = [given.A, given.B, C, D if run.structure.feedthrough else np.zeros((len(C), 0))]
-    return np.concatenate([np.asarray(part).reshape(-1) for part in parts])
-
-
-def _design(run: StateSpaceRun, unknowns: Array, given: LPVStateSpace) -> LPVStateSpace:
-    A, B, C, D = run.matrices(unknowns)
-    one = run.structure.basis.constant()[:, None, None]
-    states = tuple(Signal(f"x{i + 1}", "1") for i in range(run.structure.order))
-    return LPVStateSpace(
-        run.structure.basis,
-        A,
-        B,
-        one * C,
-        one * D,
-        given.parameters,
-        states,
-        given.inputs,
-        given.outputs,
-        given.dt,
-    )
+    white = problem.weighted(z)
+    values, vectors, scale = _directions(white.information(z).square)
+    kept = len(z) - problem.run.undetermined
+    values, vectors = values[-kept:], vectors[:, -kept:]
+    root = vectors / np.sqrt(values) / scale[:, None]
+    count = sum(int(np.isfinite(piece.y).sum()) for piece in problem.pieces)
+    return root @ root.T * count / max(count - len(values), 1)  # type: ignore[no-any-return]

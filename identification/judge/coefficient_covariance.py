@@ -28,6 +28,9 @@ TAKEN = 0.8
 
 LEAST_FREEDOM = 2.0
 
+SINGULAR = 1e-13
+"""Share of the largest eigenvalue of a correlation matrix that is rounding."""
+
 
 def covariances(
     arx: LPVARX, phi: Array, error: Array, runs: Sequence[slice], lags: int
@@ -140,7 +143,11 @@ def drawn(
     root = scale[:, None] * symmetric_root(square / np.outer(scale, scale))
     z = np.random.default_rng(seed).standard_normal((count, len(root)))
     if boundary is not None:
-        z *= np.sqrt(chi2.ppf(boundary, len(root))) / np.linalg.norm(z, axis=1, keepdims=True)
+        values, vectors = np.linalg.eigh(square / np.outer(scale, scale))
+        known = int(np.sum(values > SINGULAR * values[-1]))
+        if known < len(root):  # of states only what changes the response is distributed
+            z = z @ vectors[:, -known:] @ vectors[:, -known:].T
+        z *= np.sqrt(chi2.ppf(boundary, known)) / np.linalg.norm(z, axis=1, keepdims=True)
     moved = np.tile(theta.T.reshape(-1), (count, 1))
     moved[:, mask] += z @ root.T
     return moved.reshape(count, theta.shape[1], -1).transpose(0, 2, 1)

@@ -26,6 +26,7 @@ from identification.judge.criteria import (
 from identification.judge.frozen_plant import AtPoint, FrozenPlant, Model, Point
 from identification.judge.response_regions import StructureBias, with_neighbours
 from identification.model.kinematic_model import KinematicModel
+from identification.model.state_space_model import StateSpaceModel
 from identification.structure.regressors import as_records
 from symheli import LinearModel, LPVStateSpace, UncertainStateSpace
 from symheli.errors import InputError, NotFitError
@@ -173,8 +174,9 @@ def fit_for_control(
 
     Parameters
     ----------
-    model : LPVARXModel or KinematicModel
-        The estimate.
+    model : LPVARXModel, KinematicModel or StateSpaceModel
+        The estimate. Of states there are no rows of derivatives: their entries are no derivatives,
+        and the nu-gap counts them in any coordinates.
     record : FlightRecord or iterable of FlightRecord
         What it was fitted to, or better, another flight.
     loop : mapping, LinearModel or callable
@@ -190,7 +192,7 @@ def fit_for_control(
         Of all coefficients together; default that of the model, but not that of least squares,
         which says nothing of the bias by noise in the regressors. Without it nothing is said to be
         fit: give `uncertainty(...).covariance` only where there is no such noise.
-    second : LPVARXModel, KinematicModel or sequence of them, optional
+    second : model or sequence of them, optional
         Other estimates that ought to agree: fitted to a second flight, or with a richer basis. The
         covariance knows nothing of what the basis cannot hold; a fit with one degree more does.
     bias : StructureBias, optional
@@ -270,7 +272,7 @@ def fit_for_control(
     plant = FrozenPlant(model, outputs, inputs)
     thetas = None
     if covariance is not None:
-        thetas = drawn(model.theta, covariance, plant.regression.free, draws, seed, boundary=SET)
+        thetas = drawn(model.theta, covariance, plant.free, draws, seed, boundary=SET)
     others = tuple(
         FrozenPlant(each, outputs, inputs)
         for each in (second if isinstance(second, Sequence) else (second,))
@@ -297,7 +299,7 @@ def fit_for_control(
         stability(at, true),
         feedback(at, found.bound, second_gap, true_gap, 1.0 if whole else SHARE_OF_MARGIN),
         *(() if whole else (static_gain(at, true, in_loop) for in_loop in (True, False))),
-        *(() if whole else certainty(at)),
+        *(() if whole or isinstance(model, StateSpaceModel) else certainty(at)),
         *(residual_power(model, records) if whole else ()),
         responses(plant, records, window, band),
         predictions(plant, records, scales, horizon),

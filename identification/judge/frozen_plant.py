@@ -13,7 +13,9 @@ import numpy as np
 
 from identification.model.kinematic_model import KinematicModel
 from identification.model.lpvarx_model import LPVARXModel
+from identification.model.state_space_model import StateSpaceModel
 from identification.structure.lpvarx import LPVARX
+from identification.structure.state_space import StateSpace
 from symheli import LinearModel
 from symheli.errors import UnknownNameError
 from symheli.lpv import stability_margin
@@ -21,7 +23,7 @@ from symheli.lpv.stability_margin import Feedback, as_controller, closed_loop
 from symheli.lpv.tools import LinearModels, nu_gaps
 from symheli.values.arrays import Array
 
-Model = LPVARXModel | KinematicModel
+Model = LPVARXModel | KinematicModel | StateSpaceModel
 
 Point = float | tuple[float, ...]
 """A value of the scheduling: a number, or one a parameter."""
@@ -62,9 +64,20 @@ class FrozenPlant:
 
     @property
     def regression(self) -> LPVARX:
-        """The structure whose coefficients theta are."""
+        """The structure whose coefficients theta are; of states the difference equation in the same
+        signals.
+        """
         structure = self.model.structure
+        if isinstance(structure, StateSpace):
+            return structure.regression
         return structure if isinstance(structure, LPVARX) else structure.aerodynamics
+
+    @property
+    def free(self) -> Array:
+        """(n, ny), true where a coefficient is not zero by structure; all unknowns of states."""
+        if isinstance(self.model, StateSpaceModel):
+            return np.ones(self.model.theta.shape, bool)
+        return self.regression.free
 
 
 @dataclass(frozen=True, eq=False)

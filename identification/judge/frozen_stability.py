@@ -141,7 +141,7 @@ def frozen_stability(
 
     Parameters
     ----------
-    model : LPVARXModel or KinematicModel
+    model : LPVARXModel, KinematicModel or StateSpaceModel
         Any.
     points : iterable
         Values of the scheduling: numbers, or tuples of one number a parameter.
@@ -180,7 +180,7 @@ def frozen_stability(
         )
     covariance = frozen(covariance, "covariance", 2 * model.theta.shape[::-1])
     plant = FrozenPlant(model, tuple(map(str, model.outputs)), tuple(map(str, model.inputs)))
-    free = plant.regression.free
+    free = plant.free
     draws = whole(draws, "draws", 2)
     thetas = drawn(model.theta, SMALL**2 * covariance, free, draws, seed)
     chosen = tuple(points)

@@ -9,10 +9,14 @@ from itertools import product
 import numpy as np
 
 from identification.estimators.estimate import fit
+from identification.estimators.method import Method
 from identification.judge.scores import predicted
+from identification.model.lpvarx_model import LPVARXModel
 from identification.model.prediction import named_fit
+from identification.model.state_space_model import StateSpaceModel
 from identification.structure.lpvarx import LPVARX
 from identification.structure.regressors import as_records, stacked
+from identification.structure.state_space import StateSpace
 from symheli.errors import ExcitationError, InputError
 from symheli.lpv import Polynomial
 from symheli.records import FlightRecord
@@ -26,7 +30,7 @@ class ScannedOrder:
 
     Parameters
     ----------
-    structure : LPVARX
+    structure : LPVARX or StateSpace
         The one tried.
     bic : float
         Bayesian information criterion of the training residuals, smaller is better; NaN where
@@ -45,7 +49,7 @@ class ScannedOrder:
     (1, 0, (1,))
     """
 
-    structure: LPVARX
+    structure: LPVARX | StateSpace
     bic: float
     one_step: Array
     ahead: Array
@@ -56,7 +60,9 @@ class ScannedOrder:
 
     @property
     def na(self) -> int:
-        """Order."""
+        """Order: lags, or states."""
+        if isinstance(self.structure, StateSpace):
+            return self.structure.order
         return int(self.structure.na)  # type: ignore[arg-type]
 
     @property
@@ -132,7 +138,7 @@ def _cell(fit: float) -> str:
 
 
 def order_scan(
-    structure: LPVARX,
+    structure: LPVARX | StateSpace,
     training: FlightRecord | Iterable[FlightRecord],
     validation: FlightRecord | Iterable[FlightRecord],
     *,
@@ -140,13 +146,14 @@ def order_scan(
     degrees: Sequence[int] = (0, 1, 2, 3),
     horizon: int = 50,
     hold_p: bool = False,
+    method: Method | str | None = None,
 ) -> OrderScan:
-    """Fit a structure with every order na = nb and every polynomial degree, by least squares, and
-    score it on other records.
+    """Fit a structure with every order na = nb, or number of states, and every polynomial degree,
+    and score it on other records.
 
     Parameters
     ----------
-    structure : LPVARX
+    structure : LPVARX or StateSpace
         Its basis a polynomial of one parameter; nb follows na.
     training, validation : FlightRecord or iterable of FlightRecord
         To fit and to score.
@@ -155,7 +162,9 @@ def order_scan(
     horizon : int
         Samples ahead of the middle fit.
     hold_p : bool
-        As in `LPVARXModel.predict`: for a measured p.
+        As in `LPVARXModel.predict`: for a measured p; not of states.
+    method : Method or str, optional
+        As of `fit`; default "ls", of states "subspace".
 
     Returns
     -------
@@ -193,27 +202,29 @@ def order_scan(
         raise InputError("orders, degrees: name at least one of each")
     train, test = as_records(training), as_records(validation)
     trials = []
+    states = isinstance(structure, StateSpace)
     for degree, na in product(degrees, orders):
-        trial = replace(
-            structure,
-            na=na,
-            nb=na if structure.inputs else 0,
-            basis=Polynomial(degree, basis.low, basis.high),
-        )
-        trials.append(_judge(trial, train, test, horizon, hold_p))
+        trial = replace(structure, basis=Polynomial(degree, basis.low, basis.high))
+        if isinstance(trial, StateSpace):
+            trial = replace(trial, order=na)
+        else:
+            trial = replace(trial, na=na, nb=na if trial.inputs else 0)
+        how = method or ("subspace" if states else "ls")
+        trials.append(_judge(trial, train, test, horizon, hold_p, how))
     return OrderScan(tuple(trials), horizon)
 
 
 def _judge(
-    structure: LPVARX,
+    structure: LPVARX | StateSpace,
     train: Sequence[FlightRecord],
     test: Sequence[FlightRecord],
     horizon: int,
     hold_p: bool,
+    method: Method | str,
 ) -> ScannedOrder:
-    nothing = np.full(structure.ny, np.nan)
+    nothing = np.full(len(structure.outputs), np.nan)
     try:
-        model = fit(structure, train)
+        model: LPVARXModel | StateSpaceModel = fit(structure, train, method)  # type: ignore[arg-type]
     except ExcitationError as error:
         return ScannedOrder(
             structure=structure,
@@ -223,11 +234,9 @@ def _judge(
             free_run=nothing,
             refused=str(error),
         )
-    data = stacked(structure, train)
-    error = data.residuals(model.theta)
-    n = len(error)
-    sign, logdet = np.linalg.slogdet(error.T @ error / n)
-    bic = n * logdet + int(structure.free.sum()) * np.log(n) if sign > 0 else -np.inf
+    n, covariance, unknowns = _left(model, train)
+    sign, logdet = np.linalg.slogdet(covariance)
+    bic = n * logdet + unknowns * np.log(n) if sign > 0 else -np.inf
     one_step, ahead, free_run = (
         np.mean(
             [
@@ -241,3 +250,14 @@ def _judge(
     return ScannedOrder(
         structure=structure, bic=float(bic), one_step=one_step, ahead=ahead, free_run=free_run
     )
+
+
+def _left(
+    model: LPVARXModel | StateSpaceModel, train: Sequence[FlightRecord]
+) -> tuple[int, Array, int]:
+    """Number of residuals, their covariance (ny, ny), number of unknowns that show in them."""
+    if isinstance(model, StateSpaceModel):
+        count = model.run.size - model.run.undetermined
+        return sum(map(len, train)), model.residual_covariance, count
+    error = stacked(model.structure, train).residuals(model.theta)
+    return len(error), error.T @ error / len(error), int(model.structure.free.sum())

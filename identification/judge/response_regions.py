@@ -17,6 +17,7 @@ from identification.judge.coefficient_covariance import drawn
 from identification.judge.frozen_plant import FrozenPlant, Model, Point
 from identification.structure.kinematic_arx import KinematicARX
 from identification.structure.lpvarx import LPVARX
+from identification.structure.state_space import StateSpace
 from symheli import LinearModel
 from symheli.errors import InputError
 from symheli.records import FlightRecord
@@ -131,7 +132,7 @@ def response_regions(
 
     Parameters
     ----------
-    model : LPVARXModel or KinematicModel
+    model : LPVARXModel, KinematicModel or StateSpaceModel
         With a covariance.
     points : iterable
         K values of the scheduling: numbers, or tuples of one number a parameter.
@@ -167,9 +168,7 @@ def response_regions(
             f"method {model.method!r} gives no covariance; fit by FilterError or least squares"
         )
     plant = _plant(model, outputs, inputs)
-    thetas = drawn(
-        model.theta, model.covariance, plant.regression.free, whole(draws, "draws", 3), seed
-    )
+    thetas = drawn(model.theta, model.covariance, plant.free, whole(draws, "draws", 3), seed)
     omega, centres, covariances = frozen(frequencies, "frequencies", (None,)), [], []
     chosen = _chosen(points)
     for p in chosen:
@@ -258,7 +257,7 @@ def structure_bias(
     return StructureBias(own, exact)  # type: ignore[arg-type]
 
 
-def _in_time(structure: LPVARX | KinematicARX) -> LPVARX | KinematicARX:
+def _in_time(structure: LPVARX | KinematicARX | StateSpace) -> LPVARX | KinematicARX | StateSpace:
     """The structure for a simulated flight, whose sensors are not late."""
     return replace(structure, sensors=None) if isinstance(structure, KinematicARX) else structure
 

@@ -11,12 +11,13 @@ from identification.design.leakage import warn_of_own_past
 from identification.model.kinematic_model import KinematicModel
 from identification.model.lpvarx_model import LPVARXModel
 from identification.model.prediction import fit_percent
+from identification.model.state_space_model import StateSpaceModel
 from symheli.errors import InputError
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 from symheli.values.numbers import positive
 
-Identified = LPVARXModel | KinematicModel
+Identified = LPVARXModel | KinematicModel | StateSpaceModel
 
 HORIZON = 1.0
 """Seconds ahead at which models are judged unless said otherwise."""
@@ -96,7 +97,7 @@ def scores(
 
     Parameters
     ----------
-    model : LPVARXModel or KinematicModel
+    model : LPVARXModel, KinematicModel or StateSpaceModel
         The identified model.
     record : FlightRecord
         With the outputs, inputs and scheduling of the model, at its sample period; best one that
@@ -142,7 +143,8 @@ def scores(
     >>> round(found.ahead["y"], 6), list(found.by_horizon)
     (100.0, ['one step', '0.5 s', 'free run'])
     """
-    warn_of_own_past(model.structure, record)
+    own = model.structure.regression if isinstance(model, StateSpaceModel) else model.structure
+    warn_of_own_past(own, record)
     one, ahead, free = (
         predicted(model, record, n, hold_p) for n in steps(model.dt, horizon).values()
     )
@@ -181,7 +183,7 @@ def predicted(
     if isinstance(model, LPVARXModel):
         return model.predict(record, horizon, hold_p=hold_p)
     if hold_p:
-        raise InputError("hold_p: a KinematicModel takes its scheduling as known ahead")
+        raise InputError(f"hold_p: a {type(model).__name__} takes its scheduling as known ahead")
     return model.predict(record, horizon)
 
 

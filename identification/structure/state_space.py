@@ -1,4 +1,4 @@
-"""Structure of an LPV state-space model that is found by the closest free run."""
+"""Structure of an LPV state-space model."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ class StateSpace:
 
         x(k+1) = A(p(k)) x(k) + B(p(k)) u(k),   y(k) = C x(k) + D u(k),
 
-    with A and B in the functions of `basis`, C and D constant.
+    with A and B in the functions of `basis`, C and D constant; found as innovations e, with K(p) e
+    in the next state and e in the outputs.
 
     Parameters
     ----------
@@ -32,6 +33,8 @@ class StateSpace:
         The functions of p, on the range they are declared on.
     feedthrough : bool
         Whether there is D.
+    offset : bool
+        Adds c(p) to the next state: signals are whole values about a trim that moves with p.
     own_scheduling : bool
         Quasi-LPV: `scheduling` is an output, and p that of the model's own free run, held at the
         ends of the range of the basis; False: p as measured, which a free run then follows.
@@ -65,6 +68,7 @@ class StateSpace:
     order: int
     basis: FunctionSpace = CONSTANT
     feedthrough: bool = False
+    offset: bool = False
     own_scheduling: bool = False
 
     def __post_init__(self) -> None:
@@ -82,7 +86,7 @@ class StateSpace:
 
     @cached_property
     def regression(self) -> LPVARX:
-        """The difference equation with at least as many states, where the search begins."""
+        """The difference equation in the same signals with at least as many states."""
         ny = 1 if isinstance(self.outputs, str) else len(self.outputs)
         lags = -(-self.order // ny)
         return LPVARX(
@@ -93,4 +97,10 @@ class StateSpace:
             nb=lags,
             delay=1,
             basis=self.basis,
+            offset=self.offset,
         )
+
+    @property
+    def memory(self) -> int:
+        """Samples before the first prediction: none, the state it starts from is estimated."""
+        return 0

@@ -67,14 +67,17 @@ ONE_MODEL = {
 
 
 def _methods(*, told: bool = False) -> list[str]:
-    """Return the estimators that need nothing but names of instruments; `told`: that take them."""
+    """Return the estimators of difference equations that need nothing but names of instruments;
+    `told`: that take them.
+    """
     from identification.estimators.method import known_methods
 
     found = []
     for name, method in known_methods().items():
         parameters = signature(method).parameters
         needed = {p.name for p in parameters.values() if p.default is p.empty}
-        if needed <= {"instruments"} and (not told or "instruments" in parameters):
+        asked = not told or "instruments" in parameters
+        if needed <= {"instruments"} and asked and not method.of_states:
             found.append(name)
     return found
 

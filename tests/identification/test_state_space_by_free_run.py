@@ -114,5 +114,5 @@ def test_what_does_not_fit_is_refused():
         )
     with pytest.raises(InputError, match="order"):
         idn.StateSpace("y", "u", order=0)
-    with pytest.raises(InputError, match="fitted by the closest free run"):
+    with pytest.raises(InputError, match="closest free run"):
         idn.fit(structure(False), record(False, 1), "ls")
