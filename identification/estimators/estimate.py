@@ -15,7 +15,7 @@ from identification.design.leakage import warn_of_leakage
 from identification.estimators.filter_error import FilterError
 from identification.estimators.least_squares import residual_covariance
 from identification.estimators.method import Method, exported_methods, method_of
-from identification.estimators.prediction_error import BoxJenkins, OutputError
+from identification.estimators.prediction_error import BoxJenkins
 from identification.estimators.refined_instruments import RefinedInstruments
 from identification.estimators.state_space_search import state_space_of
 from identification.model.flown_in import flown_in
