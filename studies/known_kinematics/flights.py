@@ -45,7 +45,7 @@ hover.
 
 HELD_TARGETS = (0.0, 3.0, 6.0, 9.0, 13.0, 7.0, 2.0, 0.0)
 HELD, HELD_LOUDNESS, HELD_RAMP = 40.0, 0.4, 0.5
-"""Of a flight that tells slow modes: airspeeds, how long each is held (s), amplitude over that of
+"""Airspeeds of a flight that tells slow modes, how long each is held (s), amplitude over that of
 `AMPLITUDE`, and the acceleration between them (m/s^2). What a structure leaves out grows with all
 that moves; with it the growth rates are off.
 """
