@@ -276,8 +276,8 @@ MUTANTS = (
     Mutant(
         "bands of growth rates are a hundredth as wide",
         "identification/judge/frozen_stability.py",
-        "growth - BAND * spread, growth + BAND * spread",
-        "growth - 0.01 * BAND * spread, growth + 0.01 * BAND * spread",
+        "half = BAND * (spread + off)",
+        "half = 0.01 * BAND * (spread + off)",
         "tests/identification/test_frozen_stability.py",
     ),
     Mutant(
