@@ -12,10 +12,11 @@ from datetime import date
 import numpy as np
 
 from evidence.marks.coverage import at_points
-from evidence.marks.measured import stability_calls
 from evidence.seeds import by_name, parser_of
 from evidence.tables import DOCS, keep, kept_rows, markdown, parsed
-from identification.judge import structure_bias
+from identification.judge import frozen_stability, structure_bias
+from identification.judge.response_regions import StructureBias
+from identification.model import KinematicModel
 from studies.known_kinematics.conditions import (
     ALL,
     CONDITIONS,
@@ -26,13 +27,16 @@ from studies.known_kinematics.conditions import (
     wind_of,
 )
 from studies.known_kinematics.models import PAIRS
-from studies.known_kinematics.truth import SPEEDS
+from studies.known_kinematics.truth import SPEEDS, Truth
 from studies.output import as_json
 from symheli.errors import DataWarning
 from symheli.flight import SimulatedFlight
 
 FOUND_WITHIN = 0.002
 """Error of a delay that counts as found, s."""
+
+CALLS = 50
+"""Draws of a call of stability."""
 
 PARTS = ("actuators", "sensors", "wind")
 
@@ -71,6 +75,15 @@ def of_seed(name: str, seed: int, truth: str = "xcell60") -> Marks:
         found={name: model.details[name] for name in PARTS if name in model.details},
         calls=stability_calls(model, exact, bias),
     )
+
+
+def stability_calls(model: KinematicModel, truth: Truth, bias: StructureBias) -> tuple[int, int]:
+    """At how many of `SPEEDS` stability is called not known, and at how many wrongly."""
+    points = [(float(v), 0.0)[: len(model.parameters)] for v in SPEEDS]
+    calls = frozen_stability(model, points, draws=CALLS, bias=bias).calls
+    exact = ["stable" if m.is_stable() else "unstable" for m in truth.models[ALL]]
+    unknown = calls.count("not known")
+    return unknown, sum(a != b for a, b in zip(calls, exact, strict=True)) - unknown
 
 
 def row(name: str, marks: Sequence[Marks]) -> tuple[str, ...]:

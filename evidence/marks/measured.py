@@ -12,12 +12,8 @@ from typing import Any
 import numpy as np
 
 import symheli
-from evidence.marks.coverage import at_points
 from evidence.seeds import over_seeds, parser_of, seeds_of
 from evidence.tables import DOCS, keep, parsed
-from identification.judge import frozen_stability, structure_bias
-from identification.judge.response_regions import StructureBias
-from identification.model import KinematicModel
 from studies.known_kinematics.flights import aggressive, gentle, transition
 from studies.known_kinematics.models import PAIRS, identified
 from studies.known_kinematics.predictions import HORIZON, OUTPUTS, fits_of, states_of
@@ -26,11 +22,7 @@ from studies.output import as_json
 from studies.setup.accelerating_baseline import along_the_command
 from studies.setup.flights import TOP, autopilot_for
 from symheli import FlightRecord, Helicopter
-from symheli.flight import SimulatedFlight
 from symheli.values.arrays import Array
-
-CALLS = 50
-"""Draws of a call of stability."""
 
 STATIC_SPEEDS = (0.0, 1.0, 2.0, 4.0, 7.0, 10.0, 13.0)
 """Airspeeds at which static gains are compared, m/s."""
@@ -39,8 +31,7 @@ STATIC_SPEEDS = (0.0, 1.0, 2.0, 4.0, 7.0, 10.0, 13.0)
 @dataclass(frozen=True, kw_only=True)
 class Marks:
     """Of one seed. `gaps`: worst nu-gap by axis and where; `stability`: airspeeds on which model
-    and truth disagree; `calls`: airspeeds where stability is called not known, and where it is
-    called wrongly; `static`: ratio of static gains by airspeed; fits in percent by output:
+    and truth disagree; `static`: ratio of static gains by airspeed; fits in percent by output:
     `ahead` and `baseline` 1 s ahead against the noise-free states, `measured` against the measured
     ones, `closed_loop`.
     """
@@ -48,7 +39,6 @@ class Marks:
     seed: int
     gaps: dict[str, tuple[float, float]]
     stability: int
-    calls: tuple[int, int]
     static: dict[float, float]
     ahead: dict[str, float]
     baseline: dict[str, float]
@@ -79,10 +69,7 @@ def of_seed(setting: Setting, seed: int) -> Marks:
     autopilot = autopilot_for(heli)
     flights = (aggressive, gentle) if setting.gentle else (aggressive,)
     training = [symheli.fly(heli, plan(seed, autopilot)) for plan in flights]
-    source = SimulatedFlight(simulator)
-    model = identified(training, source)
-    there = at_points(model, Truth.of(simulator).models["all axes"], range(len(SPEEDS)))
-    bias = structure_bias(model, training, source, there)
+    model = identified(training, simulator)
     test = symheli.fly(heli, transition(seed, autopilot))
     truth = Truth.of(heli)
     models = frozen_axes(model, truth)
@@ -93,24 +80,12 @@ def of_seed(setting: Setting, seed: int) -> Marks:
         seed=seed,
         gaps={name: (float(g.max()), float(SPEEDS[g.argmax()])) for name, g in gaps.items()},
         stability=beside["all axes"].otherwise_stable("model"),
-        calls=stability_calls(model, truth, bias),
         static={v: truth.static_ratio(models, v) for v in STATIC_SPEEDS},
         ahead=fits_of(clean, model.predict(test, HORIZON)),
         baseline=fits_of(clean, baseline_of(heli, test)),
         measured=fits_of(test.columns(OUTPUTS), model.predict(test, HORIZON)),
         closed_loop=fits_of(clean, model.closed_loop(test)),
     )
-
-
-def stability_calls(
-    model: KinematicModel, truth: Truth, bias: StructureBias | None = None
-) -> tuple[int, int]:
-    """At how many of `SPEEDS` stability is called not known, and at how many wrongly."""
-    points = [(float(v), 0.0)[: len(model.parameters)] for v in SPEEDS]
-    calls = frozen_stability(model, points, draws=CALLS, bias=bias).calls
-    exact = ["stable" if m.is_stable() else "unstable" for m in truth.models["all axes"]]
-    unknown = calls.count("not known")
-    return unknown, sum(a != b for a, b in zip(calls, exact, strict=True)) - unknown
 
 
 def baseline_of(heli: Helicopter, record: FlightRecord) -> Array:
@@ -139,12 +114,6 @@ def table(setting: Setting, marks: Sequence[Marks], simulator_gaps: dict[str, fl
         lines.append(_row(f"worst nu-gap, {axis}", limits[axis], values, marks, 2 * limits[axis]))
     stable = np.array([m.stability for m in marks], float)
     lines.append(_row("airspeeds (of 27) where stability differs", 0.0, stable, marks, 0.0))
-    unknown, wrong = np.array([m.calls for m in marks], float).T
-    third = len(SPEEDS) / 3
-    lines.append(
-        _row("airspeeds where stability is called not known", third, unknown, marks, third)
-    )
-    lines.append(_row("airspeeds where stability is called wrongly", 0.0, wrong, marks, 0.0))
     for airspeed in marks[0].static:
         values = np.array([m.static[airspeed] for m in marks])
         off = np.abs(np.log(values))
