@@ -84,7 +84,7 @@ def of_seed(
     loop = robust_loop(model)
     proof = synthesis.l2_gain(loop, rate=RATE, form=FORM, search=None)
     both = Truth.of(heli), Truth.of(other)
-    nominally, covered, _ = held(model, records, SimulatedFlight(other), *both, "lateral")
+    nominally, covered, *_ = held(model, records, SimulatedFlight(other), *both, "lateral")
     nominal = synthesis.frozen_gain(loop.nominal).gain
     return Guarantee(
         seed=seed,
