@@ -118,7 +118,7 @@ def predict(run: Run, horizon: int) -> Array:
         return out
     past = [run.y[starts - i] for i in range(run.memory)]
     bad = np.zeros(len(starts), bool)
-    known = np.isfinite(past).all(axis=(0, 2))
+    known = np.asarray(np.isfinite(past).all(axis=(0, 2)))
     with np.errstate(all="ignore"):
         for j in range(1, horizon + 1):
             inputs = [run.u[starts + j - 1 - i] for i in range(run.memory)]
