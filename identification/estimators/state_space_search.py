@@ -81,6 +81,7 @@ def state_space_of(
     if not isinstance(method, Subspace):
         z, problem, more = _searched(problem, z, method)
         details |= more
+    z[: problem.run.size] = _calmed(problem.run, z[: problem.run.size])
     return _model(problem, z, records, method.shorthand, details)
 
 
@@ -269,6 +270,25 @@ def _starts(problem: Problem, unknowns: Array) -> list[Array]:
         a, b = (s + moving * (M - s) for s, M in zip(still[:2], (A, B), strict=True))
         out += [run.unknowns(a, b, C, D, share * gain) for gain in gains for share in shares]
     return [*out, run.unknowns(drawn_in * still[0], B, C, D, 0.0 * K)]
+
+
+def _calmed(run: StateSpaceRun, unknowns: Array) -> Array:
+    """The unknowns with as much of what moves in K as leaves the filter stable with p held anywhere
+    in its range: a record says little of the filter in corners that it does not visit.
+
+    Where no share does, they stay.
+    """
+    A, B, C, D, K = run.matrices(unknowns)
+    if not K.size:
+        return unknowns
+    f, one = run.structure.basis(run.structure.basis.samples()), run.structure.basis.constant()
+    still = np.multiply.outer(one, np.tensordot(one, K, 1) / (one @ one))
+    for share in np.linspace(1.0, 0.0, 11):
+        gain = still + share * (K - still)
+        filters = np.tensordot(f, A - gain @ C, 1)
+        if np.abs(np.linalg.eigvals(filters)).max() < 1.0:
+            return run.unknowns(A, B, C, D, gain)
+    return unknowns
 
 
 def _middle(structure: StateSpace) -> Array | float:

@@ -18,8 +18,8 @@ class StateSpace:
 
         x(k+1) = A(p(k)) x(k) + B(p(k)) u(k),   y(k) = C x(k) + D u(k),
 
-    with A and B in the functions of `basis`, C and D constant; found as innovations e, with K(p) e
-    in the next state and e in the outputs.
+    with A and B in the functions of `basis`, C and D constant. `Innovations` adds K(p) e to the
+    next state and e to the outputs, e white.
 
     Parameters
     ----------

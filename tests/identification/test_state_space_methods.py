@@ -327,6 +327,18 @@ def test_a_model_is_judged_fit_and_its_loop_is_proven():
     assert 0.5 * design.promised < proof.gamma < 1.05 * design.promised
 
 
+def test_a_filter_is_stable_in_corners_that_the_record_does_not_visit():
+    """p stays within a third of its range: what K would be at the ends is drawn in."""
+    system = System.drawn(2, 1, 1, 1, 5)
+    record = system.record(300, 2, noise=0.5)
+    structure = replace(system.structure, basis=idn.Polynomial(1, -3.0, 3.0))
+    found = idn.fit(structure, record, "innovations")
+    A, _, C, _, K = found.run.matrices(found.unknowns)
+    for p in (-3.0, 0.0, 3.0):
+        at = np.tensordot(structure.basis(p), A - K @ C, 1)
+        assert np.abs(np.linalg.eigvals(at)).max() < 1.0
+
+
 @pytest.mark.parametrize(
     ("what", "error", "says"),
     [
