@@ -86,7 +86,7 @@ class FrozenStability:
 
     @property
     def advice(self) -> str:
-        """What would decide the points that are not known; empty where there are none."""
+        """The flights that would decide the points not known; empty where there are none."""
         unknown = np.array([call == "not known" for call in self.calls])
         if not unknown.any():
             return ""
@@ -195,7 +195,7 @@ def frozen_stability(
 
 
 def _growth_bias(bias: StructureBias, plant: FrozenPlant, points: Sequence[Point]) -> Array:
-    """What growth rates (K,) are off by in the simulator, the largest of three neighbours, 1/s."""
+    """Errors of growth rates (K,) in the simulator, the largest of three neighbours, 1/s."""
     at = [p if isinstance(p, tuple) else (p,) for p in points]
     if at != [p if isinstance(p, tuple) else (p,) for p in bias.exact]:
         raise InputError(f"bias: expected one at the points {at}, got {list(bias.exact)}")
