@@ -276,8 +276,8 @@ MUTANTS = (
     Mutant(
         "bands of growth rates are a hundredth as wide",
         "identification/judge/frozen_stability.py",
-        "half = BAND * (spread + off)",
-        "half = 0.01 * BAND * (spread + off)",
+        "* spread + BAND * off",
+        "* 0.01 * spread + BAND * off",
         "tests/identification/test_frozen_stability.py",
     ),
     Mutant(

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
+from scipy.stats import norm
 
 from identification.design.criterion import Criterion, Verdict, table
 from identification.judge.coefficient_covariance import drawn
@@ -19,7 +20,10 @@ from symheli.values.numbers import whole
 from symheli.values.summary import summarized
 
 BAND = 1.96
-"""Half width of a band in standard deviations: 95 %."""
+"""Factor of a bias in half a band."""
+
+TOGETHER = 0.05
+"""Probability that noise carries any of the points that are asked together out of its band."""
 
 SMALL = 0.1
 """Draws are so many standard deviations wide, and what they move is scaled back: to first order.
@@ -32,7 +36,7 @@ Call = Literal["stable", "unstable", "not known"]
 @dataclass(frozen=True, eq=False)
 class FrozenStability:
     """Growth rate of the fastest growing mode (the largest real part of a pole, 1/s) at points of
-    the scheduling, with its 95 % band.
+    the scheduling, with a band that noise leaves at none of them, with a probability of 95 %.
 
     Parameters
     ----------
@@ -144,7 +148,8 @@ def frozen_stability(
     model : LPVARXModel, KinematicModel or StateSpaceModel
         Any.
     points : iterable
-        Values of the scheduling: numbers, or tuples of one number a parameter.
+        Values of the scheduling: numbers, or tuples of one number a parameter. The 95 % are for all
+        of them together (Bonferroni): of 27 points 3.1 standard deviations, of one 1.96.
     covariance : array (ny, n, ny, n), optional
         Of the coefficients; default `model.covariance`. Bands hold what it holds: noise, and as far
         as residuals show it what the structure leaves out.
@@ -153,7 +158,7 @@ def frozen_stability(
     bias : StructureBias, optional
         From `structure_bias`, at the same points. Noise is then not all: the growth rate in the
         simulator is off by what the structure leaves out. The largest of three neighbouring points
-        is added to the standard deviation, as if both had one sign.
+        is added 1.96 times, as if noise had the same sign.
 
     Returns
     -------
@@ -190,7 +195,7 @@ def frozen_stability(
     growth = rates[:, 0]
     spread = np.sqrt(np.mean((rates[:, 1:] - growth[:, None]) ** 2, axis=1)) / SMALL
     off = np.zeros(len(chosen)) if bias is None else _growth_bias(bias, plant, chosen)
-    half = BAND * (spread + off)
+    half = norm.isf(TOGETHER / (2 * len(chosen))) * spread + BAND * off
     return FrozenStability(chosen, growth, growth - half, growth + half, BAND * off)
 
 

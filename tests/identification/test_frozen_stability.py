@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from known_systems import flown
+from scipy.stats import norm
 
 import identification as idn
 from identification.judge.response_regions import StructureBias
@@ -43,7 +44,8 @@ def test_the_band_is_that_of_the_coefficient(model):
         spread = np.sqrt(f @ C @ f) / a / model.dt
         assert growth == pytest.approx(np.log(a) / model.dt)
         # 300 draws: a standard error of 4 %
-        assert (high - low) / 2 == pytest.approx(1.96 * spread, rel=0.15)
+        together = norm.isf(0.025 / len(points))
+        assert (high - low) / 2 == pytest.approx(together * spread, rel=0.15)
 
 
 def test_where_the_band_crosses_the_axis_nothing_is_known(model):
