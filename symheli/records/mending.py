@@ -28,6 +28,9 @@ AT_REST = 0.9
 COARSE = 0.5
 """Share of repeats from which a sensor counts as coarsely rounded: repeats say nothing then."""
 
+QUANTA = 2.5
+"""Step after a spell, in the smallest steps of the sensor, up to which rounding made the spell."""
+
 BY_CHANCE = 0.01
 """Number of spells in a record that rounding alone may make."""
 
@@ -102,11 +105,25 @@ def repeats(record: FlightRecord, name: str) -> Repeats:
         return nothing
     if chance > 0:
         least = max(least, int(np.ceil(np.log(BY_CHANCE / len(x)) / np.log(chance))))
-    spells = tuple((a - 1, b - 1) for a, b in runs if b - a >= least)
+    spells = tuple((a - 1, b - 1) for a, b in runs if b - a >= least and not _rounded(x, b))
     mask = same.copy() if every > 1 else np.zeros(len(x), bool)
     for first, last in spells:
         mask[first + 1 : last + 1] = True
     return Repeats(mask, same, every, spells)
+
+
+def _rounded(x: Array, end: int) -> bool:
+    """Whether a spell that ends before row `end` is a slow signal between two steps of rounding: it
+    goes on by one of the smallest steps there are, or all steps are alike and nothing follows.
+    """
+    steps = np.abs(np.diff(x))
+    steps = steps[steps > 0]
+    if not len(steps):
+        return False
+    after = abs(x[end] - x[end - 1]) if end < len(x) else np.nan
+    if not np.isfinite(after):
+        after = float(np.median(steps))
+    return bool(after <= QUANTA * steps.min())
 
 
 def all_repeats(record: FlightRecord, sensors: Iterable[str]) -> dict[str, Repeats]:

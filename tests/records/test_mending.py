@@ -87,3 +87,17 @@ def test_a_hole_longer_than_that_stays():
     found = bridged(noisy(u=u), UNITS)
     assert np.isfinite(found["u"][100:103]).all()
     assert np.isnan(found["u"][500:520]).all()
+
+
+def test_a_slow_signal_that_is_rounded_is_not_frozen():
+    """Its repeats end by one step of rounding; a frozen one goes on where the vehicle is."""
+    time = 0.02 * np.arange(600)
+    slow = np.round(3.0 + np.sin(0.01 * np.arange(600)), 1)
+    fast = np.round(np.sin(0.1 * np.arange(600)), 2)
+    fast[200:250] = fast[200]
+    theta = np.random.default_rng(0).normal(size=600)
+    logged = FlightRecord.from_arrays(time, UNITS, u=slow, q=fast, theta=theta)
+    with pytest.warns(DataWarning, match="q stands still from 4.00 to 4.98"):
+        found = logged.mended()
+    assert not np.isnan(found["u"]).any()
+    assert np.isnan(found["q"]).sum() == 49
