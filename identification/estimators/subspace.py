@@ -147,7 +147,7 @@ class _Data(NamedTuple):
         if structure.own_scheduling:
             p = np.clip(p, *structure.basis.ranges[0])
         f = basis_values(structure.regression, p)
-        known = np.isfinite(y).all(axis=1) & np.isfinite(f).all(axis=1)
+        known = np.asarray(np.isfinite(y).all(axis=1) & np.isfinite(f).all(axis=1))
         before = np.full(len(y), -1)  # the last sample that is not in a row with this one
         starts = np.cumsum([0, *(len(piece.y) for piece in pieces)])[:-1]
         before[starts] = starts - 1

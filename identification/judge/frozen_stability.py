@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -59,13 +59,13 @@ class FrozenStability:
     growth: Array
     low: Array
     high: Array
-    bias: Array | None = None
+    bias: Array = field(default_factory=lambda: np.zeros(0))
 
     __repr__ = summarized
 
     def __post_init__(self) -> None:
         frozen([np.ravel(p) for p in self.points], "points")
-        if self.bias is None:
+        if not np.size(self.bias):
             object.__setattr__(self, "bias", np.zeros(len(self.points)))
         for name in ("growth", "low", "high", "bias"):
             object.__setattr__(self, name, frozen(getattr(self, name), name, (len(self.points),)))
@@ -206,8 +206,8 @@ def _growth_bias(bias: StructureBias, plant: FrozenPlant, points: Sequence[Point
         raise InputError(f"bias: expected one at the points {at}, got {list(bias.exact)}")
     there = replace(plant, model=bias.model)
     of_each = zip(at, bias.exact.values(), strict=True)
-    rates = [np.subtract(*_rates([there.at(*p), exact], plant.model.dt)) for p, exact in of_each]
-    off = np.pad(np.abs(rates), 1, mode="edge")
+    rates = np.array([_rates([there.at(*p), exact], plant.model.dt) for p, exact in of_each])
+    off = np.pad(np.abs(rates[:, 0] - rates[:, 1]), 1, mode="edge")
     return np.asarray(np.max([off[:-2], off[1:-1], off[2:]], axis=0))
 
 
