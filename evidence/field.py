@@ -228,9 +228,6 @@ WHEEL, ANGLE = ("w", 30.0, 50.0), ("sine", -0.45, 0.45)
 INPUT = ("u", -3.5, 3.5)
 """Ranges that hold training and test data."""
 
-OWN = (StateSpace("y", "u", "y", order=6, basis=Polynomial(2, -1.3, 0.8), own_scheduling=True),)
-"""No parameter is measured: the schedule is the output of the model's own free run."""
-
 DATA = {
     "gyroscope": DataSet(
         "Control moment gyroscope (simulated by others, with noise)",
@@ -264,16 +261,15 @@ DATA = {
         1000.0,
         wiener_hammerstein,
         (
-            Way("constant", states((4, 6)), samples=30000),
-            Way("states over the input", states((6,), INPUT, degrees=(1, 2)), samples=30000),
-            Way("states over their own output", OWN, samples=4000),
+            Way("constant", states((4, 6)), samples=20000),
+            Way("states over the input", states((6,), INPUT, degrees=(1, 2)), samples=10000),
             Way(
                 "difference equation over a learnt filter of the input",
                 tuple(
                     LPVARX("y", "v", "v", na=n, nb=n + 1, delay=0, basis=splines(count))
-                    for n in (3, 4)
-                    for count in (7, 11)
+                    for n, count in ((3, 7), (3, 11), (4, 11))
                 ),
+                samples=40000,
                 learnt=partial(filtered_input, basis=splines(7)),
             ),
         ),
@@ -325,10 +321,14 @@ def main() -> None:
     parser.add_argument("--only", choices=DATA, nargs="+", default=list(DATA), help="data sets")
     options = parsed(parser, "identified.md", timed=False)
     for name in options.only:
+        found = []
         try:
-            text = table(name, list(rows(name, options.folder)))
+            for row in rows(name, options.folder):
+                print(*row, sep=", ", flush=True)
+                found.append(row)
         except InputError as error:
             parser.exit(1, f"{error}\n")
+        text = table(name, found)
         print(text, end="\n\n", flush=True)
         if options.write:
             command = f"python -m evidence.field --folder DIR --only {name} --write"
