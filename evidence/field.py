@@ -144,9 +144,14 @@ def recorded(dt: float, **columns: Any) -> FlightRecord:
 
 
 def free_run(model: Identified, record: FlightRecord) -> Array:
-    """Free run (n,) of a model that sees the first outputs of a record alone."""
-    y = np.where(np.arange(len(record)) < KNOWN_SAMPLES, record["y"], np.nan)
-    return np.asarray(model.simulate(record.with_signals({"y": "1"}, y=y))[:, 0])
+    """Free run (n,) of a model that sees the first outputs of a record alone: all of them where its
+    state is found from them, the last ones where it starts from lags.
+    """
+    k, memory = np.arange(len(record)), model.structure.memory
+    y = np.where(k < KNOWN_SAMPLES, record["y"], np.nan)
+    begin = KNOWN_SAMPLES - memory if 0 < memory < KNOWN_SAMPLES else 0
+    seen = record.with_signals({"y": "1"}, y=y).rows(k >= begin)
+    return np.concatenate([np.full(begin, np.nan), model.simulate(seen)[:, 0]])
 
 
 def error_of(model: Identified, record: FlightRecord) -> float:
@@ -267,10 +272,10 @@ DATA = {
                 "difference equation over a learnt filter of the input",
                 tuple(
                     LPVARX("y", "v", "v", na=n, nb=n + 1, delay=0, basis=splines(count))
-                    for n, count in ((3, 7), (3, 11), (4, 11))
+                    for n, count in ((3, 7), (3, 15), (4, 15))
                 ),
                 samples=40000,
-                learnt=partial(filtered_input, basis=splines(7)),
+                learnt=partial(filtered_input, basis=splines(15)),
             ),
         ),
         (
