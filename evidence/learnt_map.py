@@ -59,16 +59,17 @@ def filtered_input(record: FlightRecord, basis: BSpline) -> FilteredInput:
     u, y = (record[name][:SAMPLES] for name in "uy")
     short = record.rows(np.arange(len(record)) < SAMPLES)
     poles = fit(StateSpace("y", "u", order=6), short).at().poles()
-    pairs = sorted(poles[poles.imag > 1e-6], key=lambda pole: -abs(pole))[:2]
+    turning = np.imag(poles)
+    pairs = sorted(poles[turning > 1e-6], key=lambda pole: -abs(pole))[:2]
     if len(pairs) < 2:
         raise InputError("the constant model of order 6 needs two pairs of complex poles")
-    real = max([*poles[np.abs(poles.imag) <= 1e-6].real, 0.5])
+    real = max([*np.real(poles[np.abs(turning) <= 1e-6]), 0.5])
 
     def left(z: Array) -> Array:
         if np.abs(z[[0, 1, 3, 4]]).max() > STABLE:
             return np.full(len(y) - SETTLED, np.std(y))
         one = _normal(z, u)
-        values = lfilter(one.numerator, one.denominator, u)
+        values = np.asarray(lfilter(one.numerator, one.denominator, u))
         through = basis(np.clip(values, -EXTREME, EXTREME)) * values[:, None]
         through = lfilter([1.0], _denominator(z[3:6]), through, axis=0)
         columns = [through[SETTLED - lag : len(y) - lag] for lag in range(TAPS)]
