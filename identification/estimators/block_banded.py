@@ -45,7 +45,7 @@ class Whitening:
             for L, variances in terms:
                 for i in range(d, len(L)):
                     own = variances
-                    if variances.ndim == 2:
+                    if np.ndim(variances) == 2:
                         ahead = len(variances) - m - i
                         own = variances[ahead + d : ahead + m, None]
                     block += (L[i][d:] * own) @ L[i - d][: m - d].swapaxes(1, 2)

@@ -35,7 +35,8 @@ class Innovations(PredictionError):
 
     Examples
     --------
-    >>> found = idn.fit(idn.StateSpace("y", "u", order=2), record, "innovations")
+    >>> method = idn.methods.Innovations(evaluations=50)
+    >>> found = idn.fit(idn.StateSpace("y", "u", order=2), record, method)
     >>> found.covariance.shape, found.predict(record, 5).shape
     ((1, 10, 1, 10), (800, 1))
     """
