@@ -41,8 +41,8 @@ LAGS = 25
 """Number of samples over which residuals are taken to be correlated."""
 
 FADE = 5
-"""Samples over which instruments fall beside a break. Chosen on the seeds 1000 to 1005 of the
-study's flights, 5 % of their rows lost.
+"""Samples over which instruments fall to the end of a stretch. Chosen on the seeds 1000 to 1005 of
+the study's flights, 5 % of their rows lost.
 """
 
 TINY = np.finfo(float).tiny
@@ -131,7 +131,7 @@ def _of_flown(
     """
     Z = instrument_rows(arx, records, source, arx.input_lags.start)[data.rows]
     known = np.isfinite(Z).all(axis=1)
-    Z, phi = Z[known] * _faded(data.rows[known])[:, None], data.phi[known]
+    Z, phi = Z[known] * _faded(data.rows[known], records)[:, None], data.phi[known]
     scale, lengths = column_scale(Z), column_scale(phi)
     W = np.linalg.inv((Z / scale).T @ (phi / lengths)) / lengths[:, None]
     n, ny = phi.shape[1], data.y.shape[1]
@@ -142,14 +142,14 @@ def _of_flown(
     return 0.5 * (out + out.transpose(2, 3, 0, 1))
 
 
-def _faded(rows: Array) -> Array:
-    """Weights (m,) of samples at these rows: 1, and falling beside every break between the first
-    and the last. The noise of increments y(k) - y(k-1) cancels but for the ends of a stretch.
+def _faded(rows: Array, records: Sequence[FlightRecord]) -> Array:
+    """Weights (m,) of samples at rows that count through the records: 1, and falling to both ends
+    of every stretch. The noise of increments y(k) - y(k-1) cancels but for these ends.
     """
-    if not len(rows):
-        return np.ones(0)
-    breaks = np.flatnonzero(np.diff(rows) > 1) + 1
-    edges = np.concatenate([[-np.inf], breaks, [np.inf]])
+    starts = np.cumsum([0, *(len(record) for record in records)])[:-1]
+    stretch = np.searchsorted(starts, rows, side="right")
+    breaks = np.flatnonzero((np.diff(rows) > 1) | (np.diff(stretch) > 0)) + 1
+    edges = np.concatenate([[0], breaks, [len(rows)]])
     k = np.arange(len(rows))
     after = np.searchsorted(edges, k, side="right")
     near = np.minimum(k + 1 - edges[after - 1], edges[after] - k)
@@ -203,7 +203,7 @@ def instrumental_variables(
     known = np.isfinite(W).all(axis=1)
     W = W[known]
     if isinstance(source, FlightSource):
-        W = W * _faded(data.rows[known])[:, None]
+        W = W * _faded(data.rows[known], records)[:, None]
     Q = column_space(W) if len(W) else W
     theta, strengths = np.zeros((arx.n_regressors, arx.ny)), []
     own = np.repeat([e.kind in ("offset", "increment") for e in arx.entries], arx.basis.size)

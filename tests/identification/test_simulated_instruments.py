@@ -104,8 +104,12 @@ def test_more_flights_bring_instruments_to_the_truth_and_least_squares_to_its_bi
     assert error(records) > 2 * error(records, iv)
 
 
-def test_instruments_fade_beside_a_break_alone():
-    rows = np.array([0, 1, 2, 3, 4, 5, 6, 7, 20, 21, 22, 23, 24, 25, 26])
-    steps = np.arange(1, 6) / 6
-    expected = [1, 1, 1, *steps[::-1], *steps, 1, 1]
-    np.testing.assert_allclose(_faded(rows), expected)
+def test_instruments_fade_to_both_ends_of_every_stretch():
+    """A hole in one record, and two records one after the other, are alike."""
+    rise = [*np.arange(1, 6) / 6, 1.0, 1.0]
+    expected = [*rise, *rise[4::-1], *rise, *rise[4::-1]]
+    stretch = np.arange(12)
+    hole = _faded(np.concatenate([stretch, stretch + 20]), [range(40)])
+    two = _faded(np.concatenate([stretch, stretch + 12]), [range(12), range(12)])
+    np.testing.assert_allclose(hole, expected)
+    np.testing.assert_allclose(two, expected)
