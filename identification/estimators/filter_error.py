@@ -31,6 +31,7 @@ from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 from symheli.values.kinematics import VELOCITIES, kinematic_jacobian
 from symheli.values.numbers import whole
+from symheli.values.runs import runs
 
 MISFIT = 30.0
 """What the structure leaves unexplained of the simulated flight is slow against a sample: white
@@ -396,10 +397,7 @@ def unbroken(arx: Aerodynamics, record: FlightRecord) -> list[slice]:
     known = np.isfinite(record.columns(dict.fromkeys(names))).all(axis=1)
     out = []
     for part in record.segments():
-        inside = np.asarray(known)[part].astype(int)
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], inside, [0]])))
-        pairs = zip(edges[::2], edges[1::2], strict=True)
-        out += [slice(part.start + int(a), part.start + int(b)) for a, b in pairs]
+        out += [slice(part.start + a, part.start + b) for a, b in runs(np.asarray(known)[part])]
     edge = _edge(arx, record.dt)
     out = [slice(s.start + edge, s.stop - edge) for s in out]
     return [s for s in out if s.stop - s.start > 2 * arx.memory + 1]

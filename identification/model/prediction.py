@@ -15,6 +15,7 @@ from symheli.errors import InputError
 from symheli.records import FlightRecord
 from symheli.values import NamedVector, Signal
 from symheli.values.arrays import Array
+from symheli.values.runs import runs
 
 DIVERGED = 1e100
 """A response beyond this is reported as infinite."""
@@ -102,9 +103,7 @@ def predict(run: OutputRecursion, horizon: int, noise: NoiseModel | None = None)
 def _expected(noise: NoiseModel, v: Array, horizon: int) -> Array:
     """(n, ny) what noise v makes expect; NaN, behind which it starts from rest, where v is."""
     out = np.full_like(v, np.nan)
-    known = np.isfinite(v).all(axis=1).astype(int)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], known, [0]])))
-    for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+    for start, stop in runs(np.asarray(np.isfinite(v).all(axis=1))):
         out[start:stop] = noise.ahead(v[start:stop], horizon)
     return out
 

@@ -19,6 +19,7 @@ from symheli.errors import InputError
 from symheli.records import FlightRecord
 from symheli.values import NamedVector, Signal
 from symheli.values.arrays import Array, frozen
+from symheli.values.runs import runs
 from symheli.values.sample_period import JITTER, same_period
 from symheli.values.summary import summarized
 
@@ -173,11 +174,9 @@ def pieces_of(
     given = s.u if structure.own_scheduling else np.column_stack([s.u, s.f])
     known = np.asarray(np.isfinite(given).all(axis=1))
     for part in s.segments:
-        inside = known[part].astype(int)
-        edges = part.start + np.flatnonzero(np.diff(np.concatenate([[0], inside, [0]])))
-        for a, b in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        for a, b in runs(known[part]):
             if b - a > structure.order:
-                at = slice(a, b)
+                at = slice(part.start + a, part.start + b)
                 out.append((at, s.y[at], s.u[at], s.p[at]))
     return out
 

@@ -13,6 +13,7 @@ from symheli.errors import DataWarning
 from symheli.records.flight_record import FlightRecord
 from symheli.records.kinematics import comparable
 from symheli.values.arrays import Array
+from symheli.values.runs import runs
 
 SCATTER = 0.1
 """Part of a step by which stamps may be off an even clock and stand for it: the samples are even
@@ -99,25 +100,25 @@ def repeats(record: FlightRecord, name: str) -> Repeats:
     if not (every <= SLOWEST and np.mean(apart == every) >= REGULAR):
         every = 1
     least = max(FEWEST * every, int(FROZEN / np.median(np.diff(record.time))))
-    runs = _runs(same)
-    chance = sum(b - a for a, b in runs if b - a < least) / len(x) if every == 1 else 0.0
+    alike = runs(same)
+    chance = sum(b - a for a, b in alike if b - a < least) / len(x) if every == 1 else 0.0
     if chance > COARSE:
         return nothing
     if chance > 0:
         least = max(least, int(np.ceil(np.log(BY_CHANCE / len(x)) / np.log(chance))))
-    spells = tuple((a - 1, b - 1) for a, b in runs if b - a >= least and not _rounded(x, b))
+    steps = np.abs(np.diff(x))
+    steps = steps[steps > 0]
+    spells = tuple((a - 1, b - 1) for a, b in alike if b - a >= least and not _rounded(x, b, steps))
     mask = same.copy() if every > 1 else np.zeros(len(x), bool)
     for first, last in spells:
         mask[first + 1 : last + 1] = True
     return Repeats(mask, same, every, spells)
 
 
-def _rounded(x: Array, end: int) -> bool:
+def _rounded(x: Array, end: int, steps: Array) -> bool:
     """Whether a spell that ends before row `end` is a slow signal between two steps of rounding: it
-    goes on by one of the smallest steps there are, or all steps are alike and nothing follows.
+    goes on by one of the smallest of all `steps`, or these are alike and nothing follows.
     """
-    steps = np.abs(np.diff(x))
-    steps = steps[steps > 0]
     if not len(steps):
         return False
     after = abs(x[end] - x[end - 1]) if end < len(x) else np.nan
@@ -314,12 +315,6 @@ def _filled(record: FlightRecord, x: Array, longest: float, *, smooth: bool) -> 
             else np.interp(time[here], time[rows], x[rows])
         )
     return made, mask
-
-
-def _runs(same: Array) -> list[tuple[int, int]]:
-    """First and one behind the last of each run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(int), [0]])))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def _say(text: str) -> None:

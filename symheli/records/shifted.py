@@ -9,6 +9,7 @@ from scipy.interpolate import CubicSpline
 
 from symheli.records.flight_record import FlightRecord
 from symheli.values.arrays import Array
+from symheli.values.runs import runs
 
 SPLINE = 4
 """Least number of samples of a cubic spline."""
@@ -26,10 +27,9 @@ def shifted(record: FlightRecord, late: Mapping[str, float]) -> FlightRecord:
 def _later(record: FlightRecord, signal: Array, by: float) -> Array:
     out = np.full_like(signal, np.nan)
     for part in record.segments():
-        known = np.isfinite(signal[part]).astype(int)
-        edges = part.start + np.flatnonzero(np.diff(np.concatenate([[0], known, [0]])))
-        for a, b in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        for a, b in runs(np.isfinite(signal[part])):
             if b - a >= SPLINE:
-                time = record.time[a:b]
-                out[a:b] = CubicSpline(time, signal[a:b], extrapolate=False)(time + by)
+                piece = slice(part.start + a, part.start + b)
+                time = record.time[piece]
+                out[piece] = CubicSpline(time, signal[piece], extrapolate=False)(time + by)
     return out
