@@ -15,7 +15,6 @@ from evidence.marks.coverage import at_points
 from evidence.seeds import by_name, parser_of
 from evidence.tables import DOCS, keep, kept_rows, markdown, parsed
 from identification.judge import frozen_stability, structure_bias
-from identification.judge.response_regions import StructureBias
 from identification.model import KinematicModel
 from studies.known_kinematics.conditions import (
     ALL,
@@ -29,6 +28,7 @@ from studies.known_kinematics.conditions import (
 from studies.known_kinematics.models import PAIRS
 from studies.known_kinematics.truth import SPEEDS, Truth
 from studies.output import as_json
+from symheli import FlightRecord
 from symheli.errors import DataWarning
 from symheli.flight import SimulatedFlight
 
@@ -64,8 +64,6 @@ def of_seed(name: str, seed: int, truth: str = "xcell60") -> Marks:
         warnings.simplefilter("ignore", DataWarning)
         source = Instruments(SimulatedFlight(simulator))
         model = condition.identified(condition.structure(records[0]), records, source)
-        there = at_points(model, condition.truth(simulator).models[ALL], range(len(SPEEDS)))
-        bias = structure_bias(model, records, source, there)
     exact = condition.truth(heli)
     gap = exact.compare(frozen_all(model))[ALL]["model"].gap
     return Marks(
@@ -73,12 +71,24 @@ def of_seed(name: str, seed: int, truth: str = "xcell60") -> Marks:
         gap=float(gap.max()),
         airspeed=float(SPEEDS[gap.argmax()]),
         found={name: model.details[name] for name in PARTS if name in model.details},
-        calls=stability_calls(model, exact, bias),
+        calls=stability_calls(model, records, source, exact, condition.truth(simulator)),
     )
 
 
-def stability_calls(model: KinematicModel, truth: Truth, bias: StructureBias) -> tuple[int, int]:
-    """At how many of `SPEEDS` stability is called not known, and at how many wrongly."""
+def stability_calls(
+    model: KinematicModel,
+    records: Sequence[FlightRecord],
+    source: Instruments | SimulatedFlight,
+    truth: Truth,
+    simulated: Truth,
+) -> tuple[int, int]:
+    """At how many of `SPEEDS` stability is called not known, and at how many wrongly, with the bias
+    of the structure. `simulated`: the exact models of the simulator's vehicle.
+    """
+    there = at_points(model, simulated.models[ALL], range(len(SPEEDS)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DataWarning)
+        bias = structure_bias(model, records, source, there)
     points = [(float(v), 0.0)[: len(model.parameters)] for v in SPEEDS]
     calls = frozen_stability(model, points, draws=CALLS, bias=bias).calls
     exact = ["stable" if m.is_stable() else "unstable" for m in truth.models[ALL]]

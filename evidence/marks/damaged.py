@@ -16,11 +16,9 @@ import numpy as np
 
 import symheli
 from evidence.marks.conditions import stability_calls
-from evidence.marks.coverage import at_points
 from evidence.seeds import by_name, parser_of
 from evidence.tables import DOCS, keep, kept_rows, markdown, parsed
 from identification import fit
-from identification.judge import structure_bias
 from identification.methods import FilterError, InstrumentalVariables, Method
 from studies.known_kinematics.conditions import ALL
 from studies.known_kinematics.flights import aggressive
@@ -161,8 +159,8 @@ def of_seed(
     logs, said = _logs(truth, seed)
     logs = {damage: logs[damage] for damage in (WHOLE, *damages)}
     heli, simulator = (Helicopter.load(n, governor="ideal") for n in (truth, PAIRS[truth]))
-    exact, source = Truth.of(heli, {ALL: AXES[ALL]}), SimulatedFlight(simulator)
-    other = Truth.of(simulator, {ALL: AXES[ALL]}).models[ALL]
+    exact, other = (Truth.of(vehicle, {ALL: AXES[ALL]}) for vehicle in (heli, simulator))
+    source = SimulatedFlight(simulator)
     gaps, wrong = {}, {}
     for damage, record in logs.items():
         with warnings.catch_warnings():
@@ -171,10 +169,7 @@ def of_seed(
         found: Array = exact.compare(frozen_axes(model, exact))[ALL]["model"].gap
         gaps[damage] = float(found.max())
         if model.covariance is not None and name not in CHEAP:
-            bias = structure_bias(
-                model, record, source, at_points(model, other, range(len(SPEEDS)))
-            )
-            wrong[damage] = stability_calls(model, exact, bias)[1]
+            wrong[damage] = stability_calls(model, [record], source, exact, other)[1]
     return Marks(seed=seed, gaps=gaps, wrong=wrong, said=said)
 
 

@@ -54,8 +54,8 @@ correlated.
 """
 
 _TOO_SHORT = (
-    "no stretch of the records in which everything was measured is long enough: hold them against"
-    " record.mended(), decimate to the slowest sensor, or fly again"
+    "no stretch of the records in which everything was measured is long enough: look at what"
+    " record.mended() says of them, decimate to the slowest sensor, or fly again"
 )
 
 LAGS, CHUNK = 25, 256

@@ -17,7 +17,7 @@ from identification.model.state_space_model import StateSpaceModel
 from identification.structure.lpvarx import LPVARX
 from identification.structure.state_space import StateSpace
 from symheli import LinearModel
-from symheli.errors import UnknownNameError
+from symheli.errors import InputError, UnknownNameError
 from symheli.lpv import stability_margin
 from symheli.lpv.stability_margin import Feedback, as_controller, closed_loop
 from symheli.lpv.tools import LinearModels, nu_gaps
@@ -27,6 +27,14 @@ Model = LPVARXModel | KinematicModel | StateSpaceModel
 
 Point = float | tuple[float, ...]
 """A value of the scheduling: a number, or one a parameter."""
+
+
+def tuples(points: Iterable[Point]) -> list[tuple[float, ...]]:
+    """Return the points as tuples of one number a parameter; raises `InputError` for none."""
+    chosen = [p if isinstance(p, tuple) else (p,) for p in points]
+    if not chosen:
+        raise InputError("points: give at least one value of the scheduling")
+    return chosen
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
@@ -11,7 +11,7 @@ from scipy.stats import norm
 
 from identification.design.criterion import Criterion, Verdict, table
 from identification.judge.coefficient_covariance import drawn
-from identification.judge.frozen_plant import FrozenPlant, Model, Point, text
+from identification.judge.frozen_plant import FrozenPlant, Model, Point, text, tuples
 from identification.judge.response_regions import StructureBias
 from symheli import LinearModel
 from symheli.errors import InputError
@@ -95,16 +95,16 @@ class FrozenStability:
         if not unknown.any():
             return ""
         times = self.longer[unknown]
-        by_length, parts = np.isfinite(times), []
-        if by_length.any():
+        by_length, parts = times[np.isfinite(times)], []
+        if len(by_length):
             parts.append(
-                f"records {np.median(times[by_length]):.2g} times as long decide half of"
-                f" {int(by_length.sum())} of them"
+                f"{len(by_length)} need longer records of the same kind,"
+                f" {by_length.min():.2g} to {by_length.max():.2g} times as long"
             )
-        if not by_length.all():
+        if len(by_length) < len(times):
             parts.append(
-                f"at {int((~by_length).sum())} of them the structure is off by more than the growth"
-                " rate: hold each airspeed for 40 s, with half the excitation"
+                f"at {len(times) - len(by_length)} the structure is off by more than the growth"
+                " rate: hold each value of the scheduling for long, with less excitation"
             )
         return "; ".join(parts)
 
@@ -189,32 +189,28 @@ def frozen_stability(
     draws = whole(draws, "draws", 2)
     thetas = drawn(model.theta, SMALL**2 * covariance, free, draws, seed)
     chosen = tuple(points)
-    if not chosen:
-        raise InputError("points: give at least one value of the scheduling")
-    rates = np.array([_growth(plant, p, thetas) for p in chosen]).reshape(len(chosen), -1)
+    at = tuples(chosen)
+    rates = np.array([_growth(plant, p, thetas) for p in at]).reshape(len(at), -1)
     growth = rates[:, 0]
     spread = np.sqrt(np.mean((rates[:, 1:] - growth[:, None]) ** 2, axis=1)) / SMALL
-    off = np.zeros(len(chosen)) if bias is None else _growth_bias(bias, plant, chosen)
+    off = np.zeros(len(at)) if bias is None else _growth_bias(bias, plant, at)
     half = norm.isf(TOGETHER / (2 * len(chosen))) * spread + BAND * off
     return FrozenStability(chosen, growth, growth - half, growth + half, BAND * off)
 
 
-def _growth_bias(bias: StructureBias, plant: FrozenPlant, points: Sequence[Point]) -> Array:
+def _growth_bias(bias: StructureBias, plant: FrozenPlant, points: list[tuple[float, ...]]) -> Array:
     """Errors of growth rates (K,) in the simulator, the largest of three neighbours, 1/s."""
-    at = [p if isinstance(p, tuple) else (p,) for p in points]
-    if at != [p if isinstance(p, tuple) else (p,) for p in bias.exact]:
-        raise InputError(f"bias: expected one at the points {at}, got {list(bias.exact)}")
+    bias.require(points)
     there = replace(plant, model=bias.model)
-    of_each = zip(at, bias.exact.values(), strict=True)
+    of_each = zip(points, bias.exact.values(), strict=True)
     rates = np.array([_rates([there.at(*p), exact], plant.model.dt) for p, exact in of_each])
     off = np.pad(np.abs(rates[:, 0] - rates[:, 1]), 1, mode="edge")
     return np.asarray(np.max([off[:-2], off[1:-1], off[2:]], axis=0))
 
 
-def _growth(plant: FrozenPlant, p: Point, thetas: Array) -> Sequence[float]:
+def _growth(plant: FrozenPlant, p: tuple[float, ...], thetas: Array) -> list[float]:
     """Growth rates of the estimate and of each draw at p, 1/s."""
-    at = p if isinstance(p, tuple) else (p,)
-    return _rates([plant.at(*at), *plant.of_each(thetas, *at)], plant.model.dt)
+    return _rates([plant.at(*p), *plant.of_each(thetas, *p)], plant.model.dt)
 
 
 def _rates(models: Iterable[LinearModel], dt: float) -> list[float]:

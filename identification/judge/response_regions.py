@@ -14,7 +14,7 @@ from scipy.stats import chi2
 from identification.estimators.estimate import fit
 from identification.estimators.instruments import FlightSource
 from identification.judge.coefficient_covariance import drawn
-from identification.judge.frozen_plant import FrozenPlant, Model, Point
+from identification.judge.frozen_plant import FrozenPlant, Model, Point, tuples
 from identification.structure.kinematic_arx import KinematicARX
 from identification.structure.lpvarx import LPVARX
 from identification.structure.state_space import StateSpace
@@ -96,7 +96,7 @@ class StructureBias:
     __repr__ = summarized
 
     def __post_init__(self) -> None:
-        _chosen(self.exact)
+        tuples(self.exact)
         for truth in self.exact.values():
             if not same_period(truth.dt, self.model.dt):
                 raise InputError(
@@ -104,13 +104,18 @@ class StructureBias:
                     f" {truth.dt}; use .discretize(dt)"
                 )
 
+    def require(self, points: list[tuple[float, ...]]) -> None:
+        """Raise `InputError` unless it is at these points."""
+        if tuples(self.exact) != points:
+            raise InputError(f"bias: expected one at the points {points}, got {tuples(self.exact)}")
+
     def responses(
         self, frequencies: object, outputs: Sequence[str], inputs: Sequence[str]
     ) -> Array:
         """What frequency responses are off by, (K, w, ny, nu), at the points of `exact`."""
         plant = FrozenPlant(self.model, tuple(map(str, outputs)), tuple(map(str, inputs)))
         omega, off = frozen(frequencies, "frequencies", (None,)), []
-        for p, truth in zip(_chosen(self.exact), self.exact.values(), strict=True):
+        for p, truth in zip(tuples(self.exact), self.exact.values(), strict=True):
             part = truth.select(inputs=plant.inputs, outputs=plant.outputs)
             off.append(plant.at(*p).frequency_response(omega) - part.frequency_response(omega))
         return np.stack(off)
@@ -170,7 +175,7 @@ def response_regions(
     plant = _plant(model, outputs, inputs)
     thetas = drawn(model.theta, model.covariance, plant.free, whole(draws, "draws", 3), seed)
     omega, centres, covariances = frozen(frequencies, "frequencies", (None,)), [], []
-    chosen = _chosen(points)
+    chosen = tuples(points)
     for p in chosen:
         own = plant.at(*p).frequency_response(omega)
         spread = np.stack([m.frequency_response(omega) for m in plant.of_each(thetas, *p)]) - own
@@ -179,10 +184,7 @@ def response_regions(
         covariances.append(np.einsum("d...i,d...j->...ij", parts, parts) / len(thetas))
     centre, covariance = np.stack(centres), np.stack(covariances)
     if bias is not None:
-        if _chosen(bias.exact) != chosen:
-            raise InputError(
-                f"bias: expected one at the points {chosen}, got {_chosen(bias.exact)}"
-            )
+        bias.require(chosen)
         off = bias.responses(omega, plant.outputs, plant.inputs)
         power = with_neighbours(with_neighbours(np.abs(off) ** 2, 0), 1)
         covariance += 0.5 * power[..., None, None] * np.eye(2)
@@ -275,10 +277,3 @@ def _plant(
     y = tuple(map(str, model.outputs)) if outputs is None else tuple(outputs)
     u = tuple(map(str, model.inputs)) if inputs is None else tuple(inputs)
     return FrozenPlant(model, y, u)
-
-
-def _chosen(points: Iterable[Point]) -> list[tuple[float, ...]]:
-    chosen = [p if isinstance(p, tuple) else (p,) for p in points]
-    if not chosen:
-        raise InputError("points: give at least one value of the scheduling")
-    return chosen

@@ -110,11 +110,9 @@ class RealCondition:
 
     def flights(self, heli: Helicopter, seed: int) -> list[FlightRecord]:
         """The flights for identification, as they are logged."""
-        if self.held:
-            plans = [held(seed + i * ANOTHER, autopilot_for(heli)) for i in range(self.held)]
-            return [symheli.fly(heli, plan) for plan in plans]
         if not self.headings:
-            return [self.logged(symheli.fly(heli, self.plan(heli, seed)))]
+            plans = [held(seed + i * ANOTHER, autopilot_for(heli)) for i in range(self.held)]
+            return [self.logged(symheli.fly(heli, p)) for p in plans or [self.plan(heli, seed)]]
         longest, out = self.longest / len(self.headings), []
         for i, off in enumerate(self.headings):
             own, towards = seed + i * ANOTHER, np.radians(180.0 - off)
