@@ -187,7 +187,7 @@ def decay_rate(
     -------
     Certificate
         `alpha` (1/s) is proven; no proof can exceed `upper`: the slowest frozen mode, or growth
-        along a trajectory.
+        along a trajectory. Where the state grows, `alpha` < 0 is a bound of growth, computed.
 
     Raises
     ------
