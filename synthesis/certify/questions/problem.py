@@ -168,7 +168,8 @@ def _accepted(model: Model) -> LPVStateSpace:
     except InputError as error:
         raise InputError(
             "the LFT depends on its parameters as a rational function, not a polynomial; use"
-            " lft_gain, or fit a polynomial: to_lpv(degree=...)"
+            " synthesis.robust.rational_gain, lft_gain where p may jump, or fit a polynomial:"
+            " to_lpv(degree=...)"
         ) from error
 
 
