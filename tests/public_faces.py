@@ -18,16 +18,22 @@ def moved(package):
 
 def lower(package):
     """The modules below a package to which names of it have gone."""
-    found = {m for m, _ in moved(package)}
+    found = {m for m, _ in moved(package)} | {r for r in rings() if r.startswith(f"{package}.")}
     return sorted(m for m in found if hasattr(module(m), "__all__") or m.count(".") == 1)
 
 
+def rings():
+    """The rings of every package, which are public as a whole."""
+    house = tomllib.loads((ROOT / "evidence" / "house.toml").read_text(encoding="utf-8"))
+    return [f"{own['name']}.{ring}" for own in house["package"] for ring, _ in own.get("rings", ())]
+
+
 def names(face):
-    """Public names of a package, or of a module that only names again what rooms hold; of another
-    module below a package those that stood at the top.
+    """Public names of a package, a ring, or a module that only names again what rooms hold; of
+    another module below a package those that stood at the top.
     """
     house = tomllib.loads((ROOT / "evidence" / "house.toml").read_text(encoding="utf-8"))
-    if face in (*TOP, "symheli.lpv", "symheli.lpv.tools", *house["faces"]):
+    if face in (*TOP, "symheli.lpv", "symheli.lpv.tools", *house["faces"], *rings()):
         return list(module(face).__all__)
     packages = [package for package in (*TOP, "symheli.lpv") if face.startswith(f"{package}.")]
     return sorted({name for p in packages for m, name in moved(p) if m == face})

@@ -31,6 +31,7 @@ PUBLIC = tuple(
         for package in (*PACKAGES, *FUNCTIONS_OF, *SYNTHESIS)
         for name in shown(package)
         if isinstance(thing := getattr(importlib.import_module(package), name), type)
+        and not getattr(thing, "_is_protocol", False)
     }
 )
 """The classes that users meet."""

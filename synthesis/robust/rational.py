@@ -60,6 +60,15 @@ class RationalGain(ProvenStatement):
     P, F : array
         Bernstein coefficients over the normalised parameters of V = x' P x and of the matrix F of
         `synthesis.robust.rational_inequality`.
+
+    Examples
+    --------
+    >>> import symheli
+    >>> p = symheli.Scheduling("p", "1", 0.0, 1.0, rate=0.2)
+    >>> lag = symheli.LFT.from_expressions([[-1 / (1 + p.symbol)]], [[1]], [[1]], [[0]], p)
+    >>> found = synthesis.robust.rational_gain(lag)
+    >>> found.verify(), found.P.shape
+    (True, (3, 1, 1))
     """
 
     gamma: float
@@ -187,6 +196,7 @@ def rational_gain(
     --------
     x' = -x/(1 + p) + u/(1 + p): a lag whose time constant moves, of gain 1.
 
+    >>> import symheli
     >>> p = symheli.Scheduling("p", "1", 0.0, 1.0, rate=0.2)
     >>> s = p.symbol
     >>> lag = symheli.LFT.from_expressions([[-1 / (1 + s)]], [[1 / (1 + s)]], [[1]], [[0]], p)

@@ -54,6 +54,12 @@ class ListedBound(ProvenStatement):
         The matrices, stacked.
     left : tuple of str
         Forms of P that were left untried.
+
+    Examples
+    --------
+    >>> found = synthesis.switching.growth_rate([[[0.5, 1.0], [0.0, 0.5]], [[0.5]*2]*2], dt=1.0)
+    >>> found.verify(), found.word
+    (True, (1,))
     """
 
     kind: str
@@ -228,7 +234,7 @@ def growth_rate(
     >>> pair = [[[1.0, 1.0], [0.0, 1.0]], [[1.0, 0.0], [1.0, 1.0]]]
     >>> found = synthesis.switching.growth_rate(pair, dt=1.0)
     >>> print(f"{found.lower:.4f} <= growth <= {found.bound:.4f}, proven: {found.verified}")
-    1.6180 <= growth <= 1.6182, proven: True
+    1.6180 <= growth <= 1.6181, proven: True
     """
     own = _listed(models, dt)
     low = growing(own)

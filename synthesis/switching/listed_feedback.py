@@ -50,6 +50,16 @@ class ListedFeedback:
         Least gain of the program, computed.
     proof : ListedBound
         What is proven of the closed loops in any order.
+
+    Examples
+    --------
+    >>> from symheli import LinearModel
+    >>> model = LinearModel(
+    ...     [[1.0]], [[1.0, 1.0]], [[1.0], [0.0]], [[0.0, 0.0], [0.0, 0.1]],
+    ...     ["x"], ["w", "u"], ["x", "cost"])
+    >>> plant = synthesis.Plant(model, ["w"], ["x", "cost"], ["u"], ["x"])
+    >>> synthesis.switching.listed_feedback([plant]).proof.verified
+    True
     """
 
     K: Array
@@ -112,7 +122,7 @@ def listed_feedback(
     ...     return synthesis.Plant(model, ["w"], ["x", "cost"], ["u"], ["x"])
     >>> made = synthesis.switching.listed_feedback([plant(0.9), plant(1.3)])
     >>> print(f"K = {made.K[0].item():.3f}, gain {made.proof.bound:.3f}")
-    K = -1.094, gain 1.269
+    K = -1.100, gain 1.258
     """
     each = _plants(plants)
     solver, best = general_solver(solver), None

@@ -61,6 +61,16 @@ class PeriodicGain(ProvenStatement):
         Matrices, ranges, motion and speed of the claim.
     P : array (1 + 2 K, n, n)
         V = x' P x: mean, cosines and sines in turn.
+
+    Examples
+    --------
+    >>> import symheli
+    >>> p = symheli.Scheduling("p", "1", -1.0, 1.0)
+    >>> lag = symheli.LPVStateSpace.from_expressions(
+    ...     [[-1 - p.symbol / 2]], [[1]], [[1]], [[0]], p)
+    >>> found = synthesis.switching.periodic_gain(lag, {"p": (0.0, 1.0, 0.0)}, 2.0, harmonics=2)
+    >>> found.verify(), found.P.shape
+    (True, (5, 1, 1))
     """
 
     gamma: float
@@ -214,12 +224,13 @@ def periodic_gain(
     --------
     y'' + y' + (1 + 2.5 p) y = f with p = cos 3 t, which is not stable for p at rest at -1:
 
+    >>> import symheli
     >>> p = symheli.Scheduling("p", "1", -1.0, 1.0)
     >>> A = [[0, 1], [-1 - 2.5 * p.symbol, -1]]
     >>> spring = symheli.LPVStateSpace.from_expressions(A, [[0], [1]], [[1, 0]], [[0]], p)
     >>> found = synthesis.switching.periodic_gain(spring, {"p": (0.0, 1.0, 0.0)}, 3.0)
     >>> print(f"{found.lower:.3f} <= gain <= {found.gamma:.3f}, proven: {found.verified}")
-    1.502 <= gain <= 1.513, proven: True
+    1.502 <= gain <= 1.507, proven: True
     """
     omega, harmonics = positive(omega, "omega"), whole(harmonics, "harmonics", 0)
     if harmonics > MOST:

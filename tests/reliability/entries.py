@@ -15,11 +15,11 @@ RESULT = "made by the package alone, from what it has checked: see the entry tha
 RESULTS = set(
     """
     AgainstConstant Air Autopilot Certificate Coefficients
-    Controller Coverage Criterion DwellTime Estimate
+    Controller Coverage Criterion DwellTime Estimate ListedBound ListedFeedback
     Estimator Experiment FitForControl FlightDataset FrozenModels
     GainCurve ReferenceGovernor Helicopter History InvariantSet
     KinematicModel LPVARXModel LocalGain LoopShaping LowComplexitySet
-    MarginTable Margins MuDesign Online Plan
+    MarginTable Margins MuDesign Online PeriodicGain Plan RationalGain
     RigidBodyOnline RobustMargin Scores SlopeMargin SpecificationTable
     StateSpaceModel StructuredController SwitchedController TrimPoint Tube
     WorstCaseGain
