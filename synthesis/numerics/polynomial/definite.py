@@ -4,6 +4,9 @@ the box where they are inconclusive.
 
 from __future__ import annotations
 
+from itertools import product
+from typing import Any, NamedTuple
+
 import numpy as np
 
 from symheli.values.arrays import Array
@@ -44,26 +47,56 @@ def negative_definite_exactly(F: PolynomialMatrix, cells: int = MAX_BOXES) -> bo
     """Check in exact arithmetic, of coefficients that are rationals; only their lower triangles are
     read.
     """
+    return first_miss(F, cells) is None
+
+
+class Miss(NamedTuple):
+    """A `point` of the box where F is not negative definite; where `certain` is False it was only
+    not shown to be so near there.
+    """
+
+    point: tuple[Any, ...]
+    certain: bool
+
+
+def first_miss(F: PolynomialMatrix, cells: int = MAX_BOXES) -> Miss | None:
+    """Return where F is not negative definite, in exact arithmetic; None where it is on the whole
+    box.
+    """
     m, spent = len(F.box), 0
     # a positive factor changes nothing, and integers are halved without divisions
-    waiting = [integers(-F.coefficients)]
+    waiting = [(integers(-F.coefficients), F.box)]
     while waiting:
         spent += 1
+        G, box = waiting.pop()
         if spent > cells:
-            return False
-        G = waiting.pop()
+            return Miss(tuple((a + b) / 2 for a, b in box), False)
         numbers = nearest(G)
         # a check in floating point that fails saves the exact one
         promising = bool(np.all(np.linalg.eigvalsh(_normalised(numbers))[..., 0] > 0))
         if promising and positive_definite(G):
             continue
         if not positive_definite(G[_corners(G.shape[:m])]):
-            return False
+            return _false_corner(G, box)
         curvature = _curvature(numbers[None], m)[0]
-        if curvature.max() == 0.0:
-            return False
-        waiting += _bisect(G, int(np.argmax(curvature)))
-    return True
+        if curvature.max(initial=0.0) == 0.0:
+            return Miss(tuple((a + b) / 2 for a, b in box), False)
+        axis = int(np.argmax(curvature))
+        a, b = box[axis]
+        halves = (a, (a + b) / 2), ((a + b) / 2, b)
+        waiting += [
+            (part, (*box[:axis], own, *box[axis + 1 :]))
+            for part, own in zip(_bisect(G, axis), halves, strict=True)
+        ]
+    return None
+
+
+def _false_corner(G: Array, box: Any) -> Miss:
+    m = len(box)
+    for corner in product((0, -1), repeat=m):
+        if not positive_definite(G[corner]):
+            return Miss(tuple(ends[i] for ends, i in zip(box, corner, strict=True)), True)
+    raise AssertionError("all corners of a box are positive definite")  # pragma: no cover
 
 
 def _normalised(F: Array) -> Array:
