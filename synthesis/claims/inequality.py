@@ -28,7 +28,11 @@ from synthesis.numerics.polynomial.exact import growth_of
 from synthesis.numerics.polynomial.matrix import PolynomialMatrix, block
 
 
-class Part(NamedTuple):
+UNIT = ((Fraction(0), Fraction(1)),)
+"""The box of a vertex, on which nothing depends."""
+
+
+class Required(NamedTuple):
     """What must be positive definite: its name, the polynomial matrix, and where in words: of a
     vertex, whose number `vertex` is; on a grid None.
     """
@@ -39,7 +43,7 @@ class Part(NamedTuple):
     vertex: int | None
 
 
-class Loop(NamedTuple):
+class Closed(NamedTuple):
     """A + BK, B, C + DK, D and P on a box."""
 
     A: PolynomialMatrix
@@ -49,7 +53,7 @@ class Loop(NamedTuple):
     P: PolynomialMatrix
 
 
-def parts(plant: VertexPlant | GridPlant, claim: LyapunovClaim) -> Iterator[Part]:
+def parts(plant: VertexPlant | GridPlant, claim: LyapunovClaim) -> Iterator[Required]:
     """Yield everything that must be positive definite."""
     yield from (_of_vertices if isinstance(plant, VertexPlant) else _of_grid)(plant, claim)  # type: ignore[operator]
 
@@ -63,38 +67,38 @@ def value_at(F: PolynomialMatrix, point: tuple[Any, ...]) -> Array:
     return np.asarray(c, dtype=object)
 
 
-def _of_vertices(plant: VertexPlant, claim: LyapunovClaim) -> Iterator[Part]:
+def _of_vertices(plant: VertexPlant, claim: LyapunovClaim) -> Iterator[Required]:
     P, K = (rationals(M) for M in claim.fitting(plant))
     count = len(plant.A)
     loops = []
     for i in range(count):
         system = (rationals(M[i]) for M in (plant.A, plant.B, plant.C, plant.D))
         own = P[min(i, len(P) - 1)], K[min(i, len(K) - 1)]
-        loops.append(_loop(*(PolynomialMatrix.constant(M, ()) for M in (*system, *own))))
+        loops.append(_loop(*(PolynomialMatrix.constant(M, UNIT) for M in (*system, *own))))
     for i, loop in enumerate(loops[: len(P)]):
-        yield Part("P > 0", loop.P, f"vertex {i + 1}" if len(P) > 1 else "every vertex", i)
+        yield Required("P > 0", loop.P, f"vertex {i + 1}" if len(P) > 1 else "every vertex", i)
     for i, loop in enumerate(loops):
         for j in range(len(P)):
             after = f", followed by vertex {j + 1}" if len(P) > 1 else ""
             where = f"vertex {i + 1} of {count}{after}"
             form = _form(claim, loop, loops[j].P, None, plant.dt)
-            yield Part("V falls", form, where, i)
+            yield Required("V falls", form, where, i)
 
 
-def _of_grid(plant: GridPlant, claim: LyapunovClaim) -> Iterator[Part]:
+def _of_grid(plant: GridPlant, claim: LyapunovClaim) -> Iterator[Required]:
     P, K = (rationals(M) for M in claim.fitting(plant))
     p = rationals(plant.p)
     system = [rationals(M) for M in (plant.A, plant.B, plant.C, plant.D)]
     for k in range(len(p) - 1):
         box = ((p[k], p[k + 1]),)
         loop = _loop(*(_straight(M, k, box) for M in (*system, P, K)))
-        yield Part("P > 0", loop.P, "", None)
+        yield Required("P > 0", loop.P, "", None)
         if plant.dt is None:
             for slope in _slopes(loop.P, plant.rate):
-                yield Part("V falls", _form(claim, loop, loop.P, slope, None), "", None)
+                yield Required("V falls", _form(claim, loop, loop.P, slope, None), "", None)
             continue
         for own, after in _successors(plant, p, P, loop):
-            yield Part("V falls", _form(claim, own, after, None, plant.dt), "", None)
+            yield Required("V falls", _form(claim, own, after, None, plant.dt), "", None)
 
 
 def _straight(M: Array, k: int, box: Any) -> PolynomialMatrix:
@@ -103,9 +107,9 @@ def _straight(M: Array, k: int, box: Any) -> PolynomialMatrix:
     return PolynomialMatrix(box, np.stack([M[k], M[k + 1]]))
 
 
-def _loop(*matrices: PolynomialMatrix) -> Loop:
+def _loop(*matrices: PolynomialMatrix) -> Closed:
     A, B, C, D, P, K = matrices
-    return Loop(A + B @ K, B, C + D @ K, D, P) if K.shape[0] else Loop(A, B, C, D, P)
+    return Closed(A + B @ K, B, C + D @ K, D, P) if K.shape[0] else Closed(A, B, C, D, P)
 
 
 def _slopes(P: PolynomialMatrix, rate: float) -> list[PolynomialMatrix | None]:
@@ -116,8 +120,8 @@ def _slopes(P: PolynomialMatrix, rate: float) -> list[PolynomialMatrix | None]:
 
 
 def _successors(
-    plant: GridPlant, p: Array, P: Array, loop: Loop
-) -> Iterator[tuple[Loop, PolynomialMatrix]]:
+    plant: GridPlant, p: Array, P: Array, loop: Closed
+) -> Iterator[tuple[Closed, PolynomialMatrix]]:
     """Yield the loop on parts of its cell with P(p(k + 1)) at every corner of where p may be then:
     at the limits of the step, straight lines of p, and at points of the grid between them.
     """
@@ -133,7 +137,7 @@ def _successors(
     ends = sorted(cuts)
     for c, d in zip(ends, ends[1:], strict=False):
         box = ((c, d),)
-        own = Loop(*(M.restrict(box) for M in loop))
+        own = Closed(*(M.restrict(box) for M in loop))
         for side in (-step, step):
             q = [min(max(v + side, low), high) for v in (c, d)]
             yield own, PolynomialMatrix(box, np.stack([_at(p, P, v) for v in q]))
@@ -150,7 +154,7 @@ def _at(p: Array, P: Array, q: Any) -> Array:
 
 def _form(
     claim: LyapunovClaim,
-    loop: Loop,
+    loop: Closed,
     after: PolynomialMatrix,
     slope: PolynomialMatrix | None,
     dt: float | None,

@@ -10,7 +10,7 @@ import numpy as np
 
 from symheli.values.arrays import Array
 from symheli.values.tracking import tracked
-from synthesis.claims.inequality import Part, parts, value_at
+from synthesis.claims.inequality import Required, parts, value_at
 from synthesis.claims.lyapunov_claim import LyapunovClaim
 from synthesis.claims.plants import GridPlant, VertexPlant
 from synthesis.claims.verdict import NOT_BY_THIS, PROVEN, UNDECIDED, Place
@@ -68,7 +68,7 @@ def _jumps(plant: Plant, claim: LyapunovClaim) -> bool:
     return own and len(P) > 1 and bool(np.any(P != P[0]))
 
 
-def _place(part: Part, miss: Miss) -> Place | None:
+def _place(part: Required, miss: Miss) -> Place | None:
     """Return where a part fails; None where it was only not shown."""
     if not miss.certain:
         return None
@@ -78,14 +78,14 @@ def _place(part: Part, miss: Miss) -> Place | None:
         return None
     form, x = found
     size = sum(v * v * abs(M[i, i]) for i, v in enumerate(x)) or sum(v * v for v in x)
-    p = float(miss.point[0]) if miss.point else None
-    words = f"p = {p:.9g}" if p is not None else part.words
+    p = float(miss.point[0]) if part.vertex is None else float(part.vertex + 1)
+    words = part.words or f"p = {p:.9g}"
     x = np.array([float(v) for v in x])
     return Place(f"{words} ({part.name})", p, x / np.abs(x).max(), float(-form / size))
 
 
-def _not_shown(part: Part, miss: Miss) -> str:
-    where = f"near p = {float(miss.point[0]):.9g}" if miss.point else part.words
+def _not_shown(part: Required, miss: Miss) -> str:
+    where = part.words or f"near p = {float(miss.point[0]):.9g}"
     return f"{part.name}: undecided {where}, within the boxes that are looked at; more would decide"
 
 

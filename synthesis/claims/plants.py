@@ -175,10 +175,11 @@ class GridPlant:
             moving,
         )
 
-    def at(self, p: float, M: Array) -> Array:
-        """Return matrices M (N, ...) of the points at p, in doubles."""
-        k = int(np.clip(np.searchsorted(self.p, p, side="right") - 1, 0, len(self.p) - 2))
-        t = (p - self.p[k]) / (self.p[k + 1] - self.p[k])
+    def at(self, p: Any, M: Array) -> Array:
+        """Return matrices M (N, ...) of the points at p (...), in doubles."""
+        own = np.asarray(p, dtype=float)
+        k = np.clip(np.searchsorted(self.p, own, side="right") - 1, 0, len(self.p) - 2)
+        t = ((own - self.p[k]) / (self.p[k + 1] - self.p[k]))[..., None, None]
         return (1 - t) * M[k] + t * M[k + 1]
 
 

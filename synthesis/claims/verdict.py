@@ -20,7 +20,7 @@ UNDECIDED = "not decided"
 ANSWERS = (PROVEN, NOT_BY_THIS, FALSE, UNDECIDED)
 
 
-class Motion(NamedTuple):
+class Counterexample(NamedTuple):
     """States `x` (k, n) at the times `time` (k,), s or samples, and where the plant was: `p` (k,),
     a parameter or the number of a vertex, counted from one; None where it stays.
     """
@@ -61,7 +61,7 @@ class Verdict:
         Why this is the answer, in a sentence; empty of a proof.
     place : Place or None
         Where the inequality fails, in exact arithmetic.
-    motion : Motion or None
+    motion : Counterexample or None
         A motion that contradicts the claim.
     exact : bool
         Whether rational arithmetic decided; False: an integration, repeated by another method.
@@ -83,7 +83,7 @@ class Verdict:
     hypotheses: tuple[str, ...]
     reason: str = ""
     place: Place | None = None
-    motion: Motion | None = None
+    motion: Counterexample | None = None
     exact: bool = True
     proves: float = math.nan
     statement: ProvenStatement | None = None
@@ -142,10 +142,10 @@ def _placed(place: Place) -> str:
     return f"It fails at {place.words}{along}; it is short by {place.short:.3g} of its terms."
 
 
-def _moved(motion: Motion) -> str:
+def _moved(motion: Counterexample) -> str:
     first, last = motion.x[0], motion.x[-1]
     where = "" if motion.p is None else f", along {_few(motion.p)}"
-    return f"Motion: from x = {_numbers(first)} to {_numbers(last)} at {motion.time[-1]:.6g}{where}"
+    return f"Counterexample: from x = {_numbers(first)} to {_numbers(last)} at {motion.time[-1]:.6g}{where}"
 
 
 def _few(p: Array) -> str:
