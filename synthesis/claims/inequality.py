@@ -28,6 +28,8 @@ from synthesis.numerics.polynomial.exact import growth_of
 from synthesis.numerics.polynomial.matrix import PolynomialMatrix, block
 
 
+POSITIVE = "P > 0"
+"""Name of the inequality of P itself."""
 UNIT = ((Fraction(0), Fraction(1)),)
 """The box of a vertex, on which nothing depends."""
 
@@ -76,7 +78,7 @@ def _of_vertices(plant: VertexPlant, claim: LyapunovClaim) -> Iterator[Required]
         own = P[min(i, len(P) - 1)], K[min(i, len(K) - 1)]
         loops.append(_loop(*(PolynomialMatrix.constant(M, UNIT) for M in (*system, *own))))
     for i, loop in enumerate(loops[: len(P)]):
-        yield Required("P > 0", loop.P, f"vertex {i + 1}" if len(P) > 1 else "every vertex", i)
+        yield Required(POSITIVE, loop.P, f"vertex {i + 1}" if len(P) > 1 else "every vertex", i)
     for i, loop in enumerate(loops):
         for j in range(len(P)):
             after = f", followed by vertex {j + 1}" if len(P) > 1 else ""
@@ -92,7 +94,7 @@ def _of_grid(plant: GridPlant, claim: LyapunovClaim) -> Iterator[Required]:
     for k in range(len(p) - 1):
         box = ((p[k], p[k + 1]),)
         loop = _loop(*(_straight(M, k, box) for M in (*system, P, K)))
-        yield Required("P > 0", loop.P, "", None)
+        yield Required(POSITIVE, loop.P, "", None)
         if plant.dt is None:
             for slope in _slopes(loop.P, plant.rate):
                 yield Required("V falls", _form(claim, loop, loop.P, slope, None), "", None)
@@ -142,7 +144,7 @@ def _successors(
             q = [min(max(v + side, low), high) for v in (c, d)]
             yield own, PolynomialMatrix(box, np.stack([_at(p, P, v) for v in q]))
         for k, q in enumerate(p):
-            if c - step <= q <= d + step:
+            if d - step <= q <= c + step:
                 yield own, PolynomialMatrix.constant(P[k], box)
 
 

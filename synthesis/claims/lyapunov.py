@@ -10,7 +10,7 @@ import numpy as np
 
 from symheli.values.arrays import Array
 from symheli.values.tracking import tracked
-from synthesis.claims.inequality import Required, parts, value_at
+from synthesis.claims.inequality import POSITIVE, Required, parts, value_at
 from synthesis.claims.lyapunov_claim import LyapunovClaim
 from synthesis.claims.plants import GridPlant, VertexPlant
 from synthesis.claims.verdict import NOT_BY_THIS, PROVEN, UNDECIDED, Place
@@ -28,7 +28,16 @@ def holds(plant: Plant, claim: LyapunovClaim) -> bool:
     """Whether the claim is proven by its P, in rational arithmetic."""
     if _jumps(plant, claim):
         return False
-    return all(first_miss(-part.form) is None for part in parts(plant, claim))
+    return all(_missed(part, claim) is None for part in parts(plant, claim))
+
+
+def _missed(part: Required, claim: LyapunovClaim) -> Miss | None:
+    """Return where a part fails. A decay rate is proven where V falls just as fast, of a vertex."""
+    miss = first_miss(-part.form)
+    if miss is None or claim.kind != "decay rate" or part.vertex is None or part.name == POSITIVE:
+        return miss
+    found = not_positive(value_at(part.form, miss.point))
+    return None if found is None or found[0] == 0 else miss
 
 
 def judged(plant: Plant, claim: LyapunovClaim) -> tuple[str, str, Place | None]:
@@ -38,7 +47,7 @@ def judged(plant: Plant, claim: LyapunovClaim) -> tuple[str, str, Place | None]:
     flat: tuple[str, str, Place | None] | None = None
     every = list(parts(plant, claim))
     for part in tracked("checking in rational arithmetic", every, len(every)):
-        miss = first_miss(-part.form)
+        miss = _missed(part, claim)
         if miss is None:
             continue
         place = _place(part, miss)

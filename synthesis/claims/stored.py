@@ -10,8 +10,16 @@ from symheli.errors import InputError
 from synthesis.certify.questions.certificate_file import decoded, encoded
 from synthesis.claims import monomials
 from synthesis.claims.lyapunov_claim import LyapunovClaim
-from synthesis.claims.plants import GridPlant, LimitedPlant, PolynomialPlant, VertexPlant
+from synthesis.claims.plants import (
+    GridPlant,
+    LimitedPlant,
+    PolynomialPlant,
+    VertexPlant,
+    rationals,
+)
+from synthesis.claims.region import region_of
 from synthesis.claims.region_claim import RegionClaim
+from synthesis.claims.terminal import highest, rows
 from synthesis.claims.terminal_claim import TerminalClaim
 
 PLANTS: dict[str, Any] = {
@@ -38,6 +46,8 @@ def written(plant: Any, claim: Any) -> dict[str, Any]:
         V = monomials.monomials(claim.V, plant.states)
         found["plant"]["f"] = [monomials.stored(f) for f in plant.fields]
         found["claim"] |= {"V": monomials.stored(V), "rho": str(claim.rho)}
+        region = region_of(plant, claim)
+        found["box"] = [] if region is None else [str(u) for u in region.units]
     if isinstance(claim, TerminalClaim) and claim.H is not None:
         found["multipliers"] = _multipliers(plant, claim)
     return found
@@ -54,9 +64,6 @@ def _values(value: Any) -> dict[str, Any]:
 
 def _multipliers(plant: LimitedPlant, claim: TerminalClaim) -> list[Any]:
     """Return y >= 0 of every condition on the polytope, as rationals in texts."""
-    from synthesis.claims.plants import rationals
-    from synthesis.claims.terminal import highest, rows
-
     H, h = rationals(claim.H), rationals(claim.h)
     found = (highest(H, h, row.a, row.b).y for row in rows(plant, claim))
     return [[] if y is None else [str(v) for v in y] for y in found]
