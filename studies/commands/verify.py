@@ -46,9 +46,9 @@ ARGUMENTS = (
 
 def run(arguments: argparse.Namespace) -> Output:
     """Load, verify in rational arithmetic; exit status 1 where a proof fails."""
-    given_model.only_with_a_model(arguments)
     if arguments.plant is not None:
         return _claims(arguments)
+    given_model.only_with_a_model(arguments)
     if arguments.save is not None:
         raise InputError("--save writes the proof of a claim: give --plant FILE too")
     model = None
@@ -67,31 +67,40 @@ def run(arguments: argparse.Namespace) -> Output:
 
 def _claims(arguments: argparse.Namespace) -> Output:
     """Decide claims about a plant; exit status 1 where one is not proven."""
-    from synthesis.claims import check, read_claim, read_plant
+    from synthesis.claims import check, read_claim
 
     if arguments.model is not None:
         raise InputError("give --plant or --model, not both")
     if arguments.save is not None and len(arguments.files) > 1:
         raise InputError("--save writes one proof: give one claim")
-    plant = read_plant(arguments.plant)
+    plant = _plant(arguments)
     verdicts = []
     for file in arguments.files:
         claim = read_claim(file)
         progress(f"checking {file} in rational arithmetic")
         verdicts.append(check(plant, claim))
-    texts = [f"{f}: {v}" for f, v in zip(arguments.files, verdicts, strict=True)]
     one = len(verdicts) == 1
+    texts = [str(v) if one else f"{f}: {v}" for f, v in zip(arguments.files, verdicts, strict=True)]
     if arguments.save is not None and verdicts[0].proven:
-        verdicts[0].save(arguments.save)
-        texts[0] += f"\nwritten: {arguments.save}"
+        texts.append(f"written: {verdicts[0].save(arguments.save)}")
     data = [{"file": str(f), **v.facts} for f, v in zip(arguments.files, verdicts, strict=True)]
     proven = all(verdict.proven for verdict in verdicts)
-    text = str(verdicts[0]) + texts[0][len(f"{arguments.files[0]}: {verdicts[0]}") :]
     return Output(
-        text if one else "\n\n".join(texts),
+        ("\n" if one else "\n\n").join(texts),
         data[0] if one else {"proven": proven, "claims": data},
         status=0 if proven else 1,
     )
+
+
+def _plant(arguments: argparse.Namespace) -> Any:
+    """The plant of --plant: one of matrices or polynomials, or a model as --model reads it."""
+    from synthesis.claims import read_plant
+    from synthesis.claims.document import document
+
+    if "schema" not in document(arguments.plant):
+        return read_plant(arguments.plant)
+    arguments.model = arguments.plant
+    return given_model.closed_loop(arguments, given_model.lpv_model(arguments))
 
 
 def _verified(file: str, model: Any) -> tuple[ProvenStatement, str, dict[str, Any]]:

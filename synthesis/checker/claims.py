@@ -25,7 +25,7 @@ from .demands import Claim, Demand, exponential
 from .exact import Rows
 from .functions import solved
 from .polynomials import Polynomial, block, combined, diagonal, even, matrix, scalar, variable, zero
-from .reading import INFINITE, Unreadable, array, ascending, limit, number, period
+from .reading import INFINITE, Unreadable, array, ascending, limit, number, period, whole
 
 Stack = list[Polynomial]
 
@@ -85,10 +85,6 @@ class Given(NamedTuple):
         """Return the matrix of a vertex or point."""
         return M[i] if len(M) > 1 else M[0]
 
-    def closed(self, A: Polynomial, B: Polynomial, C: Polynomial, D: Polynomial, K: Polynomial):  # type: ignore[no-untyped-def]
-        """Return the closed loop."""
-        return A + B @ K, B, C + D @ K, D
-
     def falling(
         self, system: Sequence[Polynomial], P: Polynomial, after: Polynomial, slope: Polynomial
     ) -> Polynomial:
@@ -109,8 +105,13 @@ class Given(NamedTuple):
         return -block([[top + C.T @ C, side], [side.T, corner]])
 
 
+def _closed(system: Sequence[Polynomial], K: Polynomial) -> Stack:
+    A, B, C, D = system
+    return [A + B @ K, B, C + D @ K, D]
+
+
 def _lyapunov(plant: Any, own: Any) -> Claim:
-    count, n, _ = plant["A"]["shape"]
+    count, n = _sizes(plant)
     A = _stack(plant["A"], "A", count, n, n)
     B, C = (_stack(plant[name], name, count, *size) for name, size in
             (("B", (n, None)), ("C", (None, n))))  # fmt: skip
@@ -145,6 +146,12 @@ def _lyapunov(plant: Any, own: Any) -> Claim:
     return Claim(said, hypotheses, demands, refused=refused)
 
 
+def _sizes(plant: Any) -> tuple[int, int]:
+    """Return the numbers of models and of states, both above zero."""
+    count, n, _ = (whole(v, "a size", 1, 10**6) for v in plant["A"]["shape"])
+    return count, n
+
+
 def _rows(M: Polynomial) -> list[list[Fraction]]:
     return [[Fraction(v, M.below) for v in row] for row in M.terms.get((), [])]
 
@@ -157,7 +164,7 @@ def _of_vertices(given: Given) -> Iterator[Demand]:
     for i, P in enumerate(given.P):
         yield Demand(f"V > 0 at vertex {i + 1}", P)
     for i in range(given.count):
-        own = given.closed(*(given.of(M, i) for M in given.system), given.of(given.K, i))
+        own = _closed([given.of(M, i) for M in given.system], given.of(given.K, i))
         P = given.of(given.P, i)
         for j, after in enumerate(given.P):
             form = given.falling(own, P, after, P * 0)
@@ -188,7 +195,7 @@ def _on_grid(given: Given, plant: Any, said: str, time: str) -> Claim:
         for k, (a, b) in enumerate(pairwise(p)):
             t = variable(0)
             *system, P, K = (_line(M, k, t) for M in (*given.system, given.P, given.K))
-            own = given.closed(*system, K)
+            own = _closed(system, K)
             where = f"between points {k + 1} and {k + 2}"
             yield Demand(f"V > 0 {where}", P, variables=1)
             if given.dt is None:
@@ -240,7 +247,7 @@ def _value(P: Stack, p: Sequence[Fraction], q: Fraction) -> Polynomial:
 
 
 def _terminal(plant: Any, own: Any, content: Any) -> Claim:
-    count, n, _ = plant["A"]["shape"]
+    count, n = _sizes(plant)
     m = plant["B"]["shape"][2]
     K = matrix(array(own["K"], "K", m, n), n)
     models = zip(_stack(plant["A"], "A", count, n, n), _stack(plant["B"], "B", count, n, m),
@@ -253,11 +260,9 @@ def _terminal(plant: Any, own: Any, content: Any) -> Claim:
         limits += [(matrix([a], size) @ to_x, b) for a, b in zip(H, h, strict=True)]
     if any(b < 0 for _, b in limits):
         raise Unreadable("the file is damaged: a limit is below zero")
-    P = None if own["P"] is None else even(array(own["P"], "P", n, n))
-    demands = [] if P is None else [Demand("P > 0", P)]
     ellipsoid = own["level"] is not None
-    if P is None and (ellipsoid or own["Q"] is not None):
-        raise Unreadable("the file is damaged: P is missing")
+    P = even(array(own["P"], "P", n, n)) if ellipsoid or own["Q"] is not None else diagonal([1] * n)
+    demands = [Demand("P > 0", P)]
     if ellipsoid:
         level = number(own["level"], "the level")
         said, refused = f"x'Px <= {float(level)!r}", _ellipsoid(P, level, loops, limits)

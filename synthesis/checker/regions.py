@@ -112,9 +112,7 @@ def _on(
     return (found or scalar(0)).reduced()
 
 
-def _decided(
-    every: Sequence[Polynomial], n: int, settled: Callable[[list[bool]], bool]
-) -> bool:
+def _decided(every: Sequence[Polynomial], n: int, settled: Callable[[list[bool]], bool]) -> bool:
     """Whether halving the unit box settles all of its parts, from which polynomials are positive on
     each.
     """

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from symheli import LPVStateSpace
 from symheli.errors import InputError
 from symheli.threads import with_one_thread
-from synthesis.claims import contradicted, departed, lyapunov, region, terminal
+from synthesis.claims import contradicted, departed, lyapunov, on_model, region, terminal
 from synthesis.claims.lyapunov_claim import LyapunovClaim
 from synthesis.claims.plants import GridPlant, LimitedPlant, PolynomialPlant, VertexPlant
 from synthesis.claims.proven_claim import ProvenClaim
@@ -56,6 +57,8 @@ def check(plant: Any, claim: Any, *, refute: bool = True) -> Verdict:
     >>> round(found.place.short, 3)
     0.354
     """
+    if isinstance(plant, LPVStateSpace) and isinstance(claim, LyapunovClaim):
+        return _on_model(plant, claim, refute)
     for plants, kind, decide, _ in ROUTES:
         if isinstance(plant, plants) and isinstance(claim, kind):
             return decide(ProvenClaim(plant=plant, given=claim), refute)
@@ -117,6 +120,21 @@ def _terminal(given: ProvenClaim, refute: bool) -> Verdict:
     statement = given.established() if answer == PROVEN else None
     shown = {"reason": reason, "place": place, "motion": motion, "statement": statement}
     return Verdict(answer=answer, **shown, **_head(given))
+
+
+def _on_model(model: LPVStateSpace, claim: LyapunovClaim, refute: bool) -> Verdict:
+    cert = on_model.certificate(model, claim)
+    head: dict[str, Any] = {"claim": claim.sentence, "hypotheses": cert.conditions}
+    answer, reason, place = on_model.judged(model, claim)
+    if answer == PROVEN:
+        return Verdict(answer=PROVEN, statement=cert if cert.verify() else None, **head)
+    found = on_model.contradiction(model, claim) if refute else None
+    if found is not None:
+        shown = {"place": place, "motion": found.motion, "exact": found.exact}
+        return Verdict(answer=FALSE, reason=found.reason, **shown, **head)
+    if answer == NOT_BY_THIS and claim.P.ndim == 2:
+        reason = "; ".join(filter(None, (reason, on_model.witness(model))))
+    return Verdict(answer=answer, reason=reason, place=place, **head)
 
 
 ROUTES: tuple[tuple[Any, Any, Any, Any], ...] = (

@@ -59,10 +59,12 @@ def claim_of(content: Mapping[str, Any]) -> Any:
     if not isinstance(kind, str) or kind not in KINDS:
         raise InputError(f"claim: expected one of {', '.join(EVERY)}, got {kind!r:.60}")
     bound = BOUNDS.get(kind)
-    only(content, ("claim", "P", "K", AXIS, *([bound] if bound else [])))
+    only(content, ("claim", "P", "K", "p", AXIS, *([bound] if bound else [])))
     _present(content, "P")
-    bounds = {"bound": float(number(_present(content, bound), bound))} if bound else {}
-    return LyapunovClaim(kind, **stacked(content, ("P", "K")), **bounds)
+    bounds = {"bound": _number(content, bound)} if bound else {}
+    p = content.get("p")
+    points = {} if p is None else {"p": np.ravel(p)}
+    return LyapunovClaim(kind, **stacked(content, ("P", "K")), **bounds, **points)
 
 
 def _terminal(content: Mapping[str, Any]) -> TerminalClaim:
@@ -74,6 +76,14 @@ def _terminal(content: Mapping[str, Any]) -> TerminalClaim:
     h = content.get("h")
     level = number(content.get("level"), "level")
     return TerminalClaim(**matrices, h=None if h is None else np.ravel(h), level=level)
+
+
+def _number(content: Mapping[str, Any], name: str) -> float:
+    given: Any = number(_present(content, name), name)
+    try:
+        return float(given)
+    except (TypeError, ValueError):
+        raise InputError(f"{name}: expected a number, got {content[name]!r:.60}") from None
 
 
 def _present(content: Mapping[str, Any], name: str) -> Any:

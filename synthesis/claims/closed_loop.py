@@ -1,9 +1,9 @@
-"""The plant of a claim with its u = K x closed: in doubles for a search, in rationals at a point."""
+"""The plant of a claim with its u = K x closed: in doubles for a search, in rationals at rest."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
@@ -107,28 +107,26 @@ def frozen_loops(plant: VertexPlant | GridPlant, claim: LyapunovClaim) -> Iterat
     K = np.broadcast_to(K, (len(plant.A), *K.shape[1:]))
     every = tuple(rationals(M) for M in (plant.A, plant.B, plant.C, plant.D, K))
     for words, p, weights in _places(plant):
-        A, B, C, D, own = (
-            sum(w * M[i] for i, w in weights.items())  # type: ignore[misc]
-            for M in every
-        )
-        closed = (A + B @ own, B, C + D @ own, D) if K.shape[1] else (A, B, C, D)
-        if isinstance(plant, VertexPlant) and len(weights) > 1:
-            closed = _combined(every, weights)
-        yield FrozenLoop(words, p, *closed)
+        if isinstance(plant, VertexPlant):
+            loops = [_closed([M[i] for M in every]) for i in weights]
+            yield FrozenLoop(words, p, *_mixed(loops, weights))
+        else:
+            at = [[M[i] for M in every] for i in weights]
+            yield FrozenLoop(words, p, *_closed(_mixed(at, weights)))
 
 
-def _combined(every: tuple[Array, ...], weights: dict[int, Fraction]) -> tuple[Array, ...]:
-    """Return the convex combination of closed loops, each with its own K."""
-    A, B, C, D, K = every
-    found = [
-        (A[i] + B[i] @ K[i], B[i], C[i] + D[i] @ K[i], D[i]) if K.shape[1] else
-        (A[i], B[i], C[i], D[i])
-        for i in weights
-    ]  # fmt: skip
-    return tuple(
-        sum(w * M[k] for w, M in zip(weights.values(), found, strict=True))  # type: ignore[misc]
-        for k in range(4)
-    )
+def _closed(matrices: Sequence[Array]) -> list[Array]:
+    """Return A + BK, B, C + DK, D of A, B, C, D, K."""
+    A, B, C, D, K = matrices
+    return [A + B @ K, B, C + D @ K, D] if K.shape[0] else [A, B, C, D]
+
+
+def _mixed(each: Sequence[Sequence[Array]], weights: dict[int, Fraction]) -> list[Array]:
+    """Return the convex combination of several lists of matrices."""
+    out = [M * Fraction(0) for M in each[0]]
+    for w, own in zip(weights.values(), each, strict=True):
+        out = [total + M * w for total, M in zip(out, own, strict=True)]
+    return out
 
 
 def _places(

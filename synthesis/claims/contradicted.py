@@ -9,8 +9,9 @@ search for lower bounds, flown again here by other integrators.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -29,7 +30,9 @@ from synthesis.numerics.linear.norm import norm
 from synthesis.numerics.polynomial.exact import growth_of
 from synthesis.numerics.polynomial.spectrum import decays, solve
 
-SEARCH = LowerBoundSearch(levels=8, dwells=9, starts=2, nodes=50, evaluations=15, steps=100, samples=20_000)
+SEARCH = LowerBoundSearch(
+    levels=8, dwells=9, starts=2, nodes=50, evaluations=15, steps=100, samples=20_000
+)
 """Effort of the search for motions of p."""
 MOST_PAIRS = 10
 """Pairs of vertices between which switching is looked at, in continuous time."""
@@ -52,10 +55,13 @@ def contradiction(plant: VertexPlant | GridPlant, claim: LyapunovClaim) -> Found
     """Return what shows that the claim is false; None where nothing was found."""
     stable = without_gain(claim)
     frozen = list(frozen_loops(plant, claim))
-    own = _at_rest(plant, stable, frozen) or _switched(plant, stable) or _moving(plant, stable)
-    if own is not None or claim.kind != "l2 gain":
+    own = _at_rest(plant, stable, frozen) or _switched(plant, stable)
+    if own is not None:
         return own
-    return _amplified(plant, claim, frozen) or _driven(plant, claim)
+    if claim.kind != "l2 gain":
+        return moving(ClosedLoop.of(plant, stable)[:MOST_PAIRS], stable)
+    loops = ClosedLoop.of(plant, claim)[:MOST_PAIRS]
+    return _amplified(plant, claim, frozen) or moving(loops, stable) or driven(loops, claim)
 
 
 def _rate(claim: LyapunovClaim, dt: float | None) -> float:
@@ -106,7 +112,7 @@ def _asked(claim: LyapunovClaim) -> str:
 def _motion_at_rest(A: Array, p: float | None, dt: float | None) -> Counterexample:
     from scipy.linalg import expm
 
-    values, vectors = np.linalg.eig(A)
+    values, vectors = cast(Any, np.linalg.eig(A))
     k = int((values.real if dt is None else np.abs(values)).argmax())
     x = np.real(vectors[:, k])
     x = x if np.linalg.norm(x) > 1e-6 else np.imag(vectors[:, k])
@@ -195,14 +201,12 @@ def _repeated(models: list[Array], p: Array, dt: float) -> Counterexample:
     return Counterexample(time, np.array(states), np.r_[np.tile(p, count), p[:1]])
 
 
-def _moving(plant: VertexPlant | GridPlant, claim: LyapunovClaim) -> Found | None:
-    """Return a motion of p along which the state grows; between vertices, of each of some pairs."""
-    for loop in ClosedLoop.of(plant, claim)[:MOST_PAIRS]:
-        cycle = growing_trajectory(loop, loop.plant.rate, SEARCH)
-        if cycle is None:
-            continue
-        found = growth_along(loop, cycle)
-        if found is None:
+def moving(loops: Sequence[Any], claim: LyapunovClaim) -> Found | None:
+    """Return a motion of p along which the state of a loop grows."""
+    for loop in loops:
+        cycle = growing_trajectory(loop, loop.scheduling.limit, SEARCH)
+        found = None if cycle is None else growth_along(loop, cycle)
+        if cycle is None or found is None:
             continue
         growth, motion = found
         reason = (
@@ -223,8 +227,8 @@ def _amplified(
     """Return a sinusoid that a model at rest amplifies more than the claim has it, exactly."""
     best: tuple[float, float, FrozenLoop] | None = None
     for loop in frozen:
-        own = (M.astype(float) for M in (loop.A, loop.B, loop.C, loop.D))
-        gain, omega = norm(*own, plant.dt)
+        A, B, C, D = (M.astype(float) for M in (loop.A, loop.B, loop.C, loop.D))
+        gain, omega = norm(A, B, C, D, plant.dt)
         if best is None or gain > best[0]:
             best = gain, omega, loop
     if best is None or not claim.bound <= best[0] < math.inf:
@@ -240,7 +244,7 @@ def _amplified(
 
 
 def _above(loop: FrozenLoop, omega: float, bound: float, dt: float | None) -> bool:
-    """Whether |G u| >= bound |u| at a frequency near this one, in rational arithmetic."""
+    """Whether |G u| > bound |u| at a frequency near this one, in rational arithmetic."""
     n, one = len(loop.A), rationals(np.eye(len(loop.A)))
     if not math.isfinite(omega):
         return False
@@ -250,14 +254,16 @@ def _above(loop: FrozenLoop, omega: float, bound: float, dt: float | None) -> bo
         t = Fraction(math.tan(omega * dt / 2)) if omega * dt < 3.1 else Fraction(10**9)
         real, imaginary = (1 - t * t) / (1 + t * t), 2 * t / (1 + t * t)
     u = _worst_input(loop, complex(float(real), float(imaginary)))
-    left = np.block([[one * real - loop.A, -one * imaginary], [one * imaginary, one * real - loop.A]])
+    left = np.block(
+        [[one * real - loop.A, -one * imaginary], [one * imaginary, one * real - loop.A]]
+    )
     right = np.concatenate([loop.B @ u[0], loop.B @ u[1]])[:, None]
     x = solve(left, right)
     if x is None:
         return False
     y = [loop.C @ x[:n, 0] + loop.D @ u[0], loop.C @ x[n:, 0] + loop.D @ u[1]]
     energy = sum(v @ v for v in y) - Fraction(bound) ** 2 * sum(v @ v for v in u)
-    return bool(energy >= 0)
+    return bool(energy > 0)
 
 
 def _worst_input(loop: FrozenLoop, s: complex) -> tuple[Array, Array]:
@@ -267,12 +273,12 @@ def _worst_input(loop: FrozenLoop, s: complex) -> tuple[Array, Array]:
     return rationals(v.real), rationals(v.imag)
 
 
-def _driven(plant: VertexPlant | GridPlant, claim: LyapunovClaim) -> Found | None:
+def driven(loops: Sequence[Any], claim: LyapunovClaim) -> Found | None:
     """Return an input along a motion of p whose output has more energy than the claim allows."""
-    for loop in ClosedLoop.of(plant, claim)[:MOST_PAIRS]:
-        if loop.plant.rate == 0:
+    for loop in loops:
+        if loop.scheduling.limit == 0:
             continue
-        found = lower_bound(loop, loop.plant.rate, search=SEARCH)
+        found = lower_bound(loop, loop.scheduling.limit, search=SEARCH)
         if found.input is None or found.trajectory is None or not found.gain > claim.bound:
             continue
         ratio, motion = energy_ratio(loop, found.trajectory, found.input)
@@ -317,7 +323,5 @@ def _has_negative_eigenvalue(M: Array) -> bool:
     real = real[real < 0]
     c = polynomial(M)
     points = [2 * real[0], *(0.5 * (real[1:] + real[:-1])), 0.5 * real[-1]] if len(real) else []
-    signs = [
-        sum(v * Fraction(float(s)) ** k for k, v in enumerate(c)) > 0 for s in points
-    ]
+    signs = [sum(v * Fraction(float(s)) ** k for k, v in enumerate(c)) > 0 for s in points]
     return len(set(signs)) > 1

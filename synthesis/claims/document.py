@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
+import struct
+import zipfile
+import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,6 +17,11 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.values.arrays import Array
 
+DAMAGED = (
+    *(ValueError, LookupError, TypeError, NotImplementedError, EOFError, ArithmeticError),
+    *(MemoryError, RecursionError, zipfile.BadZipFile, zlib.error, struct.error),
+)
+"""Errors that readers of damaged files raise."""
 AXIS = "axis"
 FIRST, LAST = "first", "last"
 
@@ -31,10 +40,10 @@ def document(path: str | os.PathLike[str]) -> dict[str, Any]:
         found = reader(file)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
-    except (ValueError, KeyError, TypeError, NotImplementedError, EOFError) as error:
+    except DAMAGED as error:
         raise InputError(f"{path}: damaged, or not what its name says ({error})") from None
     if not isinstance(found, dict) or not found:
-        raise InputError(f"{path}: expected keys and values, as {{\"A\": [[-1]]}}")
+        raise InputError(f'{path}: expected keys and values, as {{"A": [[-1]]}}')
     return found
 
 
@@ -43,7 +52,7 @@ def _json(file: Path) -> Any:
 
 
 def _npz(file: Path) -> Any:
-    with np.load(file, allow_pickle=False) as content:
+    with np.load(io.BytesIO(file.read_bytes()), allow_pickle=False) as content:
         return {name: _plain(content[name]) for name in content.files}
 
 
@@ -52,7 +61,7 @@ def _mat(file: Path) -> Any:
     from scipy.io.matlab import MatReadError
 
     try:
-        content = loadmat(file)
+        content = loadmat(io.BytesIO(file.read_bytes()))
     except MatReadError as error:
         raise ValueError(str(error)) from None
     except NotImplementedError:
@@ -105,7 +114,9 @@ def stacked(content: Mapping[str, Any], names: Sequence[str]) -> dict[str, Any]:
     if axis == LAST:
         found = {k: np.moveaxis(M, -1, 0) if M.ndim == 3 else M for k, M in found.items()}
     elif axis is None and any(M.ndim == 3 for M in found.values()):
-        raise InputError(f"give {AXIS}, {FIRST!r} or {LAST!r}: no stack of square matrices tells it")
+        raise InputError(
+            f"give {AXIS}, {FIRST!r} or {LAST!r}: no stack of square matrices tells it"
+        )
     return found
 
 

@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from fractions import Fraction
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,7 +27,6 @@ from synthesis.claims.plants import GridPlant, VertexPlant, as_fraction, rationa
 from synthesis.numerics.polynomial.bernstein import blossom
 from synthesis.numerics.polynomial.exact import growth_of
 from synthesis.numerics.polynomial.matrix import PolynomialMatrix, block
-
 
 POSITIVE = "P > 0"
 """Name of the inequality of P itself."""
@@ -65,8 +65,8 @@ def value_at(F: PolynomialMatrix, point: tuple[Any, ...]) -> Array:
     c = F.coefficients
     for t, (low, high) in zip(point, F.box, strict=True):
         u = (Fraction(t) - low) / (high - low)
-        c = sum(w * own for w, own in zip(blossom([u] * (len(c) - 1)), c, strict=True))
-    return np.asarray(c, dtype=object)
+        c = np.tensordot(blossom([u] * (len(c) - 1)), c, axes=(0, 0))
+    return c
 
 
 def _of_vertices(plant: VertexPlant, claim: LyapunovClaim) -> Iterator[Required]:
@@ -137,7 +137,7 @@ def _successors(
         step = min(step, as_fraction(plant.rate) * as_fraction(plant.dt))
     cuts = {a, b, *(c for q in p for c in (q - step, q + step) if a < c < b)}
     ends = sorted(cuts)
-    for c, d in zip(ends, ends[1:], strict=False):
+    for c, d in pairwise(ends):
         box = ((c, d),)
         own = Closed(*(M.restrict(box) for M in loop))
         for side in (-step, step):

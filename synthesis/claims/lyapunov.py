@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from symheli.values.arrays import Array
 from symheli.values.tracking import tracked
 from synthesis.claims.inequality import POSITIVE, Required, parts, value_at
 from synthesis.claims.lyapunov_claim import LyapunovClaim

@@ -32,6 +32,8 @@ class LyapunovClaim:
         The decay rate, 1/s, or the gain.
     K : array (m, n) or (N, m, n), optional
         u = K x + the input of the claim.
+    p : array (N,), optional
+        Points of the P of a model (LPVStateSpace) of one parameter, from end to end of its range.
 
     Raises
     ------
@@ -48,6 +50,7 @@ class LyapunovClaim:
     P: Array
     bound: float = math.nan
     K: Any = None
+    p: Any = None
 
     __repr__ = summarized
 
@@ -69,6 +72,8 @@ class LyapunovClaim:
             K = np.asarray(self.K, dtype=object)
             own = frozen(self.K, "K", (None,) * 3 if K.ndim == 3 else (None, None))
             object.__setattr__(self, "K", own)
+        if self.p is not None:
+            object.__setattr__(self, "p", frozen(self.p, "p", (None,)))
 
     @property
     def sentence(self) -> str:
@@ -84,6 +89,8 @@ class LyapunovClaim:
 
         Raises `InputError` where they do not fit it.
         """
+        if self.p is not None:
+            raise InputError("p of a claim is for a model; vertices and grids have points already")
         count, n, m = len(plant.A), plant.states, plant.B.shape[2]
         P = self.P if self.P.ndim == 3 else self.P[None]
         K = np.zeros((1, m, n)) if self.K is None else self.K
@@ -95,7 +102,9 @@ class LyapunovClaim:
                     f" {M.shape}"
                 )
         if self.kind == "l2 gain" and not (m and plant.C.shape[1]):
-            raise InputError("a gain is from inputs to outputs: give B and C, and D if there is one")
+            raise InputError(
+                "a gain is from inputs to outputs: give B and C, and D if there is one"
+            )
         if len(P) > 1 and isinstance(plant, VertexPlant) and plant.dt is None:
             raise InputError(
                 "in continuous time a P of each vertex proves nothing while the plant moves in any"

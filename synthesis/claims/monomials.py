@@ -143,9 +143,7 @@ def power(F: Monomials, exponent: int) -> Monomials:
 
 def derivative(F: Monomials, axis: int) -> Monomials:
     """Return the partial derivative by one variable."""
-    return {
-        (*e[:axis], e[axis] - 1, *e[axis + 1 :]): c * e[axis] for e, c in F.items() if e[axis]
-    }
+    return {(*e[:axis], e[axis] - 1, *e[axis + 1 :]): c * e[axis] for e, c in F.items() if e[axis]}
 
 
 def along(V: Monomials, f: Sequence[Monomials]) -> Monomials:

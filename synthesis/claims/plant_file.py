@@ -73,7 +73,7 @@ def plant_of(content: Mapping[str, Any]) -> Any:
     try:
         rate = math.inf if rate is None else float(rate)
     except (TypeError, ValueError):
-        raise InputError(f"rate: expected a number or \"inf\", got {rate!r:.60}") from None
+        raise InputError(f'rate: expected a number or "inf", got {rate!r:.60}') from None
     return GridPlant(p=np.ravel(content["p"]), rate=rate, dt=dt, **matrices)
 
 

@@ -38,8 +38,8 @@ def _matrices(own: Any, names: Sequence[str]) -> None:
     """Check A, B, C, D of a plant, and fill in those that it does not have."""
     A = stack(own.A, "A", None, None, None)
     count, n, other = A.shape
-    if n != other or not n:
-        raise InputError(f"A: expected square matrices (N, n, n), got shape {A.shape}")
+    if n != other or not n or not count:
+        raise InputError(f"A: expected one or more square matrices (N, n, n), got shape {A.shape}")
     object.__setattr__(own, "A", A)
     if "C" not in names:
         object.__setattr__(own, "B", stack(own.B, "B", count, n, None))

@@ -108,7 +108,7 @@ Corner = Callable[[list[int], tuple[Fraction, ...]], int]
 is zero that has to be positive, or 0.
 """
 FAILS, TOUCHES = 2, 1
-MORE = 500
+MORE = 60
 """Boxes that are looked at after a corner touched."""
 
 

@@ -8,7 +8,6 @@ import numpy as np
 
 from symheli.values.arrays import Array
 from synthesis.certify.statement.trajectory import SchedulingTrajectory
-from synthesis.claims.closed_loop import ClosedLoop
 from synthesis.claims.verdict import Counterexample
 
 CYCLES = 3
@@ -19,9 +18,7 @@ STEPS = 8
 """Steps of Runge and Kutta between two times of an input; once more with twice as many."""
 
 
-def growth_along(
-    loop: ClosedLoop, cycle: SchedulingTrajectory
-) -> tuple[float, Counterexample] | None:
+def growth_along(loop: Any, cycle: SchedulingTrajectory) -> tuple[float, Counterexample] | None:
     """Return the growth of the state in one cycle of p, the lower one of two integrators, with the
     motion over some cycles; None where they do not both see growth.
     """
@@ -40,9 +37,7 @@ def growth_along(
     return growth, Counterexample(time, np.array(states), np.asarray(cycle.p, dtype=float))
 
 
-def _transition(
-    loop: ClosedLoop, cycle: SchedulingTrajectory, method: Any, tolerance: float
-) -> Array:
+def _transition(loop: Any, cycle: SchedulingTrajectory, method: Any, tolerance: float) -> Array:
     from scipy.integrate import solve_ivp
 
     n = len(loop.states)
@@ -54,9 +49,7 @@ def _transition(
             p = low + (high - low) * (t - a) / (b - a)
             return (loop.matrices(float(p))[0] @ x.reshape(n, n)).ravel()
 
-        found = solve_ivp(
-            rate, (t0, t1), Phi.ravel(), method=method, rtol=tolerance, atol=1e-14
-        )
+        found = solve_ivp(rate, (t0, t1), Phi.ravel(), method=method, rtol=tolerance, atol=1e-14)
         Phi = found.y[:, -1].reshape(n, n)
     return Phi
 
@@ -70,7 +63,7 @@ def _stretches(cycle: SchedulingTrajectory) -> list[tuple[float, float, float, f
     ]
 
 
-def _products(loop: ClosedLoop, cycle: SchedulingTrajectory) -> Array:
+def _products(loop: Any, cycle: SchedulingTrajectory) -> Array:
     Phi = np.eye(len(loop.states))
     for p in cycle.p[: max(1, len(cycle.p) - 1)] if len(cycle.p) > 1 else cycle.p:
         Phi = loop.matrices(float(p))[0] @ Phi
@@ -78,7 +71,7 @@ def _products(loop: ClosedLoop, cycle: SchedulingTrajectory) -> Array:
 
 
 def energy_ratio(
-    loop: ClosedLoop, motion: SchedulingTrajectory, held: Array
+    loop: Any, motion: SchedulingTrajectory, held: Array
 ) -> tuple[float, Counterexample]:
     """Return |y|/|u| of an input from rest, the lower of two step sizes less their difference; and
     the motion.
@@ -90,9 +83,7 @@ def energy_ratio(
     return ratio, Counterexample(motion.time, fine[1], np.asarray(motion.p, dtype=float))
 
 
-def _ratio(
-    loop: ClosedLoop, motion: SchedulingTrajectory, held: Array, steps: int
-) -> tuple[float, Array]:
+def _ratio(loop: Any, motion: SchedulingTrajectory, held: Array, steps: int) -> tuple[float, Array]:
     """Integrate by Runge and Kutta, energies by Simpson; the input ends with the last time."""
     x = np.zeros(len(loop.states))
     states, supplied, seen = [x], 0.0, 0.0
@@ -109,7 +100,7 @@ def _ratio(
 
 
 def _stretch(
-    loop: ClosedLoop, x: Array, u: Array, ends: tuple[float, float], width: float, steps: int
+    loop: Any, x: Array, u: Array, ends: tuple[float, float], width: float, steps: int
 ) -> tuple[Array, float]:
     h, energy = width / steps, 0.0
     p = np.linspace(*ends, 2 * steps + 1)
@@ -129,7 +120,7 @@ def _stretch(
 
 
 def _sampled_ratio(
-    loop: ClosedLoop, motion: SchedulingTrajectory, held: Array
+    loop: Any, motion: SchedulingTrajectory, held: Array
 ) -> tuple[float, Counterexample]:
     x, states, seen = np.zeros(len(loop.states)), [], 0.0
     for p, u in zip(motion.p, held, strict=False):

@@ -33,8 +33,10 @@ RAYS = 400
 """Directions along which the size of {V <= rho} is looked up."""
 ROOM = (Fraction(17, 16), Fraction(2), Fraction(8))
 """Factors of that size that are tried for a box that holds it."""
-ROUNDS = 14
+ROUNDS = 12
 """Bisections of the level that V does prove."""
+FEWER = 1000
+"""Boxes that are looked at for each of them."""
 
 
 class Region(NamedTuple):
@@ -243,7 +245,7 @@ def proven_level(plant: PolynomialPlant, claim: RegionClaim) -> float:
     good, bad = None, claim.rho
     for _ in range(ROUNDS):
         middle = Fraction(float((good + bad) / 2 if good is not None else bad / 4))
-        if judged(plant, claim.at_level(middle), 3000)[0] == PROVEN:
+        if judged(plant, claim.at_level(middle), FEWER)[0] == PROVEN:
             good = middle
         else:
             bad = middle

@@ -48,7 +48,7 @@ def written(plant: Any, claim: Any) -> dict[str, Any]:
         found["claim"] |= {"V": monomials.stored(V), "rho": str(claim.rho)}
         region = region_of(plant, claim)
         found["box"] = [] if region is None else [str(u) for u in region.units]
-    if isinstance(claim, TerminalClaim) and claim.H is not None:
+    if isinstance(plant, LimitedPlant) and claim.H is not None:
         found["multipliers"] = _multipliers(plant, claim)
     return found
 
@@ -83,7 +83,5 @@ def restored(content: Mapping[str, Any]) -> tuple[Any, Any]:
         f = [monomials.restored(each, len(states)) for each in plant["f"]]
         V = monomials.restored(claim["V"], len(states))
         return PolynomialPlant(states, f), RegionClaim(V, str(claim["rho"]))
-    own = (
-        {name: decoded(value) for name, value in values.items()} for values in (plant, claim)
-    )
+    own = ({name: decoded(value) for name, value in values.items()} for values in (plant, claim))
     return PLANTS[kinds[0]](**next(own)), CLAIMS[kinds[1]](**next(own))

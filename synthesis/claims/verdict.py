@@ -105,7 +105,7 @@ class Verdict:
         return self.statement.save(path)
 
     def __str__(self) -> str:
-        how = "in exact arithmetic" if self.exact else "computed, and again by a second method"
+        how = "in exact arithmetic" if self.exact else "computed"
         lines = [f"{self.answer} ({how})", f"claim: {self.claim}"]
         lines += [f"- {line}" for line in self.hypotheses]
         lines += [self.reason] if self.reason else []
@@ -139,13 +139,17 @@ def _listed(values: Array | None) -> Any:
 
 def _placed(place: Place) -> str:
     along = "" if place.x is None else f", along x = {_numbers(place.x)}"
+    if place.short == 0:
+        return f"It holds with equality at {place.words}{along}."
     return f"It fails at {place.words}{along}; it is short by {place.short:.3g} of its terms."
 
 
 def _moved(motion: Counterexample) -> str:
     first, last = motion.x[0], motion.x[-1]
-    where = "" if motion.p is None else f", along {_few(motion.p)}"
-    return f"Counterexample: from x = {_numbers(first)} to {_numbers(last)} at {motion.time[-1]:.6g}{where}"
+    along = motion.p is not None and len(set(motion.p.tolist())) > 1
+    where = f", along p = {_few(motion.p)}" if along and motion.p is not None else ""
+    end = f"{_numbers(last)} at t = {motion.time[-1]:.6g}"
+    return f"Motion: from x = {_numbers(first)} to {end}{where}."
 
 
 def _few(p: Array) -> str:
