@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from symheli.values.arrays import Array
 from synthesis.claims.contradicted import Found
-from synthesis.claims.monomials import derivative, in_units, scaled, value
+from synthesis.claims.monomials import compiled, derivative, in_units, scaled, value
 from synthesis.claims.plants import PolynomialPlant
 from synthesis.claims.region import Region, region_of, rising
 from synthesis.claims.region_claim import RegionClaim
@@ -62,19 +62,6 @@ def _left(f: Any, claim: RegionClaim, region: Region, starts: Array) -> Found | 
         )
         return Found(reason, motion, None, False)
     return None
-
-
-def compiled(f: Sequence[Any]) -> Callable[[Array], Array]:
-    """Return the polynomials as a function of a state, in doubles."""
-    powers = [np.array(list(own), dtype=int).reshape(-1, len(f)) for own in f]
-    numbers = [np.array([float(c) for c in own.values()]) for own in f]
-
-    def rate(z: Array) -> Array:
-        return np.array(
-            [c @ np.prod(z**e, axis=1) for e, c in zip(powers, numbers, strict=True)], dtype=float
-        )
-
-    return rate
 
 
 def _flown(

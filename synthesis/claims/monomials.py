@@ -7,12 +7,15 @@ writes: 0.1 is 1/10.
 from __future__ import annotations
 
 import ast
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from itertools import product
 from typing import Any
 
+import numpy as np
+
 from symheli.errors import InputError
+from symheli.values.arrays import Array
 
 Monomials = dict[tuple[int, ...], Fraction]
 MOST_TERMS, HIGHEST_POWER = 5000, 60
@@ -160,6 +163,21 @@ def value(F: Monomials, x: Sequence[Any]) -> Any:
             term = term * v**k if k else term
         total = total + term
     return total
+
+
+def compiled(polynomials: Sequence[Monomials]) -> Callable[[Array], Array]:
+    """Return polynomials as a function of points (..., n), in doubles: (..., number of them)."""
+    powers = [np.array(list(F), dtype=int) for F in polynomials]
+    numbers = [np.array([float(c) for c in F.values()]) for F in polynomials]
+
+    def values(x: Array) -> Array:
+        own = [
+            np.prod(x[..., None, :] ** e, axis=-1) @ c if len(c) else 0.0 * x[..., 0]
+            for e, c in zip(powers, numbers, strict=True)
+        ]
+        return np.stack(own, axis=-1)
+
+    return values
 
 
 def least_degree(F: Monomials) -> int:

@@ -112,6 +112,10 @@ MORE = 60
 """Boxes that are looked at after a corner touched."""
 
 
+NARROW = Fraction(1, 2**24)
+"""Width of a box, of one, in all directions below which it is not halved again."""
+
+
 class Open(NamedTuple):
     """A point of [0, 1]^n that settles the question in the negative, or (`certain` False) one at
     which it is undecided.
@@ -141,7 +145,7 @@ def first_open(
         positive = [bool(np.all(c > 0)) for c in own]
         if settled(positive):
             continue
-        if looked > cells:
+        if looked > cells or all(b - a < NARROW for a, b in box):
             return Open(touched or tuple((a + b) / 2 for a, b in box), False), looked
         for corner in product((0, -1), repeat=n):
             point = tuple(ends[i] for ends, i in zip(box, corner, strict=True))

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symheli.values.arrays import Array
-from synthesis.claims.monomials import Monomials, added, along, in_units, scaled, value
+from synthesis.claims.monomials import Monomials, added, along, compiled, in_units, scaled, value
 from synthesis.claims.plants import PolynomialPlant
 from synthesis.claims.polar import (
     FAILS,
@@ -29,7 +29,7 @@ from synthesis.claims.polar import (
 from synthesis.claims.region_claim import RegionClaim
 from synthesis.claims.verdict import NOT_BY_THIS, PROVEN, UNDECIDED, Place
 
-RAYS = 400
+RAYS = 100
 """Directions along which the size of {V <= rho} is looked up."""
 ROOM = (Fraction(17, 16), Fraction(2), Fraction(8))
 """Factors of that size that are tried for a box that holds it."""
@@ -206,8 +206,7 @@ def rising(plant: PolynomialPlant, claim: RegionClaim, region: Region) -> Array:
     first.
     """
     z = samples(region, claim.rho)
-    slope = np.array([value(region.slope, list(own)) for own in z], dtype=float)
-    return z[np.argsort(-slope)]
+    return z[np.argsort(-compiled([region.slope])(z)[:, 0])]
 
 
 def _sampled(plant: PolynomialPlant, claim: RegionClaim, region: Region) -> Place | None:

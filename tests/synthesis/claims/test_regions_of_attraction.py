@@ -19,8 +19,8 @@ REVERSED = PolynomialPlant(["x", "y"], ["-y", "x + (x^2 - 1)*y"])
 
 def drake(divided=1):
     """x' = (U - 1) dU/dx, U = (x'A1'A1 x)(x'A2'A2 x), A1 = [1 2; 3 4], A2 = A1 diag(-1, 1): the
-    region is {U < 1}, and the largest ball in it |x|^2 <= 1/20, since U <= 400 |x|^4. Source: Drake,
-    issue 12876, where a solver returned .067 to .070.
+    region is {U < 1}, and the largest ball in it |x|^2 <= 1/20, since U <= 400 |x|^4. Source:
+    Drake, issue 12876, where a solver returned .067 to .070.
     """
     own = "((x + 2*y)^2 + (3*x + 4*y)^2) * ((-x + 2*y)^2 + (-3*x + 4*y)^2)"
     U = scaled(monomials(own, "xy"), Fraction(1, divided))
