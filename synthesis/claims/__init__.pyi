@@ -6,6 +6,7 @@ from synthesis.claims.plants import GridPlant as GridPlant
 from synthesis.claims.plants import LimitedPlant as LimitedPlant
 from synthesis.claims.plants import PolynomialPlant as PolynomialPlant
 from synthesis.claims.plants import VertexPlant as VertexPlant
+from synthesis.claims.plants import box_limits as box_limits
 from synthesis.claims.proven_claim import ProvenClaim as ProvenClaim
 from synthesis.claims.region_claim import RegionClaim as RegionClaim
 from synthesis.claims.terminal_claim import TerminalClaim as TerminalClaim

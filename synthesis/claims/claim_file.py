@@ -63,8 +63,10 @@ def claim_of(content: Mapping[str, Any]) -> Any:
     _present(content, "P")
     bounds = {"bound": _number(content, bound)} if bound else {}
     p = content.get("p")
-    points = {} if p is None else {"p": np.ravel(p)}
-    return LyapunovClaim(kind, **stacked(content, ("P", "K")), **bounds, **points)
+    matrices: dict[str, Any] = stacked(content, ("P", "K"))
+    if p is not None:
+        matrices["p"] = np.ravel(p)
+    return LyapunovClaim(kind, **matrices, **bounds)
 
 
 def _terminal(content: Mapping[str, Any]) -> TerminalClaim:

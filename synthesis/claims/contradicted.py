@@ -307,7 +307,7 @@ def no_common(plant: VertexPlant | GridPlant, claim: LyapunovClaim) -> str:
         for second, B in shifted[:i]:
             if _has_negative_eigenvalue(A @ B):
                 return (
-                    f"No P at all, constant, proves it: the product of the models at {second.words}"
+                    f"No constant P at all proves it: the product of the models at {second.words}"
                     f" and {first.words} has a negative real eigenvalue, by a change of sign of its"
                     " characteristic polynomial in rationals."
                 )

@@ -306,7 +306,23 @@ class LimitedPlant:
 
 
 def box_limits(x_max: Any, u_max: Any) -> dict[str, Array]:
-    """Return H_x, h_x, H_u, h_u of |x_i| <= x_max_i, |u_j| <= u_max_j; inf: no limit."""
+    """Return H_x, h_x, H_u, h_u of |x_i| <= x_max_i, |u_j| <= u_max_j.
+
+    Parameters
+    ----------
+    x_max, u_max : float or array
+        Limits of each state and each input, in their units; inf: no limit.
+
+    Raises
+    ------
+    InputError
+        For a limit below zero.
+
+    Examples
+    --------
+    >>> box_limits([5, float("inf")], 1)["h_x"]
+    array([5., 5.])
+    """
     found = {}
     for name, most in (("x", x_max), ("u", u_max)):
         size = frozen(np.atleast_1d(most), f"{name}_max", (None,), finite=False)

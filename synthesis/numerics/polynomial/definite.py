@@ -51,52 +51,38 @@ def negative_definite_exactly(F: PolynomialMatrix, cells: int = MAX_BOXES) -> bo
 
 
 class Miss(NamedTuple):
-    """A `point` of the box where F is not negative definite; where `certain` is False it was only
-    not shown to be so near there.
-    """
+    """A `point` where a matrix is not negative definite or, not `certain`, was not shown to be."""
 
     point: tuple[Any, ...]
     certain: bool
 
 
 def first_miss(F: PolynomialMatrix, cells: int = MAX_BOXES) -> Miss | None:
-    """Return where F is not negative definite, in exact arithmetic; None where it is on the whole
-    box.
-    """
+    """Return where F is not negative definite, in exact arithmetic; None: nowhere on its box."""
     m, spent = len(F.box), 0
     # a positive factor changes nothing, and integers are halved without divisions
     waiting = [(integers(-F.coefficients), F.box)]
     while waiting:
         spent += 1
         G, box = waiting.pop()
-        if spent > cells:
-            return Miss(tuple((a + b) / 2 for a, b in box), False)
         numbers = nearest(G)
         # a check in floating point that fails saves the exact one
         promising = bool(np.all(np.linalg.eigvalsh(_normalised(numbers))[..., 0] > 0))
-        if promising and positive_definite(G):
+        if spent <= cells and promising and positive_definite(G):
             continue
-        if not positive_definite(G[_corners(G.shape[:m])]):
-            return _false_corner(G, box)
+        for corner in product((0, -1), repeat=m):
+            if not positive_definite(G[corner]):
+                return Miss(tuple(box[i][k] for i, k in enumerate(corner)), True)
         curvature = _curvature(numbers[None], m)[0]
-        if curvature.max(initial=0.0) == 0.0:
+        if spent > cells or curvature.max() == 0.0:
             return Miss(tuple((a + b) / 2 for a, b in box), False)
         axis = int(np.argmax(curvature))
-        a, b = box[axis]
-        halves = (a, (a + b) / 2), ((a + b) / 2, b)
-        waiting += [
-            (part, (*box[:axis], own, *box[axis + 1 :]))
-            for part, own in zip(_bisect(G, axis), halves, strict=True)
-        ]
+        middle = sum(box[axis]) / 2
+        for part, ends in zip(
+            _bisect(G, axis), ((box[axis][0], middle), (middle, box[axis][1])), strict=True
+        ):
+            waiting.append((part, (*box[:axis], ends, *box[axis + 1 :])))
     return None
-
-
-def _false_corner(G: Array, box: Any) -> Miss:
-    m = len(box)
-    for corner in product((0, -1), repeat=m):
-        if not positive_definite(G[corner]):
-            return Miss(tuple(ends[i] for ends, i in zip(box, corner, strict=True)), True)
-    raise AssertionError("all corners of a box are positive definite")  # pragma: no cover
 
 
 def _normalised(F: Array) -> Array:

@@ -86,7 +86,7 @@ def test_the_pair_of_ando_and_shih_needs_a_p_of_each_vertex_above_one_over_root_
 def test_two_modes_of_senames_book_have_no_common_p_and_it_is_said_exactly():
     found = check(SENAME, LyapunovClaim("stability", [[2, 1], [1, 1]]), refute=False)
     assert found.answer == BY_ANOTHER
-    assert "No P at all" in found.reason
+    assert "No constant P at all" in found.reason
     assert np.linalg.eigvals(SENAME.A[0] @ SENAME.A[1]).real.max() < 0
 
 
