@@ -202,7 +202,7 @@ def _on_functions(points: Array) -> Array:
     return np.array([M.value for M in P])
 
 
-SENAME = "Sename, Gaspar, Bokor (2013)"
+SENAME = "Sename's book on LPV control"
 SWITCH = "examples of SwitchOnSafety.jl"
 PUBLISHED = {
     "drake": Published(
@@ -218,19 +218,19 @@ PUBLISHED = {
         "LPVTools, `lpvnorm`", "gain 1.2968, by P(p) at six points", lambda: scheduled(1.2968)
     ),
     "sename-3.3": Published(
-        f"{SENAME}, example 3.3", "stable by a constant P, rho at its ends",
+        f"{SENAME}, 3.3", "stable by a constant P, rho at its ends",
         lambda: book(lambda r: [0, -4 * r], 0.0),
     ),
     "sename-3.2": Published(
-        f"{SENAME}, example 3.2", "decay rate .9 by a constant P, rho at its ends",
+        f"{SENAME}, 3.2", "decay rate .9 by a constant P, rho at its ends",
         lambda: book(lambda r: [r**2 - 1, -2 - 2 * r], 0.9),
     ),
     "iqc-tvscalar": Published(
-        "IQC toolbox, iqc_tvscalar", "stable for |delta| <= .26, any rate",
+        "IQC toolbox, iqc_tvscalar", "stable for delta in [-.26, .26], any rate",
         lambda: oscillator(0.26),
     ),
     "iqc-beyond": Published(
-        "the same, beyond", "stable for |delta| <= .27 by a constant P", lambda: oscillator(0.27)
+        "the same, beyond", "stable for delta in [-.27, .27], constant P", lambda: oscillator(0.27)
     ),
     "golden": Published(
         f"golden pair, {SWITCH}", "stable when divided by 1.6181",
@@ -256,7 +256,7 @@ PUBLISHED = {
         lambda: sampled(FOUR, 8.9149),
     ),
     "positioning": Published(
-        "Kothare et al. (1996), example 1", "the regulator at a = 1 serves a in [.1, 10]",
+        "after Kothare et al. (1996), example 1", "the regulator at a = 1 serves a in [.1, 10]",
         lambda: positioning(False),
     ),
     "positioning-robust": Published(
@@ -288,11 +288,12 @@ def row(name: str, folder: Path) -> list[str]:
     shown = found.reason.split(". ")[-1] if found.reason else ""
     how = "" if found.exact else " (computed)"
     one = PUBLISHED[name]
-    return [f"`{name}`", one.source, one.words, f"**{found.answer}**{how}", _cell(shown)]
+    answer = f"**{found.answer}**{how}"
+    return [f"`{name}`", one.source, _cell(one.words), answer, _cell(shown)]
 
 
 def _cell(text: str) -> str:
-    return text.replace("|", "\\|").rstrip(".")
+    return text.replace("|", "&#124;").rstrip(".")
 
 
 def main() -> None:

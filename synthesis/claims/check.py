@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 from symheli import LPVStateSpace
@@ -81,6 +82,11 @@ def _unknown(plant: Any, claim: Any) -> InputError:
     )
 
 
+def _established(given: ProvenClaim) -> ProvenClaim:
+    """Return the claim that has just been proven in rational arithmetic, as verified."""
+    return replace(given, verified=True, why="")
+
+
 def _head(given: ProvenClaim) -> dict[str, Any]:
     return {"claim": given.claim, "hypotheses": given.conditions}
 
@@ -90,7 +96,7 @@ def _linear(given: ProvenClaim, refute: bool) -> Verdict:
     head = _head(given)
     answer, reason, place = lyapunov.judged(plant, claim)
     if answer == PROVEN:
-        return Verdict(answer=PROVEN, statement=given.established(), **head)
+        return Verdict(answer=PROVEN, statement=_established(given), **head)
     found = contradicted.contradiction(plant, claim) if refute else None
     if found is not None:
         shown = {"place": found.place or place, "motion": found.motion, "exact": found.exact}
@@ -106,7 +112,7 @@ def _region(given: ProvenClaim, refute: bool) -> Verdict:
     plant, claim = given.plant, given.given
     answer, reason, place = region.judged(plant, claim)
     if answer == PROVEN:
-        return Verdict(answer=PROVEN, statement=given.established(), **_head(given))
+        return Verdict(answer=PROVEN, statement=_established(given), **_head(given))
     found = departed.departure(plant, claim) if refute else None
     if found is not None:
         shown = {"place": place, "motion": found.motion, "exact": found.exact}
@@ -117,7 +123,7 @@ def _region(given: ProvenClaim, refute: bool) -> Verdict:
 
 def _terminal(given: ProvenClaim, refute: bool) -> Verdict:
     answer, reason, place, motion = terminal.judged(given.plant, given.given)
-    statement = given.established() if answer == PROVEN else None
+    statement = _established(given) if answer == PROVEN else None
     shown = {"reason": reason, "place": place, "motion": motion, "statement": statement}
     return Verdict(answer=answer, **shown, **_head(given))
 

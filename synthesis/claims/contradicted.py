@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from fractions import Fraction
+from itertools import islice
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -34,6 +35,8 @@ SEARCH = LowerBoundSearch(
     levels=8, dwells=9, starts=2, nodes=50, evaluations=15, steps=100, samples=20_000
 )
 """Effort of the search for motions of p."""
+MOST_COMPARED = 20
+"""Models whose pairs are looked at for a common P."""
 MOST_PAIRS = 10
 """Pairs of vertices between which switching is looked at, in continuous time."""
 LONGEST_PRODUCT, BEAM = 12, 60
@@ -301,7 +304,8 @@ def no_common(plant: VertexPlant | GridPlant, claim: LyapunovClaim) -> str:
     if plant.dt is not None:
         return ""
     stable = without_gain(claim)
-    loops = [own for own in frozen_loops(plant, claim) if own.p is not None][:20]
+    listed = (own for own in frozen_loops(plant, claim) if own.p is not None)
+    loops = islice(listed, MOST_COMPARED)
     shifted = [(own, own.shifted(stable, None, Fraction(0))) for own in loops]
     for i, (first, A) in enumerate(shifted):
         for second, B in shifted[:i]:

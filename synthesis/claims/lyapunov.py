@@ -44,8 +44,8 @@ def judged(plant: Plant, claim: LyapunovClaim) -> tuple[str, str, Place | None]:
     if _jumps(plant, claim):
         return UNDECIDED, JUMPS, None
     flat: tuple[str, str, Place | None] | None = None
-    every = list(parts(plant, claim))
-    for part in tracked("checking in rational arithmetic", every, len(every)):
+    every = tracked("checking in rational arithmetic", parts(plant, claim), _count(plant, claim))
+    for part in every:
         miss = _missed(part, claim)
         if miss is None:
             continue
@@ -67,6 +67,12 @@ EQUAL = (
     "the inequality holds with equality in one direction, and is not strict. V does not rise there;"
     " whether it falls is not decided. A bound a little weaker would decide, or another P"
 )
+
+
+def _count(plant: Plant, claim: LyapunovClaim) -> int:
+    """Return about how many inequalities there are."""
+    models, functions = len(plant.A), len(claim.fitting(plant)[0])
+    return functions * (models + 1) if isinstance(plant, VertexPlant) else 3 * models
 
 
 def _jumps(plant: Plant, claim: LyapunovClaim) -> bool:
