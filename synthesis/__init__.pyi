@@ -1,4 +1,5 @@
 from synthesis import analysis as analysis
+from synthesis import claims as claims
 from synthesis import designs as designs
 from synthesis import forms as forms
 from synthesis import impose as impose

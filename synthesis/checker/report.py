@@ -4,7 +4,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from . import dwell, lagged, lft, listed, periodic, rational, sets, storage
+from . import claims, dwell, lagged, lft, listed, periodic, rational, sets, storage
 from .demands import Claim, failure
 from .reading import DAMAGED, TUBE, Unreadable, opened
 
@@ -29,6 +29,8 @@ def claim_of(kind: str, content: Mapping[str, Any]) -> Claim:
         return rational.claimed(kind, content)
     if kind in (periodic.GAIN, periodic.STABILITY):
         return periodic.claimed(kind, content)
+    if kind == "claim":
+        return claims.claimed(content)
     if kind in (TUBE, "tube"):
         raise Unreadable(
             "tubes are not decided here: their proof rests on enclosures of nonlinear equations"

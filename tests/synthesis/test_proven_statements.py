@@ -365,5 +365,5 @@ def test_an_unknown_statement_is_named(tmp_path):
     for name in ("passivity of the moon", None, ["set"]):
         head = {"schema": "symheli statement", "version": 2, "statement": name}
         file.write_text(json.dumps(head))
-        with pytest.raises(InputError, match=r"unknown statement .*certificate, dwell-time"):
+        with pytest.raises(InputError, match=r"unknown statement .*certificate, claim, dwell-time"):
             read(file)

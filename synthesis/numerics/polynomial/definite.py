@@ -4,6 +4,9 @@ the box where they are inconclusive.
 
 from __future__ import annotations
 
+from itertools import product
+from typing import Any, NamedTuple
+
 import numpy as np
 
 from symheli.values.arrays import Array
@@ -44,26 +47,42 @@ def negative_definite_exactly(F: PolynomialMatrix, cells: int = MAX_BOXES) -> bo
     """Check in exact arithmetic, of coefficients that are rationals; only their lower triangles are
     read.
     """
+    return first_miss(F, cells) is None
+
+
+class Miss(NamedTuple):
+    """A `point` where a matrix is not negative definite or, not `certain`, was not shown to be."""
+
+    point: tuple[Any, ...]
+    certain: bool
+
+
+def first_miss(F: PolynomialMatrix, cells: int = MAX_BOXES) -> Miss | None:
+    """Return where F is not negative definite, in exact arithmetic; None: nowhere on its box."""
     m, spent = len(F.box), 0
     # a positive factor changes nothing, and integers are halved without divisions
-    waiting = [integers(-F.coefficients)]
+    waiting = [(integers(-F.coefficients), F.box)]
     while waiting:
         spent += 1
-        if spent > cells:
-            return False
-        G = waiting.pop()
+        G, box = waiting.pop()
         numbers = nearest(G)
         # a check in floating point that fails saves the exact one
         promising = bool(np.all(np.linalg.eigvalsh(_normalised(numbers))[..., 0] > 0))
-        if promising and positive_definite(G):
+        if spent <= cells and promising and positive_definite(G):
             continue
-        if not positive_definite(G[_corners(G.shape[:m])]):
-            return False
+        for corner in product((0, -1), repeat=m):
+            if not positive_definite(G[corner]):
+                return Miss(tuple(box[i][k] for i, k in enumerate(corner)), True)
         curvature = _curvature(numbers[None], m)[0]
-        if curvature.max() == 0.0:
-            return False
-        waiting += _bisect(G, int(np.argmax(curvature)))
-    return True
+        if spent > cells or curvature.max() == 0.0:
+            return Miss(tuple((a + b) / 2 for a, b in box), False)
+        axis = int(np.argmax(curvature))
+        middle = sum(box[axis]) / 2
+        for part, ends in zip(
+            _bisect(G, axis), ((box[axis][0], middle), (middle, box[axis][1])), strict=True
+        ):
+            waiting.append((part, (*box[:axis], ends, *box[axis + 1 :])))
+    return None
 
 
 def _normalised(F: Array) -> Array:

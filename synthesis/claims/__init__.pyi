@@ -1,0 +1,13 @@
+from synthesis.claims.check import check as check
+from synthesis.claims.claim_file import read_claim as read_claim
+from synthesis.claims.lyapunov_claim import LyapunovClaim as LyapunovClaim
+from synthesis.claims.plant_file import read_plant as read_plant
+from synthesis.claims.plants import GridPlant as GridPlant
+from synthesis.claims.plants import LimitedPlant as LimitedPlant
+from synthesis.claims.plants import PolynomialPlant as PolynomialPlant
+from synthesis.claims.plants import VertexPlant as VertexPlant
+from synthesis.claims.plants import box_limits as box_limits
+from synthesis.claims.proven_claim import ProvenClaim as ProvenClaim
+from synthesis.claims.region_claim import RegionClaim as RegionClaim
+from synthesis.claims.terminal_claim import TerminalClaim as TerminalClaim
+from synthesis.claims.verdict import Verdict as Verdict

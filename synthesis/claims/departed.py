@@ -1,0 +1,127 @@
+"""Motions from {V <= rho} that do not tend to zero: integrated, and again by another method."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from symheli.values.arrays import Array
+from synthesis.claims.contradicted import Found
+from synthesis.claims.monomials import compiled, derivative, in_units, scaled, value
+from synthesis.claims.plants import PolynomialPlant
+from synthesis.claims.region import Region, region_of, rising
+from synthesis.claims.region_claim import RegionClaim
+from synthesis.claims.verdict import Counterexample
+
+STARTS = 12
+"""States from which a motion is integrated."""
+FAR = 30.0
+"""Size of a motion, in half widths of a box that holds {V <= rho}, at which it has left."""
+LONG = 1e4
+"""Time of a motion, in times that the states need to move by their own size."""
+NEAR = 0.05
+"""Part of its first size to which a motion falls before it counts as one that tends to zero."""
+METHODS = (("LSODA", 1e-9), ("Radau", 1e-11))
+"""Integrators, of different families, and their relative tolerance."""
+SMALL = 10**6
+"""Largest denominator, in units of the box, of an equilibrium that is tried in rationals."""
+
+
+def departure(plant: PolynomialPlant, claim: RegionClaim) -> Found | None:
+    """Return a motion or an equilibrium that contradicts the claim; None where none was found."""
+    region = region_of(plant, claim)
+    if region is None:
+        return None
+    f = [scaled(in_units(own, region.units), 1 / u)
+         for own, u in zip(plant.fields, region.units, strict=True)]  # fmt: skip
+    starts = rising(plant, claim, region)[:STARTS]
+    return _resting(plant, claim, region, f, starts) or _left(f, claim, region, starts)
+
+
+def _left(f: Any, claim: RegionClaim, region: Region, starts: Array) -> Found | None:
+    rate = compiled(f)
+    for z in starts:
+        exact = [Fraction(float(v)) for v in z]
+        if value(region.V, exact) > claim.rho:
+            continue
+        first = _flown(rate, z, *METHODS[0])
+        if first is None or _flown(rate, z, *METHODS[1]) is None:
+            continue
+        time, states = first
+        units = np.array([float(u) for u in region.units])
+        kept = np.unique(np.linspace(0, len(time) - 1, 40).astype(int))
+        motion = Counterexample(time[kept], states[kept] * units, None)
+        reason = (
+            f"A motion from V = {float(value(region.V, exact)):.6g} <= rho leaves: it is {FAR:g}"
+            f" times as far out as {{V <= rho}} reaches at t = {time[-1]:.6g}; a second integrator"
+            " agrees."
+        )
+        return Found(reason, motion, None, False)
+    return None
+
+
+def _flown(
+    rate: Callable[[Array], Array], z: Array, method: Any, tolerance: float
+) -> tuple[Array, Array] | None:
+    """Return (time, states) of a motion that leaves; None of one that does not."""
+    from scipy.integrate import solve_ivp
+
+    speed = float(np.abs(rate(z)).max())
+    if speed == 0:
+        return None
+
+    def gone(t: float, x: Array) -> float:
+        return FAR - float(np.abs(x).max())
+
+    def back(t: float, x: Array) -> float:
+        return float(np.abs(x).max()) - NEAR * float(np.abs(z).max())
+
+    gone.terminal = back.terminal = True  # type: ignore[attr-defined]
+    horizon = LONG * float(np.abs(z).max()) / speed
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # of a motion that ends in finite time
+        found = solve_ivp(
+            lambda t, x: rate(x), (0.0, horizon), z, method=method, rtol=tolerance, atol=1e-12,
+            events=[gone, back],
+        )  # fmt: skip
+    left = len(found.t_events[0]) > 0
+    return (found.t, found.y.T) if left else None
+
+
+def _resting(
+    plant: PolynomialPlant, claim: RegionClaim, region: Region, f: Any, starts: Array
+) -> Found | None:
+    """Return an equilibrium of {V <= rho} other than zero, in rationals."""
+    rate = compiled(f)
+    J = [[derivative(own, j) for j in range(len(f))] for own in f]
+    for z in starts:
+        near = _newton(rate, J, z)
+        if near is None or not np.abs(near).max() > 1e-3 * np.abs(z).max():
+            continue
+        x = [Fraction(float(v) * float(u)).limit_denominator(SMALL)
+             for v, u in zip(near, region.units, strict=True)]  # fmt: skip
+        V = claim.function(plant.states)
+        if any(x) and value(V, x) <= claim.rho and not any(value(own, x) for own in plant.fields):
+            numbers = np.array([float(v) for v in x])
+            words = ", ".join(map(str, x))
+            reason = f"x = ({words}) is an equilibrium with V = {value(V, x)} <= rho: it stays."
+            motion = Counterexample(np.array([0.0, 1.0]), np.array([numbers, numbers]), None)
+            return Found(reason, motion, None, True)
+    return None
+
+
+def _newton(rate: Callable[[Array], Array], J: Any, z: Array) -> Array | None:
+    own = z.copy()
+    for _ in range(50):
+        slope = np.array([[value(d, list(own)) for d in row] for row in J], dtype=float)
+        step = np.linalg.lstsq(slope, rate(own), rcond=None)[0]
+        own = own - step
+        if not np.all(np.isfinite(own)) or np.abs(own).max() > FAR:
+            return None
+        if np.abs(step).max() <= 1e-15 * np.abs(own).max():
+            break
+    return own
