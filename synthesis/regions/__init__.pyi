@@ -1,0 +1,2 @@
+from synthesis.regions.region import RegionOfAttraction as RegionOfAttraction
+from synthesis.regions.region import region_of_attraction as region_of_attraction

@@ -1,0 +1,384 @@
+"""Regions of attraction: level sets of V from which every motion tends to 0."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any, ClassVar
+
+import numpy as np
+
+from symheli.errors import InputError
+from symheli.progress import Task, task
+from symheli.threads import with_one_thread
+from symheli.values.arrays import Array, frozen
+from symheli.values.numbers import whole
+from symheli.values.summary import summarized
+from synthesis.certify.statement.proven_statement import ProvenStatement
+from synthesis.numerics.polynomial.multivariate import SparsePolynomial
+from synthesis.numerics.program.cone_program import Solver, general_solver
+from synthesis.regions.coordinates import (
+    ceiling,
+    rises_near_zero,
+    rising_point,
+    round_coordinates,
+    short,
+)
+from synthesis.regions.equations import Equations, equations, function_of
+from synthesis.regions.files import read_proof, read_terms, written_proof, written_terms
+from synthesis.regions.growth import grown, quadratic
+from synthesis.regions.proof import NOT_POSITIVE, RegionProof, why_not
+from synthesis.regions.search import Effort, RegionSearch, bases
+
+CLOSEST, CLOSE = 1e-5, 1e-3
+"""Relative distance below the ceiling at which a level is tried first, and accuracy of others."""
+ENOUGH = 0.99
+"""Share of the ceiling from which multipliers of higher degree are not tried."""
+LEAST_SHARE = 1e-6
+"""Least share of the ceiling that is tried."""
+EFFORTS = (Effort(0, 0), Effort(1, 0), Effort(0, 1), Effort(1, 1))
+MOST_MONOMIALS = 70
+"""Monomials of a sum of squares beyond which multipliers are not raised by themselves."""
+STEP, STEPS = 4.0, 20
+"""Factor from one level to the next where nothing bounds them, and the most of them."""
+NOTHING = "no level passes the exact check; try another V or higher multipliers, multiplier_degree="
+
+RISES = (
+    "dV/dt > 0 as close to 0 as one likes: take another V, or 0 is no asymptotically stable"
+    " equilibrium"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class RegionOfAttraction(ProvenStatement):
+    """The set V(x) <= level, from which every motion of dx/dt = f(x) tends to 0 and never leaves.
+
+    Made by `region_of_attraction`; `verify` proves it again from these fields alone.
+
+    Attributes
+    ----------
+    states : tuple of str
+        Names of x.
+    f : tuple of SparsePolynomial
+        dx/dt, with the rationals that the coefficients given are.
+    V : SparsePolynomial
+        The Lyapunov function.
+    level : float
+        The proven level, in units of V; inf: all of them, 0: none.
+    ceiling : float
+        Level of a `point` other than 0 where dV/dt >= 0 in exact arithmetic: this V proves no
+        higher one; inf where no such point was found.
+    point : array (n,) or None
+        That point.
+    proof : RegionProof or None
+        Coordinates and sums of squares; see `synthesis.regions.proof`.
+    verified : bool
+        The sums of squares hold in rational arithmetic.
+    why : str
+        Why there is no proof; empty where there is one.
+
+    Raises
+    ------
+    InputError
+        `save` of a region without a proof, `load` of a file that is damaged or another.
+
+    Examples
+    --------
+    >>> import sympy
+    >>> x = sympy.Symbol("x")
+    >>> found = synthesis.regions.region_of_attraction({x: -x + x**3}, x**2)
+    >>> found.verified, bool(0.999 < found.level < 1), found.contains([0.9])
+    (True, True, True)
+    """
+
+    states: tuple[str, ...]
+    f: tuple[SparsePolynomial, ...]
+    V: SparsePolynomial
+    level: float
+    ceiling: float
+    point: Array | None
+    proof: RegionProof | None
+    verified: bool
+    why: str = ""
+    reader: ClassVar[str] = "region-of-attraction"
+
+    __repr__ = summarized
+
+    def verify(self, rigorous: bool = True) -> bool:
+        """Check the sums of squares again, in rational arithmetic always."""
+        return not self._refused()
+
+    def _refused(self) -> str:
+        if self.proof is None:
+            return self.why or NOTHING
+        if any((0,) * len(self.states) in p.terms for p in (self.V, *self.f)):
+            return "f and V are not 0 at 0"
+        return why_not(self.f, self.V, self.level, self.proof)
+
+    def values(self, x: Any) -> Array:
+        """V of states (..., n)."""
+        x = frozen(x, "x")
+        if x.shape[-1:] != (len(self.states),):
+            raise InputError(f"x: expected {len(self.states)} states along the last axis, got"
+                             f" shape {x.shape}")  # fmt: skip
+        return self.V.values(x)
+
+    def contains(self, x: Any) -> bool:
+        """Whether the state x (n,) lies in the proven region, in exact arithmetic."""
+        x = frozen(x, "x", (len(self.states),))
+        value = self.V.value([Fraction(float(v)) for v in x])
+        return self.verified and (math.isinf(self.level) or value <= Fraction(self.level))
+
+    @property
+    def bound(self) -> float:
+        """The proven level."""
+        return self.level
+
+    @property
+    def claim(self) -> str:
+        """The claim in one sentence, with numbers."""
+        if math.isinf(self.level):
+            return "every motion tends to 0, wherever it starts"
+        return f"every motion from V(x) <= {self.level!r} stays there and tends to 0"
+
+    @property
+    def conditions(self) -> tuple[str, ...]:
+        """Conditions of the claim, each a sentence made from the numbers of the proof."""
+        own = zip(self.states, self.f, strict=True)
+        return (
+            *(f"d{name}/dt = {each.text(self.states)}" for name, each in own),
+            f"V = {self.V.text(self.states)}",
+        )
+
+    @property
+    def facts(self) -> Mapping[str, Any]:
+        """Kind, bounds and conditions as data that JSON holds."""
+        level = self.level if math.isfinite(self.level) else "inf"
+        return {"kind": "region of attraction", "level": level, "states": list(self.states)}
+
+    @property
+    def stored(self) -> dict[str, Any]:
+        """Values of a file: equations, V and the sums of squares."""
+        if not self.verified or self.proof is None:
+            raise InputError(f"only a proven region is saved; here {self.why}")
+        return {
+            "kind": "region of attraction",
+            "states": list(self.states),
+            "f": [written_terms(p) for p in self.f],
+            "V": written_terms(self.V),
+            "level": self.level if math.isfinite(self.level) else {"float": "inf"},
+            **written_proof(self.proof),
+        }
+
+    @classmethod
+    def restored(cls, content: Mapping[str, Any]) -> RegionOfAttraction:
+        """Return the region of a file, proven anew."""
+        states = tuple(map(str, content["states"]))
+        n, level = len(states), content["level"]
+        if len(set(states)) < n or len(content["f"]) != n or isinstance(level, str | bool):
+            raise InputError("states: expected different names, one for each of f")
+        f = tuple(read_terms(each, n) for each in content["f"])
+        own = math.inf if level == {"float": "inf"} else float(level)
+        made = cls(
+            states, f, read_terms(content["V"], n), own, math.inf, None,
+            read_proof(content, n), False, NOTHING,
+        )  # fmt: skip
+        why = made._refused()
+        return replace(made, verified=not why, why=why)
+
+    def __str__(self) -> str:
+        if not self.verified:
+            return f"no region proven: {self.why}"
+        beside = f"; V proves none above {self.ceiling:.6g}" if self.point is not None else ""
+        return f"proven: {self.claim}{beside}"
+
+
+@with_one_thread
+def region_of_attraction(
+    f: Any,
+    V: Any = None,
+    *,
+    states: Any = None,
+    degree: int = 2,
+    multiplier_degree: int | None = None,
+    solver: Solver | str = "CLARABEL",
+) -> RegionOfAttraction:
+    """The largest proven level of V from which every motion of a polynomial system tends to 0.
+
+    Sums of squares are found in floating point, rounded, and checked in rational arithmetic:
+    a level that is returned holds for the equations as given, without a tolerance.
+
+    Parameters
+    ----------
+    f : mapping, sequence or casadi.Function
+        {state: dx/dt} in SymPy; a list of SymPy or CasADi expressions with `states`; or a
+        casadi.Function x -> dx/dt. Polynomials with f(0) = 0; a float is the rational that it is.
+    V : expression, casadi.Function or array (n, n), optional
+        Lyapunov function with V(0) = 0, or P of x'P x. Default: A'P + PA = -I of the linearization
+        A where it is stable, else P = I.
+    states : sequence, optional
+        Symbols of SymPy, or the CasADi column in which f is written.
+    degree : int
+        Of V where none is given: 2, or 4, 6, ... for a V that grows from the quadratic one.
+    multiplier_degree : int, optional
+        Degree of the multiplier of level - V; default: the least one, raised where that pays.
+    solver : Solver or str
+        For the search; nothing of its answer is believed.
+
+    Returns
+    -------
+    RegionOfAttraction
+        `verified` says whether there is one, `why` why not; `ceiling` limits what V can prove.
+
+    Raises
+    ------
+    InputError
+        Equations that are no polynomials, f(0) or V(0) other than 0, degrees that are odd.
+
+    References
+    ----------
+    Parrilo (2000), Structured semidefinite programs and semialgebraic geometry methods; Tan and
+    Packard, IEEE Transactions on Automatic Control 53 (2008).
+
+    Examples
+    --------
+    The Van der Pol oscillator in reversed time, with the V of its linearization.
+
+    >>> import sympy
+    >>> x, y = sympy.symbols("x y")
+    >>> found = synthesis.regions.region_of_attraction({x: -y, y: x - (1 - x**2) * y})
+    >>> print(f"{found.level:.4f} of {found.ceiling:.4f}")
+    2.3045 of 2.3045
+    """
+    own, solver = equations(f, states), general_solver(solver)
+    degree = _even(degree, "degree", 2)
+    if multiplier_degree is not None:
+        multiplier_degree = _even(multiplier_degree, "multiplier_degree", 0)
+    if V is not None and degree != 2:
+        raise InputError("degree: of a V that is not given; leave V or the degree out")
+    function = quadratic(own.f) if V is None else function_of(V, own)
+    if degree > 2:
+        function = grown(own.f, function, degree, solver)
+    return _LevelSearch(own, function, multiplier_degree, solver).found()
+
+
+def _even(value: Any, name: str, least: int) -> int:
+    degree = whole(value, name, least)
+    if degree % 2:
+        raise InputError(f"{name}: expected an even number, got {degree}")
+    return degree
+
+
+class _LevelSearch:
+    """Levels of one V, each candidate checked before it counts."""
+
+    def __init__(
+        self, own: Equations, V: SparsePolynomial, multiplier_degree: int | None, solver: Solver
+    ):
+        self.own, self.V, self.solver = own, V, solver
+        self.degree, self.E = multiplier_degree, V.along(own.f)
+
+    def found(self) -> RegionOfAttraction:
+        """Return the largest level that is proven."""
+        if not self.V.terms or not self.E.terms:
+            return self._made(0.0, None, math.inf, None, "V or dV/dt is 0 everywhere")
+        T = round_coordinates(self.V, 1.0)
+        if rises_near_zero(self.E, T):
+            return self._made(0.0, None, math.inf, None, RISES)
+        level, z = ceiling(self.V, self.E, T)
+        with task("region of attraction", len(EFFORTS)) as progress:
+            if z is None:
+                return self._unlimited(T)
+            T = short(round_coordinates(self.V, level, T))
+            level, z = ceiling(self.V, self.E, T)
+            return self._below(level, T, np.zeros(0) if z is None else T @ z, progress)
+
+    def _below(self, level: float, T: Array, x: Array, progress: Task) -> RegionOfAttraction:
+        point = rising_point(self.E, x)
+        top = math.inf if point is None else self._upper(point)
+        search = RegionSearch(self.V, self.E, T, level, self.solver)
+        if search.V is None:
+            return self._made(0.0, None, top, point, NOT_POSITIVE)
+        best: tuple[float, RegionProof | None] = (0.0, None)
+        for effort in self._efforts(search):
+            share, proof = self._largest(search, effort, best[0])
+            if proof is not None:
+                best = share, proof
+            progress.step(f"{best[0]:.4g} of the ceiling")
+            if best[0] > ENOUGH:
+                break
+        return self._made(best[0] * level, best[1], top, point, NOTHING)
+
+    def _efforts(self, search: RegionSearch) -> Iterator[Effort]:
+        """Yield degrees of multipliers, the ones asked for alone."""
+        first = bases(search.W, search.E, EFFORTS[0])
+        least = 2 * max(map(sum, first.s))
+        if self.degree is not None:
+            if self.degree < least:
+                raise InputError(f"multiplier_degree: expected at least {least} for this f and V")
+            yield Effort((self.degree - least) // 2, 0)
+            return
+        for k, effort in enumerate(EFFORTS):
+            if not k or len(bases(search.W, search.E, effort).rest) <= MOST_MONOMIALS:
+                yield effort
+
+    def _largest(
+        self, search: RegionSearch, effort: Effort, above: float
+    ) -> tuple[float, RegionProof | None]:
+        """Return the largest share of the ceiling that is proven, above one that is."""
+        low, high, best = above, 1.0, None
+        share = 1.0 - CLOSEST
+        while share > LEAST_SHARE and high - low > CLOSE * high:
+            proof = self._proven(search, share, effort)
+            if proof is None:
+                high = share
+            else:
+                low, best = share, proof
+                if share == 1.0 - CLOSEST:
+                    break
+            share = 0.5 * (low + high) if low > 0 else 0.5 * high
+        return low, best
+
+    def _proven(self, search: RegionSearch, share: float, effort: Effort) -> RegionProof | None:
+        proof = search.at(share, effort)
+        level = share * search.unit
+        return proof if proof and not why_not(self.own.f, self.V, level, proof) else None
+
+    def _unlimited(self, T: Array) -> RegionOfAttraction:
+        """Return the region where no point bounds it: all levels, or the last one of a climb."""
+        search = RegionSearch(self.V, self.E, short(T), 1.0, self.solver)
+        if search.V is None:
+            return self._made(0.0, None, math.inf, None, NOT_POSITIVE)
+        for effort in (EFFORTS[0], EFFORTS[2]):
+            proof = self._proven(search, math.inf, effort)
+            if proof is not None:
+                return self._made(math.inf, proof, math.inf, None, "")
+        best: tuple[float, RegionProof | None] = (0.0, None)
+        for factor in (STEP, 1 / STEP):
+            for k in range(STEPS):
+                own = RegionSearch(self.V, self.E, short(T), factor**k, self.solver)
+                proof = self._proven(own, 1.0, EFFORTS[0])
+                if (proof is None) == (factor > 1):
+                    break
+                if proof is not None:
+                    best = factor**k, proof
+            if best[1] is not None:
+                break
+        return self._made(*best, math.inf, None, NOTHING)
+
+    def _upper(self, point: Array) -> float:
+        """Return V at a point, rounded up."""
+        exact = self.V.value([Fraction(float(v)) for v in point])
+        value = float(exact)
+        return value if Fraction(value) >= exact else math.nextafter(value, math.inf)
+
+    def _made(
+        self, level: float, proof: RegionProof | None, top: float, point: Array | None, why: str
+    ) -> RegionOfAttraction:
+        proven = proof is not None
+        return RegionOfAttraction(
+            self.own.states, self.own.f, self.V, level, top, point, proof, proven,
+            "" if proven else why,
+        )  # fmt: skip
