@@ -149,8 +149,10 @@ def _least(
 
 def rising_point(E: SparsePolynomial, x: Array) -> Array | None:
     """Return a point near x, outwards, where dV/dt >= 0 exactly; None without one."""
-    for k in range(50, 6, -2):
-        tried = x * (1.0 + 2.0**-k)
-        if np.any(tried) and E.value([Fraction(float(v)) for v in tried]) >= 0:
-            return tried
-    return None
+    tries = (x * (1.0 + 2.0**-k) for k in range(50, 6, -2))
+    return next((tried for tried in tries if rises_at(E, tried)), None)
+
+
+def rises_at(E: SparsePolynomial, x: Array) -> bool:
+    """Whether x is not 0 and E(x) >= 0, in exact arithmetic."""
+    return bool(np.any(x)) and E.value([Fraction(float(v)) for v in x]) >= 0

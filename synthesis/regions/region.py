@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -16,11 +17,13 @@ from symheli.threads import with_one_thread
 from symheli.values.arrays import Array, frozen
 from symheli.values.numbers import whole
 from symheli.values.summary import summarized
+from synthesis.certify.questions.certificate_file import decoded, encoded
 from synthesis.certify.statement.proven_statement import ProvenStatement
 from synthesis.numerics.polynomial.multivariate import SparsePolynomial
 from synthesis.numerics.program.cone_program import Solver, general_solver
 from synthesis.regions.coordinates import (
     ceiling,
+    rises_at,
     rises_near_zero,
     rising_point,
     round_coordinates,
@@ -43,7 +46,9 @@ MOST_MONOMIALS = 70
 """Monomials of a sum of squares beyond which multipliers are not raised by themselves."""
 STEP, STEPS = 4.0, 20
 """Factor from one level to the next where nothing bounds them, and the most of them."""
-NOTHING = "no level passes the exact check; try another V or higher multipliers, multiplier_degree="
+NOTHING = (
+    "no level passes the exact check; another V may have one, or a larger, even multiplier_degree"
+)
 
 RISES = (
     "dV/dt > 0 as close to 0 as one likes: take another V, or 0 is no asymptotically stable"
@@ -67,11 +72,8 @@ class RegionOfAttraction(ProvenStatement):
         The Lyapunov function.
     level : float
         The proven level, in units of V; inf: all of them, 0: none.
-    ceiling : float
-        Level of a `point` other than 0 where dV/dt >= 0 in exact arithmetic: this V proves no
-        higher one; inf where no such point was found.
     point : array (n,) or None
-        That point.
+        A state other than 0 where dV/dt >= 0 in exact arithmetic; None where none was found.
     proof : RegionProof or None
         Coordinates and sums of squares; see `synthesis.regions.proof`.
     verified : bool
@@ -97,7 +99,6 @@ class RegionOfAttraction(ProvenStatement):
     f: tuple[SparsePolynomial, ...]
     V: SparsePolynomial
     level: float
-    ceiling: float
     point: Array | None
     proof: RegionProof | None
     verified: bool
@@ -116,6 +117,15 @@ class RegionOfAttraction(ProvenStatement):
         if any((0,) * len(self.states) in p.terms for p in (self.V, *self.f)):
             return "f and V are not 0 at 0"
         return why_not(self.f, self.V, self.level, self.proof)
+
+    @cached_property
+    def ceiling(self) -> float:
+        """V at `point`, rounded up: this V proves no higher level; inf without a point."""
+        if self.point is None:
+            return math.inf
+        exact = self.V.value([Fraction(float(v)) for v in self.point])
+        value = float(exact)
+        return value if Fraction(value) >= exact else math.nextafter(value, math.inf)
 
     def values(self, x: Any) -> Array:
         """V of states (..., n)."""
@@ -168,7 +178,8 @@ class RegionOfAttraction(ProvenStatement):
             "states": list(self.states),
             "f": [written_terms(p) for p in self.f],
             "V": written_terms(self.V),
-            "level": self.level if math.isfinite(self.level) else {"float": "inf"},
+            "level": encoded(self.level),
+            "point": encoded(self.point),
             **written_proof(self.proof),
         }
 
@@ -176,14 +187,17 @@ class RegionOfAttraction(ProvenStatement):
     def restored(cls, content: Mapping[str, Any]) -> RegionOfAttraction:
         """Return the region of a file, proven anew."""
         states = tuple(map(str, content["states"]))
-        n, level = len(states), content["level"]
-        if len(set(states)) < n or len(content["f"]) != n or isinstance(level, str | bool):
-            raise InputError("states: expected different names, one for each of f")
+        n, level = len(states), decoded(content["level"])
+        if len(set(states)) < n or len(content["f"]) != n or not isinstance(level, float | int):
+            raise InputError("states: expected different names, one for each of f, and a level")
         f = tuple(read_terms(each, n) for each in content["f"])
-        own = math.inf if level == {"float": "inf"} else float(level)
+        V, point = read_terms(content["V"], n), decoded(content["point"])
+        if point is not None:
+            point = frozen(point, "point", (n,))
+            if not rises_at(V.along(f), point):
+                raise InputError("point: dV/dt is negative there")
         made = cls(
-            states, f, read_terms(content["V"], n), own, math.inf, None,
-            read_proof(content, n), False, NOTHING,
+            states, f, V, float(level), point, read_proof(content, n), False, NOTHING
         )  # fmt: skip
         why = made._refused()
         return replace(made, verified=not why, why=why)
@@ -283,10 +297,10 @@ class _LevelSearch:
     def found(self) -> RegionOfAttraction:
         """Return the largest level that is proven."""
         if not self.V.terms or not self.E.terms:
-            return self._made(0.0, None, math.inf, None, "V or dV/dt is 0 everywhere")
+            return self._made(0.0, None, None, "V or dV/dt is 0 everywhere")
         T = round_coordinates(self.V, 1.0)
         if rises_near_zero(self.E, T):
-            return self._made(0.0, None, math.inf, None, RISES)
+            return self._made(0.0, None, None, RISES)
         level, z = ceiling(self.V, self.E, T)
         with task("region of attraction", len(EFFORTS)) as progress:
             if z is None:
@@ -297,10 +311,9 @@ class _LevelSearch:
 
     def _below(self, level: float, T: Array, x: Array, progress: Task) -> RegionOfAttraction:
         point = rising_point(self.E, x)
-        top = math.inf if point is None else self._upper(point)
         search = RegionSearch(self.V, self.E, T, level, self.solver)
         if search.V is None:
-            return self._made(0.0, None, top, point, NOT_POSITIVE)
+            return self._made(0.0, None, point, NOT_POSITIVE)
         best: tuple[float, RegionProof | None] = (0.0, None)
         for effort in self._efforts(search):
             share, proof = self._largest(search, effort, best[0])
@@ -309,7 +322,7 @@ class _LevelSearch:
             progress.step(f"{best[0]:.4g} of the ceiling")
             if best[0] > ENOUGH:
                 break
-        return self._made(best[0] * level, best[1], top, point, NOTHING)
+        return self._made(best[0] * level, best[1], point, NOTHING)
 
     def _efforts(self, search: RegionSearch) -> Iterator[Effort]:
         """Yield degrees of multipliers, the ones asked for alone."""
@@ -350,11 +363,11 @@ class _LevelSearch:
         """Return the region where no point bounds it: all levels, or the last one of a climb."""
         search = RegionSearch(self.V, self.E, short(T), 1.0, self.solver)
         if search.V is None:
-            return self._made(0.0, None, math.inf, None, NOT_POSITIVE)
+            return self._made(0.0, None, None, NOT_POSITIVE)
         for effort in (EFFORTS[0], EFFORTS[2]):
             proof = self._proven(search, math.inf, effort)
             if proof is not None:
-                return self._made(math.inf, proof, math.inf, None, "")
+                return self._made(math.inf, proof, None, "")
         best: tuple[float, RegionProof | None] = (0.0, None)
         for factor in (STEP, 1 / STEP):
             for k in range(STEPS):
@@ -366,19 +379,13 @@ class _LevelSearch:
                     best = factor**k, proof
             if best[1] is not None:
                 break
-        return self._made(*best, math.inf, None, NOTHING)
-
-    def _upper(self, point: Array) -> float:
-        """Return V at a point, rounded up."""
-        exact = self.V.value([Fraction(float(v)) for v in point])
-        value = float(exact)
-        return value if Fraction(value) >= exact else math.nextafter(value, math.inf)
+        return self._made(*best, None, NOTHING)
 
     def _made(
-        self, level: float, proof: RegionProof | None, top: float, point: Array | None, why: str
+        self, level: float, proof: RegionProof | None, point: Array | None, why: str
     ) -> RegionOfAttraction:
         proven = proof is not None
         return RegionOfAttraction(
-            self.own.states, self.own.f, self.V, level, top, point, proof, proven,
+            self.own.states, self.own.f, self.V, level, point, proof, proven,
             "" if proven else why,
         )  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -28,67 +28,108 @@ MULTIPLIER_BITS = 40
 Terms = dict[Exponents, float]
 
 
-class Sum(NamedTuple):
-    """An unknown sum of squares of these monomials, times a known polynomial."""
+class SumsOfSquares:
+    """A program in unknown sums of squares m' Q m, which enter polynomial equations linearly.
 
-    basis: Sequence[Exponents]
-    factor: Terms
-
-
-def largest_margin(
-    known: Terms, sums: Sequence[Sum], solver: Solver, unit_trace: int | None = None
-) -> tuple[float, list[Array]] | None:
-    """Return the largest t, and Q_i >= t I, with known + sum_i factor_i m_i' Q_i m_i = 0.
-
-    `unit_trace`: the sum whose eigenvalues have the mean one. None: the solver has no point.
+    Equations are numbered from 0; each says that the sum of its parts is the zero polynomial.
     """
-    sizes = [len(each.basis) for each in sums]
-    starts = np.cumsum([0, *map(length, sizes)])
-    count = int(starts[-1]) + 1
-    rows: dict[Exponents, int] = {k: i for i, k in enumerate(known)}
-    entries: list[tuple[int, int, float]] = []
-    for own, start in zip(sums, starts, strict=False):
-        entries += _entries(own, int(start), rows)
-    b = np.zeros(len(rows) + (unit_trace is not None))
-    b[: len(known)] = [-c for c in known.values()]
-    if unit_trace is not None:
-        n = sizes[unit_trace]
-        r, c, _ = indices(n)
-        trace = int(starts[unit_trace]) + np.flatnonzero(r == c)
-        entries += [(len(rows), int(k), 1.0) for k in trace]
-        b[-1] = n
-    i, j, v = map(np.array, zip(*entries, strict=True))
-    equal = sparse.csr_matrix((v, (i, j)), shape=(len(b), count))
-    cones = []
-    for n, start in zip(sizes, starts, strict=False):
-        r, c, _ = indices(n)
-        own = sparse.lil_matrix((length(n), count))
-        own[range(length(n)), range(start, start + length(n))] = -1.0
-        own[np.flatnonzero(r == c), count - 1] = 1.0
-        cones.append(own.tocsr())
-    A = sparse.csc_matrix(sparse.vstack([equal, *cones]))
-    equalities = len(b)
-    b = np.concatenate([b, np.zeros(A.shape[0] - equalities)])
-    cost = np.zeros(count)
-    cost[-1] = -1.0
-    found = solve(ConeProgram(cost, A, b, tuple(sizes), equalities, own_units=True), solver)
-    x = found.x
-    if x is None:
-        return None
-    parts = [x[a : a + length(n)] for a, n in zip(starts, sizes, strict=False)]
-    return float(x[-1]), [smat(v, n) for v, n in zip(parts, sizes, strict=True)]
 
+    def __init__(self) -> None:
+        self.sizes: list[int] = []
+        self.count = 0
+        self._starts: list[int] = []
+        self._rows: dict[tuple[int, Exponents], int] = {}
+        self._known: dict[int, float] = {}
+        self._entries: list[tuple[int, int, float]] = []
+        self._pairs: list[list[tuple[Exponents, float]]] = []
 
-def _entries(own: Sum, start: int, rows: dict[Exponents, int]) -> list[tuple[int, int, float]]:
-    """Return (row of the monomial, column of the entry, coefficient); new monomials join `rows`."""
-    r, c, weight = indices(len(own.basis))
-    out = []
-    for place, (i, j, w) in enumerate(zip(r, c, weight, strict=True)):
-        pair = sum_exponents(own.basis[i], own.basis[j])
-        for k, value in own.factor.items():
-            row = rows.setdefault(sum_exponents(pair, k), len(rows))
-            out.append((row, start + place, value * w))
-    return out
+    def known(self, equation: int, terms: Terms) -> None:
+        """Add a known polynomial to an equation."""
+        for k, value in terms.items():
+            row = self._row(equation, k)
+            self._known[row] = self._known.get(row, 0.0) + value
+
+    def sum(self, basis: Sequence[Exponents]) -> int:
+        """Add an unknown sum of squares of these monomials; return its number."""
+        r, c, weight = indices(len(basis))
+        self._pairs.append(
+            [
+                (sum_exponents(basis[i], basis[j]), float(w))
+                for i, j, w in zip(r, c, weight, strict=True)
+            ]
+        )
+        self.sizes.append(len(basis))
+        self._starts.append(self.count)
+        self.count += length(len(basis))
+        return len(self.sizes) - 1
+
+    def times(self, equation: int, number: int, factor: Terms) -> None:
+        """Add a known polynomial times a sum of squares to an equation."""
+        self.image(equation, number, lambda k: {sum_exponents(k, a): c for a, c in factor.items()})
+
+    def image(self, equation: int, number: int, linear: Callable[[Exponents], Terms]) -> None:
+        """Add a linear function of a sum of squares, given by the images of monomials."""
+        images: dict[Exponents, Terms] = {}
+        for place, (k, weight) in enumerate(self._pairs[number]):
+            for a, c in images.setdefault(k, images.get(k) or linear(k)).items():
+                column = self._starts[number] + place
+                self._entries.append((self._row(equation, a), column, c * weight))
+
+    def unit_trace(self, number: int) -> None:
+        """Impose that the eigenvalues of Q have the mean one."""
+        row = self._row(-1 - number, ())
+        self._entries += [(row, int(k), 1.0) for k in self._diagonal(number)]
+        self._known[row] = -float(self.sizes[number])
+
+    def largest_margin(self, solver: Solver) -> tuple[float, list[Array]] | None:
+        """Return the largest t with Q >= t I of all sums, and Q; None: the solver has no point."""
+        cost = np.zeros(self.count + 1)
+        cost[-1] = -1.0
+        return self._solved(cost, None, solver)
+
+    def least(
+        self, number: int, weight: Callable[[Exponents], float], margin: float, solver: Solver
+    ) -> tuple[float, list[Array]] | None:
+        """Return the least sum of weighted coefficients of one sum of squares where Q >= margin I
+        of all, and Q; None: the solver has no point.
+        """
+        cost = np.zeros(self.count + 1)
+        start = self._starts[number]
+        cost[start : start + len(self._pairs[number])] = [
+            weight(k) * w for k, w in self._pairs[number]
+        ]
+        return self._solved(cost, margin, solver)
+
+    def _solved(
+        self, cost: Array, margin: float | None, solver: Solver
+    ) -> tuple[float, list[Array]] | None:
+        rows = len(self._rows) + (margin is not None)
+        b = np.zeros(rows + self.count)
+        b[list(self._known)] = [-c for c in self._known.values()]
+        entries = list(self._entries)
+        if margin is not None:
+            entries.append((rows - 1, self.count, 1.0))
+            b[rows - 1] = margin
+        i, j, v = map(np.array, zip(*entries, strict=True))
+        equal = sparse.csr_matrix((v, (i, j)), shape=(rows, self.count + 1))
+        cones = sparse.lil_matrix((self.count, self.count + 1))
+        cones.setdiag(-1.0)
+        for number in range(len(self.sizes)):
+            cones[self._diagonal(number), self.count] = 1.0
+        A = sparse.csc_matrix(sparse.vstack([equal, cones]))
+        program = ConeProgram(cost, A, b, tuple(self.sizes), rows, own_units=True)
+        x = solve(program, solver).x
+        if x is None:
+            return None
+        parts = zip(self._starts, self.sizes, strict=True)
+        return float(x[-1]), [smat(x[a : a + length(n)], n) for a, n in parts]
+
+    def _diagonal(self, number: int) -> Array:
+        r, c, _ = indices(self.sizes[number])
+        return self._starts[number] + np.flatnonzero(r == c)
+
+    def _row(self, equation: int, k: Exponents) -> int:
+        return self._rows.setdefault((equation, k), len(self._rows))
 
 
 class Bases(NamedTuple):
@@ -156,9 +197,10 @@ class RegionSearch:
         n = len(self.T)
         degree = max(map(sum, self.W))
         basis = half_polytope([*self.W, *_corners(n, degree + degree % 2)])
-        found = largest_margin(
-            {k: -c for k, c in self.W.items()}, [Sum(basis, _one(n))], self.solver
-        )
+        program = SumsOfSquares()
+        program.known(0, {k: -c for k, c in self.W.items()})
+        program.times(0, program.sum(basis), _one(n))
+        found = program.largest_margin(self.solver)
         if found is None or not found[0] > LEAST:
             return None
         return Gram(tuple(basis), self.unit * found[1][0])
@@ -167,14 +209,18 @@ class RegionSearch:
         """Return a candidate for the level `unit` times share, inf: for all levels."""
         everywhere, n, sigma = math.isinf(share), len(self.T), effort.sigma
         own = bases(self.W, self.E, effort, everywhere)
-        known: Terms = {} if sigma else dict(self.E)
-        sums = [Sum(own.rest, _one(n))]
+        program = SumsOfSquares()
+        program.times(0, program.sum(own.rest), _one(n))
         if not everywhere:
             room = {(0,) * n: share, **{k: -c for k, c in self.W.items()}}
-            sums.append(Sum(own.s, room))
+            program.times(0, program.sum(own.s), room)
         if sigma:
-            sums.append(Sum(own.sigma, self.E))
-        found = largest_margin(known, sums, self.solver, len(sums) - 1 if sigma else None)
+            number = program.sum(own.sigma)
+            program.times(0, number, self.E)
+            program.unit_trace(number)
+        else:
+            program.known(0, self.E)
+        found = program.largest_margin(self.solver)
         if found is None or not found[0] > LEAST or self.V is None:
             return None
         Q = found[1]

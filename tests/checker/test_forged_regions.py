@@ -1,0 +1,74 @@
+"""Forged files of regions of attraction, which package and checker refuse alike."""
+
+import json
+
+import pytest
+import sympy
+
+from symheli.errors import InputError
+from synthesis.checker import report
+from synthesis.regions import RegionOfAttraction, region_of_attraction
+
+pytestmark = pytest.mark.guard
+
+PROVEN = 0
+x, y = sympy.symbols("x y")
+VAN_DER_POL = {x: -y, y: x - (1 - x**2) * y}
+
+
+def changed(content, path, value):
+    own = json.loads(json.dumps(content))
+    *place, last = path
+    at = own
+    for step in place:
+        at = at[step]
+    at[last] = value(at[last])
+    return own
+
+
+FORGED = {
+    "a higher level": (("level",), lambda v: 1.0001 * v),
+    "all levels": (("level",), lambda v: {"float": "inf"}),
+    "no level": (("level",), lambda v: -v),
+    "another V": (("V", 0, 1), lambda v: "-" + v),
+    "another f": (("f", 0, 0, 1), lambda v: v.strip("-")),
+    "a negative multiplier": (("sum_s", "Q", "array", 0), lambda v: -v),
+    "a negative sigma": (("sum_sigma", "Q", "array", 0), lambda v: -v),
+    "flat coordinates": (("T", "array"), lambda v: [0.0] * len(v)),
+    "no monomials": (
+        ("sum_rest",),
+        lambda v: {"monomials": [], "Q": {"shape": [0, 0], "array": []}},
+    ),
+    "a constant": (("sum_rest", "monomials", 0), lambda v: [0] * len(v)),
+    "one twice": (("sum_rest", "monomials", 0), lambda v: [1, 1]),
+    "a direction left out": (("sum_V", "monomials", 0), lambda v: [1, 1]),
+}
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    found = region_of_attraction(VAN_DER_POL)
+    return found.save(tmp_path_factory.mktemp("region") / "region.json")
+
+
+def proven_by_the_package(file):
+    try:
+        return RegionOfAttraction.load(file).verified
+    except InputError:
+        return False
+
+
+def test_the_file_as_it_is_is_proven(file, capsys):
+    assert proven_by_the_package(file)
+    assert report.main([str(file)]) == PROVEN
+    assert "every start with V(x) <= 2.304" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("forged", FORGED)
+def test_a_forged_file_is_refused_by_package_and_checker(forged, file, tmp_path, capsys):
+    own = changed(json.loads(file.read_text()), *FORGED[forged])
+    (tmp_path / "forged.json").write_text(json.dumps(own))
+    assert not proven_by_the_package(tmp_path / "forged.json")
+    assert report.main([str(tmp_path / "forged.json")]) != PROVEN
+    said = capsys.readouterr().out
+    assert "not proven" in said or "not checked" in said
