@@ -6,6 +6,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 TOP = ("symheli", "identification", "synthesis")
+NEW = ("synthesis.regions",)
+"""Modules whose names never stood at the top: all of them are public."""
 
 
 def moved(package):
@@ -18,7 +20,7 @@ def moved(package):
 
 def lower(package):
     """The modules below a package to which names of it have gone."""
-    found = {m for m, _ in moved(package)}
+    found = {m for m, _ in moved(package)} | {m for m in NEW if m.startswith(f"{package}.")}
     return sorted(m for m in found if hasattr(module(m), "__all__") or m.count(".") == 1)
 
 
@@ -27,7 +29,7 @@ def names(face):
     module below a package those that stood at the top.
     """
     house = tomllib.loads((ROOT / "evidence" / "house.toml").read_text(encoding="utf-8"))
-    if face in (*TOP, "symheli.lpv", "symheli.lpv.tools", *house["faces"]):
+    if face in (*TOP, "symheli.lpv", "symheli.lpv.tools", *house["faces"], *NEW):
         return list(module(face).__all__)
     packages = [package for package in (*TOP, "symheli.lpv") if face.startswith(f"{package}.")]
     return sorted({name for p in packages for m, name in moved(p) if m == face})

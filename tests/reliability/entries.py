@@ -19,7 +19,7 @@ RESULTS = set(
     Estimator Experiment FitForControl FlightDataset FrozenModels
     GainCurve ReferenceGovernor Helicopter History InvariantSet
     KinematicModel LPVARXModel LocalGain LoopShaping LowComplexitySet
-    MarginTable Margins MuDesign Online Plan
+    MarginTable Margins MuDesign Online Plan RegionOfAttraction
     RigidBodyOnline RobustMargin Scores SlopeMargin SpecificationTable
     StateSpaceModel StructuredController SwitchedController TrimPoint Tube
     WorstCaseGain
