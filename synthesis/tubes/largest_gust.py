@@ -36,12 +36,14 @@ RATES = (1.0, 0.5, 0.25, 1.5, 2.0)
 """alpha of the first tube over the rate of the slowest mode of the linear loop, by turns."""
 STEPS = (1.0, 1 / 1.2, 1.2, 1 / 1.44, 1.44)
 """Factors on the alpha of the last tube that are tried for the next gust."""
-GROWTHS = ((1.1, 1.02), (1.02, 1.005))
+COARSE, FINE = (1.1, 1.02), (1.02, 1.005)
 """Factors on the half widths of the last tube, in the first round and from one to the next."""
+FINELY = 3
+"""How many of the alphas are tried with fine factors, where all failed with coarse ones."""
 ROUNDS = 20
 SPARE = 1e-3
 """Spare of the inequality, in terms of the rate of the slowest mode."""
-FIRST = 0.01
+FIRST = 0.05
 """First gust, in terms of the one in which a tube of the linear loop fills the sizes."""
 SMALLER, TRIES = 8.0, 4
 """Factor by which the first gust is lowered while it has no tube, and how often."""
@@ -50,6 +52,7 @@ DOUBLED = 40
 
 
 NONE = "the linear loop has no invariant ellipsoid"
+BEYOND = "the tube is beyond a limit"
 
 
 class LargestGust(NamedTuple):
@@ -120,6 +123,8 @@ def largest_gust(
     >>> found.tube.verified, bool(0.35 < found.gust < 0.3849)
     (True, True)
     """
+    if "gust" in flight:
+        raise InputError("gust: it is what is sought; leave it out")
     accuracy = positive(accuracy, "accuracy")
     segments = whole(segments, "segments", 1)
     if segments > MOST_SEGMENTS:
@@ -193,7 +198,7 @@ class _GustSearch:
             self.decay = self.rate
             for share in RATES:
                 P = self._linear(gust, share * self.rate)
-                if P is not None and self._found(gust, share * self.rate, P, progress):
+                if P is not None and self._found(gust, share * self.rate, P, COARSE, progress):
                     return LargestGust(gust, self.tried, math.inf)
             gust /= SMALLER
         return LargestGust(0.0, self.tried, gust * SMALLER)
@@ -235,18 +240,20 @@ class _GustSearch:
     def _reached(self, gust: float, last: Tube, progress: Task) -> bool:
         """Whether a tube is proven in this gust, starting from the last one."""
         decay, P = self.decay, last.P
-        return any(self._found(gust, step * decay, P, progress) for step in STEPS)
+        tries = [(step, COARSE) for step in STEPS] + [(step, FINE) for step in STEPS[:FINELY]]
+        return any(self._found(gust, step * decay, P, how, progress) for step, how in tries)
 
-    def _found(self, gust: float, decay: float, P: Array, progress: Task) -> bool:
+    def _found(
+        self, gust: float, decay: float, P: Array, growth: tuple[float, float], progress: Task
+    ) -> bool:
+        """Whether a tube with this alpha is proven, starting from P."""
         loop = replace(self.loop, gust=gust)
         drifts = loop.drifts(self.cells)
-        for first, later in GROWTHS:
-            effort = Growth(decay, first, later, ROUNDS, SPARE * self.rate)
-            grown = from_below(loop, self.cells, self.sizes, drifts, effort, P, self.solver)
-            self.tried = established(loop, self.cells, grown)
-            if self.tried.verified and self.within.hold(self.tried):
-                self.last, self.decay = self.tried, decay
-                progress.step(f"|w| <= {gust:.4g}: proven")
-                return True
-        progress.step(f"|w| <= {gust:.4g}, rate {decay:.3g}: {self.tried.why or 'beyond a limit'}")
-        return False
+        effort = Growth(decay, *growth, ROUNDS, SPARE * self.rate)
+        grown = from_below(loop, self.cells, self.sizes, drifts, effort, P, self.solver)
+        self.tried = established(loop, self.cells, grown)
+        why = self.tried.why or ("" if self.within.hold(self.tried) else BEYOND)
+        progress.step(f"|w| <= {gust:.4g}, rate {decay:.3g}: {why or 'proven'}")
+        if not why:
+            self.last, self.decay = self.tried, decay
+        return not why

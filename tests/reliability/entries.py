@@ -18,7 +18,7 @@ RESULTS = set(
     Controller Coverage Criterion DwellTime Estimate
     Estimator Experiment FitForControl FlightDataset FrozenModels
     GainCurve ReferenceGovernor Helicopter History InvariantSet
-    KinematicModel LPVARXModel LocalGain LoopShaping LowComplexitySet
+    KinematicModel LPVARXModel LargestGust LocalGain LoopShaping LowComplexitySet
     MarginTable Margins MuDesign Online Plan RegionOfAttraction
     RigidBodyOnline RobustMargin Scores SlopeMargin SpecificationTable
     StateSpaceModel StructuredController SwitchedController TrimPoint Tube
