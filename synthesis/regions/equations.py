@@ -20,28 +20,35 @@ ADVICE = (
 
 
 class Equations(NamedTuple):
-    """dx/dt = f(x) with f(0) = 0, the names of x, and `read`, which reads functions of x."""
+    """f(x, u) with f(0, 0) = 0, polynomials of x and then u; their names, and `read`, which reads
+    functions of x and u.
+    """
 
     states: tuple[str, ...]
+    controls: tuple[str, ...]
     f: tuple[SparsePolynomial, ...]
     read: Any
 
 
-def equations(f: Any, states: Any = None) -> Equations:
+def equations(f: Any, states: Any = None, controls: Any = ()) -> Equations:
     """Return the equations that a mapping, a list of expressions or a CasADi function holds.
 
-    Raises `InputError` for what is no polynomial, or where f(0) is not 0.
+    Controls None: a casadi.Function is of x and u. Raises `InputError` for what is no polynomial,
+    or where f(0, 0) is not 0.
     """
     if isinstance(f, Mapping):
         if states is not None:
             raise InputError("states: the mapping {state: dx/dt} names them already; leave it out")
         states, f = list(f), list(f.values())
-    own = _by_casadi(f, states) if _is_casadi(f) else _by_sympy(f, states)
+    own = _of_casadi(f, states, controls) if _is_casadi(f) else _of_sympy(f, states, controls)
+    names = (*own.states, *own.controls)
+    if len(set(names)) < len(names) or not own.states:
+        raise InputError(f"states and controls: expected different names, got {', '.join(names)}")
     moved = [x for x, each in zip(own.states, own.f, strict=True) if (0,) * each.size in each.terms]
     if moved:
         raise InputError(
-            f"f(0) must be 0, but d{moved[0]}/dt is not; write the equations in x - x_e, with the"
-            " equilibrium x_e"
+            f"f must be 0 at 0, but that of {moved[0]} is not; write the equations in x - x_e and"
+            " u - u_e, with the equilibrium x_e, u_e"
         )
     return own
 
@@ -65,18 +72,19 @@ def _is_casadi(f: Any) -> bool:
     return type(first).__module__.partition(".")[0] == "casadi"
 
 
-def _by_sympy(f: Any, states: Any) -> Equations:
+def _of_sympy(f: Any, states: Any, controls: Any) -> Equations:
     import sympy
 
-    if states is None or not isinstance(f, Sequence | sympy.MatrixBase):
+    if states is None or controls is None or not isinstance(f, Sequence | sympy.MatrixBase):
         raise InputError(
             "f: expected {state: dx/dt} of SymPy, a list of expressions with states=[...], or a"
-            " casadi.Function x -> dx/dt"
+            " casadi.Function; controls of SymPy are named, controls=[...]"
         )
     every: list[Any] = list(f)  # type: ignore[arg-type]
-    x = [sympy.Symbol(each) if isinstance(each, str) else each for each in states]
-    if len(x) != len(every) or len(set(x)) < len(x) or not x:
-        raise InputError(f"states: expected {len(every)} different symbols, got {states!r:.80}")
+    x = [sympy.Symbol(each) if isinstance(each, str) else each for each in (*states, *controls)]
+    n = len(list(states))
+    if n != len(every):
+        raise InputError(f"states: expected {len(every)} symbols, got {states!r:.80}")
 
     def read(expression: Any, name: str) -> SparsePolynomial:
         try:
@@ -91,48 +99,53 @@ def _by_sympy(f: Any, states: Any) -> Equations:
             ) from error
         return SparsePolynomial(len(x), terms)
 
-    return Equations(
-        tuple(map(str, x)), tuple(read(e, f"d{s}/dt") for e, s in zip(every, x, strict=True)), read
-    )
+    names = tuple(map(str, x))
+    polynomials = tuple(read(e, f"the equation of {s}") for e, s in zip(every, x, strict=False))
+    return Equations(names[:n], names[n:], polynomials, read)
 
 
-def _by_casadi(f: Any, states: Any) -> Equations:
+def _of_casadi(f: Any, states: Any, controls: Any) -> Equations:
     import casadi
 
     if isinstance(f, casadi.Function):
-        if f.n_in() != 1 or f.n_out() != 1 or f.size_in(0) != f.size_out(0) or f.size2_in(0) != 1:
+        inputs = 1 if controls is not None and not len(controls) else 2
+        columns = [f.size2_in(i) for i in range(f.n_in())]
+        if columns != [1] * inputs or f.n_out() != 1 or f.size_in(0) != f.size_out(0):
+            wanted = "x" if inputs == 1 else "(x, u)"
             raise InputError(
-                f"f: expected a casadi.Function x -> dx/dt of one column each, got {f}; put numbers"
+                f"f: expected a casadi.Function {wanted} -> one column for x, got {f}; put numbers"
                 " for its other inputs, with the feedback inside"
             )
-        x = casadi.SX.sym("x", f.size1_in(0))
-        f, states = f(x), x if states is None else states
-        names = _names(states, x)
-        states = x
+        at = [casadi.SX.sym(name, f.size1_in(i)) for i, name in enumerate("xu"[:inputs])]
+        names = [_names(own, x) for own, x in zip((states, controls), at, strict=False)]
+        f = f(*at)
     else:
-        if states is None:
-            raise InputError("states: expected the casadi column of states in which f is written")
+        if states is None or controls is None:
+            raise InputError(
+                "f: expected states, and controls if any, the columns it is written in"
+            )
         f = casadi.vertcat(*f) if isinstance(f, list | tuple) else f
-        names = _names(states, states)
-    n = len(names)
-    if f.shape != (n, 1):
-        raise InputError(f"f: expected {n} entries, as many as states, got shape {f.shape}")
+        at = [states, *([] if isinstance(controls, tuple) else [controls])]
+        names = [_names(None, own) for own in at]
+    if f.shape != (len(names[0]), 1):
+        raise InputError(f"f: expected {len(names[0])} entries, as many as states, got {f.shape}")
+    column = casadi.vertcat(*at)
 
     def read(expression: Any, name: str) -> SparsePolynomial:
         if isinstance(expression, casadi.Function):
-            expression = expression(states)
-        return _polynomials(casadi.Function("f", [states], [casadi.vertcat(expression)]), name)[0]
+            expression = expression(*at[: expression.n_in()])
+        return _polynomials(casadi.Function("f", [column], [casadi.vertcat(expression)]), name)[0]
 
-    return Equations(names, _polynomials(casadi.Function("f", [states], [f]), "f"), read)
+    polynomials = tuple(read(f[i], "f") for i in range(len(names[0])))
+    return Equations(names[0], names[1] if len(names) > 1 else (), polynomials, read)
 
 
-def _names(states: Any, x: Any) -> tuple[str, ...]:
-    if isinstance(states, list | tuple):
-        names = tuple(map(str, states))
-    else:
-        names = tuple(str(states[i]) for i in range(states.shape[0]))
-    if len(names) != x.shape[0] or len(set(names)) < len(names):
-        raise InputError(f"states: expected {x.shape[0]} different names, got {names}")
+def _names(given: Any, x: Any) -> tuple[str, ...]:
+    """Return the names given, or those of the column x."""
+    found = given if given is not None and len(given) else [x[i] for i in range(x.shape[0])]
+    names = tuple(map(str, found))
+    if len(names) != x.shape[0]:
+        raise InputError(f"expected {x.shape[0]} names, got {', '.join(names)}")
     return names
 
 

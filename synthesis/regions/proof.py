@@ -14,7 +14,6 @@ level. Source of the programs: Parrilo (2000); Tan and Packard, IEEE TAC 53 (200
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -62,14 +61,14 @@ class RegionProof(NamedTuple):
     rest: Gram
 
 
-def why_not(
-    f: Sequence[SparsePolynomial], V: SparsePolynomial, level: float, proof: RegionProof
-) -> str:
-    """Return why the proof does not hold; empty where V <= level is proven to tend to 0."""
+def why_not(V: SparsePolynomial, change: SparsePolynomial, level: float, proof: RegionProof) -> str:
+    """Return why the proof does not hold; empty where V > 0 grows without bound and its change is
+    proven to be negative where V <= level, but at 0.
+    """
     n, x = V.size, linear_substitution(proof.T)
     if not _regular(proof.T):
         return "the coordinates are not regular"
-    W, E = V.composed(x), V.along(f).composed(x)
+    W, E = V.composed(x), change.composed(x)
     if not has_pure_powers(proof.V.basis, n):
         return POWERS_OF_V
     if not positive_on_all(W, *proof.V):

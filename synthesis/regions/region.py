@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, ClassVar
 
-import numpy as np
-
 from symheli.errors import InputError
-from symheli.progress import Task, task
 from symheli.threads import with_one_thread
 from symheli.values.arrays import Array, frozen
 from symheli.values.numbers import whole
@@ -22,38 +19,13 @@ from synthesis.certify.statement.proven_statement import ProvenStatement
 from synthesis.numerics.polynomial.multivariate import SparsePolynomial
 from synthesis.numerics.program.cone_program import Solver, general_solver
 from synthesis.regions.coordinates import (
-    ceiling,
     rises_at,
-    rises_near_zero,
-    rising_point,
-    round_coordinates,
-    short,
 )
-from synthesis.regions.equations import Equations, equations, function_of
+from synthesis.regions.equations import equations, function_of
 from synthesis.regions.files import read_proof, read_terms, written_proof, written_terms
 from synthesis.regions.growth import grown, quadratic
-from synthesis.regions.proof import NOT_POSITIVE, RegionProof, why_not
-from synthesis.regions.search import Effort, RegionSearch, bases
-
-CLOSEST, CLOSE = 1e-5, 1e-3
-"""Relative distance below the ceiling at which a level is tried first, and accuracy of others."""
-ENOUGH = 0.99
-"""Share of the ceiling from which multipliers of higher degree are not tried."""
-LEAST_SHARE = 1e-6
-"""Least share of the ceiling that is tried."""
-EFFORTS = (Effort(0, 0), Effort(1, 0), Effort(0, 1), Effort(1, 1))
-MOST_MONOMIALS = 70
-"""Monomials of a sum of squares beyond which multipliers are not raised by themselves."""
-STEP, STEPS = 4.0, 20
-"""Factor from one level to the next where nothing bounds them, and the most of them."""
-NOTHING = (
-    "no level passes the exact check; another V may have one, or a larger, even multiplier_degree"
-)
-
-RISES = (
-    "dV/dt > 0 as close to 0 as one likes: take another V, or 0 is no asymptotically stable"
-    " equilibrium"
-)
+from synthesis.regions.levels import NOTHING, LevelSearch
+from synthesis.regions.proof import RegionProof, why_not
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +88,7 @@ class RegionOfAttraction(ProvenStatement):
             return self.why or NOTHING
         if any((0,) * len(self.states) in p.terms for p in (self.V, *self.f)):
             return "f and V are not 0 at 0"
-        return why_not(self.f, self.V, self.level, self.proof)
+        return why_not(self.V, self.V.along(self.f), self.level, self.proof)
 
     @cached_property
     def ceiling(self) -> float:
@@ -275,7 +247,11 @@ def region_of_attraction(
     function = quadratic(own.f) if V is None else function_of(V, own)
     if degree > 2:
         function = grown(own.f, function, degree, solver)
-    return _LevelSearch(own, function, multiplier_degree, solver).found()
+    found = LevelSearch(function, function.along(own.f), multiplier_degree, solver).found()
+    level, proof, point, why = found
+    return RegionOfAttraction(
+        own.states, own.f, function, level, point, proof, proof is not None, why
+    )
 
 
 def _even(value: Any, name: str, least: int) -> int:
@@ -283,109 +259,3 @@ def _even(value: Any, name: str, least: int) -> int:
     if degree % 2:
         raise InputError(f"{name}: expected an even number, got {degree}")
     return degree
-
-
-class _LevelSearch:
-    """Levels of one V, each candidate checked before it counts."""
-
-    def __init__(
-        self, own: Equations, V: SparsePolynomial, multiplier_degree: int | None, solver: Solver
-    ):
-        self.own, self.V, self.solver = own, V, solver
-        self.degree, self.E = multiplier_degree, V.along(own.f)
-
-    def found(self) -> RegionOfAttraction:
-        """Return the largest level that is proven."""
-        if not self.V.terms or not self.E.terms:
-            return self._made(0.0, None, None, "V or dV/dt is 0 everywhere")
-        T = round_coordinates(self.V, 1.0)
-        if rises_near_zero(self.E, T):
-            return self._made(0.0, None, None, RISES)
-        level, z = ceiling(self.V, self.E, T)
-        with task("region of attraction", len(EFFORTS)) as progress:
-            if z is None:
-                return self._unlimited(T)
-            T = short(round_coordinates(self.V, level, T))
-            level, z = ceiling(self.V, self.E, T)
-            return self._below(level, T, np.zeros(0) if z is None else T @ z, progress)
-
-    def _below(self, level: float, T: Array, x: Array, progress: Task) -> RegionOfAttraction:
-        point = rising_point(self.E, x)
-        search = RegionSearch(self.V, self.E, T, level, self.solver)
-        if search.V is None:
-            return self._made(0.0, None, point, NOT_POSITIVE)
-        best: tuple[float, RegionProof | None] = (0.0, None)
-        for effort in self._efforts(search):
-            share, proof = self._largest(search, effort, best[0])
-            if proof is not None:
-                best = share, proof
-            progress.step(f"{best[0]:.4g} of the ceiling")
-            if best[0] > ENOUGH:
-                break
-        return self._made(best[0] * level, best[1], point, NOTHING)
-
-    def _efforts(self, search: RegionSearch) -> Iterator[Effort]:
-        """Yield degrees of multipliers, the ones asked for alone."""
-        first = bases(search.W, search.E, EFFORTS[0])
-        least = 2 * max(map(sum, first.s))
-        if self.degree is not None:
-            if self.degree < least:
-                raise InputError(f"multiplier_degree: expected at least {least} for this f and V")
-            yield Effort((self.degree - least) // 2, 0)
-            return
-        for k, effort in enumerate(EFFORTS):
-            if not k or len(bases(search.W, search.E, effort).rest) <= MOST_MONOMIALS:
-                yield effort
-
-    def _largest(
-        self, search: RegionSearch, effort: Effort, above: float
-    ) -> tuple[float, RegionProof | None]:
-        """Return the largest share of the ceiling that is proven, above one that is."""
-        low, high, best = above, 1.0, None
-        share = 1.0 - CLOSEST
-        while share > LEAST_SHARE and high - low > CLOSE * high:
-            proof = self._proven(search, share, effort)
-            if proof is None:
-                high = share
-            else:
-                low, best = share, proof
-                if share == 1.0 - CLOSEST:
-                    break
-            share = 0.5 * (low + high) if low > 0 else 0.5 * high
-        return low, best
-
-    def _proven(self, search: RegionSearch, share: float, effort: Effort) -> RegionProof | None:
-        proof = search.at(share, effort)
-        level = share * search.unit
-        return proof if proof and not why_not(self.own.f, self.V, level, proof) else None
-
-    def _unlimited(self, T: Array) -> RegionOfAttraction:
-        """Return the region where no point bounds it: all levels, or the last one of a climb."""
-        search = RegionSearch(self.V, self.E, short(T), 1.0, self.solver)
-        if search.V is None:
-            return self._made(0.0, None, None, NOT_POSITIVE)
-        for effort in (EFFORTS[0], EFFORTS[2]):
-            proof = self._proven(search, math.inf, effort)
-            if proof is not None:
-                return self._made(math.inf, proof, None, "")
-        best: tuple[float, RegionProof | None] = (0.0, None)
-        for factor in (STEP, 1 / STEP):
-            for k in range(STEPS):
-                own = RegionSearch(self.V, self.E, short(T), factor**k, self.solver)
-                proof = self._proven(own, 1.0, EFFORTS[0])
-                if (proof is None) == (factor > 1):
-                    break
-                if proof is not None:
-                    best = factor**k, proof
-            if best[1] is not None:
-                break
-        return self._made(*best, None, NOTHING)
-
-    def _made(
-        self, level: float, proof: RegionProof | None, point: Array | None, why: str
-    ) -> RegionOfAttraction:
-        proven = proof is not None
-        return RegionOfAttraction(
-            self.own.states, self.own.f, self.V, level, point, proof, proven,
-            "" if proven else why,
-        )  # fmt: skip

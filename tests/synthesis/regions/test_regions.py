@@ -189,7 +189,7 @@ S = casadi.SX.sym("s", 1)
         (({x: -x + y},), "numbers as coefficients"),
         ((casadi.Function("f", [S], [-casadi.sin(S)]),), "'sin'"),
         ((casadi.Function("f", [S], [-S / (1 + S)]),), "'div'"),
-        (({x: 1 - x},), r"f\(0\) must be 0"),
+        (({x: 1 - x},), "must be 0 at 0"),
         ((CUBIC, 1 + x**2), r"V\(0\) must be 0"),
         ((CUBIC, [[1.0, 0.0]]), "expected shape"),
         (([-x],), "with states="),
