@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 from .demands import Claim, Demand
 from .polynomials import Exponents, Polynomial, combined, even, matrix, scalar, variable, zero
-from .reading import HIGHEST_DEGREE, INFINITE, Unreadable, array, number, whole
+from .reading import INFINITE, Unreadable, array, number, whole
 
 Terms = dict[Exponents, Fraction]
 KIND = "region of attraction"
@@ -84,7 +84,7 @@ def _exponents(given: Any, n: int) -> Exponents:
     return tuple(whole(e, "an exponent", 0) for e in given)
 
 
-def _read(given: Any, n: int) -> Polynomial:
+def read(given: Any, n: int) -> Polynomial:
     """Return a polynomial without a constant of a list of terms."""
     terms = {_exponents(k, n): Fraction(str(c)) for k, c in given}
     if len(terms) < len(given) or any(not any(k) for k in terms):
@@ -101,51 +101,80 @@ def _gram(given: Any, n: int) -> Gram:
     return Gram(own, Q)
 
 
-def _substituted(p: Polynomial, T: Sequence[Sequence[Fraction]]) -> Polynomial:
-    """Return p at x = T z."""
-    n = len(T)
-    for i, row in enumerate(T):
-        x = combined([variable(n + j) for j in range(n)], [scalar(t) for t in row])
+def composed(p: Polynomial, inner: Sequence[Polynomial], n: int) -> Polynomial:
+    """Return p with these polynomials of n variables in place of its own."""
+    m = len(inner)
+    for i, x in enumerate(inner):
+        for j in reversed(range(n)):
+            x = x.at(j, variable(m + j))
         p = p.at(i, x)
     for j in range(n):
-        p = p.at(n + j, variable(j))
+        p = p.at(m + j, variable(j))
     return p.reduced()
 
 
-def claimed(content: Any) -> Claim:
-    """Return what a file of a region claims; the fields of the file are named here alone."""
-    states = [str(name) for name in content["states"]]
-    n = whole(len(states), "the number of states", 1, HIGHEST_DEGREE)
-    f, V = [_read(each, n) for each in content["f"]], _read(content["V"], n)
-    level = None if content["level"] == INFINITE else number(content["level"], "the level")
+def linear(T: Sequence[Sequence[Fraction]]) -> list[Polynomial]:
+    """Return the rows of T z as polynomials."""
+    return [combined([variable(j) for j in range(len(row))], [scalar(t) for t in row]) for row in T]
+
+
+def substituted(p: Polynomial, T: Sequence[Sequence[Fraction]]) -> Polynomial:
+    """Return p at x = T z."""
+    return composed(p, linear(T), len(T[0]))
+
+
+def decrease(
+    content: Any, V: Polynomial, E: Polynomial, level: Fraction | None
+) -> tuple[list[Demand], str]:
+    """Return what proves V > 0, and E < 0 where V <= level (None: everywhere), but at 0; and why
+    nothing can.
+    """
+    n = len(content["states"])
     T = array(content["T"], "T", n, n)
     R, A, B, Q = (_gram(content[f"sum_{name}"], n) for name in ("V", "sigma", "s", "rest"))
-    if len(f) != n or len(set(states)) < n:
-        raise Unreadable("the file is damaged: states and equations do not fit")
-    refused = "the level is not above zero" if level is not None and level <= 0 else ""
-    if not (R.vanishes_at_zero_only(n) and Q.vanishes_at_zero_only(n)) or not A.monomials:
-        refused = "monomials are missing, or one is constant"
+    if level is not None and level <= 0:
+        return [], "the level is not above zero"
+    if not (R.vanishes_at_zero_only(n) and Q.vanishes_at_zero_only(n) and A.monomials):
+        return [], "monomials are missing, or one is constant"
     if level is None and B.monomials:
-        refused = "a multiplier of no level"
-    E = combined([V.derivative(i) for i in range(n)], f) if f else zero(1, 1)
-    W, E = _substituted(V, T), _substituted(E, T)
-    p = -(A.polynomial() @ E)
+        return [], "a multiplier of no level"
+    W, p = substituted(V, T), -(A.polynomial() @ substituted(E, T))
     if level is not None and B.monomials:
         p = p - B.polynomial() @ (scalar(level) - W)
-    forms = [("V > 0", R.made_equal(W)), ("dV/dt < 0", Q.made_equal(p))] if not refused else []
-    if any(form is None for _, form in forms):
-        refused = "a polynomial has monomials that no sum of squares here has"
     own = matrix(T, n)
     demands = [Demand("x = T z for every x", own.T @ own)]
-    demands += [Demand(name, form) for name, form in forms if form is not None]
+    for name, form in (("V > 0", R.made_equal(W)), ("V falls", Q.made_equal(p))):
+        if form is None:
+            return [], f"{name}: a polynomial has monomials that no sum of squares here has"
+        demands.append(Demand(name, form))
     demands += [Demand("a multiplier", even(each.Q)) for each in (A, B) if each.monomials]
-    where = "every start" if level is None else f"every start with V(x) <= {float(level)!r}"
-    claim = f"the motion from {where} tends to 0 and keeps V at most at that level"
-    if level is None:
-        claim = f"the motion from {where} tends to 0"
-    said = [f"dx/dt = f(x) of {n} states, polynomials of degree {_degree(f)}, V of {_degree([V])}"]
+    return demands, ""
+
+
+def claimed(content: Any) -> Claim:
+    """Return what a file of a region claims; the fields of the file are named here and above."""
+    n = named(content["states"])
+    f, V = [read(each, n) for each in content["f"]], read(content["V"], n)
+    if len(f) != n:
+        raise Unreadable("the file is damaged: states and equations do not fit")
+    level = None if content["level"] == INFINITE else number(content["level"], "the level")
+    E = combined([V.derivative(i) for i in range(n)], f)
+    demands, refused = decrease(content, V, E, level)
+    claim = "the motion from every start tends to 0"
+    if level is not None:
+        where = f"every start with V(x) <= {float(level)!r}"
+        claim = f"the motion from {where} tends to 0 and keeps V at most at that level"
+    said = [f"dx/dt = f(x) of {n} states, polynomials of degree {degree(f)}, V of {degree([V])}"]
     return Claim(claim, said, demands, refused=refused)
 
 
-def _degree(polynomials: Sequence[Polynomial]) -> int:
+def named(states: Any) -> int:
+    """Return how many different names these are, at least one."""
+    if len({str(name) for name in states}) < len(states):
+        raise Unreadable("the file is damaged: a name twice")
+    return whole(len(states), "the number of states", 1)
+
+
+def degree(polynomials: Sequence[Polynomial]) -> int:
+    """Return the largest degree."""
     return max((sum(k) for p in polynomials for k in p.terms), default=0)

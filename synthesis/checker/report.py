@@ -4,7 +4,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from . import dwell, lagged, lft, regions, sets, storage
+from . import dwell, lagged, lft, regions, sets, storage, terminal
 from .demands import Claim, failure
 from .reading import DAMAGED, TUBE, Unreadable, opened
 
@@ -25,6 +25,8 @@ def claim_of(kind: str, content: Mapping[str, Any]) -> Claim:
         return dwell.claimed(content)
     if kind == regions.KIND:
         return regions.claimed(content)
+    if kind == terminal.KIND:
+        return terminal.claimed(content)
     if kind in (TUBE, "tube"):
         raise Unreadable(
             "tubes are not decided here: their proof rests on enclosures of nonlinear equations"

@@ -47,9 +47,8 @@ SPARES = (0.1, 0.5)
 
 
 def linearization(f: Sequence[SparsePolynomial]) -> Array:
-    """Return A of dx/dt = A x near 0."""
-    n = len(f)
-    units = np.eye(n, dtype=int).tolist()
+    """Return the matrix of the linear terms, a row for each polynomial."""
+    units = np.eye(f[0].size, dtype=int).tolist()
     return np.array([[float(p.terms.get(tuple(u), 0)) for u in units] for p in f])
 
 

@@ -1,4 +1,4 @@
-"""Forged files of regions of attraction, which package and checker refuse alike."""
+"""Forged files of regions of attraction and of terminal sets, which package and checker refuse."""
 
 import json
 
@@ -7,7 +7,7 @@ import sympy
 
 from symheli.errors import InputError
 from synthesis.checker import report
-from synthesis.regions import RegionOfAttraction, region_of_attraction
+from synthesis.regions import RegionOfAttraction, TerminalSet, region_of_attraction, terminal
 
 pytestmark = pytest.mark.guard
 
@@ -72,3 +72,46 @@ def test_a_forged_file_is_refused_by_package_and_checker(forged, file, tmp_path,
     assert report.main([str(tmp_path / "forged.json")]) != PROVEN
     said = capsys.readouterr().out
     assert "not proven" in said or "not checked" in said
+
+
+OF_A_TERMINAL_SET = {
+    "a higher level": (("alpha",), lambda v: 1.0001 * v),
+    "no level": (("alpha",), lambda v: -v),
+    "a narrower limit": (("bounds", 0, 1), lambda v: 0.9999 * v),
+    "a limit of nothing": (("bounds", 0, 0), lambda v: "w"),
+    "a larger cost of states": (("Q", "array"), lambda v: [1.5 * each for each in v]),
+    "a larger cost of controls": (("R", "array", 0), lambda v: 1.5 * v),
+    "another feedback": (("K", "array", 0), lambda v: -v),
+    "a smaller terminal cost": (("P", "array"), lambda v: [0.9 * each for each in v]),
+    "samples": (("dt",), lambda v: 0.1),
+    "another f": (("f", 0, 0, 1), lambda v: v.strip("-") if "-" in v else "-" + v),
+    "a name twice": (("states", 0), lambda v: "y"),
+}
+
+
+@pytest.fixture(scope="module")
+def terminal_file(tmp_path_factory):
+    u = sympy.Symbol("u")
+    f = {x: y, y: u - x**3}
+    found = terminal(
+        f, [[1.0, 0.0], [0.0, 1.0]], [[1.0]], controls=[u], input_bounds={"u": 0.5}, share=0.3
+    )
+    return found.save(tmp_path_factory.mktemp("terminal") / "terminal.json")
+
+
+def test_the_terminal_set_as_it_is_is_proven(terminal_file, capsys):
+    assert TerminalSet.load(terminal_file).verified
+    assert report.main([str(terminal_file)]) == PROVEN
+    assert "|u| <= 0.5" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("forged", OF_A_TERMINAL_SET)
+def test_a_forged_terminal_set_is_refused(forged, terminal_file, tmp_path, capsys):
+    own = changed(json.loads(terminal_file.read_text()), *OF_A_TERMINAL_SET[forged])
+    (tmp_path / "forged.json").write_text(json.dumps(own))
+    try:
+        assert not TerminalSet.load(tmp_path / "forged.json").verified
+    except InputError:
+        pass
+    assert report.main([str(tmp_path / "forged.json")]) != PROVEN
+    capsys.readouterr()

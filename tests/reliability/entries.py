@@ -21,7 +21,7 @@ RESULTS = set(
     KinematicModel LPVARXModel LargestGust LocalGain LoopShaping LowComplexitySet
     MarginTable Margins MuDesign Online Plan RegionOfAttraction
     RigidBodyOnline RobustMargin Scores SlopeMargin SpecificationTable
-    StateSpaceModel StructuredController SwitchedController TrimPoint Tube
+    StateSpaceModel StructuredController SwitchedController TerminalSet TrimPoint Tube
     WorstCaseGain
     """.split()
 )

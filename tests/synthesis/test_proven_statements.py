@@ -22,7 +22,7 @@ from synthesis.analysis import (
 from synthesis.certify.statement.statement_file import read
 from synthesis.checker.report import main as checker
 from synthesis.forms import Spline
-from synthesis.regions import region_of_attraction
+from synthesis.regions import region_of_attraction, terminal
 from synthesis.robust import DynamicBlock, robust_margin, slope_margin, worst_case_gain
 from synthesis.sets import invariant_set, low_complexity_set
 from synthesis.switching import dwell_time
@@ -83,7 +83,7 @@ def pushed():
 QUICK = {"form": Spline(degree=1, segments=1), "search": None}
 TRIPLED = {(0, 1): [[3.0]], (1, 0): [[3.0]]}
 SLOW = [[[-1.0]], [[-1.0]]]
-X = sympy.Symbol("x")
+X, U = sympy.symbols("x u")
 MADE = {
     "l2 gain": lambda: l2_gain(lag(), **QUICK),
     "sampled l2 gain": lambda: l2_gain(lag(0.1), **QUICK),
@@ -110,6 +110,9 @@ MADE = {
     "average dwell time": lambda: dwell_time(SLOW, TRIPLED, average=True),
     "sampled dwell time": lambda: dwell_time([[[0.9]], [[0.8]]], TRIPLED, dt=0.1),
     "region": lambda: region_of_attraction({X: -X + X**3}, X**2),
+    "terminal set": lambda: terminal(
+        {X: X**3 + U}, [[1.0]], [[1.0]], controls=[U], input_bounds={"u": 1.0}, share=0.5
+    ),
 }
 BETTER = {
     **dict.fromkeys(("l2 gain", "sampled l2 gain", "energy-to-peak gain", "h2 gain"), "gamma"),
@@ -123,6 +126,7 @@ BETTER = {
     **dict.fromkeys(("passivity index of two", "output strictness of two"), "index"),
     **dict.fromkeys(("dwell time", "average dwell time", "sampled dwell time"), "seconds"),
     "region": "level",
+    "terminal set": "alpha",
 }
 
 LARGER = ("alpha", "index", "slope", "level")
