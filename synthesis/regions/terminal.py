@@ -74,6 +74,19 @@ class TerminalSet(ProvenStatement):
     ------
     InputError
         `save` of a set without a proof, `load` of a file that is damaged or another.
+
+    Examples
+    --------
+    A motor with saturated torque.
+
+    >>> import sympy
+    >>> w, u = sympy.symbols("w u")
+    >>> found = synthesis.regions.terminal(
+    ...     {w: u - w}, [[1.0]], [[1.0]], controls=[u], input_bounds={"u": 0.5}
+    ... )
+    >>> given = found.acados()
+    >>> found.contains([1.2]), found.contains([1.3]), given["uh_e"].tolist() == [found.alpha]
+    (True, False, True)
     """
 
     states: tuple[str, ...]

@@ -58,6 +58,13 @@ BEYOND = "the tube is beyond a limit"
 class LargestGust(NamedTuple):
     """The largest `gust` with a proven `tube`, and the least one, `refused`, where none was found:
     that there is none is not shown. 0 and a tube without proof where no gust has one.
+
+    Examples
+    --------
+    >>> import symheli
+    >>> heli = symheli.Helicopter.load("xcell60", governor="ideal")
+    >>> print(LargestGust(0.1, tube(heli, 3.0, gust=0.1), 0.2))
+    a tube is proven for |w| <= 0.1; none was found at 0.2
     """
 
     gust: float

@@ -1,17 +1,22 @@
 """Forged files of regions of attraction and of terminal sets, which package and checker refuse."""
 
 import json
+import math
 
+import numpy as np
 import pytest
 import sympy
 
 from symheli.errors import InputError
 from synthesis.checker import report
 from synthesis.regions import RegionOfAttraction, TerminalSet, region_of_attraction, terminal
+from synthesis.regions.equations import equations, function_of
+from synthesis.regions.proof import Gram, RegionProof
 
 pytestmark = pytest.mark.guard
 
 PROVEN = 0
+HEAD = {"schema": "symheli statement", "version": 2, "statement": "region-of-attraction"}
 x, y = sympy.symbols("x y")
 VAN_DER_POL = {x: -y, y: x - (1 - x**2) * y}
 
@@ -72,6 +77,45 @@ def test_a_forged_file_is_refused_by_package_and_checker(forged, file, tmp_path,
     assert report.main([str(tmp_path / "forged.json")]) != PROVEN
     said = capsys.readouterr().out
     assert "not proven" in said or "not checked" in said
+
+
+def forged_proof(f, V, sigma, s, rest, level):
+    """A region about x and y whose sums of squares have these Q over these monomials."""
+    own = [function_of(each, equations({x: -x, y: -y})) for each in (*f, V)]
+    squares = [
+        Gram(tuple(basis), np.diag(np.array(Q, dtype=float))) for basis, Q in (sigma, s, rest)
+    ]
+    both = Gram(((1, 0), (0, 1)), np.eye(2)) if V.has(y) else Gram(((1, 0),), np.eye(1))
+    proof = RegionProof(np.eye(2), both, *squares)
+    return RegionOfAttraction(("x", "y"), tuple(own[:2]), own[2], level, None, proof, True)
+
+
+ONE, BOTH, NONE = [(0, 0)], [(1, 0), (0, 1)], ([], [])
+FALSE = {
+    # V = x^2 says nothing of y, which grows
+    "a direction left out": ((-x, y), x**2, (ONE, [1]), NONE, ([(1, 0)], [2]), math.inf),
+    # dV/dt = 2 |x|^2 times -1 is negative
+    "a negative sigma": ((x, y), x**2 + y**2, (ONE, [-1]), NONE, (BOTH, [2, 2]), math.inf),
+    # -dV/dt + x^2 (4 - V) is positive, but 0 is unstable
+    "a negative multiplier": (
+        (x - x**3, -4 * y - 2 * x**2 * y),
+        x**2 + y**2,
+        (ONE, [1]),
+        ([(1, 0)], [-1]),
+        ([(1, 0), (0, 1), (2, 0), (1, 1)], [2, 8, 1, 3]),
+        4.0,
+    ),
+}
+
+
+@pytest.mark.parametrize("false", FALSE)
+def test_sums_of_squares_that_prove_nothing_are_refused(false, tmp_path):
+    """Their identities hold: what fails is what they would have to mean."""
+    found = forged_proof(*FALSE[false])
+    assert not found.verify()
+    (tmp_path / "false.json").write_text(json.dumps(HEAD | found.stored))
+    assert not proven_by_the_package(tmp_path / "false.json")
+    assert report.main([str(tmp_path / "false.json")]) == 1
 
 
 OF_A_TERMINAL_SET = {
