@@ -74,7 +74,8 @@ def exact_gram(p: SparsePolynomial, basis: Sequence[Exponents], Q: Array) -> Arr
 def positive_on_all(p: SparsePolynomial, basis: Sequence[Exponents], Q: Array) -> bool:
     """Whether p(x) >= c |m(x)|^2 for some c > 0, with Q that `exact_gram` makes exact."""
     own = exact_gram(p, basis, Q)
-    return own is not None and len(basis) > 0 and positive_definite(own)
+    even = np.array_equal(Q, np.asarray(Q).T)
+    return own is not None and even and len(basis) > 0 and positive_definite(own)
 
 
 def has_pure_powers(basis: Collection[Exponents], size: int) -> bool:
