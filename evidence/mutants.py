@@ -520,6 +520,41 @@ MUTANTS = (
         "return float((z**2).sum() / (w**2).sum())",
         "tests/studies/test_study_controllers.py",
     ),
+    Mutant(
+        "a sum of squares may leave a direction out",
+        "synthesis/numerics/polynomial/gram.py",
+        "own == set(range(size))",
+        "True",
+        "tests/checker/test_forged_regions.py",
+    ),
+    Mutant(
+        "what a sum of squares misses of its polynomial is left out",
+        "synthesis/numerics/polynomial/gram.py",
+        "            out[i, j] += c / len(places[k])\n",
+        "            out[i, j] += 0\n",
+        "tests/checker/test_forged_regions.py tests/synthesis/regions/test_regions.py",
+    ),
+    Mutant(
+        "the multiplier of a region may have either sign",
+        "synthesis/regions/proof.py",
+        "if not (proof.sigma.is_sum_of_squares and proof.s.is_sum_of_squares):",
+        "if not proof.sigma.is_sum_of_squares:",
+        "tests/checker/test_forged_regions.py",
+    ),
+    Mutant(
+        "the cost of a terminal set leaves the controls out",
+        "synthesis/regions/terminal.py",
+        " + quadratic_form(R).composed(u)",
+        "",
+        "tests/checker/test_forged_regions.py",
+    ),
+    Mutant(
+        "limits of a terminal set are not checked",
+        "synthesis/regions/terminal.py",
+        "if not _within(self.P, self.row(name), bound, self.alpha):",
+        "if False:",
+        "tests/checker/test_forged_regions.py",
+    ),
 )
 
 

@@ -4,6 +4,7 @@ from synthesis import designs as designs
 from synthesis import forms as forms
 from synthesis import impose as impose
 from synthesis import objectives as objectives
+from synthesis import regions as regions
 from synthesis import robust as robust
 from synthesis import sets as sets
 from synthesis import sheet as sheet

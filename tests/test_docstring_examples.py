@@ -134,6 +134,7 @@ LONG = (
     "synthesis.robust-robust_margin",
     "synthesis.robust-worst_case_gain",
     "synthesis.robust-mu_synthesis",
+    "synthesis.tubes-largest_gust",
     "synthesis.designs-loop_shaping",
     "synthesis-DwellTime",
     "synthesis.switching-SwitchedController",

@@ -25,7 +25,8 @@ PACKAGES = (
     "synthesis",
     *("synthesis.analysis", "synthesis.designs", "synthesis.objectives", "synthesis.forms"),
     *("synthesis.impose", "synthesis.robust", "synthesis.sets", "synthesis.tubes"),
-    *("synthesis.switching", "synthesis.structures", "synthesis.sheet", "synthesis.claims"),
+    *("synthesis.regions", "synthesis.switching", "synthesis.structures", "synthesis.sheet"),
+    "synthesis.claims",
 )
 """Modules with names for users, the names that count most first."""
 OWN = {"symheli.embedding": ("embed",), "symheli.progress": ("watched",)}

@@ -20,7 +20,7 @@ from fractions import Fraction
 from itertools import pairwise
 from typing import Any, NamedTuple
 
-from . import regions
+from . import bounded_regions
 from .demands import Claim, Demand, exponential
 from .exact import Rows
 from .functions import solved
@@ -39,7 +39,7 @@ def claimed(content: Any) -> Claim:
     if kinds == ("limited", "terminal"):
         return _terminal(plant, own, content)
     if kinds == ("polynomial", "region"):
-        return regions.claimed(plant, own, content)
+        return bounded_regions.claimed(plant, own, content)
     raise Unreadable(f"a claim {kinds!r:.60} is not known")
 
 
@@ -305,7 +305,7 @@ def _polytope(H: Polynomial, h: Sequence[Fraction], conditions: Any, multipliers
     if len(conditions) != len(multipliers):
         raise Unreadable("the file is damaged: the multipliers are not those of the conditions")
     for i, ((a, b), texts) in enumerate(zip(conditions, multipliers, strict=True)):
-        y = [regions.rational(text) for text in texts]
+        y = [bounded_regions.rational(text) for text in texts]
         if len(y) != len(h):
             raise Unreadable("the file is damaged: a multiplier for each row of H is missing")
         same = not (matrix([y], len(y)) @ H - a).reduced().terms

@@ -1,136 +1,180 @@
-"""A polynomial V that somebody else computed: {V <= rho} is a region of attraction of x' = f(x).
+"""Level sets V <= level from which all motions of dx/dt = f(x) tend to 0, f and V polynomials.
 
-It is where {V <= rho} is bounded, and V > 0 > dV/dt at all of its x other than zero: a component of
-it holds a least V, there dV/dx = 0, so that it is zero. With x = diag(box) r y, y on a face of the
-unit box, the signs of V/r^k, (dV/dt)/r^l and V - rho are decided on 0 <= r <= 1, and with r = 1/s,
-V > rho on 0 <= s <= 1, by Bernstein coefficients on boxes that are halved.
+With x = T z, W(z) = V(x), E(z) = grad V . f, and monomials a, b, c, m of z:
+
+    W = c'Rc,  -(a'Aa) E - (b'Bb)(level - W) = m'Qm,  R, Q, A, B > 0
+
+R and Q as stored, after the coefficients that are missing were spread over the entries with that
+product. c and m hold a power of each variable and no constant: so V > 0 and dV/dt < 0 but at 0.
 """
 
-from collections.abc import Callable, Sequence
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from itertools import product as combinations
-from typing import Any
+from itertools import product as pairs
+from typing import Any, NamedTuple
 
-from .demands import Claim
-from .polynomials import Polynomial, bernstein_coefficients, scalar, variable
-from .reading import Unreadable, whole
+from .demands import Claim, Demand
+from .polynomials import Exponents, Polynomial, combined, even, matrix, scalar, variable, zero
+from .reading import INFINITE, Unreadable, array, number, whole
 
-MOST_BOXES, MOST_TERMS = 20_000, 5000
-Terms = dict[tuple[int, ...], Fraction]
-
-
-def rational(text: Any) -> Fraction:
-    """Return the rational of a text such as "-3/4"."""
-    if not isinstance(text, str) or len(text) > 10_000 or set(text) - set("0123456789-/"):
-        raise Unreadable("the file is damaged: a rational is no text of digits")
-    return Fraction(text)
+Terms = dict[Exponents, Fraction]
+KIND = "region of attraction"
 
 
-def _terms(value: Any, n: int) -> Terms:
-    found = {tuple(whole(k, "an exponent", 0) for k in e): rational(c) for e, c in value}
-    if any(len(e) != n for e in found) or len(found) != len(value) or len(found) > MOST_TERMS:
-        raise Unreadable("the file is damaged: exponents that fit no states, or are there twice")
-    return {e: c for e, c in found.items() if c}
+class Gram(NamedTuple):
+    """m'Qm of monomials m by their exponents."""
+
+    monomials: Sequence[Exponents]
+    Q: Sequence[Sequence[Fraction]]
+
+    def places(self) -> Iterator[tuple[Exponents, int, int]]:
+        """Yield the product of every two monomials, and the entry of Q at which it stands."""
+        for (i, a), (j, b) in pairs(enumerate(self.monomials), repeat=2):
+            yield tuple(x + y for x, y in zip(a, b, strict=True)), i, j
+
+    def polynomial(self) -> Polynomial:
+        """Return it as a scalar polynomial."""
+        terms: Terms = {}
+        for k, i, j in self.places():
+            terms[k] = terms.get(k, Fraction(0)) + self.Q[i][j]
+        return _polynomial(terms)
+
+    def made_equal(self, p: Polynomial) -> Polynomial | None:
+        """Return Q with p = m'Qm exactly; None: a monomial of p is none of the products."""
+        rest, own = _terms(p - self.polynomial(), len(self.monomials[0])), {}
+        for k, i, j in self.places():
+            own.setdefault(k, []).append((i, j))
+        Q = [list(row) for row in self.Q]
+        for k, c in rest.items():
+            for i, j in own.get(k, ()):
+                Q[i][j] += c / len(own[k])
+        return even(Q) if rest.keys() <= own.keys() else None
+
+    def vanishes_at_zero_only(self, n: int) -> bool:
+        """Whether a power of every variable is among the monomials, and no constant."""
+        alone = {k.index(max(k)) for k in self.monomials if sum(k) == max(k) > 0}
+        return alone == set(range(n)) and all(map(any, self.monomials))
 
 
-def _slope(V: Terms, f: Sequence[Terms]) -> Terms:
-    """Return dV/dt = sum_i dV/dx_i f_i."""
-    found: Terms = {}
-    for i, own in enumerate(f):
-        for (e, c), (k, d) in combinations(V.items(), own.items()):
-            if e[i]:
-                key = tuple(a + b - (j == i) for j, (a, b) in enumerate(zip(e, k, strict=True)))
-                found[key] = found.get(key, Fraction(0)) + c * d * e[i]
-    return {e: c for e, c in found.items() if c}
+def _polynomial(terms: Terms) -> Polynomial:
+    return (
+        combined([_power(k) for k in terms], [scalar(c) for c in terms.values()])
+        if terms
+        else (zero(1, 1))
+    )
 
 
-def claimed(plant: Any, own: Any, content: Any) -> Claim:
-    """Return what a file of a region of attraction claims."""
-    names, rho = plant["states"], rational(own["rho"])
-    n = len(names)
-    f, V = [_terms(each, n) for each in plant["f"]], _terms(own["V"], n)
-    box = [rational(text) for text in content["box"]]
-    claim = f"every motion that starts in V <= {float(rho)!r} tends to zero"
-    said = [f"x' = f(x) with {n} polynomials of {sum(map(len, f))} terms, f(0) = 0"]
-    zero = (0,) * n
-    if len(f) != n or len(box) != n or not n or any(b <= 0 for b in box):
-        raise Unreadable("the file is damaged: not one polynomial and one width of a state")
-    if rho <= 0 or zero in V or any(zero in own for own in f) or not V:
-        return Claim(claim, said, (), refused="rho is not above zero, or V(0) or f(0) is not zero")
-    return Claim(claim, said, (), refused=_missed(V, _slope(V, f), rho, box))
+def _power(k: Exponents) -> Polynomial:
+    last = max((i + 1 for i, e in enumerate(k) if e), default=0)
+    return Polynomial((1, 1), {k[:last]: [[1]]})
 
 
-def _missed(V: Terms, slope: Terms, rho: Fraction, box: Sequence[Fraction]) -> str:
-    """Return why {V <= rho} is not shown to be a region of attraction; nothing where it is."""
-    n = len(box)
-    if not slope:
-        return "V does not fall"
-    level, fall = {**V, (0,) * n: -rho}, {e: -c for e, c in slope.items()}
-    most = max(map(sum, V))
-    for face in combinations(range(n), (-1, 1)):
-        beyond = _on(level, face, box, lambda k: most - k)
-        if not _decided([beyond], n, all):
-            return "{V <= rho} is not shown to lie in the box"
-        own = [_on(F, face, box, _lowered(F)) for F in (V, fall)]
-        own.append(_on(level, face, box, lambda k: k))
-        if not _decided(own, n, lambda good: good[2] or (good[0] and good[1])):
-            return "V is not shown to be positive and to fall at all states with V <= rho"
-    return ""
+def _terms(p: Polynomial, n: int) -> Terms:
+    own = p.reduced()
+    return {
+        (*k, *(0,) * (n - len(k))): Fraction(rows[0][0], own.below) for k, rows in own.terms.items()
+    }
 
 
-def _lowered(F: Terms) -> Callable[[int], int]:
-    least = min(map(sum, F))
-    return lambda k: k - least
+def _exponents(given: Any, n: int) -> Exponents:
+    if len(given) != n:
+        raise Unreadable("the file is damaged: exponents that are not one for each state")
+    return tuple(whole(e, "an exponent", 0) for e in given)
 
 
-def _on(
-    F: Terms, face: tuple[int, int], box: Sequence[Fraction], radial: Callable[[int], int]
-) -> Polynomial:
-    """Return F at x = diag(box) y, each term of degree k times r^radial(k): in t of the other
-    coordinates, y = 2 t - 1, and r.
+def read(given: Any, n: int) -> Polynomial:
+    """Return a polynomial without a constant of a list of terms."""
+    terms = {_exponents(k, n): Fraction(str(c)) for k, c in given}
+    if len(terms) < len(given) or any(not any(k) for k in terms):
+        raise Unreadable("the file is damaged: a term twice, or f or V that is not 0 at 0")
+    return _polynomial(terms)
+
+
+def _gram(given: Any, n: int) -> Gram:
+    own = [_exponents(k, n) for k in given["monomials"]]
+    if len(set(own)) < len(own):
+        raise Unreadable("the file is damaged: a monomial twice")
+    Q = array(given["Q"], "a sum of squares", len(own), len(own))
+    even(Q)
+    return Gram(own, Q)
+
+
+def composed(p: Polynomial, inner: Sequence[Polynomial], n: int) -> Polynomial:
+    """Return p with these polynomials of n variables in place of its own."""
+    m = len(inner)
+    for i, x in enumerate(inner):
+        for j in reversed(range(n)):
+            x = x.at(j, variable(m + j))
+        p = p.at(i, x)
+    for j in range(n):
+        p = p.at(m + j, variable(j))
+    return p.reduced()
+
+
+def linear(T: Sequence[Sequence[Fraction]]) -> list[Polynomial]:
+    """Return the rows of T z as polynomials."""
+    return [combined([variable(j) for j in range(len(row))], [scalar(t) for t in row]) for row in T]
+
+
+def substituted(p: Polynomial, T: Sequence[Sequence[Fraction]]) -> Polynomial:
+    """Return p at x = T z."""
+    return composed(p, linear(T), len(T[0]))
+
+
+def decrease(
+    content: Any, V: Polynomial, E: Polynomial, level: Fraction | None
+) -> tuple[list[Demand], str]:
+    """Return what proves V > 0, and E < 0 where V <= level (None: everywhere), but at 0; and why
+    nothing can.
     """
-    axis, sign = face
-    n, others = len(box), [j for j in range(len(box)) if j != face[0]]
-    most = max(max(e) for e in F)
-    powers = []
-    for i in range(len(others)):
-        y = variable(i) * 2 - scalar(1)
-        own = [scalar(1)]
-        for _ in range(most):
-            own.append((own[-1] @ y).reduced())
-        powers.append(own)
-    found: Polynomial | None = None
-    for e, c in F.items():
-        for b, k in zip(box, e, strict=True):
-            c = c * b**k
-        k = radial(sum(e))
-        term = Polynomial((1, 1), {(*(0,) * (n - 1), k) if k else (): [[1]]})
-        term = term * (c * sign ** e[axis])
-        for i, j in enumerate(others):
-            term = term @ powers[i][e[j]]
-        found = term if found is None else found + term
-    return (found or scalar(0)).reduced()
+    n = len(content["states"])
+    T = array(content["T"], "T", n, n)
+    R, A, B, Q = (_gram(content[f"sum_{name}"], n) for name in ("V", "sigma", "s", "rest"))
+    if level is not None and level <= 0:
+        return [], "the level is not above zero"
+    if not (R.vanishes_at_zero_only(n) and Q.vanishes_at_zero_only(n) and A.monomials):
+        return [], "monomials are missing, or one is constant"
+    if level is None and B.monomials:
+        return [], "a multiplier of no level"
+    W, p = substituted(V, T), -(A.polynomial() @ substituted(E, T))
+    if level is not None and B.monomials:
+        p = p - B.polynomial() @ (scalar(level) - W)
+    own = matrix(T, n)
+    demands = [Demand("x = T z for every x", own.T @ own)]
+    for name, form in (("V > 0", R.made_equal(W)), ("V falls", Q.made_equal(p))):
+        if form is None:
+            return [], f"{name}: a polynomial has monomials that no sum of squares here has"
+        demands.append(Demand(name, form))
+    demands += [Demand("a multiplier", even(each.Q)) for each in (A, B) if each.monomials]
+    return demands, ""
 
 
-def _decided(every: Sequence[Polynomial], n: int, settled: Callable[[list[bool]], bool]) -> bool:
-    """Whether halving the unit box settles all of its parts, from which polynomials are positive on
-    each.
-    """
-    waiting, looked = [(list(every), 0)], 0
-    while waiting:
-        own, depth = waiting.pop()
-        looked += 1
-        good = [_positive(F, n) for F in own]
-        if settled(good):
-            continue
-        if looked > MOST_BOXES or depth > 60 * n:
-            return False
-        axis, half = depth % n, Fraction(1, 2)
-        for side in (0, 1):
-            t = (variable(axis) + scalar(side)) * half
-            waiting.append(([F.at(axis, t) for F in own], depth + 1))
-    return True
+def claimed(content: Any) -> Claim:
+    """Return what a file of a region claims; the fields of the file are named here and above."""
+    n = named(content["states"])
+    f, V = [read(each, n) for each in content["f"]], read(content["V"], n)
+    if len(f) != n:
+        raise Unreadable("the file is damaged: states and equations do not fit")
+    level = None if content["level"] == INFINITE else number(content["level"], "the level")
+    E = combined([V.derivative(i) for i in range(n)], f)
+    demands, refused = decrease(content, V, E, level)
+    claim = "the motion from every start tends to 0"
+    if level is not None:
+        where = f"every start with V(x) <= {float(level)!r}"
+        claim = f"the motion from {where} tends to 0 and keeps V at most at that level"
+    said = [f"dx/dt = f(x) of {n} states, polynomials of degree {degree(f)}, V of {degree([V])}"]
+    return Claim(claim, said, demands, refused=refused)
 
 
-def _positive(F: Polynomial, n: int) -> bool:
-    return all(row[0][0] > 0 for row in bernstein_coefficients(F, n).values())
+def named(states: Any) -> int:
+    """Return how many different names these are, at least one."""
+    if len({str(name) for name in states}) < len(states):
+        raise Unreadable("the file is damaged: a name twice")
+    return whole(len(states), "the number of states", 1)
+
+
+def degree(polynomials: Sequence[Polynomial]) -> int:
+    """Return the largest degree."""
+    return max((sum(k) for p in polynomials for k in p.terms), default=0)

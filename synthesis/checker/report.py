@@ -4,7 +4,19 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from . import claims, dwell, lagged, lft, listed, periodic, rational, sets, storage
+from . import (
+    claims,
+    dwell,
+    lagged,
+    lft,
+    listed,
+    periodic,
+    rational,
+    regions,
+    sets,
+    storage,
+    terminal,
+)
 from .demands import Claim, failure
 from .reading import DAMAGED, TUBE, Unreadable, opened
 
@@ -31,6 +43,10 @@ def claim_of(kind: str, content: Mapping[str, Any]) -> Claim:
         return periodic.claimed(kind, content)
     if kind == "claim":
         return claims.claimed(content)
+    if kind == regions.KIND:
+        return regions.claimed(content)
+    if kind == terminal.KIND:
+        return terminal.claimed(content)
     if kind in (TUBE, "tube"):
         raise Unreadable(
             "tubes are not decided here: their proof rests on enclosures of nonlinear equations"

@@ -26,6 +26,10 @@ TAMED = 1e-3
 """Share of the largest kinks' squares below which offsets of a kink are kept small."""
 TINY = 1e-300
 """Least divisor where a square may be 0."""
+SEGMENTS = 4
+"""Parts of the way to a deviation, by default,"""
+MOST_SEGMENTS = 1000
+"""and at most."""
 CORNERS = 3
 """Commands at whose ends the inequality is checked; the others are terms of the remainder."""
 
@@ -61,12 +65,14 @@ class Deviations:
     """de/dt of e = x - x_r with u = u_r + K e in gusts of amplitude `gust`.
 
     model: a helicopter with its `Reference`, or any dx/dt = f(x, u, w) with its `Motions`. gust:
-    m/s, body axes, any direction; or the size of w.
+    m/s, body axes, any direction; or the size of w. segments: parts of the way to a deviation over
+    which the Jacobian is averaged; more are sharper and take longer.
     """
 
     model: Helicopter | casadi.Function
     reference: Reference | Motions
     gust: float
+    segments: int = SEGMENTS
 
     __repr__ = summarized
 
@@ -178,7 +184,9 @@ class Deviations:
             places, widths, commands, data = self.parts(cell, self.reference.jacobian_parts)
             ellipsoid = Domain.ellipsoid(zero, share * factor)
             over = (ellipsoid, Domain.ellipsoid(calm, share * np.eye(m)), commands, data)
-            parts = segment_averages(function, *over, along=[0, 1], start=start)
+            parts = segment_averages(
+                function, *over, along=[0, 1], start=start, pieces=self.segments
+            )
             if np.all(np.isfinite(parts.average.rest)):
                 units = np.concatenate([np.linalg.norm(factor, axis=1), np.ones(m + 1)])
                 own = _covered(parts, places, widths, whole, units)

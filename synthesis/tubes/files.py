@@ -14,7 +14,7 @@ from symheli import Helicopter
 from symheli.airframe.vehicle import load_vehicle
 from symheli.airframe.written import as_toml
 from symheli.values.arrays import Array
-from synthesis.tubes.deviations import Deviations
+from synthesis.tubes.deviations import MOST_SEGMENTS, SEGMENTS, Deviations
 from synthesis.tubes.enclosure import equations
 from synthesis.tubes.equipment import LoopEquipment
 from synthesis.tubes.inequality import Multipliers
@@ -50,7 +50,7 @@ def written_loop(loop: Deviations) -> dict[str, Any]:
         }
     else:
         own |= {"model": equations.written(model)}
-    return {**own, "gust": loop.gust}
+    return {**own, "gust": loop.gust, "segments": loop.segments}
 
 
 def read_loop(content: Mapping[str, Any]) -> Deviations:
@@ -59,7 +59,10 @@ def read_loop(content: Mapping[str, Any]) -> Deviations:
     gust = float(numbers(content["gust"]))
     if not gust >= 0:
         raise ValueError(f"gust: expected the size of the gusts, >= 0, got {gust:g}")
-    return Deviations(model, reference, gust)
+    segments = content.get("segments", SEGMENTS)
+    if type(segments) is not int or not 1 <= segments <= MOST_SEGMENTS:
+        raise ValueError(f"segments: expected a whole number, got {segments!r:.40}")
+    return Deviations(model, reference, gust, segments)
 
 
 def _written(r: Reference) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise, product
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import casadi
 import numpy as np
@@ -24,7 +24,7 @@ from symheli.values.summary import summarized
 from synthesis.certify.statement.proven_statement import ProvenStatement
 from synthesis.numerics.program.cone_program import Solver
 from synthesis.tubes.controllers import Choice
-from synthesis.tubes.deviations import CommandCell, Deviations
+from synthesis.tubes.deviations import SEGMENTS, CommandCell, Deviations
 from synthesis.tubes.equipment import of_periods
 from synthesis.tubes.files import (
     numbers,
@@ -453,6 +453,32 @@ def tube(
     >>> found.verified, bool(found.half_widths[0] < 0.02)
     (True, True)
     """
+    loop, cells, own = posed(
+        model, reference, gust=gust, acceleration=acceleration, jerk=jerk, snap=snap, gain=gain,
+        known=known, servos=servos, period=period, delay=delay, sizes=sizes,
+    )  # fmt: skip
+    return _found(loop, cells, own, solver or Solver(tolerance=TOLERANCE))
+
+
+def posed(
+    model: Helicopter | casadi.Function,
+    reference: Any,
+    *,
+    gust: float,
+    acceleration: float = 0.0,
+    jerk: float = 0.0,
+    snap: float = math.inf,
+    gain: Any = None,
+    known: Sequence[str] | None = None,
+    servos: Mapping[str, Servo] | Actuation | None = None,
+    period: float = 0.0,
+    delay: int = 0,
+    sizes: Any = None,
+    segments: int = SEGMENTS,
+) -> tuple[Deviations, tuple[CommandCell, ...], Array]:
+    """Return the closed loop, the cells of its commands and the half widths of equal weight of what
+    `tube` is asked.
+    """
     if not (np.isfinite(gust) and gust >= 0):
         raise InputError(f"gust must be a number >= 0; got {gust!r:.60}")
     limits = _limits(acceleration, jerk, snap)
@@ -466,11 +492,11 @@ def tube(
     else:
         others = [gain, known, servos, period or None, delay or None]
         made = _checked(model, reference, [*limits[:2], *(x is not None for x in others)], sizes)
-    loop = Deviations(model, made, float(gust))
+    loop = Deviations(model, made, float(gust), segments)
     own = own if sizes is None else np.array(sizes, float)
     if own.shape != (len(loop.states),) or not (np.all(np.isfinite(own)) and np.all(own > 0)):
         raise InputError(f"sizes must be {len(loop.states)} numbers > 0; got {sizes}")
-    return _found(loop, tuple(_cells(made)), own, solver or Solver(tolerance=TOLERANCE))
+    return loop, tuple(_cells(made)), own
 
 
 def _flight(
@@ -601,6 +627,18 @@ def _fills(boxes: Array, whole: Array) -> bool:
     )
 
 
+class Growth(NamedTuple):
+    """How a tube is sought: its rate alpha, 1/s, the factors on the half widths in the first round
+    and from one round to the next, the rounds at most, and the spare of the inequality, 1/s.
+    """
+
+    decay: float
+    first: float
+    later: float
+    rounds: int = ROUNDS
+    spare: float = SPARE
+
+
 Grown = tuple[TubeSolution | None, Sequence[Enclosed], Array, str]
 """What was found, the cells enclosed, P, why nothing was."""
 
@@ -610,7 +648,12 @@ def _found(loop: Deviations, cells: tuple[CommandCell, ...], sizes: Array, solve
     that satisfy the inequality lie inside.
     """
     with task("tube", len(GROWTHS)) as progress:
-        found, over, P, why = _grown(loop, cells, sizes, solver, progress)
+        return established(loop, cells, _grown(loop, cells, sizes, solver, progress))
+
+
+def established(loop: Deviations, cells: tuple[CommandCell, ...], grown: Grown) -> Tube:
+    """Return the tube that a search has found, with its proof."""
+    found, over, P, why = grown
     factors = np.array([cell.factor for cell in over])
     if found is None:
         return Tube(loop, P, cells, factors, (), False, why)
@@ -638,38 +681,39 @@ def _grown(
         return None, (), P, "the linear loop has no invariant ellipsoid"
     made: Grown = (None, (), P, "")
     for first, growth in GROWTHS:
-        made = _from_below(loop, cells, sizes, drifts, (found[1], first, growth), found[0], solver)
+        effort = Growth(found[1], first, growth)
+        made = from_below(loop, cells, sizes, drifts, effort, found[0], solver)
         if made[0] is not None:
             break
         progress.step(made[3])
     return made
 
 
-def _from_below(
+def from_below(
     loop: Deviations,
     cells: Sequence[CommandCell],
     sizes: Array,
     drifts: Array,
-    numbers: tuple[float, float, float],
+    effort: Growth,
     P: Array,
     solver: Solver,
 ) -> Grown:
-    """As `_grown`, from the ellipsoids P of the linear loop; numbers: decay and growths."""
-    decay, growth, later = numbers
-    for _ in range(ROUNDS):
+    """As `_grown`, from ellipsoids P that are too small or just large enough."""
+    decay, growth, later, rounds, spare = effort
+    for _ in range(rounds):
         P, growth = P / growth**2, later
         roots, factors = coordinates(P, cells)
         over = enclosed_cells(loop, cells, factors, drifts)
         if over is None:
             return None, (), P, "the equations have no bounds over a tube of the size needed"
-        found = smallest(over, roots, sizes, decay, SPARE, solver, loop.reference.jump)
+        found = smallest(over, roots, sizes, decay, spare, solver, loop.reference.jump)
         if found is None:
             why = "no ellipsoid satisfies the inequality: the gusts are too large"
             return None, over, P, why
         if inside(found.P, cells, factors) * INSIDE > 1:
             return found, over, found.P, ""
         P = found.P
-    return None, over, P, f"the tube still grew after {ROUNDS} rounds"
+    return None, over, P, f"the tube still grew after {rounds} rounds"
 
 
 def of_linear_loop(

@@ -18,10 +18,10 @@ RESULTS = set(
     Controller Coverage Criterion DwellTime Estimate ListedBound ListedFeedback
     Estimator Experiment FitForControl FlightDataset FrozenModels
     GainCurve ReferenceGovernor Helicopter History InvariantSet
-    KinematicModel LPVARXModel LocalGain LoopShaping LowComplexitySet
-    MarginTable Margins MuDesign Online PeriodicGain Plan RationalGain
+    KinematicModel LPVARXModel LargestGust LocalGain LoopShaping LowComplexitySet
+    MarginTable Margins MuDesign Online PeriodicGain Plan RationalGain RegionOfAttraction
     RigidBodyOnline RobustMargin Scores SlopeMargin SpecificationTable
-    StateSpaceModel StructuredController SwitchedController TrimPoint Tube
+    StateSpaceModel StructuredController SwitchedController TerminalSet TrimPoint Tube
     WorstCaseGain
     """.split()
 )

@@ -7,6 +7,7 @@ from math import inf, log
 
 import numpy as np
 import pytest
+import sympy
 
 from studies import cli
 from symheli import LinearModel, LPVStateSpace, Scheduling
@@ -21,6 +22,7 @@ from synthesis.analysis import (
 from synthesis.certify.statement.statement_file import read
 from synthesis.checker.report import main as checker
 from synthesis.forms import Spline
+from synthesis.regions import region_of_attraction, terminal
 from synthesis.robust import DynamicBlock, robust_margin, slope_margin, worst_case_gain
 from synthesis.sets import invariant_set, low_complexity_set
 from synthesis.switching import dwell_time
@@ -81,6 +83,7 @@ def pushed():
 QUICK = {"form": Spline(degree=1, segments=1), "search": None}
 TRIPLED = {(0, 1): [[3.0]], (1, 0): [[3.0]]}
 SLOW = [[[-1.0]], [[-1.0]]]
+X, U = sympy.symbols("x u")
 MADE = {
     "l2 gain": lambda: l2_gain(lag(), **QUICK),
     "sampled l2 gain": lambda: l2_gain(lag(0.1), **QUICK),
@@ -106,6 +109,10 @@ MADE = {
     "dwell time": lambda: dwell_time(SLOW, TRIPLED, within=1.2, parts=4),
     "average dwell time": lambda: dwell_time(SLOW, TRIPLED, average=True),
     "sampled dwell time": lambda: dwell_time([[[0.9]], [[0.8]]], TRIPLED, dt=0.1),
+    "region": lambda: region_of_attraction({X: -X + X**3}, X**2),
+    "terminal set": lambda: terminal(
+        {X: X**3 + U}, [[1.0]], [[1.0]], controls=[U], input_bounds={"u": 1.0}, share=0.5
+    ),
 }
 BETTER = {
     **dict.fromkeys(("l2 gain", "sampled l2 gain", "energy-to-peak gain", "h2 gain"), "gamma"),
@@ -118,7 +125,12 @@ BETTER = {
     **dict.fromkeys(("passivity index", "output strictness"), "index"),
     **dict.fromkeys(("passivity index of two", "output strictness of two"), "index"),
     **dict.fromkeys(("dwell time", "average dwell time", "sampled dwell time"), "seconds"),
+    "region": "level",
+    "terminal set": "alpha",
 }
+
+LARGER = ("alpha", "index", "slope", "level")
+"""Numbers of which a larger one is better."""
 
 
 @cache
@@ -182,7 +194,7 @@ def test_the_checker_that_stands_alone_agrees(saved):
     assert checked(file) == expected
     if kind in BETTER and not expected:
         content, name = json.loads(file.read_text()), BETTER[kind]
-        content[name] *= 1.2 if name == "alpha" else 0.8
+        content[name] *= 1.2 if name in ("alpha", "level") else 0.8
         file.write_text(json.dumps(content))
         assert checked(file) == 1
 
@@ -219,7 +231,7 @@ def test_a_better_number_is_not_proven(kind, tmp_path):
     file = found.save(tmp_path / "proof.json")
     content = json.loads(file.read_text())
     name = BETTER[kind]
-    content[name] *= 1.2 if name in ("alpha", "index", "slope") else 0.8
+    content[name] *= 1.2 if name in LARGER else 0.8
     for other in {"lower", "upper", "frozen", "index_limit"} & content.keys():
         content[other] = {"float": "nan"}
     file.write_text(json.dumps(content))
@@ -267,7 +279,7 @@ def test_a_number_changed_is_refused_or_says_what_it_now_proves(saved, tmp_path)
             again = proven(tmp_path / "forged.json")
             if again is not None and kind in BETTER and BETTER[kind] == path[0]:
                 better = again.bound > found.bound * (1 + 1e-2)
-                looser = BETTER[kind] not in ("alpha", "index", "slope")
+                looser = BETTER[kind] not in LARGER
                 assert better == looser or again.bound == found.bound
 
 
