@@ -1,0 +1,592 @@
+"""Gains by multipliers: x' P x of a loop with the lags of its multipliers, P of any sign.
+
+d = Delta v are inputs of a model and f others; x has its states and those of lags of signals of the
+blocks. The gain from f to y is below g where for all (x, w) other than zero, w = (d, f),
+
+    d(x' P x)/dt + sum of the forms + |y|^2 - g^2 |f|^2 < 0
+
+(sampled: x+' P x+ - x' P x), each form has an integral >= 0 for all v and d = Delta(v) of finite
+energy, the loop with d = N v is stable, and the blocks are joined to N by a path of blocks for which
+the forms are as well. E is a power of a lag a/(s + a), sampled (1 - a)/(z - a). The forms:
+
+    static     e = d - low v, u = high v - d: sum over (i, j) of c (e_i u_i + e_j u_j -+ 2 e_i E u_j)/2
+               and of the same with (E e_i) u_j, c >= 0, + if phi is odd; s_i e_i u_i with s_i above
+               half the difference of the sums of c in row i and column i, i != j; q e dv/dt
+    parameter  e = d - middle v: radius^2 |v|_Y^2 - |e|_Y^2 + 2 v' S e over v, e and all E v, E e,
+               Y > 0, S = -S'
+    dynamics   bound^2 |v|_Y^2 - |d|_Y^2 over each channel and all its E, Y > 0
+    delay      e = v(t - T) - v(t): |v|_X^2 - |v + e|_X^2 over the powers E, X of any sign; |N v|_Y^2
+               - |D e|_Y^2, with |exp(-s T) - 1| <= |N/D|, Y > 0, over powers of the lag; of a
+               window, e = s d and T^2 |v|_Z^2 - |d|_Z^2, Z > 0
+    own        M of the outputs of a filter of (v, d), with weights >= 0
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+from .demands import Claim, Demand
+from .functions import solved
+from .polynomials import Polynomial, diagonal, even, matrix
+from .reading import Unreadable, array, number, period, whole
+
+Row = list[Fraction]
+CORNER, ZEROS, POLES = Fraction(2363, 1000), Fraction(838, 1000), Fraction(685, 1000)
+MOST = 10**4
+
+
+class Loop:
+    """Signals as rows on (x, w): `motion` are those of dx/dt, or of the next x."""
+
+    def __init__(self, content: Mapping[str, Any]) -> None:
+        """Read the model; states of lags are added later."""
+        rows = [array(content[k], k, None, None) for k in "ABCD"]
+        A, B, C, D = rows
+        n, m, p = len(A), len(B[0]) if B else len(D[0]), len(C)
+        shapes = ((A, n, n), (B, n, m), (C, p, n), (D, p, m))
+        if any(len(M) != a or any(len(row) != b for row in M) for M, a, b in shapes):
+            raise Unreadable("the file is damaged: the matrices of the model do not fit")
+        self.A, self.B, self.C, self.D, self.dt = A, B, C, D, period(content["dt"])
+        self.lags = sum(_states(each) for each in content["blocks"])
+        self.n, self.m, self.own = n + self.lags, m, n
+        self.size, self.used = self.n + m, n
+        self.motion = [self.wide(A[i], B[i]) for i in range(n)]
+
+    def wide(self, x: Sequence[Fraction], w: Sequence[Fraction]) -> Row:
+        """Return a signal of the model's states and inputs."""
+        return [*x, *[Fraction(0)] * self.lags, *w]
+
+    def output(self, j: int) -> Row:
+        """Return an output."""
+        return self.wide(self.C[j], self.D[j])
+
+    def input(self, i: int) -> Row:
+        """Return an input."""
+        return [Fraction(k == self.n + i) for k in range(self.size)]
+
+    def slope(self, j: int) -> Row:
+        """Return the derivative of an output."""
+        if self.dt is not None or any(self.D[j]):
+            raise Unreadable("an output with feedthrough, or a sampled one, has no derivative")
+        return added((c, self.motion[i]) for i, c in enumerate(self.C[j]))
+
+    def state(self, motion: Row) -> Row:
+        """Return a new state, its motion without the state itself."""
+        self.motion.append(motion)
+        self.used += 1
+        return [Fraction(k == self.used - 1) for k in range(self.size)]
+
+    def lagged(self, signal: Row, pole: Fraction) -> Row:
+        """Return a lag of a signal."""
+        stay, enter = (pole, 1 - pole) if self.dt else (-pole, pole)
+        own = self.state([enter * v for v in signal])
+        self.motion[-1] = added([(Fraction(1), self.motion[-1]), (stay, own)])
+        return own
+
+
+def added(terms: Any, size: int = 0) -> Row:
+    """Return the sum of (factor, signal)."""
+    out: Row = []
+    for factor, row in terms:
+        out = out or [Fraction(0)] * len(row)
+        if factor:
+            out = [a + factor * b for a, b in zip(out, row, strict=True)]
+    return out
+
+
+class Form:
+    """The sum of forms, as a symmetric matrix on (x, w)."""
+
+    def __init__(self, size: int) -> None:
+        """Begin with zero."""
+        self.rows = [[Fraction(0)] * size for _ in range(size)]
+
+    def add(self, factor: Fraction, p: Row, q: Row) -> None:
+        """Add factor p q."""
+        for a, b in ((p, q), (q, p)) if factor else ():
+            right = [(j, v) for j, v in enumerate(b) if v]
+            for i, u in enumerate(a):
+                if u:
+                    for j, v in right:
+                        self.rows[i][j] += factor * u * v / 2
+
+    def square(self, M: Sequence[Row], rows: Sequence[Row], factor: Fraction | int = 1) -> None:
+        """Add factor times the form of M in these signals."""
+        for i, own in enumerate(M):
+            for j, value in enumerate(own):
+                self.add(factor * value, rows[i], rows[j])
+
+
+class Block(NamedTuple):
+    """A block: its fields, channels, and coefficients that are taken one after the other."""
+
+    content: Mapping[str, Any]
+    inputs: Sequence[int]
+    outputs: Sequence[int]
+    values: Iterator[Fraction]
+
+    def take(self) -> Fraction:
+        """Return the next coefficient."""
+        value = next(self.values, None)
+        if value is None:
+            raise Unreadable("the file is damaged: a multiplier has too few coefficients")
+        return value
+
+    def lower(self, n: int) -> list[Row]:
+        """Return a symmetric matrix of its lower triangle by rows."""
+        M = [[Fraction(0)] * n for _ in range(n)]
+        for i in range(n):
+            for j in range(i + 1):
+                M[i][j] = M[j][i] = self.take()
+        return M
+
+    def value(self, name: str) -> Fraction:
+        """Return a number."""
+        return number(self.content[name], name)
+
+    @property
+    def poles(self) -> list[Fraction]:
+        """Poles of the lags."""
+        return [number(v, "a pole") for v in self.content["poles"]]
+
+    @property
+    def order(self) -> int:
+        """Largest power of a lag."""
+        return whole(self.content["order"], "the order", 0)
+
+    def flag(self, name: str) -> bool:
+        """Return whether a field is true."""
+        if not isinstance(self.content[name], bool):
+            raise Unreadable(f"the file is damaged: {name} is neither true nor false")
+        return self.content[name]
+
+
+def _states(content: Any) -> int:
+    """Return the number of states that the multipliers of a block add."""
+    if content["type"] == "own":
+        return len(array(content["filter"][0], "a filter", None, None))
+    signals = len(content["inputs"]) + len(content["outputs"])
+    order = whole(content["order"], "the order", 0)
+    return whole(len(content["poles"]) * order * signals, "a number of states", 0, MOST)
+
+
+class Told(NamedTuple):
+    """What the multipliers of a block demand, their words, and the factor of the nominal block."""
+
+    demands: Sequence[Demand]
+    words: str
+    nominal: Fraction
+
+
+def _copies(loop: Loop, block: Block, signals: Sequence[Row]) -> list[list[Row]]:
+    """Return the signals, then those through each power of each lag."""
+    out = [list(signals)]
+    for pole in block.poles:
+        own = list(signals)
+        for _ in range(block.order):
+            own = [loop.lagged(row, pole) for row in own]
+            out.append(own)
+    return out
+
+
+def _range(block: Block) -> tuple[Fraction, Fraction]:
+    low, high = block.value("low"), block.value("high")
+    if low >= high:
+        raise Unreadable("the file is damaged: a range is empty")
+    return low, high
+
+
+def _not_below(values: Sequence[Fraction]) -> None:
+    if any(v < 0 for v in values):
+        raise Refused("a multiplier is not of its class: a coefficient is below zero")
+
+
+class Refused(Exception):
+    """The proof is none, whatever its inequality says."""
+
+
+def _static(loop: Loop, form: Form, block: Block) -> Told:
+    low, high = _range(block)
+    sloped, odd, constant, popov = (block.flag(k) for k in ("sloped", "odd", "constant", "popov"))
+    if not constant and (sloped or popov) or not sloped and block.poles:
+        raise Refused("a function that depends on time, or has no slopes, has no such multiplier")
+    channels = range(len(block.inputs))
+    v = [loop.output(j) for j in block.outputs]
+    d = [loop.input(i) for i in block.inputs]
+    u = [added([(high, v[i]), (Fraction(-1), d[i])]) for i in channels]
+    e = [added([(Fraction(1), d[i]), (-low, v[i])]) for i in channels]
+    copies = _copies(loop, block, [*u, *e])[1:]
+    spare = [block.take() for _ in channels]
+    rows, columns = [Fraction(0)] * len(spare), [Fraction(0)] * len(spare)
+
+    def pair(i: int, j: int, p: Row, q: Row, sign: int) -> None:
+        c = block.take()
+        _not_below([c])
+        if i != j:
+            rows[i] += c
+            columns[j] += c
+        form.add(sign * c, p, q)
+        form.add(c / 2, e[i], u[i])
+        form.add(c / 2, e[j], u[j])
+
+    every = [(i, j) for i in channels for j in channels]
+    for sign in ((-1, 1) if odd else (-1,)) if sloped else ():
+        for i, j in every:
+            if i != j:
+                pair(i, j, e[i], u[j], sign)
+        for own in copies:
+            for i, j in every:
+                pair(i, j, e[i], own[j], sign)
+            for i, j in every:
+                pair(i, j, own[len(u) + i], u[j], sign)
+    for i in channels:
+        _not_below([spare[i] - abs(rows[i] - columns[i]) / 2])
+        form.add(spare[i], e[i], u[i])
+        if popov:
+            form.add(block.take(), e[i], loop.slope(block.outputs[i]))
+    kind = "slopes" if sloped else "a sector"
+    time = "" if constant else ", which may depend on time"
+    words = f"static functions, the same{', odd' * odd}, of {kind} from {float(low)!r} to"
+    return Told((), f"{words} {float(high)!r}{time}", low)
+
+
+def _parameter(loop: Loop, form: Form, block: Block) -> Told:
+    low, high = _range(block)
+    middle, radius = (low + high) / 2, (high - low) / 2
+    moves = block.flag("moves")
+    if moves and block.poles:
+        raise Refused("a parameter that moves has no multiplier with lags")
+    v = [loop.output(j) for j in block.outputs]
+    d = [loop.input(i) for i in block.inputs]
+    e = [added([(Fraction(1), b), (-middle, a)]) for a, b in zip(v, d, strict=True)]
+    copies = _copies(loop, block, [*v, *e])
+    v = [row for own in copies for row in own[: len(block.inputs)]]
+    e = [row for own in copies for row in own[len(block.inputs) :]]
+    Y = block.lower(len(v))
+    form.square(Y, v, radius * radius)
+    form.square(Y, e, -1)
+    for i in range(len(v)):
+        for j in range(i):
+            value = block.take()
+            form.add(2 * value, v[i], e[j])
+            form.add(-2 * value, v[j], e[i])
+    how = "moving in any way" if moves else "constant"
+    words = f"a real number from {float(low)!r} to {float(high)!r}, {how}"
+    return Told([Demand("a multiplier is positive", even(Y))], words, middle)
+
+
+def _dynamics(loop: Loop, form: Form, block: Block) -> Told:
+    bound = block.value("bound")
+    _not_below([bound])
+    v = [loop.output(j) for j in block.outputs]
+    copies = _copies(loop, block, [*v, *(loop.input(i) for i in block.inputs)])
+    Y = block.lower(len(copies))
+    for k in range(len(copies[0])):
+        size = bound * bound if k < len(v) else Fraction(-1)
+        form.square(Y, [own[k] for own in copies], size)
+    words = f"stable linear dynamics of gain at most {float(bound)!r}"
+    return Told([Demand("a multiplier is positive", even(Y))], words, Fraction(0))
+
+
+def _delay(loop: Loop, form: Form, block: Block) -> Told:
+    T, shape, (a, *more) = block.value("longest"), block.content["shape"], block.poles
+    window, count, top = shape == "window", len(block.inputs), block.order
+    known = shape in ("difference", "delay", "window")
+    if not known or T <= 0 or more or top < 3 + window or loop.dt is not None:
+        raise Refused(
+            "a delay is not above zero, or its multipliers have not one lag to its power 3"
+        )
+    nominal = Fraction(shape == "delay")
+    v = [loop.output(j) for j in block.outputs]
+    d = [
+        added([(Fraction(1), loop.input(i)), (-nominal, own)])
+        for i, own in zip(block.inputs, v, strict=True)
+    ]
+    copies = _copies(loop, block, [*v, *d])
+    v_all, d_all = [own[:count] for own in copies], [own[count:] for own in copies]
+    v, e = v_all, d_all
+    if window:  # s E^k = a (E^(k - 1) - E^k)
+        v, e = (
+            v_all[1:],
+            [
+                [added([(a, p), (-a, q)]) for p, q in zip(before, own, strict=True)]
+                for before, own in zip(d_all, d_all[1:], strict=False)
+            ],
+        )
+    one = Fraction(1)
+    flat = [row for own in v for row in own]
+    both = [
+        added([(one, p), (one, q)])
+        for x, y in zip(v, e, strict=True)
+        for p, q in zip(x, y, strict=True)
+    ]
+    X = block.lower(len(flat))
+    form.square(X, flat)
+    form.square(X, both, -1)
+    c = CORNER
+    N = [Fraction(0), T, 2 * ZEROS / c * T**2, T**3 / c**2]
+    first, second = 2 * POLES / c * T, T**2 / c**2
+    D = [one, first + T / 2, second + T / 2 * first, T / 2 * second]
+    up, down = (_through(p, own, a) for p, own in ((N, v), (D, e)))
+    Y = block.lower(len(up))
+    form.square(Y, up)
+    form.square(Y, down, -1)
+    matrices = [Y]
+    if window:
+        Z = block.lower(len(flat) + count)
+        form.square(Z, [row for own in v_all for row in own], T * T)
+        form.square(Z, [row for own in d_all for row in own], -1)
+        matrices.append(Z)
+    demands = [Demand("a multiplier is positive", even(M)) for M in matrices]
+    says = {"difference": "v(t - T) - v(t)", "delay": "v(t - T)"}
+    words = says.get(shape, "minus the integral of v from t - T to t")
+    return Told(
+        [*demands, *_above_the_error()],
+        f"{words}, T constant, from 0 to {float(T)!r} s",
+        nominal,
+    )
+
+
+def _through(p: Sequence[Fraction], copies: Sequence[Sequence[Row]], a: Fraction) -> list[Row]:
+    """Return p(s)/(s + a)^3 times the powers of the lag, from the first on: with E = a/(s + a), s =
+    a (1 - E)/E, so that s^k/(s + a)^3 = a^(k - 3) (1 - E)^k E^(3 - k).
+    """
+    weights = [Fraction(0)] * 4
+    for k, value in enumerate(p):
+        size = value * a**k / a**3
+        for i, binomial in enumerate([(1,), (1, -1), (1, -2, 1), (1, -3, 3, -1)][k]):
+            weights[3 - k + i] += size * binomial
+    return [
+        added((w, copies[start + r][i]) for r, w in enumerate(weights))
+        for start in range(len(copies) - 3)
+        for i in range(len(copies[0]))
+    ]
+
+
+def _above_the_error() -> Iterator[Demand]:
+    """Yield that |exp(-s T) - 1|^2 <= |N/D|^2, in t = (w T)^2: 2 - 2 cos is below its Taylor sum up
+    to t = 9.87 > pi^2, where it also is below the same of a longer delay, and below 4 at all t.
+    """
+
+    def times(p: Sequence[Fraction], q: Sequence[Fraction]) -> list[Fraction]:
+        out = [Fraction(0)] * (len(p) + len(q) - 1)
+        for i, a in enumerate(p):
+            for j, b in enumerate(q):
+                out[i + j] += a * b
+        return out
+
+    def squared(damping: Fraction) -> list[Fraction]:
+        return [Fraction(1), (4 * damping**2 - 2) / CORNER**2, 1 / CORNER**4]
+
+    N, D = [Fraction(0), *squared(ZEROS)], times([Fraction(1), Fraction(1, 4)], squared(POLES))
+    taylor, factor = [Fraction(0)], Fraction(2)
+    for k in range(7):
+        factor /= (2 * k + 1) * (2 * k + 2)
+        taylor.append((-1) ** k * factor)
+    sums = times(D, taylor)
+    near = [(N[k] if k < len(N) else 0) - v for k, v in enumerate(sums)][2:]
+    end, start = Fraction(987, 100), Fraction(986, 100)
+    scaled = [v * end**k for k, v in enumerate(near)]
+    far = [(a - 4 * b) * start**k for k, (a, b) in enumerate(zip(N, D, strict=True))][:-1]
+    for p in (scaled, far[::-1]):
+        terms = [matrix([[v]], 1) for v in p]
+        poly = Polynomial((1, 1), {}, 1)
+        for k, M in enumerate(terms):
+            poly = poly + Polynomial((1, 1), {(k,) if k else (): M.terms[()]}, M.below)
+        yield Demand("the weight is above the error of a delay", poly, variables=1)
+
+
+def _own(loop: Loop, form: Form, block: Block) -> Told:
+    A, B, C, D = (array(M, "a filter", None, None) for M in block.content["filter"])
+    if not stable(A, loop.dt is not None):
+        raise Refused("the filter of a multiplier is not stable")
+    signals = [
+        *(loop.output(j) for j in block.outputs),
+        *(loop.input(i) for i in block.inputs),
+    ]
+    first = loop.used
+    states = [loop.state(added(zip(row, signals, strict=True))) for row in B]
+    for i, row in enumerate(A):
+        own = [(Fraction(1), loop.motion[first + i]), *zip(row, states, strict=True)]
+        loop.motion[first + i] = added(own)
+    z = [
+        added([*zip(c, states, strict=True), *zip(d, signals, strict=True)])
+        for c, d in zip(C, D, strict=True)
+    ]
+    for M in block.content["forms"]:
+        weight = block.take()
+        _not_below([weight])
+        rows = array(M, "a form", len(z), len(z))
+        even(rows)
+        form.square(rows, z, weight)
+    words = "a block with the integral inequalities of the filter in the file, as multiples of it"
+    return Told((), words, Fraction(0))
+
+
+KINDS = {
+    "static": _static,
+    "parameter": _parameter,
+    "dynamics": _dynamics,
+    "delay": _delay,
+    "own": _own,
+}
+
+
+def characteristic(A: Sequence[Row]) -> list[Fraction]:
+    """Return the coefficients of det(s - A), ascending (Leverrier)."""
+    n = len(A)
+    found, M = [Fraction(1)], [[Fraction(i == j) for j in range(n)] for i in range(n)]
+    for k in range(1, n + 1):
+        M = [
+            [sum((a * M[q][j] for q, a in enumerate(row)), Fraction(0)) for j in range(n)]
+            for row in A
+        ]
+        found.append(-sum((M[i][i] for i in range(n)), Fraction(0)) / k)
+        for i in range(n):
+            M[i][i] += found[-1]
+    return found[::-1]
+
+
+def stable(A: Sequence[Row], sampled: bool) -> bool:
+    """Whether all eigenvalues are left of the axis, or inside the unit circle; Routh's scheme."""
+    p, n = characteristic(A), len(A)
+    if sampled:  # z = (1 + s)/(1 - s)
+        total = [Fraction(0)] * (n + 1)
+        for k, value in enumerate(p):
+            own = [value]
+            for factor in [1] * k + [-1] * (n - k):
+                own = [x + factor * y for x, y in zip([*own, 0], [0, *own], strict=True)]
+            total = [x + y for x, y in zip(total, own, strict=True)]
+        p = total if total[-1] > 0 else [-v for v in total]
+    above, row = p[::-1][0::2], p[::-1][1::2]
+    if above[0] <= 0:
+        return False
+    while row:
+        if row[0] <= 0:
+            return False
+        padded = [*row, *[Fraction(0)] * (len(above) - len(row))]
+        after = [a - above[0] * b / row[0] for a, b in zip(above[1:], padded[1:], strict=True)]
+        above, row = row, after
+    return True
+
+
+def _nominal(loop: Loop, factors: Mapping[tuple[int, int], Fraction]) -> list[Row]:
+    """Return A + B N (I - D N)^-1 C of the nominal blocks d_i = N_ij v_j."""
+    p = range(len(loop.C))
+    left = [
+        [
+            Fraction(i == j)
+            - sum((loop.D[i][k] * f for (k, q), f in factors.items() if q == j), Fraction(0))
+            for j in p
+        ]
+        for i in p
+    ]
+    try:
+        out = solved(left, loop.C) if loop.own else []
+    except ZeroDivisionError:
+        raise Refused("the nominal loop is not well posed") from None
+    return [
+        [
+            loop.A[i][j]
+            + sum((loop.B[i][k] * f * out[q][j] for (k, q), f in factors.items()), Fraction(0))
+            for j in range(loop.own)
+        ]
+        for i in range(loop.own)
+    ]
+
+
+def _channels(values: Any, size: int) -> list[int]:
+    found = [whole(v, "a channel", 0, size - 1) for v in values]
+    if len(set(found)) < len(found):
+        raise Unreadable("the file is damaged: a channel stands twice")
+    return found
+
+
+def claimed(content: Any) -> Claim:
+    """Return what a file of a gain by multipliers claims."""
+    loop, bound = Loop(content), number(content["gain"], "the gain")
+    into, out = _channels(content["into"], loop.m), _channels(content["out"], len(loop.C))
+    form, blocks = Form(loop.size), []
+    for each in content["blocks"]:
+        inputs, outputs = _channels(each["inputs"], loop.m), _channels(each["outputs"], len(loop.C))
+        values = iter(array(each["coefficients"], "coefficients", None))
+        blocks.append(Block(each, inputs, outputs, values))
+    refused, told = "", []
+    try:
+        told = _told(loop, form, blocks, into)
+    except Refused as error:
+        refused = str(error)
+    demands = [demand for each in told for demand in each.demands]
+    if not refused:
+        demands.append(_gain(loop, form, content, into, out))
+    claim = f"the energy gain is below {float(bound)!r}: |y|_2 < {float(bound)!r} |f|_2 from rest"
+    time = "continuous time" if loop.dt is None else f"samples of {float(loop.dt)!r} s"
+    said = [
+        f"a model of {loop.own} states, {loop.m} inputs, {len(loop.C)} outputs, in {time}",
+        f"f: inputs {', '.join(str(i + 1) for i in into)}; y: outputs"
+        f" {', '.join(str(j + 1) for j in out)}",
+    ]
+    for block, each in zip(blocks, told, strict=False):
+        d, v = (", ".join(str(i + 1) for i in own) for own in block[1:3])
+        said.append(f"inputs {d} of outputs {v}: {each.words}")
+    level = lambda g: g * g  # noqa: E731
+    return Claim(
+        claim,
+        said,
+        demands,
+        bound,
+        level,
+        refused=refused or ("" if bound >= 0 else "a gain below zero"),
+    )
+
+
+def _told(loop: Loop, form: Form, blocks: Sequence[Block], into: Sequence[int]) -> list[Told]:
+    """Add the forms of all blocks; return what they demand. Raise where they do not fit."""
+    d = [i for block in blocks for i in block.inputs]
+    v = [j for block in blocks for j in block.outputs]
+    if sorted([*d, *into]) != list(range(loop.m)):
+        raise Refused("an input belongs to two blocks, or to none")
+    kinds = {block.content["type"] for block in blocks}
+    if not kinds <= {"parameter", "dynamics"} and any(loop.D[j][i] for j in v for i in d):
+        raise Refused("an output of a block depends on an input of one at the same instant")
+    told, factors = [], {}
+    for block in blocks:
+        if block.content["type"] not in KINDS:
+            raise Unreadable(f"a block of the type {block.content['type']!r:.40} is not known")
+        paired = len(block.inputs) == len(block.outputs)
+        if not paired and block.content["type"] not in ("dynamics", "own"):
+            raise Unreadable("the file is damaged: a block has other inputs than outputs")
+        most = 1 if loop.dt is not None else None
+        poles = block.poles
+        if len(set(poles)) < len(poles) or any(a <= 0 or (most and a >= most) for a in poles):
+            raise Refused("a pole of a lag is not stable, or there twice")
+        told.append(KINDS[block.content["type"]](loop, form, block))
+        if next(block.values, None) is not None:
+            raise Unreadable("the file is damaged: a multiplier has too many coefficients")
+        if paired:
+            factors |= {
+                (i, j): told[-1].nominal for i, j in zip(block.inputs, block.outputs, strict=True)
+            }
+    if not stable(_nominal(loop, {k: f for k, f in factors.items() if f}), loop.dt is not None):
+        raise Refused("the nominal loop is not stable")
+    return told
+
+
+def _gain(loop: Loop, form: Form, content: Any, into: Sequence[int], out: Sequence[int]) -> Demand:
+    """Return the inequality of the gain."""
+    P = array(content["P"], "P", loop.n, loop.n)
+    even(P)
+    states = [[Fraction(k == i) for k in range(loop.size)] for i in range(loop.n)]
+    if loop.dt is None:
+        for i, own in enumerate(P):
+            form.add(Fraction(2), added(zip(own, states, strict=True)), loop.motion[i])
+    else:
+        form.square(P, loop.motion)
+        form.square(P, states, -1)
+    for j in out:
+        form.add(Fraction(1), loop.output(j), loop.output(j))
+    energy = diagonal([int(k - loop.n in into) for k in range(loop.size)])
+    F = even(form.rows)
+    return Demand("the inequality of the gain", -F, None, energy)

@@ -1,0 +1,596 @@
+"""Multipliers that are known of a block, affine in coefficients: sum c_k z' M_k z has a nonnegative
+integral over time for all signals v, d = Delta(v) of finite energy.
+
+z are `base` signals of the block, sums of v, d and dv/dt, and what a chain of lags makes of the
+first of them: the powers of a/(s + a), sampled (1 - a)/(z - a). Everything is written once for
+doubles and for rationals.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from symheli.values.arrays import Array
+from synthesis.numerics.polynomial.transfer import Transfer
+
+CORNER, ZEROS, POLES = Fraction(2363, 1000), Fraction(838, 1000), Fraction(685, 1000)
+"""Corner frequency, times the delay, and damping of the weight of a delay: Skogestad and
+Postlethwaite, Multivariable Feedback Control (2005), eq. 7.27 (published).
+"""
+SHAPES = "difference", "delay", "window"
+"""What a delay makes of v: v(t - T) - v(t), v(t - T), or minus the integral of v from t - T to t.
+"""
+WEIGHT = 3
+"""Order of that weight."""
+
+
+class Filter(NamedTuple):
+    """A, B, C, D from the base signals of a block to z."""
+
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+
+
+class Lags(NamedTuple):
+    """The powers 1, ..., `order` of the lag of each pole."""
+
+    poles: tuple[float, ...]
+    order: int
+
+    @property
+    def count(self) -> int:
+        """Number of lagged copies of a signal."""
+        return len(self.poles) * self.order
+
+    def filter(self, signals: int, lagged: int, sampled: bool, number: Any) -> Filter:
+        """Return the filter from `signals` to these and the lagged copies of the first `lagged`."""
+        k, n = lagged, self.count * lagged
+        A, B = np.zeros((n, n), dtype=object), np.zeros((n, signals), dtype=object)
+        for j, pole in enumerate(self.poles):
+            a = number(pole)
+            stay, enter = (a, 1 - a) if sampled else (-a, a)
+            for r in range(self.order):
+                own = slice((j * self.order + r) * k, (j * self.order + r + 1) * k)
+                A[own, own] = stay * _eye(k)
+                if r:
+                    A[own, own.start - k : own.start] = enter * _eye(k)
+                else:
+                    B[own, :k] = enter * _eye(k)
+        C = np.vstack([np.zeros((signals, n), dtype=object), _eye(n)])
+        D = np.vstack([_eye(signals), np.zeros((n, signals), dtype=object)])
+        return Filter(A, B, C, D)
+
+
+def _eye(n: int) -> Array:
+    out = np.zeros((n, n), dtype=object)
+    out[range(n), range(n)] = 1
+    return out
+
+
+class Multipliers(ABC):
+    """The class of multipliers of one block of `channels` inputs d and outputs v."""
+
+    lags: Lags
+    channels: int
+    fields: ClassVar[dict[str, Any]] = {}
+    """Names of the numbers of a class that a file holds, and their types."""
+
+    def fault(self, sampled: bool) -> str:
+        """Return why these numbers are none of the class; empty where they are."""
+        poles = self.lags.poles
+        most = 1.0 if sampled else math.inf
+        if not all(0 < a < most for a in poles) or len(set(poles)) < len(poles):
+            return "a pole of the lags is not stable, or there twice"
+        return self._fault()
+
+    def _fault(self) -> str:
+        return ""
+
+    @property
+    def moving(self) -> bool:
+        """Whether dv/dt is one of the signals."""
+        return False
+
+    @abstractmethod
+    def base(self, v: Array, d: Array, slope: Array | None, number: Any) -> Array:
+        """Return the base signals, of rows of v, d and dv/dt."""
+
+    @property
+    @abstractmethod
+    def signals(self) -> int:
+        """Number of base signals."""
+
+    @property
+    def lagged(self) -> int:
+        """Number of base signals that are lagged too, the first ones."""
+        return 2 * self.channels
+
+    @property
+    @abstractmethod
+    def count(self) -> int:
+        """Number of coefficients."""
+
+    @abstractmethod
+    def form(self, c: Array, number: Any) -> Array:
+        """Return the symmetric matrix of the quadratic form in z."""
+
+    def amounts(self, c: Array) -> Array:
+        """Return the numbers that are nonnegative of a multiplier of the class."""
+        return c[:0]
+
+    def matrices(self, c: Array) -> Sequence[Array]:
+        """Return the symmetric matrices that are positive definite."""
+        return ()
+
+    def near(self, c: Array) -> Array:
+        """Return the coefficients next to those of a solver, numbers below zero as zero."""
+        return c
+
+    def nominal(self, number: Any) -> Any:
+        """Return the factor k of the member d = k v from which all others are reached."""
+        return number(0.0)
+
+    def filter(self, sampled: bool, number: Any) -> Filter:
+        """Return the filter from the base signals to z."""
+        return self.lags.filter(self.signals, self.lagged, sampled, number)
+
+    def at(self, power: int, pole: int = 0) -> int:
+        """Return where in z the lagged copies of this power begin; power 0: the base."""
+        if not power:
+            return 0
+        return self.signals + (pole * self.lags.order + power - 1) * self.lagged
+
+
+class Pair(NamedTuple):
+    """sign * z_p z_q with a coefficient; `row` and `column` of the matrix multiplier that it
+    takes, -1 of none.
+    """
+
+    p: int
+    q: int
+    sign: int
+    row: int
+    column: int
+
+
+@dataclass(frozen=True, eq=False)
+class StaticMultipliers(Multipliers):
+    """Functions d_i = phi(v_i) with (d - low v)(high v - d) >= 0; `sloped`: with slopes from low to
+    high, all channels the same function, constant; `constant`: phi does not depend on time.
+
+    u = high v - d is a monotone function of e = d - low v. The form is e' M u: M has a diagonal
+    that dominates its rows and columns, with the integrals of its kernels; kernels are positive and
+    entries beside the diagonal negative, unless phi is odd. q e dv/dt is Popov's. An entry (i, j)
+    stands in the program with half its size on the diagonal at i and at j, so that the diagonal's
+    own coefficient is above half the difference of the sums of row and column.
+    """
+
+    channels: int
+    low: float
+    high: float
+    sloped: bool
+    odd: bool
+    constant: bool
+    popov: bool
+    lags: Lags
+    fields: ClassVar[dict[str, Any]] = {
+        **dict.fromkeys(("low", "high"), float),
+        **dict.fromkeys(("sloped", "odd", "constant", "popov"), bool),
+    }
+
+    def _fault(self) -> str:
+        if not -math.inf < self.low < self.high < math.inf:
+            return "a sector is empty"
+        if (self.sloped or self.popov) and not self.constant:
+            return "a function that depends on time has no such multipliers"
+        return "" if self.sloped or not self.lags.count else "lags are for slopes"
+
+    @property
+    def moving(self) -> bool:
+        """Whether dv/dt is one of the signals."""
+        return self.popov
+
+    @property
+    def signals(self) -> int:
+        """Number of base signals: u, e, dv/dt."""
+        return (2 + self.moving) * self.channels
+
+    def base(self, v: Array, d: Array, slope: Array | None, number: Any) -> Array:
+        """Return u, e and dv/dt."""
+        own = [number(self.high) * v - d, d - number(self.low) * v]
+        return np.vstack([*own, slope] if self.moving else own)
+
+    def nominal(self, number: Any) -> Any:
+        """Return the least slope."""
+        return number(self.low)
+
+    @cached_property
+    def pairs(self) -> tuple[Pair, ...]:
+        """The terms, one for each coefficient: those of the diagonal first, Popov's last."""
+        n, out = self.channels, []
+        out += [Pair(n + i, i, 1, -1, -1) for i in range(n)]
+        signs = (-1, 1) if self.odd else (-1,)
+        both = [(i, j) for i in range(n) for j in range(n)] if self.sloped else []
+        for sign in signs:
+            out += [Pair(n + i, j, sign, i, j) for i, j in both if i != j]
+            for pole in range(len(self.lags.poles)):
+                for r in range(1, self.lags.order + 1):
+                    at = self.at(r, pole)
+                    out += [Pair(n + i, at + j, sign, i, j) for i, j in both]
+                    out += [Pair(at + n + i, j, sign, i, j) for i, j in both]
+        if self.moving:
+            out += [Pair(n + i, 2 * n + i, 1, -1, -1) for i in range(n)]
+        return tuple(out)
+
+    @property
+    def count(self) -> int:
+        """Number of coefficients."""
+        return len(self.pairs)
+
+    def form(self, c: Array, number: Any) -> Array:
+        """Return the matrix of e' M u + q e dv/dt."""
+        n, size = self.channels, self.signals + self.lags.count * self.lagged
+        out = np.zeros((size, size), dtype=c.dtype)
+        for value, pair in zip(c, self.pairs, strict=True):
+            terms = [(pair.p, pair.q, value * pair.sign / 2)]
+            if pair.row >= 0:
+                terms += [(n + i, i, value / 4) for i in (pair.row, pair.column)]
+            for p, q, half in terms:
+                out[p, q] += half
+                out[q, p] += half
+        return out
+
+    def _tilt(self, c: Array) -> Array:
+        """Return half the difference of the row sums and the column sums of the entries (n,)."""
+        out = 0 * c[: self.channels]
+        for value, pair in zip(c, self.pairs, strict=True):
+            if pair.row >= 0 and pair.row != pair.column:
+                out[pair.row] = out[pair.row] + value / 2
+                out[pair.column] = out[pair.column] - value / 2
+        return out
+
+    def amounts(self, c: Array) -> Array:
+        """Return the coefficients of M, and by how much its diagonal dominates."""
+        n, tilt = self.channels, self._tilt(c)
+        return np.concatenate([c[n : len(c) - n * self.moving], c[:n] + tilt, c[:n] - tilt])
+
+    def near(self, c: Array) -> Array:
+        """Return the coefficients next to these, those of M not below zero, the diagonal large
+        enough.
+        """
+        n, last = self.channels, len(c) - self.channels * self.moving
+        out = np.concatenate([c[:n], np.maximum(c[n:last], 0.0), c[last:]])
+        least = np.abs(self._tilt(out)) * (1 + 1e-12) + 1e-13 * np.abs(out[n:last]).max(initial=0.0)
+        return np.concatenate([np.maximum(out[:n], least if self.sloped else 0.0), out[n:]])
+
+
+def symmetric(c: Array) -> Array:
+    """Return the symmetric matrix whose lower triangle by rows is c."""
+    n = triangle(len(c))
+    out = np.zeros((n, n), dtype=c.dtype)
+    rows, columns = np.tril_indices(n)
+    out[rows, columns] = c
+    out[columns, rows] = c
+    return out
+
+
+def skew(c: Array, n: int) -> Array:
+    """Return the skew-symmetric matrix whose strict lower triangle by rows is c."""
+    out = np.zeros((n, n), dtype=c.dtype)
+    rows, columns = np.tril_indices(n, -1)
+    out[rows, columns] = c
+    out[columns, rows] = -c
+    return out
+
+
+def triangle(length: int) -> int:
+    """Return n of length = n (n + 1)/2."""
+    return int((8 * length + 1) ** 0.5 - 1) // 2
+
+
+@dataclass(frozen=True, eq=False)
+class ParameterMultipliers(Multipliers):
+    """d = delta v, a real number from low to high, constant with `lags`, else moving in any way.
+
+    With e = d - middle v: radius^2 v' Y v - e' Y e + v' S e + e' S' v, Y > 0 and S = -S' over v and
+    its lagged copies.
+    """
+
+    channels: int
+    low: float
+    high: float
+    moves: bool
+    lags: Lags
+    fields: ClassVar[dict[str, Any]] = {"low": float, "high": float, "moves": bool}
+
+    def _fault(self) -> str:
+        if not -math.inf < self.low < self.high < math.inf:
+            return "the range of a parameter is empty"
+        return "lags are for a constant parameter" if self.moves and self.lags.count else ""
+
+    @property
+    def signals(self) -> int:
+        """Number of base signals: v, e."""
+        return 2 * self.channels
+
+    @property
+    def lagged(self) -> int:
+        """Number of base signals that are lagged too."""
+        return self.signals if self.lags.count else 0
+
+    def nominal(self, number: Any) -> Any:
+        """Return the middle of the range."""
+        return (number(self.low) + number(self.high)) / 2
+
+    def base(self, v: Array, d: Array, slope: Array | None, number: Any) -> Array:
+        """Return v and e."""
+        return np.vstack([v, d - self.nominal(number) * v])
+
+    @property
+    def size(self) -> int:
+        """Number of copies of v, lagged ones too."""
+        return self.channels * (1 + self.lags.count)
+
+    @property
+    def count(self) -> int:
+        """Number of coefficients: Y and S."""
+        return self.size**2
+
+    def _places(self) -> tuple[Array, Array]:
+        n, starts = self.channels, [0]
+        starts += [
+            self.at(r, j)
+            for j in range(len(self.lags.poles))
+            for r in range(1, self.lags.order + 1)
+        ]
+        v = np.concatenate([s + np.arange(n) for s in starts])
+        return v, v + n
+
+    def form(self, c: Array, number: Any) -> Array:
+        """Return the matrix of the form in (v, e) and their lagged copies."""
+        n = self.size
+        half = n * (n + 1) // 2
+        Y, S = symmetric(c[:half]), skew(c[half:], n)
+        v, e = self._places()
+        radius = (number(self.high) - number(self.low)) / 2
+        out = np.zeros((2 * n, 2 * n), dtype=c.dtype)
+        out[np.ix_(v, v)], out[np.ix_(e, e)] = radius * radius * Y, -Y
+        out[np.ix_(v, e)], out[np.ix_(e, v)] = S, S.T
+        return out
+
+    def matrices(self, c: Array) -> Sequence[Array]:
+        """Return Y."""
+        return (symmetric(c[: self.size * (self.size + 1) // 2]),)
+
+
+@dataclass(frozen=True, eq=False)
+class DynamicMultipliers(Multipliers):
+    """Any dynamics from `outputs` channels v to `channels` d, of gain at most `bound`:
+    bound^2 |v|^2 - |d|^2, both through lags, with a Y > 0 that is the same for all channels.
+    """
+
+    channels: int
+    outputs: int
+    bound: float
+    lags: Lags
+    fields: ClassVar[dict[str, Any]] = {"outputs": int, "bound": float}
+
+    def _fault(self) -> str:
+        return "" if 0 <= self.bound < math.inf else "the bound of dynamics is no number"
+
+    @property
+    def signals(self) -> int:
+        """Number of base signals: v, d."""
+        return self.channels + self.outputs
+
+    @property
+    def lagged(self) -> int:
+        """Number of base signals that are lagged too."""
+        return self.signals
+
+    def base(self, v: Array, d: Array, slope: Array | None, number: Any) -> Array:
+        """Return v and d."""
+        return np.vstack([v, d])
+
+    @property
+    def count(self) -> int:
+        """Number of coefficients of Y."""
+        return (1 + self.lags.count) * (2 + self.lags.count) // 2
+
+    def form(self, c: Array, number: Any) -> Array:
+        """Return the matrix of the form in (v, d) and their lagged copies."""
+        Y, bound = symmetric(c), number(self.bound)
+        sizes = np.array([bound * bound] * self.outputs + [number(-1.0)] * self.channels)
+        n = self.signals
+        out = np.zeros((n * len(Y), n * len(Y)), dtype=c.dtype)
+        for k in range(n):
+            out[k::n, k::n] = sizes[k] * Y
+        return out
+
+    def matrices(self, c: Array) -> Sequence[Array]:
+        """Return Y."""
+        return (symmetric(c),)
+
+
+@dataclass(frozen=True, eq=False)
+class DelayMultipliers(Multipliers):
+    """A constant delay up to `longest` (s), with e = v(t - T) - v(t): d is e ("difference"), v + e
+    ("delay") or the integral of e ("window"); the same T in all channels.
+
+    |v + e| = |v| at every frequency has a multiplier of any sign; |e| <= |W v| one that is
+    positive, and of a window |d| <= longest |v| one more. One pole a; W = N/D as polynomials of s,
+    so that N v and D e, over powers of (s + a), are sums of lagged copies.
+    """
+
+    channels: int
+    longest: float
+    shape: str
+    lags: Lags
+    fields: ClassVar[dict[str, Any]] = {"longest": float, "shape": str}
+
+    def _fault(self) -> str:
+        if not (0 < self.longest < math.inf and self.shape in SHAPES):
+            return "a delay is not above zero, or of no known form"
+        enough = len(self.lags.poles) == 1 and self.lags.order >= WEIGHT + self.first
+        return "" if enough else "multipliers of a delay have one pole, and powers of it to 3"
+
+    @property
+    def signals(self) -> int:
+        """Number of base signals: v, e or the integral of e."""
+        return 2 * self.channels
+
+    def nominal(self, number: Any) -> Any:
+        """Return what a delay of zero makes of v."""
+        return number(float(self.shape == "delay"))
+
+    def base(self, v: Array, d: Array, slope: Array | None, number: Any) -> Array:
+        """Return v, and e or its integral."""
+        return np.vstack([v, d - self.nominal(number) * v])
+
+    @property
+    def first(self) -> int:
+        """Least power of the lag at which e is known: 1 where d is its integral."""
+        return int(self.shape == "window")
+
+    @property
+    def sizes(self) -> tuple[int, int, int]:
+        """Sizes of the matrices X, Y and, of a window, the one more."""
+        n, top = self.channels, self.lags.order + 1
+        last = n * top if self.first else 0
+        return n * (top - self.first), n * (top - self.first - WEIGHT), last
+
+    @property
+    def count(self) -> int:
+        """Number of coefficients."""
+        return sum(n * (n + 1) // 2 for n in self.sizes)
+
+    def _copies(self, number: Any) -> tuple[Array, Array]:
+        """Return v and e through the powers of the lag from `first` on, as rows on z."""
+        n, size = self.channels, self.signals * (1 + self.lags.order)
+        whole = _eye(size)
+        v = [whole[self.at(r) : self.at(r) + n] for r in range(self.lags.order + 1)]
+        d = [whole[self.at(r) + n : self.at(r) + 2 * n] for r in range(self.lags.order + 1)]
+        if self.first:  # e = s d, and s (a/(s + a))^r = a ((a/(s + a))^(r - 1) - (a/(s + a))^r)
+            a = number(self.lags.poles[0])
+            d = [a * (before - own) for before, own in zip(d, d[1:], strict=False)]
+            v = v[1:]
+        return np.array(v), np.array(d)
+
+    def _weighted(self, rows: Array, polynomial: Sequence[Any], a: Any) -> Array:
+        """Return p(s)/(s + a)^3 times the copies, from the powers 0, 1, ... of the lag on."""
+        out = []
+        for start in range(len(rows) - WEIGHT):
+            total = 0 * rows[0]
+            for power, coefficient in enumerate(polynomial):
+                # s^q/(s + a)^3 = a^(q - 3) (1 - E)^q E^(3 - q)
+                signs = [1]
+                for _ in range(power):
+                    signs = [x - y for x, y in zip([*signs, 0], [0, *signs], strict=True)]
+                size = coefficient * a**power / a**WEIGHT
+                for k, sign in enumerate(signs):
+                    total = total + sign * size * rows[start + WEIGHT - power + k]
+            out.append(total)
+        return np.vstack(out) if out else np.zeros((0, rows.shape[-1]), dtype=object)
+
+    def form(self, c: Array, number: Any) -> Array:
+        """Return the matrix of the form in (v, e or its integral) and their lagged copies."""
+        ends = np.cumsum([0, *(n * (n + 1) // 2 for n in self.sizes)])
+        X, Y, Z = (symmetric(c[a:b]) for a, b in zip(ends, ends[1:], strict=False))
+        v, e = self._copies(number)
+        N, D = weight(number(self.longest), number)
+        a = number(self.lags.poles[0])
+        up, down = self._weighted(v, N, a), self._weighted(e, D, a)
+        v, e = np.concatenate([*v]), np.concatenate([*e])
+        cross = v.T @ X @ e
+        out = -(cross + cross.T + e.T @ X @ e) + up.T @ Y @ up - down.T @ Y @ down
+        if self.first:
+            n, T = self.channels, number(self.longest)
+            at = [self.at(r) for r in range(self.lags.order + 1)]
+            own = np.concatenate([start + np.arange(n) for start in at])
+            out = out + 0 * c[0]
+            out[np.ix_(own, own)] += T * T * Z
+            out[np.ix_(own + n, own + n)] -= Z
+        return np.asarray(out, dtype=c.dtype)
+
+    def matrices(self, c: Array) -> Sequence[Array]:
+        """Return Y, and the one more of a window."""
+        ends = np.cumsum([0, *(n * (n + 1) // 2 for n in self.sizes)])
+        parts = [c[a:b] for a, b in zip(ends, ends[1:], strict=False)]
+        return tuple(symmetric(part) for part in parts[1:] if len(part))
+
+
+def weight(T: Any, number: Any) -> tuple[list[Any], list[Any]]:
+    """Return N and D, ascending in s, of a weight above |exp(-s T) - 1| on the axis."""
+    c, zeros, poles = (_of(x, number) for x in (CORNER, ZEROS, POLES))
+    half = _of(Fraction(1, 2), number)
+    N = [0 * T, T, 2 * zeros / c * T * T, T * T * T / (c * c)]
+    first, second = 2 * poles / c * T, T * T / (c * c)
+    D = [1 + 0 * T, first + half * T, second + half * T * first, half * T * second]
+    return N, D
+
+
+def _of(x: Fraction, number: Any) -> Any:
+    return float(x) if number is float else x
+
+
+@dataclass(frozen=True, eq=False)
+class OwnMultipliers(Multipliers):
+    """A filter of (v, d) and matrices M of its outputs, with weights >= 0."""
+
+    channels: int
+    given: Filter
+    forms: tuple[Array, ...]
+    lags: Lags = Lags((), 0)
+
+    def fault(self, sampled: bool) -> str:
+        """Return why the filter or the forms are of no use; empty where they are."""
+        A, _, C, _ = self.given
+        none = np.zeros((len(A), 0)), np.zeros((0, len(A))), np.zeros((0, 0))
+        if not Transfer.of(A, *none, sampled).stable:
+            return "the filter of a multiplier is not stable"
+        good = all(M.shape == (len(C), len(C)) and np.array_equal(M, M.T) for M in self.forms)
+        return "" if good else "a form of a multiplier is not symmetric"
+
+    @property
+    def signals(self) -> int:
+        """Number of base signals: v, d."""
+        return self.given.B.shape[1]
+
+    def base(self, v: Array, d: Array, slope: Array | None, number: Any) -> Array:
+        """Return v and d."""
+        return np.vstack([v, d])
+
+    @property
+    def count(self) -> int:
+        """Number of weights."""
+        return len(self.forms)
+
+    def filter(self, sampled: bool, number: Any) -> Filter:
+        """Return the filter that is given."""
+        return Filter(*(_numbers(M, number) for M in self.given))
+
+    def form(self, c: Array, number: Any) -> Array:
+        """Return the sum of the forms."""
+        return np.asarray(sum(x * _numbers(M, number) for x, M in zip(c, self.forms, strict=True)))
+
+    def amounts(self, c: Array) -> Array:
+        """Return the weights."""
+        return c
+
+    def near(self, c: Array) -> Array:
+        """Return the weights, not below zero."""
+        return np.maximum(c, 0.0)
+
+
+def _numbers(M: Array, number: Any) -> Array:
+    return np.array([[number(float(x)) for x in row] for row in M], dtype=object).reshape(M.shape)
