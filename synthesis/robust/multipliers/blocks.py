@@ -14,8 +14,6 @@ from symheli.errors import InputError
 from symheli.lpv.linear_model import as_model
 from symheli.values.arrays import Array
 from synthesis.robust.multipliers.classes import (
-    SHAPES,
-    DelayMultipliers,
     DynamicMultipliers,
     Filter,
     Lags,
@@ -24,6 +22,7 @@ from synthesis.robust.multipliers.classes import (
     ParameterMultipliers,
     StaticMultipliers,
 )
+from synthesis.robust.multipliers.delays import SHAPES, DelayMultipliers
 from synthesis.robust.structure import DynamicBlock
 
 RATES = 0.0, math.inf
@@ -249,7 +248,7 @@ class OwnMultiplier:
         """Return the class."""
         own = self.filter
         return OwnMultipliers(
-            len(self.inputs), Filter(own.A, own.B, own.C, own.D), tuple(self.forms)
+            len(self.inputs), Filter(own.A, own.B, own.C, own.D), tuple(self.forms), Lags((), 0)
         )
 
 

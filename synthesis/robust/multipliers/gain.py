@@ -20,12 +20,13 @@ from synthesis.certify.statement.proven_statement import ProvenStatement
 from synthesis.numerics.program.cone_program import Solver, general_solver
 from synthesis.robust.multipliers import search as searching
 from synthesis.robust.multipliers.blocks import Block, DelayBlock, multipliers_of
-from synthesis.robust.multipliers.classes import WEIGHT, Lags
+from synthesis.robust.multipliers.classes import Lags
+from synthesis.robust.multipliers.delays import WEIGHT
 from synthesis.robust.multipliers.loop import Plant, Wired
 from synthesis.robust.multipliers.members import Family, Member
 from synthesis.robust.multipliers.proof import GainProof
-from synthesis.robust.multipliers.sentences import sentence
 from synthesis.robust.multipliers.search import Search, Storage
+from synthesis.robust.multipliers.sentences import sentence
 
 KIND = "multiplier gain"
 APART = 30.0

@@ -16,7 +16,6 @@ from synthesis.numerics.polynomial.exact import matmul, positive_definite
 from synthesis.numerics.polynomial.transfer import Transfer, inverse, rationals
 from synthesis.robust.multipliers import inequality
 from synthesis.robust.multipliers.classes import (
-    DelayMultipliers,
     DynamicMultipliers,
     Filter,
     Lags,
@@ -25,6 +24,7 @@ from synthesis.robust.multipliers.classes import (
     ParameterMultipliers,
     StaticMultipliers,
 )
+from synthesis.robust.multipliers.delays import DelayMultipliers
 from synthesis.robust.multipliers.loop import Plant, Wired, extended, fractions
 
 TYPES: dict[str, type[Multipliers]] = {
@@ -174,7 +174,7 @@ def _read(content: Mapping[str, Any], inputs: int, outputs: int) -> tuple[Wired,
     if kind is OwnMultipliers:
         given = Filter(*(np.asarray(decoded(M), float) for M in content["filter"]))
         forms = tuple(np.asarray(decoded(M), float) for M in content["forms"])
-        made: Any = OwnMultipliers(len(into), given, forms)
+        made: Any = OwnMultipliers(len(into), given, forms, Lags((), 0))
     else:
         made = kind(channels=len(into), lags=lags, **own)
     if isinstance(made, DynamicMultipliers) and made.outputs != len(out):

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,7 +21,7 @@ from symheli.values.arrays import Array
 from synthesis.numerics.program.affine_program import AffineProgram, BernsteinCell, cells
 from synthesis.numerics.program.cone_program import Solver
 from synthesis.robust.multipliers import inequality
-from synthesis.robust.multipliers.loop import Extended, Plant, Wired, extended
+from synthesis.robust.multipliers.loop import Plant, Wired, extended
 
 BACKED = 1e-4, 1e-3, 1e-2, 0.1
 """Relative distances from the optimum at which the largest margin of the inequality is sought."""
@@ -370,7 +371,7 @@ class Search:
         """Return the coefficients of each block, in the units of the model."""
         ends = np.cumsum([0, *(kind.count for kind, _, _ in self.blocks)])
         own = c * self.scale**2
-        parts = [own[a:b] for a, b in zip(ends, ends[1:], strict=False)]
+        parts = [own[a:b] for a, b in pairwise(ends)]
         return tuple(b.kind.near(part) for b, part in zip(self.blocks, parts, strict=True))
 
     def _scaled(

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from synthesis.robust.multipliers.classes import (
-    DelayMultipliers,
     DynamicMultipliers,
     Multipliers,
     ParameterMultipliers,
     StaticMultipliers,
 )
+from synthesis.robust.multipliers.delays import DelayMultipliers
 from synthesis.robust.multipliers.loop import Wired
 
 
