@@ -365,15 +365,15 @@ class ParameterMultipliers(Multipliers):
 
 @dataclass(frozen=True, eq=False)
 class DynamicMultipliers(Multipliers):
-    """Any dynamics from `outputs` channels v to `channels` d, of gain at most `bound`:
+    """Any dynamics from `measured` channels v to `channels` d, of gain at most `bound`:
     bound^2 |v|^2 - |d|^2, both through lags, with a Y > 0 that is the same for all channels.
     """
 
     channels: int
-    outputs: int
+    measured: int
     bound: float
     lags: Lags
-    fields: ClassVar[dict[str, Any]] = {"outputs": int, "bound": float}
+    fields: ClassVar[dict[str, Any]] = {"measured": int, "bound": float}
 
     def _fault(self) -> str:
         return "" if 0 <= self.bound < math.inf else "the bound of dynamics is no number"
@@ -381,7 +381,7 @@ class DynamicMultipliers(Multipliers):
     @property
     def signals(self) -> int:
         """Number of base signals: v, d."""
-        return self.channels + self.outputs
+        return self.channels + self.measured
 
     @property
     def lagged(self) -> int:
@@ -400,7 +400,7 @@ class DynamicMultipliers(Multipliers):
     def form(self, c: Array, number: Any) -> Array:
         """Return the matrix of the form in (v, d) and their lagged copies."""
         Y, bound = symmetric(c), number(self.bound)
-        sizes = np.array([bound * bound] * self.outputs + [number(-1.0)] * self.channels)
+        sizes = np.array([bound * bound] * self.measured + [number(-1.0)] * self.channels)
         n = self.signals
         out = np.zeros((n * len(Y), n * len(Y)), dtype=c.dtype)
         for k in range(n):
@@ -450,7 +450,8 @@ class OwnMultipliers(Multipliers):
 
     def form(self, c: Array, number: Any) -> Array:
         """Return the sum of the forms."""
-        return np.asarray(sum(x * _numbers(M, number) for x, M in zip(c, self.forms, strict=True)))
+        terms = (x * _numbers(M, number) for x, M in zip(c, self.forms, strict=True))
+        return np.asarray(sum(terms), dtype=c.dtype)
 
     def amounts(self, c: Array) -> Array:
         """Return the weights."""

@@ -271,7 +271,8 @@ class _Asked:
         attained = member.gain, member.numbers, member.omega
         if math.isinf(member.gain):
             return MultiplierGain(math.inf, *attained, None, "a linear member is not stable")
-        search = Search(self.plant, self.blocks, solver, member.gain or 1.0, sizes)
+        peak = member.omega * (self.dt or 1.0)
+        search = Search(self.plant, self.blocks, solver, member.gain or 1.0, sizes, peak)
 
         def proven(at: Storage, level: float) -> bool:
             return not self.proof(*at, level).fault()

@@ -26,7 +26,7 @@ from synthesis.robust.structure import DynamicBlock
 
 GRID = 300
 """Frequencies at which members are looked at first."""
-VALUES, MOST = 9, 1000
+VALUES, MOST = 9, 250
 """Values of each number of a member, and members that are looked at."""
 DECADES = 2.0
 

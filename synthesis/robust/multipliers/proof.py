@@ -177,7 +177,7 @@ def _read(content: Mapping[str, Any], inputs: int, outputs: int) -> tuple[Wired,
         made: Any = OwnMultipliers(len(into), given, forms, Lags((), 0))
     else:
         made = kind(channels=len(into), lags=lags, **own)
-    if isinstance(made, DynamicMultipliers) and made.outputs != len(out):
+    if isinstance(made, DynamicMultipliers) and made.measured != len(out):
         raise InputError("a block has other channels than its multipliers")
     if not isinstance(made, DynamicMultipliers | OwnMultipliers) and len(into) != len(out):
         raise InputError("a block has other inputs than outputs")

@@ -29,6 +29,8 @@ FREQUENCIES, FINE = 40, 1500
 """Frequencies of the first program, and those at which its answer is looked at."""
 DECADES = 2.0
 """Decades of frequency beyond the poles of the loop and its filters."""
+AROUND = 0.1
+"""Relative distance from the frequency of a member's peak that the first program looks at, too."""
 ROUNDS = 15
 """Largest number of programs at one level."""
 JOINING = 8
@@ -88,14 +90,14 @@ class Responses(NamedTuple):
         """Return them in coordinates in which the matrices H (K, m, m) are -1 times the identity,
         where these are negative definite.
         """
+        own = -0.5 * self.turned(H + H.conj().swapaxes(1, 2))
+        unit = np.sqrt(np.abs(np.einsum("kii->ki", own).real))
+        unit[unit == 0] = 1.0
+        values, vectors = np.linalg.eigh(own / unit[:, :, None] / unit[:, None, :])
+        good = values[:, 0] > DEFINITE * values[:, -1]
+        back = vectors[good] / np.sqrt(values[good])[:, None, :] / unit[good][:, :, None]
         turn = self.turn.copy()
-        own = 0.5 * self.turned(H + H.conj().swapaxes(1, 2))
-        for k, each in enumerate(-own):
-            unit = np.sqrt(np.abs(each.diagonal().real))
-            if np.all(unit > 0):
-                values, vectors = np.linalg.eigh(each / unit[:, None] / unit)
-                if values[0] > DEFINITE * values[-1]:
-                    turn[k] = turn[k] @ (vectors / np.sqrt(values) / unit[:, None])
+        turn[good] = turn[good] @ back
         return self._replace(turn=turn)
 
 
@@ -109,8 +111,11 @@ class Search:
         solver: Solver,
         scale: float,
         sizes: Sequence[float],
+        peak: float,
     ) -> None:
-        """Prepare the loop and its responses; `sizes` of the model's inputs, where f is 1."""
+        """Prepare the loop and its responses; `sizes` of the model's inputs, where f is 1, and the
+        frequency `peak` of the largest gain of a member.
+        """
         self.plant, self.blocks, self.solver = plant, tuple(blocks), solver
         self.loop = extended(plant, blocks, float)
         self.scale = scale
@@ -132,7 +137,9 @@ class Search:
         self.fine = self.responses(grid, X)
         self.sizes = np.abs(self.fine.turned(self.fine.terms)).max(axis=(1, 2, 3))
         self.sizes[self.sizes == 0] = 1.0
-        self.points = self.responses(self._frequencies(FREQUENCIES))
+        around = peak * np.exp(np.linspace(-AROUND, AROUND, 9)) if peak > 0 else np.ones(0)
+        line = self._frequencies(FREQUENCIES)
+        self.points = self.responses(np.unique(np.r_[line, around]))
 
     def _frequencies(self, count: int) -> Array:
         poles = np.linalg.eigvals(self.loop.A) if len(self.loop.A) else np.ones(1)
