@@ -19,7 +19,14 @@ from symheli.values.summary import summarized
 from synthesis.certify.statement.proven_statement import ProvenStatement
 from synthesis.numerics.program.cone_program import Solver, general_solver
 from synthesis.robust.multipliers import search as searching
-from synthesis.robust.multipliers.blocks import Block, DelayBlock, multipliers_of
+from synthesis.robust.multipliers.blocks import (
+    Block,
+    DelayBlock,
+    OwnMultiplier,
+    ParameterBlock,
+    StaticBlock,
+    multipliers_of,
+)
 from synthesis.robust.multipliers.classes import Lags
 from synthesis.robust.multipliers.delays import WEIGHT
 from synthesis.robust.multipliers.loop import Plant, Wired
@@ -27,6 +34,7 @@ from synthesis.robust.multipliers.members import Family, Member
 from synthesis.robust.multipliers.proof import GainProof
 from synthesis.robust.multipliers.search import Search, Storage
 from synthesis.robust.multipliers.sentences import sentence
+from synthesis.robust.structure import DynamicBlock
 
 KIND = "multiplier gain"
 APART = 30.0
@@ -186,9 +194,7 @@ def multiplier_gain(
     25.96, attained 7.08
     7.08, attained 7.08
     """
-    model, own = as_model(model), [blocks] if not isinstance(blocks, Sequence) else list(blocks)
-    if hasattr(blocks, "inputs"):
-        own = [blocks]  # a named tuple is a sequence, too
+    model, own = as_model(model), _blocks(blocks)
     asked = _Asked.of(model, own, inputs, outputs, poles, order)
     family = Family(asked.plant, own, [(b.inputs, b.outputs) for b in asked.blocks], model.dt)
     fault = asked.proof(np.zeros((0, 0)), (), 0.0).fault_of_blocks()
@@ -283,6 +289,16 @@ class _Asked:
             return MultiplierGain(math.inf, *attained, None, why)
         level, at = found
         return MultiplierGain(level, *attained, self.proof(*at, level))
+
+
+def _blocks(given: Sequence[Block] | Block) -> list[Block]:
+    """Return a list, of one block too: a named tuple is a sequence as well."""
+    match given:
+        case StaticBlock() | DelayBlock() | ParameterBlock() | OwnMultiplier() | DynamicBlock():
+            return [given]
+        case _:
+            found: list[Any] = list(given)
+            return found
 
 
 def _list(names: Sequence[str]) -> list[str]:

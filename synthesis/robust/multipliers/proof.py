@@ -176,7 +176,8 @@ def _read(content: Mapping[str, Any], inputs: int, outputs: int) -> tuple[Wired,
         forms = tuple(np.asarray(decoded(M), float) for M in content["forms"])
         made: Any = OwnMultipliers(len(into), given, forms, Lags((), 0))
     else:
-        made = kind(channels=len(into), lags=lags, **own)
+        make: Any = kind
+        made = make(channels=len(into), lags=lags, **own)
     if isinstance(made, DynamicMultipliers) and made.measured != len(out):
         raise InputError("a block has other channels than its multipliers")
     if not isinstance(made, DynamicMultipliers | OwnMultipliers) and len(into) != len(out):

@@ -67,20 +67,24 @@ class Responses(NamedTuple):
 
     def joined(self, other: Responses) -> Responses:
         """Return both."""
-        pairs = zip(self, other, strict=True)
-        axes = (0, 1, 0, 0, 0, 0)
-        joined = (np.concatenate(p, axis=a) for p, a in zip(pairs, axes, strict=True))
-        return Responses(*joined)
+        axes = dict.fromkeys(self._fields, 0) | {"terms": 1}
+        return self._replace(
+            **{
+                name: np.concatenate([getattr(self, name), getattr(other, name)], axis=axis)
+                for name, axis in axes.items()
+            }
+        )
 
     def at(self, k: Array) -> Responses:
         """Return these at some of the frequencies."""
-        return Responses(self.omega[k], self.terms[:, k], *(M[k] for M in self[2:]))
+        rest = {name: getattr(self, name)[k] for name in self._fields if name != "terms"}
+        return Responses(terms=self.terms[:, k], **rest)
 
     def inner(self, d: Array) -> Responses:
         """Return them for inputs d alone, without outputs."""
-        parts = [M[..., d, :][..., d] for M in self[1:5]]
-        unit = np.broadcast_to(np.eye(len(d)) + 0j, parts[1].shape)
-        return Responses(self.omega, parts[0], 0 * parts[1], *parts[2:], unit).near(-parts[3])
+        terms, out, size, signals = (M[..., d, :][..., d] for M in self[1:5])
+        unit = np.broadcast_to(np.eye(len(d)) + 0j, out.shape)
+        return Responses(self.omega, terms, 0 * out, size, signals, unit).near(-signals)
 
     def turned(self, F: Array) -> Array:
         """Return matrices (..., K, m, m) in these coordinates."""
@@ -110,7 +114,7 @@ class Search:
         blocks: Sequence[Wired],
         solver: Solver,
         scale: float,
-        sizes: Sequence[float],
+        sizes: Array,
         peak: float,
     ) -> None:
         """Prepare the loop and its responses; `sizes` of the model's inputs, where f is 1, and the
@@ -299,14 +303,15 @@ class Search:
         none = np.zeros((n, n))
         if self.plant.sampled:
             left = np.block([[A, none, B], [Q, -np.eye(n), S], [S.T, 0 * B.T, R]])
-            right = linalg.block_diag(np.eye(n), -A.T, np.zeros((m, m)))
-            right[2 * n :, n : 2 * n] = -B.T
+            right = np.block(
+                [[np.eye(n), none, 0 * B], [none, -A.T, 0 * B], [0 * B.T, -B.T, np.zeros((m, m))]]
+            )
         else:
             left = np.block([[A, none, B], [-Q, -A.T, -S], [S.T, B.T, R]])
             right = linalg.block_diag(np.eye(2 * n), np.zeros((m, m)))
         values = linalg.eigvals(left, right)
         values = values[np.isfinite(values)]
-        own = np.abs(np.angle(values) if self.plant.sampled else values.imag)
+        own = np.abs(np.angle(values) if self.plant.sampled else np.imag(values))
         own = np.unique(own[own > 0])
         return np.unique(np.r_[own, np.sqrt(own[1:] * own[:-1])])
 
@@ -421,10 +426,9 @@ def _ratio(H: Array, size: Array) -> Array:
 
 def _real(H: Array) -> Array:
     """Return Hermitian matrices as symmetric ones of twice the size."""
-    return np.concatenate(
-        [np.concatenate([H.real, -H.imag], axis=-1), np.concatenate([H.imag, H.real], axis=-1)],
-        axis=-2,
-    )
+    real, imaginary = np.real(H), np.imag(H)
+    upper = np.concatenate([real, -imaginary], axis=-1)
+    return np.concatenate([upper, np.concatenate([imaginary, real], axis=-1)], axis=-2)
 
 
 def _power(value: float) -> float:
