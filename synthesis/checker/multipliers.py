@@ -320,87 +320,111 @@ def _nominal(loop: Loop, factors: Mapping[tuple[int, int], Fraction]) -> list[Ro
     ]
 
 
-def _channels(values: Any, size: int) -> list[int]:
+def channels(values: Any, size: int) -> list[int]:
+    """Return different numbers of channels."""
     found = [whole(v, "a channel", 0, size - 1) for v in values]
     if len(set(found)) < len(found):
         raise Unreadable("the file is damaged: a channel stands twice")
     return found
 
 
+def blocks_of(content: Any, loop: Loop) -> list[Block]:
+    """Return the blocks of a file."""
+    out = []
+    for each in content["blocks"]:
+        inputs, outputs = channels(each["inputs"], loop.m), channels(each["outputs"], len(loop.C))
+        values = iter(array(each["coefficients"], "coefficients", None))
+        out.append(Block(each, inputs, outputs, values))
+    return out
+
+
+def sentences(
+    loop: Loop,
+    into: Sequence[int],
+    out: Sequence[int],
+    blocks: Sequence[Block],
+    told: Sequence[Told],
+) -> list[str]:
+    """Return of which model and blocks a claim is."""
+    time = "continuous time" if loop.dt is None else f"samples of {float(loop.dt)!r} s"
+    f, y = (", ".join(str(i + 1) for i in own) for own in (into, out))
+    said = [
+        f"a model of {loop.own} states, {loop.m} inputs, {len(loop.C)} outputs, in {time}",
+        f"f: inputs {f}; y: outputs {y}",
+    ]
+    for block, each in zip(blocks, told, strict=False):
+        d, v = (", ".join(str(i + 1) for i in own) for own in block[1:3])
+        said.append(f"inputs {d} of outputs {v}: {each.words}")
+    return said
+
+
 def claimed(content: Any) -> Claim:
     """Return what a file of a gain by multipliers claims."""
     loop, bound = Loop(content), number(content["gain"], "the gain")
-    into, out = _channels(content["into"], loop.m), _channels(content["out"], len(loop.C))
-    form, blocks = Form(loop.size), []
-    for each in content["blocks"]:
-        inputs, outputs = _channels(each["inputs"], loop.m), _channels(each["outputs"], len(loop.C))
-        values = iter(array(each["coefficients"], "coefficients", None))
-        blocks.append(Block(each, inputs, outputs, values))
-    refused, told = "", []
+    into, out = channels(content["into"], loop.m), channels(content["out"], len(loop.C))
+    form, blocks = Form(loop.size), blocks_of(content, loop)
+    refused, told = "" if bound >= 0 else "a gain is below zero", []
     try:
-        told = _told(loop, form, blocks, into)
+        told = told_of(loop, form, blocks, into, KINDS)
     except Refused as error:
         refused = str(error)
     demands = [demand for each in told for demand in each.demands]
     if not refused:
         demands.append(_gain(loop, form, content, into, out))
     claim = f"the energy gain is below {float(bound)!r}: |y|_2 < {float(bound)!r} |f|_2 from rest"
-    time = "continuous time" if loop.dt is None else f"samples of {float(loop.dt)!r} s"
-    said = [
-        f"a model of {loop.own} states, {loop.m} inputs, {len(loop.C)} outputs, in {time}",
-        f"f: inputs {', '.join(str(i + 1) for i in into)}; y: outputs"
-        f" {', '.join(str(j + 1) for j in out)}",
-    ]
-    for block, each in zip(blocks, told, strict=False):
-        d, v = (", ".join(str(i + 1) for i in own) for own in block[1:3])
-        said.append(f"inputs {d} of outputs {v}: {each.words}")
-    level = lambda g: g * g  # noqa: E731
-    return Claim(
-        claim,
-        said,
-        demands,
-        bound,
-        level,
-        refused=refused or ("" if bound >= 0 else "a gain below zero"),
-    )
+    said = sentences(loop, into, out, blocks, told)
+    return Claim(claim, said, demands, bound, lambda g: g * g, refused=refused)
 
 
-def _told(loop: Loop, form: Form, blocks: Sequence[Block], into: Sequence[int]) -> list[Told]:
-    """Add the forms of all blocks; return what they demand. Raise where they do not fit."""
+def told_of(
+    loop: Loop,
+    form: Form,
+    blocks: Sequence[Block],
+    into: Sequence[int],
+    kinds: Mapping[str, Any],
+    nominal: bool = True,
+) -> list[Told]:
+    """Add the forms of all blocks; return what they demand. Raise where they do not fit, or, with
+    `nominal`, where the loop with the nominal blocks is not stable.
+    """
     d = [i for block in blocks for i in block.inputs]
     v = [j for block in blocks for j in block.outputs]
     if sorted([*d, *into]) != list(range(loop.m)):
         raise Refused("an input belongs to two blocks, or to none")
-    kinds = {block.content["type"] for block in blocks}
-    if not kinds <= {"parameter", "dynamics"} and any(loop.D[j][i] for j in v for i in d):
+    types = {str(block.content["type"]) for block in blocks}
+    at_once = any(loop.D[j][i] for j in v for i in d)
+    if at_once and not types <= {"parameter", "dynamics", "box"}:
         raise Refused("an output of a block depends on an input of one at the same instant")
     told, factors = [], {}
     for block in blocks:
-        if block.content["type"] not in KINDS:
-            raise Unreadable(f"a block of the type {block.content['type']!r:.40} is not known")
-        paired = len(block.inputs) == len(block.outputs)
-        if not paired and block.content["type"] not in ("dynamics", "own"):
-            raise Unreadable("the file is damaged: a block has other inputs than outputs")
-        most = 1 if loop.dt is not None else None
-        poles = block.poles
-        if len(set(poles)) < len(poles) or any(a <= 0 or (most and a >= most) for a in poles):
-            raise Refused("a pole of a lag is not stable, or there twice")
-        told.append(KINDS[block.content["type"]](loop, form, block))
-        if next(block.values, None) is not None:
-            raise Unreadable("the file is damaged: a multiplier has too many coefficients")
-        if paired:
-            factors |= {
-                (i, j): told[-1].nominal for i, j in zip(block.inputs, block.outputs, strict=True)
-            }
-    if not stable(_nominal(loop, {k: f for k, f in factors.items() if f}), loop.dt is not None):
+        told.append(_read(loop, form, block, kinds))
+        if len(block.inputs) == len(block.outputs):
+            pairs = zip(block.inputs, block.outputs, strict=True)
+            factors |= dict.fromkeys(pairs, told[-1].nominal)
+    own = {k: f for k, f in factors.items() if f}
+    if nominal and not stable(_nominal(loop, own), loop.dt is not None):
         raise Refused("the nominal loop is not stable")
     return told
 
 
-def _gain(loop: Loop, form: Form, content: Any, into: Sequence[int], out: Sequence[int]) -> Demand:
-    """Return the inequality of the gain."""
-    P = array(content["P"], "P", loop.n, loop.n)
-    even(P)
+def _read(loop: Loop, form: Form, block: Block, kinds: Mapping[str, Any]) -> Told:
+    """Add the form of a block; return what it demands."""
+    kind = block.content["type"]
+    if kind not in kinds:
+        raise Unreadable(f"a block of the type {kind!r:.40} is not known")
+    if len(block.inputs) != len(block.outputs) and kind not in ("dynamics", "own"):
+        raise Unreadable("the file is damaged: a block has other inputs than outputs")
+    poles = block.poles
+    if len(set(poles)) < len(poles) or any(a <= 0 or (loop.dt and a >= 1) for a in poles):
+        raise Refused("a pole of a lag is not stable, or there twice")
+    told = kinds[kind](loop, form, block)
+    if next(block.values, None) is not None:
+        raise Unreadable("the file is damaged: a multiplier has too many coefficients")
+    return told
+
+
+def motion_of(loop: Loop, form: Form, P: Sequence[Row]) -> None:
+    """Add the change of x' P x."""
     states = [[Fraction(k == i) for k in range(loop.size)] for i in range(loop.n)]
     if loop.dt is None:
         for i, own in enumerate(P):
@@ -408,6 +432,13 @@ def _gain(loop: Loop, form: Form, content: Any, into: Sequence[int], out: Sequen
     else:
         form.square(P, loop.motion)
         form.square(P, states, -1)
+
+
+def _gain(loop: Loop, form: Form, content: Any, into: Sequence[int], out: Sequence[int]) -> Demand:
+    """Return the inequality of the gain."""
+    P = array(content["P"], "P", loop.n, loop.n)
+    even(P)
+    motion_of(loop, form, P)
     for j in out:
         form.add(Fraction(1), loop.output(j), loop.output(j))
     energy = diagonal([int(k - loop.n in into) for k in range(loop.size)])

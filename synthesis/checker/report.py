@@ -4,11 +4,13 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from . import dwell, lagged, lft, multipliers, sets, storage
+from . import dwell, lagged, lft, multipliers, peaks, sets, storage
 from .demands import Claim, failure
 from .reading import DAMAGED, TUBE, Unreadable, opened
 
 SETS = {"InvariantSet": sets.ellipsoid, "LowComplexitySet": sets.parallelepiped}
+
+GAINS = {"multiplier gain": multipliers.claimed, "multiplier peak gain": peaks.claimed}
 
 
 def claim_of(kind: str, content: Mapping[str, Any]) -> Claim:
@@ -23,8 +25,8 @@ def claim_of(kind: str, content: Mapping[str, Any]) -> Claim:
         return SETS[kind](content)
     if kind in ("dwell time", "average dwell time"):
         return dwell.claimed(content)
-    if kind == "multiplier gain":
-        return multipliers.claimed(content)
+    if kind in GAINS:
+        return GAINS[kind](content)
     if kind in (TUBE, "tube"):
         raise Unreadable(
             "tubes are not decided here: their proof rests on enclosures of nonlinear equations"

@@ -20,9 +20,9 @@ from synthesis.robust.multipliers.classes import (
     Multipliers,
     OwnMultipliers,
     ParameterMultipliers,
-    StaticMultipliers,
 )
 from synthesis.robust.multipliers.delays import SHAPES, DelayMultipliers
+from synthesis.robust.multipliers.static import StaticMultipliers
 from synthesis.robust.structure import DynamicBlock
 
 RATES = 0.0, math.inf

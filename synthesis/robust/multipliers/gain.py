@@ -7,56 +7,46 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-
 from symheli import LinearModel, progress
-from symheli.errors import InputError
+from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.linear_model import as_model
 from symheli.threads import with_one_thread
-from symheli.values.arrays import Array
-from symheli.values.signal import indices
 from symheli.values.summary import summarized
 from synthesis.certify.statement.proven_statement import ProvenStatement
 from synthesis.numerics.program.cone_program import Solver, general_solver
-from synthesis.robust.multipliers import search as searching
-from synthesis.robust.multipliers.blocks import (
-    Block,
-    DelayBlock,
-    OwnMultiplier,
-    ParameterBlock,
-    StaticBlock,
-    multipliers_of,
-)
-from synthesis.robust.multipliers.classes import Lags
-from synthesis.robust.multipliers.delays import WEIGHT
-from synthesis.robust.multipliers.loop import Plant, Wired
-from synthesis.robust.multipliers.members import Family, Member
+from synthesis.robust.multipliers import trajectories
+from synthesis.robust.multipliers.asked import L2, Asked, blocks_of
+from synthesis.robust.multipliers.blocks import Block
+from synthesis.robust.multipliers.members import Family
+from synthesis.robust.multipliers.peak_proof import ENERGY, PEAK, PeakProof
+from synthesis.robust.multipliers.peak_proof import KIND as PEAK_KIND
 from synthesis.robust.multipliers.proof import GainProof
-from synthesis.robust.multipliers.search import Search, Storage
 from synthesis.robust.multipliers.sentences import sentence
-from synthesis.robust.structure import DynamicBlock
 
+KINDS = L2, ENERGY, PEAK
 KIND = "multiplier gain"
-APART = 30.0
-"""Ratio of the fastest to the slowest pole of a model from which on the lags have two poles."""
+UNSTABLE = "a linear member is not stable"
+UNFOUND = "no multiplier was found that holds"
 
 
 @dataclass(frozen=True, eq=False)
 class MultiplierGain(ProvenStatement):
-    """The L2 gain from the outside inputs to the outside outputs is proven to be at most `upper`,
-    for every member of the blocks; a linear member attains `lower`.
+    """The gain of this `kind` from the outside inputs to the outside outputs is proven to be at
+    most `upper`, for every member of the blocks; a member with linear blocks attains `lower`.
 
     `member` has a number for each block: the slope, the delay (s), the parameter, or a phase (rad)
-    of dynamics; `omega` (rad/s) is the frequency where it attains the gain. `proof` has all numbers
-    that the statement rests on; None: nothing is proven, `upper` is inf, and `why` says why.
+    of dynamics; `omega` (rad/s) is the frequency where it attains an L2 gain, NaN of others, where
+    parameters that move may jump. `proof` has all numbers that the statement rests on; None:
+    nothing is proven, `upper` is inf, and `why` says why.
     """
 
     upper: float
     lower: float
     member: tuple[float, ...]
     omega: float
-    proof: GainProof | None = None
+    proof: GainProof | PeakProof | None = None
     why: str = ""
+    kind: str = L2
     reader: ClassVar[str] = "multiplier-gain"
 
     __repr__ = summarized
@@ -74,10 +64,13 @@ class MultiplierGain(ProvenStatement):
     @property
     def claim(self) -> str:
         """The claim in one sentence, with numbers and units."""
-        return (
-            f"L2 gain {self.upper:.9g}: |y|_2 < {self.upper:.6g} |u|_2 from rest, for every member"
-            " of the blocks"
-        )
+        size = f"{self.upper:.6g}"
+        words = {
+            L2: f"|y|_2 < {size} |u|_2 from rest",
+            ENERGY: f"|y(t)| < {size} |u|_2 from rest, at every t",
+            PEAK: f"|y(t)| < {size} max |u| from rest, at every t",
+        }[self.kind]
+        return f"{self.kind} gain {self.upper:.9g}: {words}, for every member of the blocks"
 
     @property
     def conditions(self) -> tuple[str, ...]:
@@ -92,21 +85,22 @@ class MultiplierGain(ProvenStatement):
     @property
     def facts(self) -> Mapping[str, Any]:
         """Kind, bounds and conditions as data that JSON holds."""
-        return {"kind": KIND, "bound": self.bound}
+        return {"kind": KIND if self.kind == L2 else PEAK_KIND, "bound": self.bound}
 
     @property
     def stored(self) -> dict[str, Any]:
         """Values of a file: the model, its blocks, multipliers and storage."""
         if self.proof is None:
             raise InputError("only a proven gain is saved")
-        return {"kind": KIND, **self.proof.stored}
+        return {"kind": self.facts["kind"], **self.proof.stored}
 
     @classmethod
     def restored(cls, content: Mapping[str, Any]) -> MultiplierGain:
         """Return the gain of a file, proven anew."""
-        proof = GainProof.restored(content)
-        why = proof.fault()
-        return cls(proof.gain, math.nan, (), math.nan, None if why else proof, why)
+        reader = GainProof if content["kind"] == KIND else PeakProof
+        proof = reader.restored(content)
+        why, kind = proof.fault(), proof.kind if isinstance(proof, PeakProof) else L2
+        return cls(proof.gain, math.nan, (), math.nan, None if why else proof, why, kind)
 
     def verify(self, rigorous: bool = True) -> bool:
         """Check the proof again from its numbers, in exact arithmetic."""
@@ -114,10 +108,11 @@ class MultiplierGain(ProvenStatement):
         return own is not None and own.gain <= self.upper and not own.fault()
 
     def __str__(self) -> str:
-        attained = f"{self.lower:.6g} is attained at {self.omega:.4g} rad/s"
+        where = "" if math.isnan(self.omega) else f" at {self.omega:.4g} rad/s"
+        attained = f"{self.lower:.6g} is attained{where}"
         if self.proof is None:
-            return f"no gain is proven ({self.why}); {attained}"
-        return f"L2 gain at most {self.upper:.6g}, proven in exact arithmetic; {attained}"
+            return f"no {self.kind} gain is proven ({self.why}); {attained}"
+        return f"{self.kind} gain at most {self.upper:.6g}, proven in exact arithmetic; {attained}"
 
 
 @with_one_thread
@@ -127,12 +122,14 @@ def multiplier_gain(
     inputs: Sequence[str] | None = None,
     outputs: Sequence[str] | None = None,
     *,
+    kind: str = L2,
     poles: Sequence[float] | None = None,
     order: int = 1,
+    decay: float | None = None,
     solver: Solver | str = "CLARABEL",
 ) -> MultiplierGain:
-    """Prove an L2 gain of a loop with static functions, delays, constant parameters and dynamics,
-    by multipliers that depend on frequency.
+    """Prove a gain of a loop with static functions, delays, real parameters and dynamics by
+    multipliers; an L2 gain by those that depend on frequency.
 
     Multipliers are those of the circle criterion, of Popov, of Zames and Falb (odd and repeated
     functions too), D and G scalings, and of a delay its size and that |v(t - T)| has the energy of
@@ -150,11 +147,18 @@ def multiplier_gain(
         Each with its inputs d and outputs v of the model.
     inputs, outputs : sequence of str, optional
         Of the gain; those of no block. An output may be one of a block, too.
+    kind : str
+        "L2"; "energy to peak", of parameters, functions in a sector and, of a sampled model,
+        dynamics and multipliers of one's own, whose inequalities hold over every finite time then;
+        "peak to peak", of parameters and functions in a sector. Parameters are taken as moving.
     poles : sequence of float, optional
         Poles a (rad/s) of the lags a/(s + a) of the multipliers; from the model's poles by default.
         A delay has one of its own.
     order : int
         Largest power of each lag.
+    decay : float, optional
+        Of peak to peak: V falls by exp(-decay t), decay in 1/s; of a sampled model by the factor
+        1 - decay in a period. The best by default.
     solver : Solver or str
         Of the semidefinite programs over frequency.
 
@@ -167,10 +171,10 @@ def multiplier_gain(
     Raises
     ------
     InputError
-        Blocks and channels that do not fit; a path without delay between channels of static
+        Blocks, channels and kind that do not fit; a path without delay between channels of static
         functions or delays; a delay of a sampled model; poles that are not above zero.
     UnknownNameError
-        A channel that the model does not have.
+        A channel that the model does not have, or another kind.
 
     References
     ----------
@@ -194,139 +198,30 @@ def multiplier_gain(
     25.96, attained 7.08
     7.08, attained 7.08
     """
-    model, own = as_model(model), _blocks(blocks)
-    asked = _Asked.of(model, own, inputs, outputs, poles, order)
-    family = Family(asked.plant, own, [(b.inputs, b.outputs) for b in asked.blocks], model.dt)
-    fault = asked.proof(np.zeros((0, 0)), (), 0.0).fault_of_blocks()
+    model, own = as_model(model), blocks_of(blocks)
+    if kind not in KINDS:
+        raise UnknownNameError("kind", kind, KINDS)
+    asked = Asked.of(model, own, inputs, outputs, poles, order, kind)
+    fault = asked.fault()
     if fault:
         raise InputError(fault)
+    if decay is not None and not (0 < decay < (1 if model.dt else math.inf)):
+        raise InputError(f"decay: expected a number > 0, sampled below 1, got {decay!r:.40}")
     with progress.task("multipliers", 2) as task:
+        family = Family(asked.plant, own, asked.places, model.dt)
         member, sizes = family.worst()
+        lower, numbers, omega = member.gain, member.numbers, member.omega
+        if kind != L2 and math.isfinite(lower):
+            attained = trajectories.energy_to_peak if kind == ENERGY else trajectories.peak_to_peak
+            (lower, numbers), omega = attained(family), math.nan
         task.step("a linear member")
-        return asked.proven(member, sizes, general_solver(solver))
-
-
-@dataclass(frozen=True, eq=False)
-class _Asked:
-    """What is asked, in numbers."""
-
-    plant: Plant
-    blocks: tuple[Wired, ...]
-    dt: float | None
-
-    @classmethod
-    def of(
-        cls,
-        model: LinearModel,
-        blocks: Sequence[Block],
-        inputs: Sequence[str] | None,
-        outputs: Sequence[str] | None,
-        poles: Sequence[float] | None,
-        order: int,
-    ) -> _Asked:
-        """Return the question; raise for names and numbers that do not fit."""
-        if not blocks:
-            raise InputError("blocks: expected at least one; without a block use l2_gain")
-        taken = [
-            [indices(_list(names), group, kind) for names in own]
-            for own, group, kind in (
-                ([b.inputs for b in blocks], model.inputs, "input"),
-                ([b.outputs for b in blocks], model.outputs, "output"),
-            )
-        ]
-        ends = []
-        for given, own, group, kind in (
-            (inputs, taken[0], model.inputs, "input"),
-            (outputs, taken[1], model.outputs, "output"),
-        ):
-            used = {i for each in own for i in each}
-            if len(used) < sum(map(len, own)):
-                raise InputError(f"an {kind} belongs to two blocks, or twice to one")
-            rest = [i for i in range(len(group)) if i not in used]
-            ends.append(rest if given is None else indices(_list(given), group, kind))
-        if not (ends[0] and ends[1]):
-            raise InputError("expected an input and an output of the gain besides the blocks'")
-        inside = [i for each in taken[0] for i in each]
-        if set(inside) & set(ends[0]):
-            raise InputError("inputs: expected those of no block")
-        kept = sorted([*inside, *ends[0]])
-        place = {i: k for k, i in enumerate(kept)}
-        plant = Plant(
-            model.A,
-            model.B[:, kept],
-            model.C,
-            model.D[:, kept],
-            tuple(place[i] for i in ends[0]),
-            tuple(ends[1]),
-            model.dt is not None,
-        )
-        wired = []
-        for block, into, out in zip(blocks, *taken, strict=True):
-            moving = model.dt is None and not np.any(plant.D[out])
-            lags = _lags(block, model, poles, order)
-            kind = multipliers_of(block, lags, moving)
-            wired.append(Wired(kind, tuple(place[i] for i in into), tuple(out)))
-        return cls(plant, tuple(wired), model.dt)
-
-    def proof(self, P: Array, coefficients: tuple[Array, ...], gain: float) -> GainProof:
-        """Return these numbers as a proof."""
-        return GainProof(self.plant, self.dt, self.blocks, P, coefficients, gain)
-
-    def proven(self, member: Member, sizes: Array, solver: Solver) -> MultiplierGain:
-        """Search a proof."""
-        attained = member.gain, member.numbers, member.omega
-        if math.isinf(member.gain):
-            return MultiplierGain(math.inf, *attained, None, "a linear member is not stable")
-        peak = member.omega * (self.dt or 1.0)
-        search = Search(self.plant, self.blocks, solver, member.gain or 1.0, sizes, peak)
-
-        def proven(at: Storage, level: float) -> bool:
-            return not self.proof(*at, level).fault()
-
-        found = searching.found(search, proven)
-        if found is None:
-            why = "no multiplier was found that holds at every frequency"
-            return MultiplierGain(math.inf, *attained, None, why)
-        level, at = found
-        return MultiplierGain(level, *attained, self.proof(*at, level))
-
-
-def _blocks(given: Sequence[Block] | Block) -> list[Block]:
-    """Return a list, of one block too: a named tuple is a sequence as well."""
-    match given:
-        case StaticBlock() | DelayBlock() | ParameterBlock() | OwnMultiplier() | DynamicBlock():
-            return [given]
-        case _:
-            found: list[Any] = list(given)
-            return found
-
-
-def _list(names: Sequence[str]) -> list[str]:
-    return [names] if isinstance(names, str) else list(names)
-
-
-def _lags(block: Block, model: LinearModel, poles: Sequence[float] | None, order: int) -> Lags:
-    """Return the lags of a block, sampled as the model is."""
-    if isinstance(order, bool) or not isinstance(order, int) or not 1 <= order <= 20:
-        raise InputError(f"order: expected an integer from 1 to 20, got {order!r:.40}")
-    if isinstance(block, DelayBlock):
-        return Lags((2.0 / block.longest,), max(order, WEIGHT + (block.form == "window")))
-    given = _usual(model) if poles is None else tuple(float(v) for v in poles)
-    if not all(0 < a < math.inf for a in given) or len(set(given)) < len(given):
-        raise InputError(f"poles: expected different numbers > 0 rad/s, got {given!r:.60}")
-    if model.dt is not None:
-        given = tuple(math.exp(-a * model.dt) for a in given)
-    return Lags(given, order if given else 0)
-
-
-def _usual(model: LinearModel) -> tuple[float, ...]:
-    """Return poles (rad/s) between those of the model."""
-    modes = np.linalg.eigvals(model.A) if len(model.A) else np.ones(0)
-    if model.dt is not None:
-        modes = np.log(modes[np.abs(modes) > 0] + 0j) / model.dt
-    sizes = np.abs(modes)[np.abs(modes) > 0]
-    if not len(sizes):
-        return ()
-    low, high = float(sizes.min()), float(sizes.max())
-    middle = math.sqrt(low * high)
-    return (middle,) if high < APART * low else (math.sqrt(low * middle), math.sqrt(middle * high))
+        if math.isinf(lower):
+            return MultiplierGain(math.inf, lower, numbers, omega, None, UNSTABLE, kind)
+        proof: GainProof | PeakProof | None
+        if kind == L2:
+            proof = asked.proven(member, sizes, general_solver(solver))
+        else:
+            proof = asked.proven_peak(lower, sizes, decay, general_solver(solver))
+    if proof is None:
+        return MultiplierGain(math.inf, lower, numbers, omega, None, UNFOUND, kind)
+    return MultiplierGain(proof.gain, lower, numbers, omega, proof, "", kind)

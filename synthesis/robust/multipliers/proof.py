@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any, NamedTuple
 
@@ -15,6 +15,7 @@ from synthesis.certify.questions.certificate_file import decoded, encoded
 from synthesis.numerics.polynomial.exact import matmul, positive_definite
 from synthesis.numerics.polynomial.transfer import Transfer, inverse, rationals
 from synthesis.robust.multipliers import inequality
+from synthesis.robust.multipliers.boxes import BoxMultipliers
 from synthesis.robust.multipliers.classes import (
     DynamicMultipliers,
     Filter,
@@ -22,10 +23,10 @@ from synthesis.robust.multipliers.classes import (
     Multipliers,
     OwnMultipliers,
     ParameterMultipliers,
-    StaticMultipliers,
 )
 from synthesis.robust.multipliers.delays import DelayMultipliers
 from synthesis.robust.multipliers.loop import Plant, Wired, extended, fractions
+from synthesis.robust.multipliers.static import StaticMultipliers
 
 TYPES: dict[str, type[Multipliers]] = {
     "static": StaticMultipliers,
@@ -33,6 +34,7 @@ TYPES: dict[str, type[Multipliers]] = {
     "parameter": ParameterMultipliers,
     "dynamics": DynamicMultipliers,
     "own": OwnMultipliers,
+    "box": BoxMultipliers,
 }
 """Classes by their names in files."""
 NAMES = {kind: name for name, kind in TYPES.items()}
@@ -55,26 +57,9 @@ class GainProof(NamedTuple):
     def fault_of_blocks(self) -> str:
         """Return why the blocks and this loop do not fit; empty where they do."""
         plant, exact = self.plant, self.plant.exact()
-        inputs = [i for b in self.blocks for i in b.inputs]
-        outputs = [j for b in self.blocks for j in b.outputs]
-        if len({*inputs, *plant.into}) < len(inputs) + len(plant.into):
-            return "an input belongs to two blocks, or to one and to the outside"
-        if sorted([*inputs, *plant.into]) != list(range(plant.B.shape[1])):
-            return "an input belongs to no block and is not outside"
-        direct = np.any(plant.D[np.ix_(outputs, inputs)])
-        if direct and any(_needs_time(b.kind) for b in self.blocks):
-            return (
-                "an output of a block depends on an input of one at the same instant: put a lag"
-                " between"
-            )
-        for kind, _, own in self.blocks:
-            if kind.moving and (plant.sampled or np.any(plant.D[list(own)])):
-                return "Popov's term is for outputs without feedthrough, in continuous time"
-            if isinstance(kind, DelayMultipliers) and plant.sampled:
-                return "multipliers of a delay are for continuous time"
-            wrong = kind.fault(plant.sampled)
-            if wrong:
-                return wrong
+        wrong = fault_of_channels(plant, self.blocks)
+        if wrong:
+            return wrong
         N = np.zeros((plant.B.shape[1], len(plant.C)), dtype=object) + Fraction(0)
         for kind, into, out in self.blocks:
             if len(into) == len(out):
@@ -91,11 +76,9 @@ class GainProof(NamedTuple):
     def _fault_of_inequality(self) -> str:
         coefficients = [fractions(c) for c in self.coefficients]
         for (kind, _, _), c in zip(self.blocks, coefficients, strict=True):
-            amounts = kind.amounts(c)
-            if any(v < 0 for v in amounts.tolist()):
-                return "a multiplier is not one of its class: a coefficient is below zero"
-            if not all(positive_definite(M) for M in kind.matrices(c)):
-                return "a multiplier is not one of its class: a matrix is not positive definite"
+            wrong = kind.fault_of(c)
+            if wrong:
+                return wrong
         if np.any(self.P != self.P.T) or not 0 <= self.gain < math.inf:
             return "P is not symmetric, or the gain no number"
         loop = extended(self.plant.exact(), self.blocks, Fraction)
@@ -109,42 +92,75 @@ class GainProof(NamedTuple):
     @property
     def stored(self) -> dict[str, Any]:
         """Values of a file."""
-        plant = self.plant
-        return {
-            **{name: encoded(np.asarray(getattr(plant, name), float)) for name in "ABCD"},
-            "dt": self.dt,
-            "into": list(plant.into),
-            "out": list(plant.out),
-            "P": encoded(self.P),
-            "gain": float(self.gain),
-            "blocks": [_written(b, c) for b, c in zip(self.blocks, self.coefficients, strict=True)],
-        }
+        return written(self)
 
     @classmethod
     def restored(cls, content: Mapping[str, Any]) -> GainProof:
         """Return the proof of a file; raise `InputError` for shapes that do not fit."""
-        dt = None if content["dt"] is None else float(content["dt"])
-        A, B, C, D = (np.asarray(decoded(content[name]), float) for name in "ABCD")
-        n, m, p = len(A), B.shape[1], len(C)
-        for M, name, shape in (
-            (A, "A", (n, n)),
-            (B, "B", (n, m)),
-            (C, "C", (p, n)),
-            (D, "D", (p, m)),
-        ):
-            frozen(M, name, shape)
-        into, out = (_numbers(content[name], size) for name, size in (("into", m), ("out", p)))
-        plant = Plant(A, B, C, D, into, out, dt is not None)
-        read = [_read(each, m, p) for each in content["blocks"]]
-        blocks = tuple(block for block, _ in read)
-        size = len(extended(plant, blocks, float).A)
-        P = frozen(decoded(content["P"]), "P", (size, size))
-        return cls(plant, dt, blocks, P, tuple(c for _, c in read), float(content["gain"]))
+        return cls(*read(content))
+
+
+def written(proof: Any) -> dict[str, Any]:
+    """Return model, blocks, P and gain of a proof as a file holds them."""
+    plant = proof.plant
+    return {
+        **{name: encoded(np.asarray(getattr(plant, name), float)) for name in "ABCD"},
+        "dt": proof.dt,
+        "into": list(plant.into),
+        "out": list(plant.out),
+        "P": encoded(proof.P),
+        "gain": float(proof.gain),
+        "blocks": [_written(b, c) for b, c in zip(proof.blocks, proof.coefficients, strict=True)],
+    }
+
+
+Read = tuple[Plant, float | None, tuple[Wired, ...], Array, tuple[Array, ...], float]
+
+
+def read(content: Mapping[str, Any]) -> Read:
+    """Return model, period, blocks, P, coefficients and gain of a file."""
+    dt = None if content["dt"] is None else float(content["dt"])
+    A, B, C, D = (np.asarray(decoded(content[name]), float) for name in "ABCD")
+    n, m, p = len(A), B.shape[1], len(C)
+    shapes = ((A, "A", (n, n)), (B, "B", (n, m)), (C, "C", (p, n)), (D, "D", (p, m)))
+    for M, name, shape in shapes:
+        frozen(M, name, shape)
+    into, out = (_numbers(content[name], size) for name, size in (("into", m), ("out", p)))
+    plant = Plant(A, B, C, D, into, out, dt is not None)
+    both = [_read(each, m, p) for each in content["blocks"]]
+    blocks = tuple(block for block, _ in both)
+    size = len(extended(plant, blocks, float).A)
+    P = frozen(decoded(content["P"]), "P", (size, size))
+    return plant, dt, blocks, P, tuple(c for _, c in both), float(content["gain"])
+
+
+def fault_of_channels(plant: Plant, blocks: Sequence[Wired]) -> str:
+    """Return why channels or numbers of the blocks do not fit; empty where they do."""
+    inputs = [i for b in blocks for i in b.inputs]
+    outputs = [j for b in blocks for j in b.outputs]
+    if len({*inputs, *plant.into}) < len(inputs) + len(plant.into):
+        return "an input belongs to two blocks, or to one and to the outside"
+    if sorted([*inputs, *plant.into]) != list(range(plant.B.shape[1])):
+        return "an input belongs to no block and is not outside"
+    direct = np.any(plant.D[np.ix_(outputs, inputs)])
+    if direct and any(_needs_time(b.kind) for b in blocks):
+        return (
+            "an output of a block depends on an input of one at the same instant: put a lag between"
+        )
+    for kind, _, own in blocks:
+        if kind.moving and (plant.sampled or np.any(plant.D[list(own)])):
+            return "Popov's term is for outputs without feedthrough, in continuous time"
+        if isinstance(kind, DelayMultipliers) and plant.sampled:
+            return "multipliers of a delay are for continuous time"
+        wrong = kind.fault(plant.sampled)
+        if wrong:
+            return wrong
+    return ""
 
 
 def _needs_time(kind: Multipliers) -> bool:
     """Whether a path without delay around the block is refused."""
-    return not isinstance(kind, ParameterMultipliers | DynamicMultipliers)
+    return not isinstance(kind, ParameterMultipliers | DynamicMultipliers | BoxMultipliers)
 
 
 def _written(block: Wired, c: Array) -> dict[str, Any]:

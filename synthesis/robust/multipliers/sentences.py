@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from synthesis.robust.multipliers.boxes import BoxMultipliers
 from synthesis.robust.multipliers.classes import (
     DynamicMultipliers,
     Multipliers,
     ParameterMultipliers,
-    StaticMultipliers,
 )
 from synthesis.robust.multipliers.delays import DelayMultipliers
 from synthesis.robust.multipliers.loop import Wired
+from synthesis.robust.multipliers.static import StaticMultipliers
 
 
 def sentence(block: Wired) -> str:
@@ -29,6 +30,10 @@ def _said(kind: Multipliers) -> str:
         case ParameterMultipliers():
             moves = "moving in any way" if kind.moves else "constant"
             return f"a real number from {kind.low!r} to {kind.high!r}, {moves}"
+        case BoxMultipliers():
+            ends = zip(kind.lows, kind.highs, kind.copies, strict=True)
+            each = (f"{a!r} to {b!r}" + f" ({n} times)" * (n > 1) for a, b, n in ends)
+            return f"real numbers, moving in any way: {', '.join(each)}"
         case DynamicMultipliers():
             return f"stable linear dynamics of gain <= {kind.bound!r}"
         case DelayMultipliers():
