@@ -97,9 +97,9 @@ def demands(
         yield Demand(said, -(change + shows.T @ shows), None, energy)
 
 
-def claimed(kind: str, content: Any) -> Claim:
+def claimed(content: Any) -> Claim:
     """Return what a file of listed models claims; its fields are named here alone."""
-    dt, gain = period(content["dt"]), kind == GAIN
+    dt, gain = period(content["dt"]), content["kind"] == GAIN
     letters = whole(content["letters"], "the letters", 0, MOST_LETTERS if dt else 0)
     degree = whole(content["degree"], "the degree", 1, 1 if gain else HIGHEST)
     every = [array(content["A"], "A", None, None, None)]

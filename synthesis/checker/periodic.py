@@ -130,14 +130,14 @@ def _demands(content: Any, P: Sequence[Polynomial], driven: bool) -> Iterator[De
         yield Demand(f"V falls {said}", -block([[a, b], [b.T, d]]), None, paid, 1)
 
 
-def claimed(kind: str, content: Any) -> Claim:
+def claimed(content: Any) -> Claim:
     """Return what a file of a periodic model claims; its fields are named here alone."""
     n = whole(content["A"]["shape"][-1], "the states", 1, 10**4)
     terms = array(content["P"], "P", None, n, n)
     columns = whole(content["motion"]["shape"][1], "the terms of a motion", 1, MOST)
     if not len(terms) % 2 or not columns % 2 or len(terms) > MOST:
         raise Unreadable("a series has a mean, and a cosine and a sine of each harmonic")
-    driven = kind == GAIN
+    driven = content["kind"] == GAIN
     bound = number(content["gamma"], "the bound") if driven else Fraction(0)
     P = [even(M) for M in terms]
     omega = number(content["omega"], "the speed")

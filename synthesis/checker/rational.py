@@ -89,7 +89,7 @@ def _function(value: Any, name: str, m: int, rows: int, columns: int) -> Polynom
     return along(nested, 0)
 
 
-def claimed(kind: str, content: Any) -> Claim:
+def claimed(content: Any) -> Claim:
     """Return what a file of a rational gain claims; its fields are named here alone."""
     lft = content["lft"]
     moving = parameters([each["scheduling"] for each in lft["blocks"]])
@@ -97,8 +97,9 @@ def claimed(kind: str, content: Any) -> Claim:
         raise Unreadable("an LFT of this kind has no proof that is known here")
     sizes = [whole(each["size"], "the size of a block", 0, 10**3) for each in lft["blocks"]]
     x, u, y = (len(names(lft[name])) for name in ("states", "inputs", "outputs"))
-    if (kind == GAIN) != bool(u):
-        raise Unreadable(f"an LFT of {u} inputs has no proof of the kind {kind!r:.40}")
+    kind = GAIN if u else STABILITY
+    if content["kind"] != kind:
+        raise Unreadable(f"the claim about {u} inputs is no {kind}")
     w = sum(sizes)
 
     def rows(into: str, states: str, count: int) -> list[Polynomial]:

@@ -1,7 +1,7 @@
 """Command of the checker: reads a file, prints what its numbers claim, and decides."""
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from . import (
@@ -10,6 +10,8 @@ from . import (
     lagged,
     lft,
     listed,
+    multipliers,
+    peaks,
     periodic,
     rational,
     regions,
@@ -20,7 +22,20 @@ from . import (
 from .demands import Claim, failure
 from .reading import DAMAGED, TUBE, Unreadable, opened
 
-SETS = {"InvariantSet": sets.ellipsoid, "LowComplexitySet": sets.parallelepiped}
+OWN: Mapping[str, Callable[[Any], Claim]] = {
+    "InvariantSet": sets.ellipsoid,
+    "LowComplexitySet": sets.parallelepiped,
+    **dict.fromkeys(("dwell time", "average dwell time"), dwell.claimed),
+    **dict.fromkeys((listed.GROWTH, listed.GAIN), listed.claimed),
+    **dict.fromkeys((rational.GAIN, rational.STABILITY), rational.claimed),
+    **dict.fromkeys((periodic.GAIN, periodic.STABILITY), periodic.claimed),
+    "multiplier gain": multipliers.claimed,
+    "multiplier peak gain": peaks.claimed,
+    "claim": claims.claimed,
+    regions.KIND: regions.claimed,
+    terminal.KIND: terminal.claimed,
+}
+"""Kinds of files, each read by a module of its own."""
 
 
 def claim_of(kind: str, content: Mapping[str, Any]) -> Claim:
@@ -31,22 +46,8 @@ def claim_of(kind: str, content: Mapping[str, Any]) -> Claim:
             raise Unreadable("the file holds no proof")
         rest = lagged if proof["lyapunov"]["type"] == "MemoryLyapunov" else storage
         return (lft if proof["route"] == "lft" else rest).claimed(kind, content)
-    if kind in SETS:
-        return SETS[kind](content)
-    if kind in ("dwell time", "average dwell time"):
-        return dwell.claimed(content)
-    if kind in (listed.GROWTH, listed.GAIN):
-        return listed.claimed(kind, content)
-    if kind in (rational.GAIN, rational.STABILITY):
-        return rational.claimed(kind, content)
-    if kind in (periodic.GAIN, periodic.STABILITY):
-        return periodic.claimed(kind, content)
-    if kind == "claim":
-        return claims.claimed(content)
-    if kind == regions.KIND:
-        return regions.claimed(content)
-    if kind == terminal.KIND:
-        return terminal.claimed(content)
+    if kind in OWN:
+        return OWN[kind](content)
     if kind in (TUBE, "tube"):
         raise Unreadable(
             "tubes are not decided here: their proof rests on enclosures of nonlinear equations"

@@ -1,4 +1,9 @@
 from synthesis.robust.mu_synthesis import mu_synthesis as mu_synthesis
+from synthesis.robust.multipliers.blocks import DelayBlock as DelayBlock
+from synthesis.robust.multipliers.blocks import OwnMultiplier as OwnMultiplier
+from synthesis.robust.multipliers.blocks import ParameterBlock as ParameterBlock
+from synthesis.robust.multipliers.blocks import StaticBlock as StaticBlock
+from synthesis.robust.multipliers.gain import multiplier_gain as multiplier_gain
 from synthesis.robust.rational import RationalGain as RationalGain
 from synthesis.robust.rational import rational_gain as rational_gain
 from synthesis.robust.robust_margin import robust_margin as robust_margin

@@ -1,0 +1,1 @@
+"""Gains of loops with several uncertain blocks, by dynamic multipliers."""
