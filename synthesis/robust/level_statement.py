@@ -98,9 +98,7 @@ class LevelStatement(ProvenStatement):
         return found if found.verify(rigorous=False) else cls.proposed(found.bound, None, asked)
 
     @classmethod
-    def proposed(
-        cls, bound: float, proof: LevelProof | CellsProof | None, asked: Asked
-    ) -> Self:
+    def proposed(cls, bound: float, proof: LevelProof | CellsProof | None, asked: Asked) -> Self:
         """Return the statement with this number; without a proof it is none."""
         raise NotImplementedError
 

@@ -97,9 +97,7 @@ def held_level(loop: BlockLoop, level: float, *, performance: bool) -> Upper:
     return Upper(unit * own, math.nan, proof)
 
 
-def _checked(
-    loop: BlockLoop, level: float, performance: bool
-) -> tuple[float, Check, Array, Array]:
+def _checked(loop: BlockLoop, level: float, performance: bool) -> tuple[float, Check, Array, Array]:
     """Return the unit of levels near this one, the check in its units, and those of z and w."""
     unit = 2.0 ** round(math.log2(level))
     rows, columns = loop.units(unit, performance)

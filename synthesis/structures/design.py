@@ -27,9 +27,16 @@ from synthesis.design.lpv.worst_optimum import worst_optimum
 from synthesis.design.plant.diagnosis import modes_out_of_reach, unpriced
 from synthesis.design.plant.plant import Plant, require_plant
 from synthesis.design.plant.refusals import conditions, require_channels
+from synthesis.design.tuning.descent import (
+    STANDSTILL,
+    Point,
+    Stationarity,
+    bfgs,
+    sampled_descent,
+)
+from synthesis.design.tuning.peaks import Active, Value
 from synthesis.numerics.linear.norm import norm
-from synthesis.structures.descent import STANDSTILL, Point, Stationarity, bfgs, sampled_descent
-from synthesis.structures.peaks import Active, StructureLoops, Value
+from synthesis.structures.loops import StructureLoops
 from synthesis.structures.structure import TunableController
 
 POINTS = {1: 9, 2: 4}
