@@ -45,11 +45,11 @@ STALLS = 2
 """So many of these one after the other, the next one ends the search."""
 FAR = 3.0
 """Step of the scalings towards those found for the last loop, from the second iteration on: near
-the end these are close, and plain steps many (1.0: plain ones). Where the level does not fall, the
-step is this times smaller.
+the end these are close, and plain steps many (1.0: plain ones). Where the level rises by more than
+`ROOM`, the next step is from the best design, and this times smaller.
 """
-LEAST = 0.2
-"""Step that is not made smaller."""
+ROOM, LEAST = 0.01, 0.1
+"""Relative rise of the level from which the iteration goes on all the same; the least step."""
 ORDERS = (4, 2, 0)
 """Orders of the filters that are tried, each from the best level so far on."""
 ABOVE, DAMPED = 1.2, 0.7
@@ -302,30 +302,28 @@ def _iterated(
     """Return the best iterate, from the best so far on, with the levels on the way, that fall, and
     the reasons why there is none.
     """
-    levels, shape, far, stalled = [], D, 1.0, 0
+    levels, shape, far, stalled, here = [], D, 1.0, 0, best
     if best.K is not None:
         D = best.towards(D, far)
     for _ in range(iterations):
         design = plant.designed(D)
-        if design.controller is None:
-            if best.K is None:
-                return best, levels, design.reasons
-            found = best
-        else:
+        if design.controller is None and best.K is None:
+            return best, levels, design.reasons
+        found = best
+        if design.controller is not None:
             found = _Iterate.of(plant, design.controller, D)
-        gained = found.level < best.level * (1 - GAINED)
+        stalled = 0 if found.level < best.level * (1 - GAINED) else stalled + 1
         if found.level < best.level:
-            best = found
+            best = here = found
             levels.append(best.level)
             far = FAR if len(levels) > 1 else 1.0
-        elif far <= LEAST:
-            break
+        elif best.level < found.level <= best.level * (1 + ROOM):
+            here = found
         else:
-            far = far / FAR
-        stalled = 0 if gained else stalled + 1
-        if stalled > STALLS:
+            here, far = best, far / FAR
+        if stalled > STALLS or far < LEAST:
             break
-        D = best.towards(shape, far)
+        D = here.towards(shape, far)
     return best, levels, ()
 
 
