@@ -133,13 +133,13 @@ def _written_proof(proof: LevelProof | CellsProof) -> dict[str, Any]:
 
 def _proof(content: Mapping[str, Any]) -> LevelProof | CellsProof:
     if "cells" in content:
-        return CellsProof(
-            tuple(
-                Cell(*(tuple(map(float, one[end])) for end in ("low", "high")), _level_proof(one))
-                for one in content["cells"]
-            )
-        )
+        return CellsProof(tuple(map(_cell, content["cells"])))
     return _level_proof(content)
+
+
+def _cell(content: Mapping[str, Any]) -> Cell:
+    low, high = (tuple(map(float, content[end])) for end in ("low", "high"))
+    return Cell(low, high, _level_proof(content))
 
 
 def _level_proof(content: Mapping[str, Any]) -> LevelProof:

@@ -466,6 +466,11 @@ class Plant:
 
     def with_scheduling(self, scheduling: Scheduling | Sequence[Scheduling]) -> Plant:
         """Return the same plant over narrower ranges or with other rate limits."""
+        if isinstance(self.model, LFT):
+            model = self.model
+            for each in [scheduling] if isinstance(scheduling, Scheduling) else scheduling:
+                model = model.with_scheduling(each)
+            return replace(self, model=model)
         return replace(self, model=self.model.with_scheduling(scheduling))
 
     def close(self, controller: Any) -> Any:
@@ -479,13 +484,13 @@ class Plant:
         for a design without a controller. Of an LFT the loop is one, of constant gains.
         """
         K = as_controller(controller, self.controls, self.measurements)
-        between = {"inputs": self.disturbances, "outputs": self.performance}
+        w, z = self.disturbances, self.performance
         if not isinstance(self.model, LFT):
-            return lower_feedback(self.model, K, **between)
+            return lower_feedback(self.model, K, inputs=w, outputs=z)
         if isinstance(K, LPVStateSpace) and K.basis.size > 1:
             raise InputError("the plant is an LFT, and the controller depends on its parameters")
         one = K.at(*(s.middle for s in K.parameters)) if isinstance(K, LPVStateSpace) else K
-        return connect(self.model, one, **between)
+        return connect(self.model, one, inputs=w, outputs=z)
 
     def _changed(self, change: Callable[[LPVStateSpace], LPVStateSpace], **groups: Any) -> Plant:
         """Return the plant with another model, to which inputs that are performance are
