@@ -330,14 +330,17 @@ def _iterated(
 def _for_the_gain(
     plant: DesignPlant, asked: Asked, order: int, iterations: int, states: int | None
 ) -> GainDesign:
+    own = len(plant.loop.A) + order * sum(
+        size_of(side) for part in plant.parts for side in (part.rows, part.columns)
+    )
+    if states is not None and whole(states, "states", 0) < own:
+        raise InputError(
+            f"states: the start has {own}, expected as many or more, got {states}; a controller of"
+            " fewer is a TunableController of synthesis.structured"
+        )
     start, reasons = _start(plant, order, iterations)
     if start is None:
         return GainDesign(None, None, (), tuple(reasons))
-    if states is not None and whole(states, "states", 0) < len(start.A):
-        raise InputError(
-            f"states: the start has {len(start.A)}, expected as many or more, got {states}; a"
-            " controller of fewer is a TunableController of synthesis.structured"
-        )
     best, levels = least_gain(plant, start, states)
     if best is None:
         return GainDesign(None, None, (), (NOT_STABILISED,))

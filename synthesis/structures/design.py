@@ -183,8 +183,9 @@ def structured(
     From every start the largest real part of a pole is lowered until every loop is stable, then the
     largest gain, by BFGS along the slope of the peak that decides; the best are continued, and the
     best of those by gradient sampling, whose measure says how nearly it is a local minimum. Where
-    the gain between the conditions is larger, conditions are added. Of several conditions the mean
-    gain is lowered at last, with the largest within .2 % of that minimum. A local minimum is not
+    the gain between the conditions is larger, conditions are added. Of several conditions of a
+    parameter that moves the mean gain is lowered at last, with the largest within .2 % of that
+    minimum. A local minimum is not
     the least gain of the structure: more `starts` may find less.
 
     Ctrl-C ends the search; where some loop was stable by then the best is returned, and a note says
@@ -419,7 +420,7 @@ class _StructureSearch:
             if self.best is not None:
                 end, self.stationarity = sampled_descent(self.function, self.best, rng)
                 self.best = end if end.value <= self.best.value else self.best
-                if len(self.points) > 1:
+                if len(self.points) > 1 and not isinstance(self.plant.model, LFT):
                     self._settle(self.best)
 
     def _settle(self, best: Point) -> None:
@@ -513,7 +514,11 @@ class _StructureSearch:
         """The worst optimum over controllers of every order, None where it is not known."""
         P = self.plant.matrices(conditions(self.plant)[0])
         plant = self.plant
-        if unpriced(np.swapaxes(P.D21, 1, 2), plant.measurements, dual=True):
+        noiseless = unpriced(np.swapaxes(P.D21, 1, 2), plant.measurements, dual=True)
+        if noiseless and isinstance(plant.model, LFT):
+            notes.append("the least gain is not known: a measurement has no noise")
+            return None
+        if noiseless:
             plant = plant.with_noise(dict.fromkeys(plant.measurements, SMALL_NOISE))
             notes.append(f"the least gain is that with noise of {SMALL_NOISE:g} on measurements")
         if len(self.points) > 1:

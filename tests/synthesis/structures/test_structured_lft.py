@@ -29,7 +29,7 @@ def rational():
 
 @pytest.fixture(scope="module")
 def made():
-    return structured(rational(), TunableController.pid(rational()), starts=2)
+    return structured(rational(), TunableController.pid(rational()), starts=1)
 
 
 def test_the_gain_is_the_best_for_the_worst_parameter(made):
