@@ -23,6 +23,9 @@ mixed sensitivity, loop shaping, the coefficient diagram; `point_design.py` is w
 inequalities in X and Y, `search.py` tries which of them depends on p, `recovery.py` makes the
 controller from them; `fitted.py` makes gains at single p functions of p.
 
+`tuning`: Descent on the largest gain of many loops at once, for gains of a structure and for
+controllers of uncertain models: `descent.py` on `peaks.py`.
+
 To follow one design read plant/plant.py, lpv/output_feedback.py, search.py, existence.py,
 recovery.py, then loops/controller.py and loops/sampled_loop.py.
 """

@@ -18,6 +18,7 @@ from symheli.values.signal import signals
 from synthesis.certify.questions.certificate_file import decoded, encoded, same_model
 from synthesis.certify.statement.proven_statement import ProvenStatement
 from synthesis.certify.statement.sentences import motion
+from synthesis.robust.cells import Cell, CellsProof
 from synthesis.robust.intervals import Interval, LevelProof, Scalings
 from synthesis.robust.structure import DynamicBlock, Part
 
@@ -74,63 +75,90 @@ class LevelStatement(ProvenStatement):
     @property
     def stored(self) -> dict[str, Any]:
         """Values of a file: the number, the model, its blocks and the scalings."""
-        if not isinstance(self.proof, LevelProof) or self.asked is None:
+        if not isinstance(self.proof, LevelProof | CellsProof) or self.asked is None:
             raise InputError(
                 "only a bound that is proven by scalings over frequency is saved so; a margin with"
                 " one block is proven by a certificate: save its .proof"
             )
         model, blocks = self.asked
-        proof = self.proof
         return {
             "kind": self.kind,
             "bound": self.bound,
             "model": encoded(model),
             "blocks": [_written(block) for block in blocks],
-            "level": proof.level,
-            "rows": encoded(proof.rows),
-            "columns": encoded(proof.columns),
-            "parts": [
-                [p.rows.start, p.rows.stop, p.columns.start, p.columns.stop, p.real]
-                for p in proof.parts
-            ],
-            "performance": proof.performance,
-            "intervals": [
-                [encoded(low), encoded(high), *(_complex(M) for M in by)]
-                for low, high, by in proof.intervals
-            ],
+            **_written_proof(self.proof),
         }
 
     @classmethod
     def restored(cls, content: Mapping[str, Any]) -> Self:
         """Return the statement of a file, proven anew."""
-        parts = tuple(
-            Part(slice(int(a), int(b)), slice(int(c), int(d)), real is True)
-            for a, b, c, d, real in content["parts"]
-        )
-        intervals = tuple(
-            Interval(float(decoded(low)), float(decoded(high)), Scalings(*map(_read_complex, by)))
-            for low, high, *by in content["intervals"]
-        )
-        proof = LevelProof(
-            float(content["level"]),
-            frozen(decoded(content["rows"]), "rows", (None,)),
-            frozen(decoded(content["columns"]), "columns", (None,)),
-            parts,
-            content["performance"] is True,
-            intervals,
-        )
+        proof = _proof(content)
         asked = _model(decoded(content["model"])), [_block(one) for one in content["blocks"]]
         found = cls.proposed(float(content["bound"]), proof, asked)
         return found if found.verify(rigorous=False) else cls.proposed(found.bound, None, asked)
 
     @classmethod
-    def proposed(cls, bound: float, proof: LevelProof | None, asked: Asked) -> Self:
+    def proposed(cls, bound: float, proof: LevelProof | CellsProof | None, asked: Asked) -> Self:
         """Return the statement with this number; without a proof it is none."""
         raise NotImplementedError
 
     def proven_of(self, model: Any) -> bool:
         """Return whether the claim is about exactly this model; see `ProvenStatement.proven_of`."""
         return self.asked is not None and same_model(self.asked[0], model)
+
+
+def _written_proof(proof: LevelProof | CellsProof) -> dict[str, Any]:
+    if isinstance(proof, CellsProof):
+        return {
+            "cells": [
+                {"low": [*low], "high": [*high], **_written_proof(own)}
+                for low, high, own in proof.cells
+            ]
+        }
+    return {
+        "level": proof.level,
+        "rows": encoded(proof.rows),
+        "columns": encoded(proof.columns),
+        "parts": [
+            [p.rows.start, p.rows.stop, p.columns.start, p.columns.stop, p.real]
+            for p in proof.parts
+        ],
+        "performance": proof.performance,
+        "intervals": [
+            [encoded(low), encoded(high), *(_complex(M) for M in by)]
+            for low, high, by in proof.intervals
+        ],
+    }
+
+
+def _proof(content: Mapping[str, Any]) -> LevelProof | CellsProof:
+    if "cells" in content:
+        return CellsProof(tuple(map(_cell, content["cells"])))
+    return _level_proof(content)
+
+
+def _cell(content: Mapping[str, Any]) -> Cell:
+    low, high = (tuple(map(float, content[end])) for end in ("low", "high"))
+    return Cell(low, high, _level_proof(content))
+
+
+def _level_proof(content: Mapping[str, Any]) -> LevelProof:
+    parts = tuple(
+        Part(slice(int(a), int(b)), slice(int(c), int(d)), real is True)
+        for a, b, c, d, real in content["parts"]
+    )
+    intervals = tuple(
+        Interval(float(decoded(low)), float(decoded(high)), Scalings(*map(_read_complex, by)))
+        for low, high, *by in content["intervals"]
+    )
+    return LevelProof(
+        float(content["level"]),
+        frozen(decoded(content["rows"]), "rows", (None,)),
+        frozen(decoded(content["columns"]), "columns", (None,)),
+        parts,
+        content["performance"] is True,
+        intervals,
+    )
 
 
 def _complex(M: Any) -> list[Any]:

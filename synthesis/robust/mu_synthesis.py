@@ -11,59 +11,54 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Literal, NamedTuple, overload
 
 import numpy as np
 from scipy import optimize
 
 from symheli import LFT, LinearModel
 from symheli.errors import InputError
-from symheli.lpv import series
 from symheli.lpv.linear_model import as_model
 from symheli.threads import with_one_thread
 from symheli.values.arrays import Array
 from symheli.values.numbers import whole
-from symheli.values.signal import Signal
 from symheli.values.summary import summarized
-from synthesis.design.lti.hinf import hinf
-from synthesis.design.lti.point_design import PointDesign, named_loop
-from synthesis.design.plant.generalized import Channels, Generalized, sampled_controller
-from synthesis.numerics.linear.norm import to_continuous
 from synthesis.robust import witness
-from synthesis.robust.covers import rational
+from synthesis.robust.design_plant import Asked, DesignPlant, size_of
+from synthesis.robust.filters import Filter
+from synthesis.robust.gain_design import GainDesign, least_gain, require_goal
 from synthesis.robust.intervals import LevelProof
-from synthesis.robust.structure import BlockLoop, DynamicBlock, Part, behind, channels_of, loop_of
-from synthesis.robust.upper_bound import Upper, proven_level
+from synthesis.robust.structure import BlockLoop, DynamicBlock
+from synthesis.robust.worst_case_gain import worst_member
 
 FREQUENCIES = 80
 """Frequencies at which scalings are found, over the poles of plant and controller and a decade
 beyond.
 """
-BACK_OFF = 1.002
-"""Level of a design by the least of its scaled plant."""
 NEAR = 1e-4
 """Weight of the squared step, in logarithms, of scalings from one frequency to the next: where they
 do not matter they stay.
 """
 GAINED = 1e-3
-"""Relative decrease of the level below which an iteration has gained nothing; the second such one
-ends the search.
-"""
+"""Relative decrease of the level below which an iteration has gained nothing."""
+STALLS = 2
+"""So many of these one after the other, the next one ends the search."""
 FAR = 3.0
 """Step of the scalings towards those found for the last loop, from the second iteration on: near
-the end these are close, and plain steps many (1.0: plain ones).
+the end these are close, and plain steps many (1.0: plain ones). Where the level rises by more than
+`ROOM`, the next step is from the best design, and this times smaller.
 """
+ROOM, LEAST = 0.01, 0.1
+"""Relative rise of the level from which the iteration goes on all the same; the least step."""
+ORDERS = (4, 2, 0)
+"""Orders of the filters that are tried, each from the best level so far on."""
+ABOVE, DAMPED = 1.2, 0.7
+"""First worst-case gain that is asked for, by that without uncertainty; power of the level by which
+it follows.
+"""
+NOT_STABILISED = "no controller was found that stabilises every member of the set"
 
-
-LIMIT, FITS = 30.0, 400
-"""Largest logarithm of a coefficient of a filter, evaluations of a fit."""
 NOT_SAMPLED = "the controller of the continuous plant has no sampled one: it would not be causal"
-
-
-MAX_PROVEN_STATES = 24
-"""Number of states of a loop up to which `mu` is proven: that of 44 states of the distillation
-column takes over ten minutes.
-"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +78,8 @@ class MuDesign:
     omega : float
         The frequency that decides it, rad/s; NaN where `mu` is not proven.
     levels : tuple of float
-        The least level found at the frequencies looked at, of the loop of each iteration.
+        The least level found at the frequencies looked at, of each controller that was better than
+        those before.
     scalings : tuple of LinearModel
         D of each part for which the controller was designed: parameters, blocks, performance.
     reasons : tuple of str
@@ -101,7 +97,7 @@ class MuDesign:
     scalings: tuple[LinearModel, ...]
     reasons: tuple[str, ...] = ()
     proof: LevelProof | None = None
-    asked: tuple[LFT, Sequence[str], Sequence[str], Sequence[DynamicBlock]] | None = None
+    asked: Asked | None = None
 
     __repr__ = summarized
 
@@ -117,7 +113,7 @@ class MuDesign:
         if self.proof is None or self.asked is None or self.controller is None:
             return False
         loop, level = (
-            _Plant.of(*self.asked).loop.in_rationals.behind(self.controller),
+            DesignPlant.of(*self.asked).loop.in_rationals.behind(self.controller),
             self.proof.bound,
         )
         if level is None or self.proof.performance or level > self.mu:
@@ -127,6 +123,30 @@ class MuDesign:
         )
 
 
+@overload
+def mu_synthesis(
+    model: LinearModel | LFT,
+    controls: Sequence[str],
+    measurements: Sequence[str],
+    blocks: Sequence[DynamicBlock] = (),
+    *,
+    goal: Literal["mu"] = "mu",
+    order: int | None = None,
+    iterations: int = 8,
+    states: int | None = None,
+) -> MuDesign: ...
+@overload
+def mu_synthesis(
+    model: LinearModel | LFT,
+    controls: Sequence[str],
+    measurements: Sequence[str],
+    blocks: Sequence[DynamicBlock] = (),
+    *,
+    goal: Literal["gain"],
+    order: int | None = None,
+    iterations: int = 8,
+    states: int | None = None,
+) -> GainDesign: ...
 @with_one_thread
 def mu_synthesis(
     model: LinearModel | LFT,
@@ -134,15 +154,24 @@ def mu_synthesis(
     measurements: Sequence[str],
     blocks: Sequence[DynamicBlock] = (),
     *,
-    order: int = 4,
+    goal: str = "mu",
+    order: int | None = None,
     iterations: int = 8,
-) -> MuDesign:
-    """Design the output feedback of one model for its uncertain blocks and constant parameters, by
-    D-K iteration.
+    states: int | None = None,
+) -> MuDesign | GainDesign:
+    """Design the output feedback of one model for its uncertain blocks and constant parameters: for
+    the least structured singular value by D-K iteration, or for the least worst-case gain.
 
-    D is one stable filter with a stable inverse a block and a parameter, times the identity: of a
-    parameter that is repeated a full matrix, and that it is real, count in the proof alone. The
-    iteration need not end at the least mu.
+    D is one stable filter with a stable inverse a block and a parameter, times the identity. Of a
+    parameter that is repeated a full matrix, and that it is real, count in the proof alone. A new D
+    is kept where the level falls; else a smaller step towards it is tried. The iteration need not
+    end at the least mu.
+
+    With `goal="gain"` the uncertainty is the one that is stated, and D-K iteration is the start
+    alone. From its best loop BFGS descends on the largest gain over the members of the set that are
+    worst. These have real parameters at fixed values, and stable dynamics in the blocks. New worst
+    members are added until none is worse, and more states are tried. The gain of the set is then
+    proven as by `worst_case_gain` in up to 32 cells. It is a local minimum.
 
     Parameters
     ----------
@@ -154,14 +183,20 @@ def mu_synthesis(
         is the performance.
     blocks : sequence of DynamicBlock
         The unknown dynamics, with their bounds and weights.
-    order : int
-        Number of states of each filter, even; 0: constants.
+    goal : "mu" or "gain"
+        What is made small.
+    order : int, optional
+        Number of states of each filter, even; 0: constants. None: 4, and 2 and 0 where these gain
+        more; for the gain 0.
     iterations : int
-        Largest number of designs.
+        Largest number of designs of the iteration, of each order.
+    states : int, optional
+        For the gain: number of states of the controller, from that of the start on. None: that of
+        the start, and two more where these lower the gain by .2 %.
 
     Returns
     -------
-    MuDesign
+    MuDesign or GainDesign
         The best loop of all iterations, of the order of the plant, its weights and twice its
         scalings: `symheli.lpv.balanced_truncation` makes it smaller, `robust_margin` proves what is
         left. Where no design was found, `reasons`.
@@ -169,14 +204,16 @@ def mu_synthesis(
     Raises
     ------
     InputError
-        As of `robust_margin`; an order that is odd, a number below 1.
+        As of `robust_margin`; another goal; an order that is odd, a number below 1; `states` for
+        the goal mu.
     UnknownNameError
         A signal that the model does not have.
 
     References
     ----------
     `musyn` of MATLAB; Skogestad and Postlethwaite, Multivariable Feedback Control (2005), sec.
-    8.12; Packard and Doyle, Automatica 29 (1993).
+    8.12; Packard and Doyle, Automatica 29 (1993). For the gain: Apkarian, Dao and Noll, "Parametric
+    robust structured control design", IEEE Trans. Automatic Control 60 (2015).
 
     Examples
     --------
@@ -191,220 +228,150 @@ def mu_synthesis(
     >>> print(f"{design.levels[0]:.2f}, then {design.mu:.2f}", design.controller.is_stable())
     1.74, then 1.49 True
     """
-    order, iterations = whole(order, "order", 0), whole(iterations, "iterations", 1)
-    if order % 2:
+    require_goal(goal)
+    iterations = whole(iterations, "iterations", 1)
+    if order is not None and whole(order, "order", 0) % 2:
         raise InputError(f"order: expected an even number of states, got {order}")
     if not isinstance(model, LFT):
         model = LFT.constant(as_model(model))
-    plant = _Plant.of(model, controls, measurements, blocks)
-    D = tuple(_Filter.one(order, plant.pace) for _ in plant.parts)
-    best, levels, reasons = (math.inf, None, D), [], ()
-    for _ in range(iterations):
-        design = plant.designed(D)
-        if design.controller is None:
-            reasons = design.reasons
-            break
-        loop = plant.closed(design.controller)
-        omega = _frequencies(loop)
-        values, x = _scalings(loop, omega)
-        levels.append(float(values.max()))
-        gained = levels[-1] < best[0] * (1 - GAINED)
-        if levels[-1] < best[0]:
-            best = levels[-1], design.controller, D
-        if not gained and len(levels) - np.argmin(levels) > 2:
-            break
-        count = values / values.max()
-        far = FAR if len(levels) > 1 else 1.0
-        D = tuple(
-            own.fitted(omega, own.logarithm(omega) + far * (each - own.logarithm(omega)), count)
-            for own, each in zip(D, x.T, strict=True)
-        )
-    level, K, D = best
-    if K is None:
+    plant, asked = (
+        DesignPlant.of(model, controls, measurements, blocks),
+        (model, controls, measurements, blocks),
+    )
+    if goal == "gain":
+        return _for_the_gain(plant, asked, order or 0, iterations, states)
+    if states is not None:
+        raise InputError('states: the controller of goal="mu" has as many as plant and scalings')
+    return _for_mu(plant, asked, ORDERS if order is None else (order,), iterations)
+
+
+def _for_mu(plant: DesignPlant, asked: Asked, orders: Sequence[int], iterations: int) -> MuDesign:
+    best, levels, reasons = _Iterate(math.inf, None, ()), [], ()
+    for order in orders:
+        D = tuple(Filter.one(order, plant.pace) for _ in plant.parts)
+        found, own, reasons = _iterated(plant, D, iterations, best)
+        levels += own
+        best = found if found.level < best.level else best
+    if best.K is None:
         return MuDesign(None, math.inf, math.nan, tuple(levels), (), tuple(reasons))
-    found = plant.named(K)
-    if found is None:
+    named = plant.named(best.K)
+    if named is None:
         return MuDesign(None, math.inf, math.nan, tuple(levels), (), (NOT_SAMPLED,))
-    proven = plant.proven(K, found, level)
-    omega, filters = plant.loop.frequency(proven.omega), tuple(d.model() for d in D)
-    asked = model, controls, measurements, blocks
+    proven = plant.proven(best.K, named, best.level)
+    omega, filters = plant.loop.frequency(proven.omega), tuple(d.model() for d in best.D)
     return MuDesign(
-        found, proven.level, omega, tuple(levels), filters, proof=proven.proof, asked=asked
+        named, proven.level, omega, tuple(levels), filters, proof=proven.proof, asked=asked
     )
 
 
-class _Plant(NamedTuple):
-    """The plant of all parts, continuous, from (w, u) to (z, y)."""
-
-    loop: BlockLoop
-    parts: tuple[Part, ...]
-    controls: tuple[Signal, ...]
-    measurements: tuple[Signal, ...]
-
-    @classmethod
-    def of(
-        cls,
-        model: LFT,
-        controls: Sequence[str],
-        measurements: Sequence[str],
-        blocks: Sequence[DynamicBlock],
-    ) -> _Plant:
-        """Return the plant with the parts first, controls and measurements last."""
-        if not (model.order or blocks):
-            raise InputError("nothing is uncertain: hinf designs for one model that is known")
-        path = DynamicBlock(controls, measurements)
-        (columns,), (rows,) = channels_of(model, [path])
-        loop = loop_of(model, [*blocks, path], performance=True)
-        k = loop.reals + len(blocks)
-        parts = (*loop.parts[:k], *loop.parts[k + 1 :])
-        into, out = (
-            np.r_[tuple(np.r_[getattr(p, side)] for p in (*parts, loop.parts[k]))]
-            for side in ("columns", "rows")
-        )
-        own = loop.in_rationals.select(into, out)
-        # a design in coordinates of the modes loses levels: its Riccati equations are worse
-        # conditioned there
-        A, B, C, D = own.nearest()
-        if loop.dt is not None:
-            A, B, C, D = to_continuous(A, B, C, D)
-        moved = loop._replace(A=A, B=B, C=C, D=D, exact=own)
-        ends = np.cumsum([(0, 0), *((_size(p.rows), _size(p.columns)) for p in parts)], axis=0)
-        own = tuple(
-            Part(slice(a, b), slice(c, d), part.real)
-            for part, (a, c), (b, d) in zip(
-                parts, ends[:-1].tolist(), ends[1:].tolist(), strict=True
-            )
-        )
-        return cls(
-            moved,
-            own,
-            tuple(model.inputs[i] for i in columns),
-            tuple(model.outputs[i] for i in rows),
-        )
-
-    @property
-    def pace(self) -> float:
-        """Mean frequency of the poles, rad/s of the continuous plant."""
-        paces = self.loop.paces
-        return math.exp(np.log(paces).mean()) if len(paces) else 1.0
-
-    def designed(self, D: Sequence[_Filter]) -> PointDesign:
-        """Return the H-infinity design of the plant between D and its inverse."""
-        A, B, C, E = self.loop[:4]
-        pairs = list(zip(D, self.parts, strict=True))
-        out = [d.model() for d, part in pairs for _ in range(_size(part.rows))]
-        into = [d.inverse() for d, part in pairs for _ in range(_size(part.columns))]
-        A, B, C, E = behind(A, B, C, E, out, None)
-        A, C, B, E = (M.T for M in behind(A.T, C.T, B.T, E.T, into, None))
-        scaled = self._model(A, B, C, E)
-        return hinf(scaled, self.controls, self.measurements, back_off=BACK_OFF)
-
-    def _model(self, A: Array, B: Array, C: Array, D: Array) -> LinearModel:
-        nw, nz = B.shape[1] - len(self.controls), len(C) - len(self.measurements)
-        names = [
-            [Signal(f"{letter}_{i}") for i in range(n)]
-            for letter, n in (("mu_x", len(A)), ("mu_w", nw), ("mu_z", nz))
-        ]
-        inputs, outputs = (*names[1], *self.controls), (*names[2], *self.measurements)
-        return LinearModel(A, B, C, D, tuple(names[0]), inputs, outputs)
-
-    def closed(self, K: LinearModel) -> BlockLoop:
-        """Return the loop of the parts behind a controller, continuous."""
-        model = self._model(*self.loop[:4])
-        names = Channels.of(model, self.controls, self.measurements, None, None)
-        one = named_loop(Generalized.between(model, names), K, names)
-        return self.loop._replace(A=one.A, B=one.B, C=one.C, D=one.D, parts=self.parts)
-
-    def proven(self, K: LinearModel, named: LinearModel, level: float) -> Upper:
-        """Return what is proven, from a level on, of the loop behind a controller; of too many
-        states that level without a proof. `named` is the controller of the model itself.
-        """
-        loop = self.closed(K)._replace(exact=self.loop.in_rationals.behind(named))
-        if len(loop.A) > MAX_PROVEN_STATES:
-            return Upper(level, math.nan, None)
-        return proven_level(loop, level, performance=False)
-
-    def named(self, K: LinearModel) -> LinearModel | None:
-        """Return the controller of the model itself; None where that has none of this kind."""
-        gains = K.A, K.B, K.C, K.D
-        if self.loop.dt is not None:
-            gains = sampled_controller(*gains)
-        if gains is None:
-            return None
-        states = tuple(Signal(f"controller_{i + 1}") for i in range(len(gains[0])))
-        return LinearModel(*gains, states, self.measurements, self.controls, self.loop.dt)
-
-
-class _Filter(NamedTuple):
-    """d(s) = gain times the product of (s^2 + a s + b)/(s^2 + c s + e), all > 0, s in units of
-    `pace`: stable, with a stable inverse.
+class _Iterate(NamedTuple):
+    """A level with the controller that reaches it, the scalings that it was designed for, and those
+    that its loop asks for: frequencies, logarithms and weights.
     """
 
-    gain: float
-    quadratics: Array
-    pace: float
+    level: float
+    K: LinearModel | None
+    D: tuple[Filter, ...]
+    wanted: tuple[Array, Array, Array] | None = None
 
     @classmethod
-    def one(cls, order: int, pace: float) -> _Filter:
-        """Return the filter 1 with poles and zeros spread over four decades about the pace."""
-        at = np.logspace(-2, 2, order // 2 + 2)[1:-1]
-        return cls(1.0, np.column_stack([2 * at, at**2, 2 * at, at**2]), pace)
+    def of(cls, plant: DesignPlant, K: LinearModel, D: tuple[Filter, ...]) -> _Iterate:
+        """Return the iterate of a controller."""
+        loop = plant.closed(K)
+        omega = _frequencies(loop)
+        values, x = _scalings(loop, omega)
+        return cls(float(values.max()), K, D, (omega, x, values / values.max()))
 
-    def fitted(self, omega: Array, x: Array, count: Array) -> _Filter:
-        """Return the filter with |d| closest to exp(x) at these frequencies, weighed by `count`."""
-        if not len(self.quadratics):
-            return self._replace(gain=math.exp(np.average(x, weights=count)))
-        level, root = np.average(x, weights=count), np.sqrt(count)
-        spread = self.one(2 * len(self.quadratics), self.pace).quadratics
-        starts = (
-            np.r_[math.log(self.gain), np.log(self.quadratics).ravel()],
-            np.r_[level, np.log(spread).ravel()],
+    def towards(self, D: tuple[Filter, ...], far: float) -> tuple[Filter, ...]:
+        """Return filters of the order of D, a step from those of this design towards those that its
+        loop asks for.
+        """
+        assert self.wanted is not None  # noqa: S101 - of an iterate with a controller
+        omega, x, count = self.wanted
+        return tuple(
+            (own if own.order == new.order else new).fitted(
+                omega, own.logarithm(omega) + far * (each - own.logarithm(omega)), count
+            )
+            for new, own, each in zip(D, self.D, x.T, strict=True)
         )
 
-        def misfit(own: Array) -> Array:
-            return root * (self._of(own).logarithm(omega) - x)
 
-        def slope(own: Array) -> Array:
-            return root[:, None] * self._of(own).slopes(omega)
+def _iterated(
+    plant: DesignPlant, D: tuple[Filter, ...], iterations: int, best: _Iterate
+) -> tuple[_Iterate, list[float], tuple[str, ...]]:
+    """Return the best iterate, from the best so far on, with the levels on the way, that fall, and
+    the reasons why there is none.
+    """
+    levels, shape, far, stalled, here = [], D, 1.0, 0, best
+    if best.K is not None:
+        D = best.towards(D, far)
+    for _ in range(iterations):
+        design = plant.designed(D)
+        if design.controller is None and best.K is None:
+            return best, levels, design.reasons
+        found = best
+        if design.controller is not None:
+            found = _Iterate.of(plant, design.controller, D)
+        stalled = 0 if found.level < best.level * (1 - GAINED) else stalled + 1
+        if found.level < best.level:
+            best = here = found
+            levels.append(best.level)
+            far = FAR if len(levels) > 1 else 1.0
+        elif best.level < found.level <= best.level * (1 + ROOM):
+            here = found
+        else:
+            here, far = best, far / FAR
+        if stalled > STALLS or far < LEAST:
+            break
+        D = here.towards(shape, far)
+    return best, levels, ()
 
-        found = [
-            optimize.least_squares(misfit, own, slope, (-LIMIT, LIMIT), max_nfev=FITS)  # type: ignore[arg-type]
-            for own in starts
-        ]
-        return self._of(min(found, key=lambda f: f.cost).x)
 
-    def _of(self, own: Array) -> _Filter:
-        return self._replace(gain=math.exp(own[0]), quadratics=np.exp(own[1:]).reshape(-1, 4))
+def _for_the_gain(
+    plant: DesignPlant, asked: Asked, order: int, iterations: int, states: int | None
+) -> GainDesign:
+    own = len(plant.loop.A) + order * sum(
+        size_of(side) for part in plant.parts for side in (part.rows, part.columns)
+    )
+    if states is not None and whole(states, "states", 0) < own:
+        raise InputError(
+            f"states: the start has {own}, expected as many or more, got {states}; a controller of"
+            " fewer is a TunableController of synthesis.structured"
+        )
+    start, reasons = _start(plant, order, iterations)
+    if start is None:
+        return GainDesign(None, None, (), tuple(reasons))
+    best, levels = least_gain(plant, start, states)
+    if best is None:
+        return GainDesign(None, None, (), (NOT_STABILISED,))
+    found = plant.named(best.K)
+    if found is None:
+        return GainDesign(None, None, levels, (NOT_SAMPLED,))
+    return GainDesign.proven(asked, found, levels)
 
-    def logarithm(self, omega: Array) -> Array:
-        """Return log |d(j omega)|."""
-        s = 1j * omega[:, None] / self.pace
-        a, b, c, e = self.quadratics.T
-        each = np.log(np.abs(s * s + a * s + b)) - np.log(np.abs(s * s + c * s + e))
-        return math.log(self.gain) + each.sum(axis=1)
 
-    def slopes(self, omega: Array) -> Array:
-        """Return the derivatives (K, 1 + coefficients) of that by the logarithms of the gain and
-        the coefficients.
-        """
-        s = 1j * omega[:, None] / self.pace
-        a, b, c, e = self.quadratics.T
-        above, below = s * s + a * s + b, s * s + c * s + e
-        each = np.real(np.stack([a * s / above, b / above, -c * s / below, -e / below], axis=2))
-        return np.column_stack([np.ones(len(omega)), each.reshape(len(omega), -1)])
-
-    def model(self) -> LinearModel:
-        """Return the filter as a linear model of one input and output."""
-        found = LinearModel.gain([[self.gain]], ["in"], ["out"])
-        for a, b, c, e in self.quadratics:
-            found = series(found, rational(np.array([1.0, a, b]), np.array([1.0, c, e]), self.pace))
-        return found
-
-    def inverse(self) -> LinearModel:
-        """Return 1/d as a linear model."""
-        return self._replace(
-            gain=1 / self.gain, quadratics=self.quadratics[:, [2, 3, 0, 1]]
-        ).model()
+def _start(
+    plant: DesignPlant, order: int, iterations: int
+) -> tuple[LinearModel | None, tuple[str, ...]]:
+    """Return the controller of the least worst gain of an iteration in which the performance is
+    asked for in units of a gain, which follows the level.
+    """
+    known = plant.known()
+    if known.controller is None:
+        return None, known.reasons
+    D = tuple(Filter.one(order, plant.pace) for _ in plant.parts)
+    gain, best, chosen = ABOVE * known.hinf_norm, math.inf, None
+    for _ in range(iterations):
+        asking = plant.asking(gain)
+        design = asking.designed(D)
+        if design.controller is None:
+            break
+        worst = worst_member(plant.closed(design.controller)).gain
+        if chosen is None or worst < best:
+            best, chosen = worst, design.controller
+        found = _Iterate.of(asking, design.controller, D)
+        D, gain = found.towards(D, 1.0), gain * found.level**DAMPED
+    return chosen, design.reasons
 
 
 def _frequencies(loop: BlockLoop) -> Array:
@@ -417,7 +384,7 @@ def _scalings(loop: BlockLoop, omega: Array) -> tuple[Array, Array]:
     best D = exp(x) found, x (K, parts), 0 of the last part.
     """
     rows, columns = (
-        np.repeat(np.arange(len(loop.parts)), [_size(getattr(p, side)) for p in loop.parts])
+        np.repeat(np.arange(len(loop.parts)), [size_of(getattr(p, side)) for p in loop.parts])
         for side in ("rows", "columns")
     )
     free, before = len(loop.parts) - 1, np.zeros(len(loop.parts) - 1)
@@ -438,7 +405,3 @@ def _scalings(loop: BlockLoop, omega: Array) -> tuple[Array, Array]:
         levels.append(np.linalg.norm(np.exp(whole[rows, None] - whole[columns]) * M, 2))
         found.append(whole)
     return np.array(levels), np.array(found)
-
-
-def _size(part: slice) -> int:
-    return part.stop - part.start

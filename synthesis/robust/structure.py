@@ -177,6 +177,27 @@ class ExactLoop(NamedTuple):
         """Return the loop from these columns of w to these rows of z."""
         return self._replace(B=self.B[:, into], C=self.C[out], D=self.D[np.ix_(out, into)])
 
+    def within(
+        self, parts: Sequence[Part], low: Sequence[float], high: Sequence[float]
+    ) -> ExactLoop:
+        """Return the loop whose real parts go from these numbers to those where they went from -1
+        to 1.
+
+        Raises `InputError` where it is not well posed at the middle.
+        """
+        real = [part for part in parts if part.real]
+        at = np.r_[tuple(np.r_[part.rows] for part in real)] if real else np.zeros(0, int)
+        size = [part.rows.stop - part.rows.start for part in real]
+        a, b = (rationals(np.repeat(np.asarray(ends, float), size)) for ends in (low, high))
+        middle, radius = (a + b) / 2, (b - a) / 2
+        inner = inverse(rationals(np.eye(len(at))) - self.D[np.ix_(at, at)] * middle)
+        gain = middle[:, None] * inner
+        into, out = gain @ self.D[at], gain @ self.C[at]
+        A, B = self.A + self.B[:, at] @ out, self.B + self.B[:, at] @ into
+        C, D = self.C + self.D[:, at] @ out, self.D + self.D[:, at] @ into
+        C[at], D[at] = radius[:, None] * C[at], radius[:, None] * D[at]
+        return ExactLoop(A, B, C, D, self.sampled)
+
     def behind(self, K: LinearModel) -> ExactLoop:
         """Return the loop whose last inputs are K times its last outputs.
 

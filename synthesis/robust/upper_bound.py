@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -56,7 +56,7 @@ class Upper(NamedTuple):
 
     level: float
     omega: float
-    proof: LevelProof | None
+    proof: Any
 
 
 def proven_level(loop: BlockLoop, start: float, *, performance: bool) -> Upper:
@@ -65,10 +65,8 @@ def proven_level(loop: BlockLoop, start: float, *, performance: bool) -> Upper:
 
     Proven of `loop.exact`, in integers.
     """
-    unit = 2.0 ** round(math.log2(start))
-    rows, columns = loop.units(unit, performance)
-    transfer = loop.in_rationals.transfer.scaled(rows, columns)
-    check = Check.of(transfer, loop.parts, performance)
+    unit, check, rows, columns = _checked(loop, start, performance)
+    transfer = check.transfer
     level, decides, step = _short(start / unit), math.nan, GROWTH
     known: list[tuple[float, Scalings]] = []
     while transfer.stable and level < MAX_LEVEL:
@@ -82,6 +80,29 @@ def proven_level(loop: BlockLoop, start: float, *, performance: bool) -> Upper:
         least = level_at(transfer.response(failed), loop, level, performance)
         level = _short(max(least, level) * step) if math.isfinite(least) else math.inf
     return Upper(math.inf, decides, None)
+
+
+def held_level(loop: BlockLoop, level: float, *, performance: bool) -> Upper:
+    """Return the proof of one level, rounded up to fewer bits; inf and the frequency that has none
+    where it is not found.
+    """
+    unit, check, rows, columns = _checked(loop, level, performance)
+    own = _short(level / unit)
+    if not check.transfer.stable:
+        return Upper(math.inf, math.nan, None)
+    failed, covered = _uncovered(loop, check, own, [])
+    if failed is not None:
+        return Upper(math.inf, failed, None)
+    proof = LevelProof(own, rows, columns, loop.parts, performance, tuple(covered))
+    return Upper(unit * own, math.nan, proof)
+
+
+def _checked(loop: BlockLoop, level: float, performance: bool) -> tuple[float, Check, Array, Array]:
+    """Return the unit of levels near this one, the check in its units, and those of z and w."""
+    unit = 2.0 ** round(math.log2(level))
+    rows, columns = loop.units(unit, performance)
+    transfer = loop.in_rationals.transfer.scaled(rows, columns)
+    return unit, Check.of(transfer, loop.parts, performance), rows, columns
 
 
 def _short(level: float) -> float:

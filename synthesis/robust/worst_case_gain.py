@@ -5,16 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq
 
 from symheli import LFT, LPVStateSpace
 from symheli.threads import with_one_thread
+from symheli.values.numbers import whole
 from symheli.values.summary import summarized
 from synthesis.numerics.linear.norm import norm
 from synthesis.robust import witness
+from synthesis.robust.cells import CellsProof, proven_in_cells
 from synthesis.robust.intervals import LevelProof
 from synthesis.robust.level_statement import Asked, LevelStatement
 from synthesis.robust.lower_bound import ACCURACY, ROUGH, best_reals, worst_closing
@@ -47,7 +49,7 @@ class WorstCaseGain(LevelStatement):
     p: float | tuple[float, ...]
     omega: float
     perturbation: np.ndarray | None = None
-    proof: LevelProof | None = None
+    proof: LevelProof | CellsProof | None = None
     asked: tuple[LFT | LPVStateSpace, Sequence[DynamicBlock]] | None = None
     reader: ClassVar[str] = "worst-case-gain"
     number: ClassVar[str] = "upper"
@@ -56,7 +58,9 @@ class WorstCaseGain(LevelStatement):
     __repr__ = summarized
 
     @classmethod
-    def proposed(cls, bound: float, proof: LevelProof | None, asked: Asked) -> WorstCaseGain:
+    def proposed(
+        cls, bound: float, proof: LevelProof | CellsProof | None, asked: Asked
+    ) -> WorstCaseGain:
         """Return the gain with this number; without a proof it is none."""
         return cls(math.nan, bound, math.nan, math.nan, None, proof, asked)
 
@@ -77,26 +81,37 @@ class WorstCaseGain(LevelStatement):
         loop, level = loop_of(*self.asked, performance=True).in_rationals, self.proof.bound
         if level is None or not (self.proof.performance and level <= self.upper):
             return False
-        return self.proof.verified(loop) and (
-            not rigorous or witness.level_is_kept(self.proof, loop)
+        if not self.proof.verified(loop):
+            return False
+        if not rigorous:
+            return True
+        if isinstance(self.proof, LevelProof):
+            return witness.level_is_kept(self.proof, loop)
+        return all(
+            witness.level_is_kept(own, loop.within(own.parts, low, high))
+            for low, high, own in self.proof.cells
         )
 
 
 @with_one_thread
 def worst_case_gain(
-    model: LFT | LPVStateSpace, blocks: Sequence[DynamicBlock] = ()
+    model: LFT | LPVStateSpace, blocks: Sequence[DynamicBlock] = (), *, cells: int = 1
 ) -> WorstCaseGain:
     """Compute the largest L2 gain of a model over its constant parameters and blocks of any linear
     dynamics, from the channels that belong to no block.
 
     The lower bound is attained by what is returned; the upper one is proven by D and G scalings
-    over intervals of frequency that leave none out, in exact arithmetic. For parameters that move,
-    and one block, `l2_gain` of an `UncertainStateSpace`.
+    over intervals of frequency that leave none out, in exact arithmetic. Scalings of several
+    parameters leave a gap: with more `cells` the ranges are divided, and each part has scalings of
+    its own. For parameters that move, and one block, `l2_gain` of an `UncertainStateSpace`.
 
     Parameters
     ----------
     model, blocks
         As of `robust_margin`.
+    cells : int
+        Largest number of parts into which the ranges of the parameters are divided until the upper
+        bound is within .1 % of the lower one.
 
     Returns
     -------
@@ -106,7 +121,7 @@ def worst_case_gain(
     Raises
     ------
     InputError
-        As of `robust_margin`; no channel besides those of the blocks.
+        As of `robust_margin`; no channel besides those of the blocks; fewer than one cell.
     UnknownNameError
         A channel that the model does not have.
 
@@ -127,24 +142,47 @@ def worst_case_gain(
     >>> print(f"{found.lower:.3f}", bool(1.0 <= found.upper < 1.01), round(found.p, 3))
     1.000 True 0.5
     """
+    most = whole(cells, "cells", 1)
     loop = loop_of(model, blocks, performance=True)
-    nowhere = loop.physical(np.zeros(loop.reals))
-    if not loop.stable:
-        return WorstCaseGain(math.inf, math.inf, nowhere, math.nan)
-    negative, d = best_reals(lambda d: -_gain(loop.closed(d))[0], loop.reals)
-    lower, omega, delta = _gain(loop.closed(d), refine=True)
-    if math.isinf(negative) or math.isinf(lower):
-        return WorstCaseGain(math.inf, math.inf, loop.physical(d), math.nan)
-    proven = proven_level(
-        loop, lower or LEAST_SHARE * _through(loop) or LEAST_GAIN, performance=True
+    worst = worst_member(loop)
+    if math.isinf(worst.gain):
+        return WorstCaseGain(math.inf, math.inf, loop.physical(worst.reals), math.nan)
+    start = worst.gain or LEAST_SHARE * _through(loop) or LEAST_GAIN
+    proven = (
+        proven_level(loop, start, performance=True)
+        if most == 1 or not loop.reals
+        else proven_in_cells(loop, start, most)
     )
     inner = None
-    if delta is not None:  # without the last block, the performance
+    if worst.blocks is not None:
         last = loop.parts[-1]
         columns, rows = last.columns.stop - last.columns.start, last.rows.stop - last.rows.start
-        inner = loop.unscaled(delta, omega)[: len(delta) - columns, : len(loop.sizes) - rows]
-    worst = loop.physical(d), loop.frequency(omega), inner
-    return WorstCaseGain(lower, proven.level, *worst, proven.proof, (model, blocks))
+        inner = loop.unscaled(worst.blocks, worst.omega)[:-columns, :-rows]
+    at = loop.physical(worst.reals), loop.frequency(worst.omega), inner
+    return WorstCaseGain(worst.gain, proven.level, *at, proven.proof, (model, blocks))
+
+
+class Member(NamedTuple):
+    """A model of the set: its gain, inf where it is unstable, the normalised real parameters, the
+    response of all blocks with the performance (nw, nz), None where there is no block, and the
+    frequency of the continuous model.
+    """
+
+    gain: float
+    reals: np.ndarray
+    omega: float
+    blocks: np.ndarray | None
+
+
+def worst_member(loop: BlockLoop) -> Member:
+    """Return the member of the largest gain that is found."""
+    if not loop.stable:
+        return Member(math.inf, np.zeros(loop.reals), math.nan, None)
+    negative, d = best_reals(lambda d: -_gain(loop.closed(d))[0], loop.reals)
+    lower, omega, delta = _gain(loop.closed(d), refine=True)
+    if math.isinf(negative):
+        lower = math.inf
+    return Member(lower, d, omega, delta)
 
 
 def _gain(closed: BlockLoop, refine: bool = False) -> tuple[float, float, np.ndarray | None]:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from symheli import UncertainStateSpace
+from symheli import LFT, LPVStateSpace, UncertainStateSpace
 from symheli.errors import InputError, SynthesisError
 from symheli.lpv.bases.polynomials import lobatto_points
 from symheli.progress import task
@@ -27,13 +27,22 @@ from synthesis.design.lpv.worst_optimum import worst_optimum
 from synthesis.design.plant.diagnosis import modes_out_of_reach, unpriced
 from synthesis.design.plant.plant import Plant, require_plant
 from synthesis.design.plant.refusals import conditions, require_channels
+from synthesis.design.tuning.descent import (
+    STANDSTILL,
+    Point,
+    Stationarity,
+    bfgs,
+    sampled_descent,
+)
+from synthesis.design.tuning.peaks import Active, Value
 from synthesis.numerics.linear.norm import norm
-from synthesis.structures.descent import STANDSTILL, Point, Stationarity, bfgs, sampled_descent
-from synthesis.structures.peaks import Active, StructureLoops, Value
+from synthesis.structures.loops import StructureLoops
 from synthesis.structures.structure import TunableController
 
 POINTS = {1: 9, 2: 4}
 """Conditions of each parameter at first (more parameters: 3)."""
+MOST_CORNERS = 16
+"""Corners of constant parameters that are all taken at first."""
 STABILISING, SHORT, LONG = 300, 100, 1500
 """Steps of BFGS at most: on the pole, on the gain from every start, and from the best of those."""
 SCHEDULED_STANDSTILL = 1e-6
@@ -108,7 +117,7 @@ class StructuredController(Controller):
         or one point (m,).
         """
         own = self.structure.coefficients(self.gains)[name]
-        basis, m = self.structure.basis, len(self.plant.nominal.parameters)
+        basis, m = self.structure.basis, len(self.plant.parameters)
         points = np.asarray(p, float)
         if basis is None or len(own) < basis.size:
             return np.full(np.shape(points)[: np.ndim(points) - (m > 1)], own[0])
@@ -146,7 +155,7 @@ class StructuredController(Controller):
         each = ", ".join(f"{v:.5g}" for v in self.starts)
         lines.append(f"  stationary to {measure:.1e} within {radius:.0e}; starts reached {each}")
         lines.append(f"  {self.structure.numbers} numbers are the gains:")
-        box = self.plant.nominal.box
+        box = self.plant.box
         p = [low for low, _ in box], [0.5 * sum(ends) for ends in box], [high for _, high in box]
         for gain in self.structure.gains:
             one = self.structure.numbers_of(gain) == 1
@@ -174,8 +183,9 @@ def structured(
     From every start the largest real part of a pole is lowered until every loop is stable, then the
     largest gain, by BFGS along the slope of the peak that decides; the best are continued, and the
     best of those by gradient sampling, whose measure says how nearly it is a local minimum. Where
-    the gain between the conditions is larger, conditions are added. Of several conditions the mean
-    gain is lowered at last, with the largest within .2 % of that minimum. A local minimum is not
+    the gain between the conditions is larger, conditions are added. Of several conditions of a
+    parameter that moves the mean gain is lowered at last, with the largest within .2 % of that
+    minimum. A local minimum is not
     the least gain of the structure: more `starts` may find less.
 
     Ctrl-C ends the search; where some loop was stable by then the best is returned, and a note says
@@ -184,7 +194,8 @@ def structured(
     Parameters
     ----------
     plant : Plant
-        Continuous or sampled; of one that is sampled the structure is too.
+        Continuous or sampled; of one that is sampled the structure is too. Of an LFT the parameters
+        are constant: the gain is lowered over its corners, its middle and the worst values found.
     structure : Structure
         With the gains that are free.
     specifications : L2 or sequence of L2
@@ -207,13 +218,16 @@ def structured(
     Returns
     -------
     StructuredController
-        Nothing is proven of it: `certify` proves, between the conditions and while p moves.
+        Nothing is proven of it: `certify` proves, between the conditions and while p moves; of an
+        LFT where p may jump, and `synthesis.robust.worst_case_gain` of `closed()` where it is
+        constant.
 
     Raises
     ------
     InputError
         A plant that is uncertain, a structure of another sample period or basis, a specification
-        that is not an L2 gain with the default weight.
+        that is not an L2 gain with the default weight; a loop whose feedthrough depends on the
+        parameters.
     UnknownNameError
         A signal or gain that is not there.
     SynthesisError
@@ -278,14 +292,9 @@ class _StructureSearch:
     ):
         self.plant, self.structure, self.wanted, self.decay = plant, structure, wanted, decay
         self.first, self.units, self.starts = first, units, starts
-        m = len(plant.parameters)
-        varies = plant.basis.size > 1 or structure.basis is not None
-        box = plant.nominal.box
-        self.points = (
-            lobatto_points(POINTS.get(m, 3), box).reshape(-1, m)
-            if varies
-            else np.array([[0.5 * (low + high) for low, high in box]])
-        )
+        rational = isinstance(plant.model, LFT)
+        varies = rational or plant.basis.size > 1 or structure.basis is not None
+        self.points = _first_conditions(plant.box, varies, rational)
         self.standstill = SCHEDULED_STANDSTILL if varies else STANDSTILL
         self.between = check_points(plant.parameters) if varies else self.points
         inside = {gain.name: gain.inside for gain in structure.gains}
@@ -335,10 +344,15 @@ class _StructureSearch:
                 f" {plant.dt} s; make it for this plant"
             )
         basis = structure.basis
-        if basis is not None and basis.ranges != plant.nominal.box:
+        if basis is not None and isinstance(plant.model, LFT):
+            raise InputError(
+                "structure: the parameters of an LFT are constant and not known; its gains are"
+                " numbers, leave out the basis"
+            )
+        if basis is not None and basis.ranges != plant.box:
             raise InputError(
                 f"structure: its basis is over {basis.ranges}, the plant's parameters range over"
-                f" {plant.nominal.box}; make them equal"
+                f" {plant.box}; make them equal"
             )
         inside = {gain.name: gain.inside for gain in structure.gains}
         first = structure.coefficients(inside | dict(start or {}))
@@ -352,6 +366,7 @@ class _StructureSearch:
             raise InputError(f"units: expected numbers > 0, got {dict(units or {})}")
         unit = np.array(each)
         x = np.concatenate([*first.values()]) / unit
+        plant.close(_some(structure, plant))  # refused at once where no loop could be formed
         return cls(plant, structure, given or (L2(),), x, unit, float(decay), starts)
 
     def _loops(self, points: Array) -> StructureLoops:
@@ -405,7 +420,7 @@ class _StructureSearch:
             if self.best is not None:
                 end, self.stationarity = sampled_descent(self.function, self.best, rng)
                 self.best = end if end.value <= self.best.value else self.best
-                if len(self.points) > 1:
+                if len(self.points) > 1 and not isinstance(self.plant.model, LFT):
                     self._settle(self.best)
 
     def _settle(self, best: Point) -> None:
@@ -499,13 +514,40 @@ class _StructureSearch:
         """The worst optimum over controllers of every order, None where it is not known."""
         P = self.plant.matrices(conditions(self.plant)[0])
         plant = self.plant
-        if unpriced(np.swapaxes(P.D21, 1, 2), plant.measurements, dual=True):
+        noiseless = unpriced(np.swapaxes(P.D21, 1, 2), plant.measurements, dual=True)
+        if noiseless and isinstance(plant.model, LFT):
+            notes.append("the least gain is not known: a measurement has no noise")
+            return None
+        if noiseless:
             plant = plant.with_noise(dict.fromkeys(plant.measurements, SMALL_NOISE))
             notes.append(f"the least gain is that with noise of {SMALL_NOISE:g} on measurements")
         if len(self.points) > 1:
             return worst_optimum(plant).level or None
         found = hinf_at(plant, self.points[0])
         return found.optimum if found.optimum > 0 else None
+
+
+def _some(structure: TunableController, plant: Plant) -> LPVStateSpace:
+    """Return the structure with gains that are no special ones."""
+    numbers = iter(np.random.default_rng(0).uniform(0.1, 0.2, structure.numbers))
+    gains = {
+        g.name: [next(numbers) for _ in range(structure.numbers_of(g))] for g in structure.gains
+    }
+    return structure.controller(
+        {name: np.array(values) for name, values in gains.items()}, plant.parameters
+    )
+
+
+def _first_conditions(box: Sequence[tuple[float, float]], varies: bool, rational: bool) -> Array:
+    """Return the first conditions (K, m): the middle of what does not vary, the corners too of
+    constant parameters, points all over the box of those that move.
+    """
+    m, middle = len(box), np.array([[0.5 * (low + high) for low, high in box]])
+    if not varies or (rational and 2**m > MOST_CORNERS):
+        return middle
+    if rational:
+        return np.vstack([middle, lobatto_points(2, box).reshape(-1, m)])
+    return lobatto_points(POINTS.get(m, 3), box).reshape(-1, m)
 
 
 def _largest(loop: Any, points: Array, wanted: Sequence[L2]) -> list[float]:

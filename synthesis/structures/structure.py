@@ -14,7 +14,7 @@ from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.bases import FunctionSpace
 from symheli.lpv.tools import lower_feedback
 from symheli.values.arrays import Array
-from symheli.values.numbers import positive
+from symheli.values.numbers import positive, whole
 from symheli.values.signal import Signal, indices, signals
 from symheli.values.summary import summarized
 
@@ -230,6 +230,49 @@ class TunableController:
         )
         limits = {n: (-math.inf, math.inf) for n in names} | _limits(bounds or {}, names)
         return cls(frame, tuple(TunableGain(n, *limits[n]) for n in names), basis)
+
+    @classmethod
+    def of_order(cls, plant: Plant, order: int) -> TunableController:
+        """A controller of so many states of which every entry is a gain, one number each.
+
+        The gains are called `A_1_2`, `B_1_<measurement>`, `C_<control>_1`,
+        `D_<control>_<measurement>`. Start it from several random `starts`: states that are driven
+        and read by nothing have no slope.
+
+        Raises `InputError` for an order below 0 and a plant without controls or measurements.
+
+        Examples
+        --------
+        >>> free = synthesis.structures.TunableController.of_order(plant, 1)
+        >>> print([gain.name for gain in free.gains])
+        ['A_1_1', 'B_1_y', 'C_u_1', 'D_u_y']
+        """
+        k, (u, y) = whole(order, "order", 0), (plant.controls, plant.measurements)
+        if not (u and y):
+            raise InputError("the plant has no controls or no measurements: name them")
+        each = [
+            *((f"A_{i + 1}", f"B_{i + 1}") for i in range(k)),
+            *((f"C_{s}", f"D_{s}") for s in u),
+        ]
+        names = [
+            f"{own}_{j + 1}" if j < k else f"{other}_{y[j - k]}"
+            for own, other in each
+            for j in range(k + len(y))
+        ]
+        rows = np.repeat(np.eye(k + len(u)), k + len(y), axis=1)
+        reads = np.tile(np.eye(k + len(y)), (k + len(u), 1))
+        g = len(names)
+        frame = LinearModel(
+            np.zeros((k, k)),
+            np.hstack([np.zeros((k, len(y))), rows[:k]]),
+            np.vstack([np.zeros((len(u), k)), reads[:, :k]]),
+            np.block([[np.zeros((len(u), len(y))), rows[k:]], [reads[:, k:], np.zeros((g, g))]]),
+            signals(f"controller_{i + 1}" for i in range(k)),
+            (*y, *signals(names)),
+            (*u, *signals(names)),
+            plant.dt,
+        )
+        return cls(frame, tuple(TunableGain(name) for name in names))
 
     # --- what it is ------------------------------------------------------------------------------
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
-from symheli import LinearModel, LPVStateSpace, UncertainStateSpace
+from symheli import LFT, LinearModel, LPVStateSpace, UncertainStateSpace
 from symheli.errors import InputError
 from symheli.values.arrays import Array
 from symheli.values.html_table import as_table
@@ -190,12 +192,15 @@ class Controller:
 
         Of a controller that was sampled it is the gain of the sampled loop, and the hypotheses say
         so, with the misfit of the sampled plant. `synthesis.certify_sampled` proves that of a plant
-        with servos and delay as they are.
+        with servos and delay as they are. Of an LFT it is that of `synthesis.lft_gain`, where p may
+        jump.
         """
         from synthesis.certify.questions.adjoint import ADJOINT, adjoint_options
         from synthesis.certify.questions.questions import l2_gain
 
         loop = self.closed()
+        if isinstance(loop, LFT):
+            return _of_lft(loop, rate, options)
         rests = [SAMPLED.format(dt=self.dt)] if self.loop_plant is not self.plant else []
         moving = limits(loop.parameters, rate)
         tied = any(isinstance(s.rate, str) for s in moving)
@@ -321,9 +326,9 @@ class Controller:
             s.name: s.rate if isinstance(s.rate, str) else f"{s.rate:g}"
             for s in self.plant.parameters
         }
+        jumps = "constant" if isinstance(self.plant.model, LFT) else "that may jump"
         names = ", ".join(
-            f"{name} {'that may jump' if rate == 'inf' else f'(rate {rate})'}"
-            for name, rate in rates.items()
+            f"{name} {jumps if rate == 'inf' else f'(rate {rate})'}" for name, rate in rates.items()
         )
         time = "continuous" if self.dt is None else f"sampled every {self.dt:g} s"
         least = "" if self.optimum is None else f", least {self.optimum:.6g}"
@@ -338,3 +343,15 @@ class Controller:
             promised,
         ]
         return "\n".join([*lines, *(f"  {reason}" for reason in self.reasons)])
+
+
+def _of_lft(loop: LFT, rate: Any, options: Mapping[str, Any]) -> Certificate:
+    """Return the certificate of a loop that is an LFT, for parameters that jump."""
+    from synthesis.certify.questions.lft_gain import lft_gain
+
+    if rate is not None and not np.all(np.isinf(np.asarray(rate, float))):
+        raise InputError(
+            "rate: the loop is an LFT, certified where p may jump; where it is constant"
+            " synthesis.robust.worst_case_gain(made.closed(), cells=32) proves the gain"
+        )
+    return lft_gain(loop.reduce(), **options)

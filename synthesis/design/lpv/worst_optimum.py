@@ -45,7 +45,7 @@ def worst_optimum(plant: Plant) -> FrozenOptimum:
     Without the part of a plant that is uncertain, and of some p only; of one parameter also of
     those between them where the worst may be.
     """
-    box = plant.nominal.box
+    box = plant.box
     p = lobatto_points(POINTS.get(len(box), 3), box).reshape(-1, len(box))
 
     def at(q: Array) -> Generalized:

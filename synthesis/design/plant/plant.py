@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from symheli import LinearModel, LPVStateSpace, Scheduling, UncertainStateSpace
+from symheli import LFT, LinearModel, LPVStateSpace, Scheduling, UncertainStateSpace
 from symheli.errors import InputError, UnknownNameError
+from symheli.lpv import connect
 from symheli.lpv.bases import FunctionSpace
 from symheli.lpv.delay import delay_of
 from symheli.lpv.in_series import Part
@@ -42,6 +43,15 @@ TRUE, WEIGHTED = "true_", "weighted_"
 """Prefixes of a performance signal that is also measured: without the noise and filter of the
 measurement, and with a weight.
 """
+RATIONAL = (
+    "the plant is an LFT: synthesis.structured tunes gains for it, and of the LFT itself"
+    " synthesis.robust.mu_synthesis designs for constant parameters, synthesis.designs.lft_feedback"
+    " for those that jump"
+)
+BEFORE = (
+    "the plant is an LFT: connect weights, servos, delays, and outputs that equal inputs, to the"
+    " model first with symheli.lpv.connect"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,10 +68,11 @@ class Plant:
 
     Parameters
     ----------
-    model : LPVStateSpace, UncertainStateSpace, LinearModel or a system of python-control
-        What does not depend on a parameter becomes a model over one called "constant". Afterwards
-        `model` has the inputs (disturbances, controls) and the outputs (performance, measurements
-        that are not among those), then the channels of an uncertain one's block.
+    model : LPVStateSpace, UncertainStateSpace, LFT, LinearModel or a system of python-control
+        What does not depend on a parameter becomes a model over one called "constant". An LFT is
+        for `synthesis.structured` alone, with its parameters constant. Afterwards `model` has the
+        inputs (disturbances, controls) and the outputs (performance, measurements that are not
+        among those), then the channels of an uncertain one's block.
     disturbances, controls : sequence of str
         Inputs of the model, none in both.
     performance : sequence of str
@@ -101,7 +112,7 @@ class Plant:
     ('gust',) ('weighted_phi', 'weighted_d_lat') True
     """
 
-    model: Model
+    model: Model | LFT
     disturbances: tuple[Signal, ...] = ()
     performance: tuple[Signal, ...] = ()
     controls: tuple[Signal, ...] = ()
@@ -138,7 +149,11 @@ class Plant:
         known = (*model.outputs, *(s for s in (*w, *u) if s not in model.outputs))
         z = _named(self.performance, known, "performance signal")
         groups["performance"] = z
-        model = on(model, passing([name for name in z if name in (*w, *u)]))
+        within = [name for name in z if name in (*w, *u)]
+        if not isinstance(model, LFT):
+            model = on(model, passing(within))
+        elif within:
+            raise InputError(BEFORE)
         y = [name for name in groups["measurements"] if name not in z]
         object.__setattr__(self, "model", model.select(inputs=[*w, *u], outputs=[*z, *y]))
         for name, value in groups.items():
@@ -146,8 +161,26 @@ class Plant:
 
     @property
     def nominal(self) -> LPVStateSpace:
-        """The model; for an uncertain one, that of Delta = 0."""
-        return self.model.nominal if isinstance(self.model, UncertainStateSpace) else self.model
+        """The model; for an uncertain one, that of Delta = 0. Raises `InputError` for an LFT."""
+        model = self._functions
+        return model.nominal if isinstance(model, UncertainStateSpace) else model
+
+    @property
+    def _functions(self) -> Model:
+        """The model, which is no LFT."""
+        if isinstance(self.model, LFT):
+            raise InputError(RATIONAL)
+        return self.model
+
+    @property
+    def _frozen(self) -> LPVStateSpace | LFT:
+        """The model that is frozen at p."""
+        return self.model if isinstance(self.model, LFT) else self.nominal
+
+    @property
+    def box(self) -> tuple[tuple[float, float], ...]:
+        """The range of every parameter."""
+        return tuple((s.low, s.high) for s in self.parameters)
 
     @property
     def states(self) -> tuple[Signal, ...]:
@@ -173,11 +206,11 @@ class Plant:
         """Return the nine matrices at p; see `LPVStateSpace.matrices`. For an uncertain plant,
         those of Delta = 0.
         """
-        return Generalized(*Partition.of(self.nominal.matrices(p), self._positions))
+        return Generalized(*Partition.of(self._frozen.matrices(p), self._positions))
 
     def at(self, *p: float) -> Generalized:
         """Return the nine matrices frozen at p, one value a parameter."""
-        model = self.nominal.at(*p)
+        model = self._frozen.at(*p)
         return Generalized(*Partition.of((model.A, model.B, model.C, model.D), self._positions))
 
     def functions(self) -> Generalized:
@@ -193,7 +226,7 @@ class Plant:
 
     @property
     def _positions(self) -> Positions:
-        inputs, outputs = self.nominal.inputs, self.nominal.outputs
+        inputs, outputs = self._frozen.inputs, self._frozen.outputs
         return Positions(
             indices(self.disturbances, inputs, "input"),
             indices(self.controls, inputs, "input"),
@@ -429,13 +462,18 @@ class Plant:
 
     def with_rate(self, rate: Rates) -> Plant:
         """Return the same plant with |dp/dt| <= rate; see `LPVStateSpace.with_rate`."""
-        return replace(self, model=self.model.with_rate(rate))
+        return replace(self, model=self._functions.with_rate(rate))
 
     def with_scheduling(self, scheduling: Scheduling | Sequence[Scheduling]) -> Plant:
         """Return the same plant over narrower ranges or with other rate limits."""
+        if isinstance(self.model, LFT):
+            model = self.model
+            for each in [scheduling] if isinstance(scheduling, Scheduling) else scheduling:
+                model = model.with_scheduling(each)
+            return replace(self, model=model)
         return replace(self, model=self.model.with_scheduling(scheduling))
 
-    def close(self, controller: Any) -> Model:
+    def close(self, controller: Any) -> Any:
         """Return the loop of u = K y from the disturbances to the performance; see
         `symheli.lpv.tools.lower_feedback`.
 
@@ -443,20 +481,24 @@ class Plant:
         LinearModel, an LPVStateSpace, a python-control system (in the order of the plant where its
         signals have no names), or what has such a `model` or `controller`. Controls that it does
         not drive stay zero. An `UncertainStateSpace` of an uncertain plant. Raises `SynthesisError`
-        for a design without a controller.
+        for a design without a controller. Of an LFT the loop is one, of constant gains.
         """
-        return lower_feedback(
-            self.model,
-            as_controller(controller, self.controls, self.measurements),
-            inputs=self.disturbances,
-            outputs=self.performance,
-        )
+        K = as_controller(controller, self.controls, self.measurements)
+        w, z = self.disturbances, self.performance
+        if not isinstance(self.model, LFT):
+            return lower_feedback(self.model, K, inputs=w, outputs=z)
+        if isinstance(K, LPVStateSpace) and K.basis.size > 1:
+            raise InputError("the plant is an LFT, and the controller depends on its parameters")
+        one = K.at(*(s.middle for s in K.parameters)) if isinstance(K, LPVStateSpace) else K
+        return connect(self.model, one, inputs=w, outputs=z)
 
     def _changed(self, change: Callable[[LPVStateSpace], LPVStateSpace], **groups: Any) -> Plant:
         """Return the plant with another model, to which inputs that are performance are
         added anew.
         """
         inputs = (*self.disturbances, *self.controls)
+        if isinstance(self.model, LFT):
+            raise InputError(BEFORE)
         own = self.model.select(outputs=[y for y in self.model.outputs if y not in inputs])
         return replace(self, model=on(own, change), **groups)
 
@@ -581,15 +623,15 @@ def require_plant(given: object) -> None:
         )
 
 
-def _scheduled(given: Any) -> Model:
+def _scheduled(given: Any) -> Model | LFT:
     if is_control_system(given):
         given = LinearModel.from_control(given)
     if isinstance(given, LinearModel):
         given = LPVStateSpace.constant(given)
-    if not isinstance(given, LPVStateSpace | UncertainStateSpace):
+    if not isinstance(given, LPVStateSpace | UncertainStateSpace | LFT):
         raise InputError(
-            "model: expected an LPVStateSpace, an UncertainStateSpace, a LinearModel or a system of"
-            f" python-control, got {type(given).__name__}"
+            "model: expected an LPVStateSpace, an UncertainStateSpace, an LFT, a LinearModel or a"
+            f" system of python-control, got {type(given).__name__}"
         )
     return given
 

@@ -40,7 +40,7 @@ def levels_above(back_off: float | Sequence[float]) -> tuple[float, ...]:
 
 def conditions(plant: Plant) -> tuple[Array, list[str]]:
     """Return some p all over the box, as `Plant.matrices` takes them, and a name for each."""
-    p = lobatto_points(5 if len(plant.parameters) == 1 else 3, plant.nominal.box)
+    p = lobatto_points(5 if len(plant.parameters) == 1 else 3, plant.box)
     names = [s.name for s in plant.parameters]
     texts = [
         ", ".join(f"{n} = {v:g}" for n, v in zip(names, np.atleast_1d(q), strict=True)) for q in p

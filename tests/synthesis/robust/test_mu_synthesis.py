@@ -1,6 +1,5 @@
 """D-K iteration: what mu promises, and routes that agree; a published plant: docs/gallery.md."""
 
-import sys
 from dataclasses import replace
 
 import control
@@ -11,7 +10,13 @@ from symheli import LFT, LinearModel, LPVStateSpace, Scheduling
 from symheli.errors import InputError
 from symheli.lpv import connect
 from synthesis import hinf
-from synthesis.robust import DynamicBlock, mu_synthesis, robust_margin, worst_case_gain
+from synthesis.robust import (
+    DynamicBlock,
+    design_plant,
+    mu_synthesis,
+    robust_margin,
+    worst_case_gain,
+)
 
 STILL = Scheduling("still", "1", 0.0, 1.0, rate=0.0)
 
@@ -56,7 +61,7 @@ def test_mu_is_the_margin_of_the_loop_with_the_performance_as_a_block(design):
 
 
 def test_of_a_loop_of_many_states_mu_is_computed_and_says_so(monkeypatch):
-    monkeypatch.setattr(sys.modules[mu_synthesis.__module__], "MAX_PROVEN_STATES", 1)
+    monkeypatch.setattr(design_plant, "MAX_PROVEN_STATES", 1)
     found = mu_synthesis(lag(), ["u"], ["y"], BLOCK, order=0, iterations=1)
     assert found.mu == min(found.levels)
     assert not found.verified

@@ -16,9 +16,10 @@ from symheli.lpv import BSpline, Polynomial
 from symheli.lpv.bases.polynomials import lobatto_points
 from symheli.progress import watched
 from synthesis import Plant, hinf, structured
+from synthesis.design.tuning import descent
 from synthesis.objectives import L2
-from synthesis.structures import TunableController, TunableGain, descent, design
-from synthesis.structures.peaks import StructureLoops
+from synthesis.structures import TunableController, TunableGain, design
+from synthesis.structures.loops import StructureLoops
 
 
 def integrator(dt=None):

@@ -11,7 +11,7 @@ from scipy import optimize
 
 from symheli.progress import tracked
 from symheli.values.arrays import Array
-from synthesis.structures.peaks import Value
+from synthesis.design.tuning.peaks import Value
 
 Function = Callable[[Array, float], Value]
 """The value and slope at numbers (n,); above the limit any value above it is enough."""

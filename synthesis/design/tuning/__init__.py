@@ -1,0 +1,1 @@
+"""Descent on the largest gain of many loops at once."""
