@@ -19,8 +19,9 @@ import casadi
 import numpy as np
 from scipy import linalg
 
-from symheli import LPVStateSpace, Scheduling
+from symheli import LinearModel, LPVStateSpace, Scheduling
 from symheli.errors import SymheliError
+from symheli.values.signal import signals
 from synthesis import decay_rate, h2_gain, l2_gain, lft_gain, stability
 from synthesis.analysis import (
     energy_to_peak,
@@ -30,7 +31,11 @@ from synthesis.analysis import (
 )
 from synthesis.forms import Spline
 from synthesis.robust import (
+    DelayBlock,
     DynamicBlock,
+    ParameterBlock,
+    StaticBlock,
+    multiplier_gain,
     robust_margin,
     slope_margin,
     uncertain,
@@ -368,8 +373,6 @@ def _parallelepiped(rng: np.random.Generator) -> Trial:
 def _slope(rng: np.random.Generator) -> Trial:
     model = plant(rng, states=4)
     A, B, C, _ = next(frozen(model))
-    from symheli import LinearModel
-
     names: Any = [f"x{i}" for i in range(len(A))]
     into: Any = ["d"]
     out: Any = ["v"]
@@ -424,6 +427,38 @@ def _worst_case(rng: np.random.Generator) -> Trial:
     return Trial(max(float(np.abs(each).max()) for each in closed) / found.upper)
 
 
+def _multipliers(rng: np.random.Generator) -> Trial:
+    """One block near its limit; members by their own responses, with w = Delta v."""
+    A, B, C, _ = next(frozen(plant(rng, 2, 2)))
+    names = [f"x{i}" for i in range(len(A))], ["f", "d"], ["y", "v"]
+    loop = LinearModel(A, B, C, np.zeros((2, 2)), *map(signals, names))
+    grid = np.geomspace(1e-2, 1e2, 1500) * np.abs(np.linalg.eigvals(A)).max()
+    grid = np.unique(np.r_[grid, np.abs(np.linalg.eigvals(A))])
+    G, s = loop.frequency_response(grid), 1j * grid
+    k = float(rng.uniform(0.2, 1.5) / np.abs(G[:, 1, 1]).max())
+    T = float(rng.uniform(0.1, 3.0) / np.abs(np.linalg.eigvals(A)).max())
+    kind = str(rng.choice(["sector", "slope", "parameter", "dynamics", "delay", "window"]))
+    block, delta = {
+        "sector": (StaticBlock("d", "v", sector=(-k, k)), lambda t: k * t),
+        "slope": (StaticBlock("d", "v", slope=(-k, k), odd=True), lambda t: k * t),
+        "parameter": (ParameterBlock("d", "v", -k, k), lambda t: k * t),
+        "dynamics": (DynamicBlock(["d"], ["v"], k), lambda t: k * np.exp(1j * np.pi * t)),
+        "delay": (DelayBlock("d", "v", T), lambda t: np.exp(-s * T * abs(t)) - 1),
+        "window": (DelayBlock("d", "v", T, "window"), lambda t: (np.exp(-s * T * abs(t)) - 1) / s),
+    }[kind]
+    found = multiplier_gain(loop, block)
+    if not (found.verified and found.verify()):
+        return NOTHING
+    worst = found.lower
+    for t in rng.uniform(-1, 1, 60):
+        own = delta(t)
+        closed = G[:, 0, 0] + G[:, 0, 1] * own / (1 - G[:, 1, 1] * own) * G[:, 1, 0]
+        worst = max(worst, float(np.abs(closed).max()))
+        if kind in ("sector", "slope", "parameter") and slow(A + own * B[:, 1:] @ C[1:], None) > 0:
+            worst = math.inf
+    return Trial(worst / found.upper)
+
+
 def _tube(rng: np.random.Generator) -> Trial:
     """A random oscillator with a sine, a cubic and a saturation, about rest in gusts: dV/dt on the
     border by the function alone.
@@ -467,6 +502,7 @@ KINDS: dict[str, Callable[[np.random.Generator], Trial]] = {
     "slope margin": _slope,
     "robust margin": _robust,
     "worst-case gain": _worst_case,
+    "multiplier gain": _multipliers,
 }
 
 

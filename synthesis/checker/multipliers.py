@@ -38,7 +38,7 @@ CORNER, ZEROS, POLES = Fraction(2363, 1000), Fraction(838, 1000), Fraction(685, 
 
 
 class Told(NamedTuple):
-    """What the multipliers of a block demand, their words, and the factor of the nominal block."""
+    """Demands of the multipliers of a block, their words, and the factor of the nominal block."""
 
     demands: Sequence[Demand]
     words: str

@@ -93,7 +93,7 @@ def stored(name):
 
 
 class Contents:
-    """What a file holds of each gain, made when it is first asked for."""
+    """The files of all gains, made when one is first asked for."""
 
     def __getitem__(self, name):
         return json.loads(stored(name))

@@ -21,8 +21,8 @@ RESULTS = set(
     KinematicModel LPVARXModel LargestGust LocalGain LoopShaping LowComplexitySet
     MarginTable Margins MuDesign Online PeriodicGain Plan RationalGain RegionOfAttraction
     RigidBodyOnline RobustMargin Scores SlopeMargin SpecificationTable
-    StateSpaceModel StructuredController SwitchedController TerminalSet TrimPoint Tube
-    WorstCaseGain
+    ProvenClaim StateSpaceModel StructuredController SwitchedController TerminalSet TrimPoint Tube
+    Verdict WorstCaseGain
     """.split()
 )
 

@@ -22,8 +22,20 @@ from synthesis.analysis import (
 from synthesis.certify.statement.statement_file import read
 from synthesis.checker.report import main as checker
 from synthesis.forms import Spline
+<<<<<<< HEAD
 from synthesis.regions import region_of_attraction, terminal
 from synthesis.robust import DynamicBlock, robust_margin, slope_margin, worst_case_gain
+=======
+from synthesis.robust import (
+    DelayBlock,
+    DynamicBlock,
+    ParameterBlock,
+    multiplier_gain,
+    robust_margin,
+    slope_margin,
+    worst_case_gain,
+)
+>>>>>>> multipliers
 from synthesis.sets import invariant_set, low_complexity_set
 from synthesis.switching import dwell_time
 
@@ -70,6 +82,17 @@ def two_by_two():
     )
 
 
+def opened():
+    """Two lags in a row, from the block's d and from u to its v, and to y."""
+    A, B = [[-1.0, 0.0], [1.0, -2.0]], [[1.0, 1.0], [0.0, 0.0]]
+    C, D = [[0.0, 1.0], [1.0, 0.0]], [[0.0, 0.0], [0.0, 0.0]]
+    return LinearModel(A, B, C, D, ["x1", "x2"], ["d", "u"], ["v", "y"])
+
+
+def swaying():
+    return ParameterBlock("d", "v", -0.5, 0.5, inf)
+
+
 def rotated():
     nothing = np.zeros((2, 0))
     A, names = [[0.5, 0.2], [0.0, 0.7]], ["x_m", "y_m"]
@@ -104,6 +127,8 @@ MADE = {
     "slope margin": lambda: slope_margin(third_order(), "d", "v", "Zames-Falb", odd=True),
     "robust margin": lambda: robust_margin(passing().with_rate(0.0), [loss("u1", "y1")]),
     "worst-case gain": lambda: worst_case_gain(two_by_two(), [loss("d", "v")]),
+    "multiplier gain": lambda: multiplier_gain(opened(), DelayBlock("d", "v", 0.2)),
+    "multiplier peak gain": lambda: multiplier_gain(opened(), swaying(), kind="energy to peak"),
     "ellipsoid": lambda: invariant_set(pushed(), input_bounds={"u": 1.0}),
     "parallelepiped": lambda: low_complexity_set(rotated(), state_bounds={"x": 1.0, "y": 2.0}),
     "dwell time": lambda: dwell_time(SLOW, TRIPLED, within=1.2, parts=4),
@@ -118,6 +143,7 @@ BETTER = {
     **dict.fromkeys(("l2 gain", "sampled l2 gain", "energy-to-peak gain", "h2 gain"), "gamma"),
     "LFT gain": "gamma",
     "slope margin": "slope",
+    **dict.fromkeys(("multiplier gain", "multiplier peak gain"), "gain"),
     "decay rate": "alpha",
     "l2 gain of two": "gamma",
     "decay rate of two": "alpha",

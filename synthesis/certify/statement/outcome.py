@@ -29,9 +29,7 @@ class Status(Enum):
 
     @classmethod
     def without_proof(cls, answer: Answer) -> Status:
-        """Return the status where nothing was proven and the solver gave this answer to the last
-        program.
-        """
+        """Return the status of nothing proven, by the answer to the last program."""
         return {Answer.INFEASIBLE: cls.INFEASIBLE, Answer.UNTRIED: cls.UNTRIED}.get(
             answer, cls.FAILED
         )

@@ -78,9 +78,8 @@ def first_miss(F: PolynomialMatrix, cells: int = MAX_BOXES) -> Miss | None:
             return Miss(tuple((a + b) / 2 for a, b in box), False)
         axis = int(np.argmax(curvature))
         middle = sum(box[axis]) / 2
-        for part, ends in zip(
-            _bisect(G, axis), ((box[axis][0], middle), (middle, box[axis][1])), strict=True
-        ):
+        halves = (box[axis][0], middle), (middle, box[axis][1])
+        for part, ends in zip(_bisect(G, axis), halves, strict=True):
             waiting.append((part, (*box[:axis], ends, *box[axis + 1 :])))
     return None
 

@@ -41,7 +41,7 @@ APART = 30.0
 
 @dataclass(frozen=True, eq=False)
 class Asked:
-    """What is asked, in numbers."""
+    """A question in numbers."""
 
     plant: Plant
     blocks: tuple[Wired, ...]

@@ -102,7 +102,7 @@ class StaticBlock:
 
 @dataclass(frozen=True)
 class DelayBlock:
-    """What a constant delay T of 0 to `longest` (s) makes of v, the same T in all channels.
+    """A constant delay T of 0 to `longest` (s) acts on v, the same T in all channels.
 
     Parameters
     ----------

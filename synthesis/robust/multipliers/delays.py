@@ -21,7 +21,7 @@ CORNER, ZEROS, POLES = Fraction(2363, 1000), Fraction(838, 1000), Fraction(685, 
 Postlethwaite, Multivariable Feedback Control (2005), eq. 7.27 (published).
 """
 SHAPES = "difference", "delay", "window"
-"""What a delay makes of v: v(t - T) - v(t), v(t - T), or minus the integral of v from t - T to t.
+"""Forms of a delay: v(t - T) - v(t), v(t - T), or minus the integral of v from t - T to t.
 """
 WEIGHT = 3
 """Order of that weight."""

@@ -29,6 +29,8 @@ GRID = 300
 VALUES, MOST = 9, 250
 """Values of each number of a member, and members that are looked at."""
 DECADES = 2.0
+SINGULAR = 1e14
+"""Condition number of a loop from which on it counts as being on the limit of stability."""
 
 
 class Member(NamedTuple):
@@ -76,16 +78,29 @@ class Family(NamedTuple):
         m = B.shape[1]
         outside = np.zeros((m, len(self.plant.into)))
         outside[list(self.plant.into), range(len(self.plant.into))] = 1.0
-        w = np.linalg.solve(
-            np.eye(m) - Delta @ G, np.broadcast_to(outside, (len(omega), *outside.shape)) + 0j
-        )
-        return np.concatenate([w, G @ w], axis=1)
+        right = np.broadcast_to(outside + 0j, (len(omega), *outside.shape))
+        left = np.eye(m) - Delta @ G
+        singular = np.linalg.cond(left) > SINGULAR
+        left[singular] = np.eye(m)
+        w = np.where(singular[:, None, None], math.inf, np.linalg.solve(left, right))
+        G = np.where(singular[:, None, None], 0.0, G)
+        with np.errstate(invalid="ignore"):
+            own = G @ w
+        own[singular] = math.inf
+        return np.concatenate([w, own], axis=1)
 
     def gains(self, numbers: Sequence[float], omega: Array) -> Array:
         """Return the largest singular values (K,) from f to y."""
-        m = self.plant.B.shape[1]
-        rows = [m + i for i in self.plant.out]
-        return np.linalg.svd(self.closed(numbers, omega)[:, rows], compute_uv=False)[:, 0]
+        return self._largest(self.closed(numbers, omega))
+
+    def _largest(self, own: Array) -> Array:
+        """Return the largest singular values (K,) of the outputs' part; inf on the limit of
+        stability.
+        """
+        rows = own[:, [self.plant.B.shape[1] + i for i in self.plant.out]]
+        finite = np.isfinite(rows).all(axis=(1, 2))
+        values = np.linalg.svd(np.where(finite[:, None, None], rows, 0.0), compute_uv=False)[:, 0]
+        return np.where(finite, values, math.inf)
 
     def stable(self, numbers: Sequence[float]) -> bool:
         """Whether a member is stable, or has a delay or dynamics, for which it is not known."""
@@ -119,13 +134,12 @@ class Family(NamedTuple):
         """
         omega, m = self.grid(), self.plant.B.shape[1]
         best, sizes = Member(-1.0, (), math.nan), np.zeros(m)
-        rows = [m + i for i in self.plant.out]
         for numbers in self.members():
             if not self.stable(numbers):
                 return Member(math.inf, numbers, math.nan), sizes
             own = self.closed(numbers, omega)
-            sizes = np.maximum(sizes, np.abs(own[:, :m]).max(axis=(0, 2)))
-            gains = np.linalg.svd(own[:, rows], compute_uv=False)[:, 0]
+            sizes = np.maximum(sizes, np.nan_to_num(np.abs(own[:, :m]).max(axis=(0, 2))))
+            gains = self._largest(own)
             k = int(np.argmax(gains))
             if gains[k] > best.gain:
                 best = Member(float(gains[k]), numbers, float(omega[k]))

@@ -38,9 +38,9 @@ JOINING = 8
 DEFINITE = 1e-13
 """Ratio of eigenvalues above which a matrix gives coordinates."""
 GAIN, MARGIN, STABLE = "gain", "margin", "stable"
-"""What a program optimises."""
-KEPT = 0.25
-"""Part of the margin that the Riccati equation is given."""
+"""Aims of a program."""
+KEPT = 0.25, 0.75, 0.05
+"""Parts of the margin that the Riccati equation is given, one after the other."""
 HALVED = 1.02
 """Ratio of a gain that is proven to one that is not beyond which one between is tried."""
 
@@ -400,9 +400,11 @@ class Search:
         return back * self.loop.A * self.units, back * self.loop.B * self.into, F
 
     def storage(self, c: Array, margin: float, level: float) -> Storage | None:
-        """Return the storage of these coefficients; None where the Riccati equation has none."""
+        """Return the storage of these coefficients with a margin to spare; None where the Riccati
+        equation has none.
+        """
         parts = self._parts(c)
-        A, B, F = self._scaled(parts, level, KEPT * margin)
+        A, B, F = self._scaled(parts, level, margin)
         try:
             P = _riccati(A, B, F, self.plant.sampled) if len(A) else np.zeros((0, 0))
         except (ValueError, np.linalg.LinAlgError):
@@ -457,5 +459,10 @@ def _confirmed(
     search: Search, level: float, proven: Callable[[Storage, float], bool]
 ) -> tuple[float, Storage] | None:
     centre = search.centred(level)
-    at = None if centre is None else search.storage(*centre, level)
-    return (level, at) if at is not None and proven(at, level) else None
+    if centre is None:
+        return None
+    for part in KEPT:
+        at = search.storage(centre[0], part * centre[1], level)
+        if at is not None and proven(at, level):
+            return level, at
+    return None
