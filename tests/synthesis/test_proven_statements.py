@@ -22,10 +22,7 @@ from synthesis.analysis import (
 from synthesis.certify.statement.statement_file import read
 from synthesis.checker.report import main as checker
 from synthesis.forms import Spline
-<<<<<<< HEAD
 from synthesis.regions import region_of_attraction, terminal
-from synthesis.robust import DynamicBlock, robust_margin, slope_margin, worst_case_gain
-=======
 from synthesis.robust import (
     DelayBlock,
     DynamicBlock,
@@ -35,7 +32,6 @@ from synthesis.robust import (
     slope_margin,
     worst_case_gain,
 )
->>>>>>> multipliers
 from synthesis.sets import invariant_set, low_complexity_set
 from synthesis.switching import dwell_time
 
