@@ -4,7 +4,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from . import dwell, lagged, lft, sets, storage
+from . import dwell, lagged, levels, lft, sets, storage
 from .demands import Claim, failure
 from .reading import DAMAGED, TUBE, Unreadable, opened
 
@@ -23,6 +23,8 @@ def claim_of(kind: str, content: Mapping[str, Any]) -> Claim:
         return SETS[kind](content)
     if kind in ("dwell time", "average dwell time"):
         return dwell.claimed(content)
+    if kind == "worst-case gain":
+        return levels.claimed(content)
     if kind in (TUBE, "tube"):
         raise Unreadable(
             "tubes are not decided here: their proof rests on enclosures of nonlinear equations"
