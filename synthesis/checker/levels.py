@@ -242,6 +242,8 @@ class Proof(NamedTuple):
             if k == len(loop.parts) - 1 and not 0 < self.level <= bound * unit:
                 return "the level of a cell is above the bound"
         ends = sorted((number(low, "a frequency"), _end(high)) for low, high, *_ in self.intervals)
+        if any(low < 0 or (high != ENDLESS and high < low) for low, high in ends):
+            return "an interval is none of frequencies from 0 on"
         highest = Fraction(0)
         for low, high in ends:
             if highest is not None and low > highest:

@@ -62,7 +62,8 @@ class LevelStatement(ProvenStatement):
         time = "in continuous time" if model.dt is None else f"sampled every {model.dt!r} s"
         each = (
             f"stable linear dynamics from {', '.join(names_of(b.outputs))} to"
-            f" {', '.join(names_of(b.inputs))} of gain <= {b.bound!r}{'' if b.weight is None else ' times the weight in the file'}"
+            f" {', '.join(names_of(b.inputs))} of gain <= {b.bound!r}"
+            f"{'' if b.weight is None else ' times the weight in the file'}"
             for b in blocks
         )
         moving = (motion(s, 0.0) for s in model.parameters)
