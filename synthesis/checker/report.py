@@ -8,6 +8,7 @@ from . import (
     claims,
     dwell,
     lagged,
+    levels,
     lft,
     listed,
     multipliers,
@@ -32,6 +33,7 @@ OWN: Mapping[str, Callable[[Any], Claim]] = {
     "multiplier gain": multipliers.claimed,
     "multiplier peak gain": peaks.claimed,
     "claim": claims.claimed,
+    "worst-case gain": levels.claimed,
     regions.KIND: regions.claimed,
     terminal.KIND: terminal.claimed,
 }

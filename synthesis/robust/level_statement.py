@@ -10,6 +10,7 @@ import numpy as np
 
 from symheli import LFT, LinearModel, LPVStateSpace
 from symheli.errors import InputError
+from symheli.lpv.lft.reduction import exact_units
 from symheli.lpv.lft_matrices import LFTMatrices
 from symheli.lpv.linear_model import as_model
 from symheli.lpv.lpv_matrices import LPVMatrices
@@ -20,7 +21,7 @@ from synthesis.certify.statement.proven_statement import ProvenStatement
 from synthesis.certify.statement.sentences import motion
 from synthesis.robust.cells import Cell, CellsProof
 from synthesis.robust.intervals import Interval, LevelProof, Scalings
-from synthesis.robust.structure import DynamicBlock, Part
+from synthesis.robust.structure import DynamicBlock, Part, names_of
 
 Asked = tuple[LFT | LPVStateSpace, Sequence[DynamicBlock]]
 
@@ -60,8 +61,9 @@ class LevelStatement(ProvenStatement):
         n = len(model.states)
         time = "in continuous time" if model.dt is None else f"sampled every {model.dt!r} s"
         each = (
-            f"stable linear dynamics from {', '.join(b.outputs)} to {', '.join(b.inputs)} of gain"
-            f" <= {b.bound!r}{'' if b.weight is None else ' times the weight in the file'}"
+            f"stable linear dynamics from {', '.join(names_of(b.outputs))} to"
+            f" {', '.join(names_of(b.inputs))} of gain <= {b.bound!r}"
+            f"{'' if b.weight is None else ' times the weight in the file'}"
             for b in blocks
         )
         moving = (motion(s, 0.0) for s in model.parameters)
@@ -86,6 +88,7 @@ class LevelStatement(ProvenStatement):
             "bound": self.bound,
             "model": encoded(model),
             "blocks": [_written(block) for block in blocks],
+            **_copies(model),
             **_written_proof(self.proof),
         }
 
@@ -105,6 +108,14 @@ class LevelStatement(ProvenStatement):
     def proven_of(self, model: Any) -> bool:
         """Return whether the claim is about exactly this model; see `ProvenStatement.proven_of`."""
         return self.asked is not None and same_model(self.asked[0], model)
+
+
+def _copies(model: LFT | LPVStateSpace) -> dict[str, Any]:
+    """Return the units of the copies, for the checker that stands alone; nothing where the proof is
+    in other coordinates.
+    """
+    units = exact_units(model) if isinstance(model, LFT) else None
+    return {} if units is None else {"copies": encoded(units)}
 
 
 def _written_proof(proof: LevelProof | CellsProof) -> dict[str, Any]:
@@ -175,7 +186,9 @@ def _written(block: DynamicBlock) -> dict[str, Any]:
     if block.weight is not None:
         own = as_model(block.weight)
         weight = {**{name: encoded(getattr(own, name)) for name in "ABCD"}, "dt": own.dt}
-    own_names = {"inputs": list(map(str, block.inputs)), "outputs": list(map(str, block.outputs))}
+    own_names = {
+        side: list(map(str, names_of(getattr(block, side)))) for side in ("inputs", "outputs")
+    }
     return {**own_names, "bound": float(block.bound), "weight": weight}
 
 

@@ -451,8 +451,8 @@ def channels_of(
                 "blocks: expected DynamicBlock(inputs, outputs, bound) with a finite bound > 0, got"
                 f" {each!r:.80}"
             )
-        columns.append(indices(_names(each.inputs), model.inputs, "input"))
-        rows.append(indices(_names(each.outputs), model.outputs, "output"))
+        columns.append(indices(names_of(each.inputs), model.inputs, "input"))
+        rows.append(indices(names_of(each.outputs), model.outputs, "output"))
     for group in (columns, rows):
         if len({*chain(*group)}) < len(list(chain(*group))):
             raise InputError("blocks: an input or an output belongs to one block only")
@@ -466,7 +466,7 @@ def stable_weight(block: DynamicBlock, dt: float | None) -> LinearModel | None:
     """
     if block.weight is None:
         return None
-    found = parts.weight(block.weight, ", ".join(_names(block.outputs)), dt)
+    found = parts.weight(block.weight, ", ".join(names_of(block.outputs)), dt)
     if not isinstance(found, LinearModel) or (len(found.inputs), len(found.outputs)) != (1, 1):
         raise InputError("weight of a block: expected a LinearModel of one input and one output")
     if not (same_period(found.dt, dt) or not found.states) or not found.is_stable():
@@ -498,7 +498,7 @@ def _paired(
     inputs: Sequence[str], outputs: Sequence[str]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return as many inputs as outputs; raise `InputError` for other numbers."""
-    d, v = tuple(_names(inputs)), tuple(_names(outputs))
+    d, v = tuple(names_of(inputs)), tuple(names_of(outputs))
     if len(d) != len(v):
         raise InputError(
             f"expected an output for each input, got {len(d)} inputs and {len(v)} outputs"
@@ -510,5 +510,6 @@ def _shifted(part: slice, by: int) -> slice:
     return slice(part.start - by, part.stop - by)
 
 
-def _names(given: str | Sequence[str]) -> Sequence[str]:
+def names_of(given: str | Sequence[str]) -> Sequence[str]:
+    """Return the names of one signal or of several."""
     return (given,) if isinstance(given, str) else given

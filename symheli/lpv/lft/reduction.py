@@ -103,6 +103,15 @@ def reduce_exactly(lft: LFT) -> ExactCopies:
         found = smaller
 
 
+def exact_units(lft: LFT) -> Array | None:
+    """Return the units (n,) of the copies in which `reduce_exactly` leaves all of them: row i of M
+    times the first, column i by it; None where it leaves fewer.
+    """
+    if reduce_exactly(lft).sizes != lft.sizes:
+        return None
+    return _units(lft).copies if lft.order else np.ones(0)
+
+
 def _reached_exactly(own: ExactCopies) -> ExactCopies:
     """Return what the inputs reach alone, in coordinates that are some of the copies."""
     here = parts(own.sizes)
