@@ -46,7 +46,7 @@ NEAR = 1e-7
 
 
 class Found(NamedTuple):
-    """What contradicts a claim: a sentence, the motion and the place, and whether it is exact."""
+    """A contradiction of a claim: a sentence, the motion and the place, and whether it is exact."""
 
     reason: str
     motion: Counterexample | None
