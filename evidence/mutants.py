@@ -48,6 +48,12 @@ COVERS = (
     "tests/synthesis/certify/test_cover.py"
     " tests/synthesis/robust/test_delays_and_servos_as_blocks.py"
 )
+CLAIMS = (
+    "tests/synthesis/claims/test_vertices_and_grids.py"
+    " tests/synthesis/claims/test_regions_of_attraction.py"
+    " tests/synthesis/claims/test_terminal_sets.py"
+    " tests/checker/test_claims_of_others.py"
+)
 POLYNOMIALS = (
     "tests/synthesis/numerics/test_bernstein_and_cells.py"
     " tests/synthesis/numerics/test_polynomial_matrices.py"
@@ -378,6 +384,62 @@ MUTANTS = (
         "jump.T @ own[j][0] @ jump",
         "jump.T @ own[j][-1] @ jump",
         "tests/synthesis/switching/test_switching.py",
+    ),
+    Mutant(
+        "a rate of p counts on one side only, in a claim about a grid",
+        "synthesis/claims/inequality.py",
+        "return [own * as_fraction(rate), own * -as_fraction(rate)]",
+        "return [own * as_fraction(rate)]",
+        CLAIMS,
+    ),
+    Mutant(
+        "a step of p is as long as its rate, whatever the period, in a claim about a grid",
+        "synthesis/claims/inequality.py",
+        "step = min(step, as_fraction(plant.rate) * as_fraction(plant.dt))",
+        "step = min(step, as_fraction(plant.rate) * as_fraction(plant.dt) / 2)",
+        CLAIMS,
+    ),
+    Mutant(
+        "inputs pass twice to the outputs, in a claim of a gain",
+        "synthesis/claims/inequality.py",
+        "corner = D.T @ D if dt is None else D.T @ D + B.T @ (after @ B)",
+        "corner = D.T @ D",
+        CLAIMS,
+    ),
+    Mutant(
+        "a region of attraction is looked at on one side of each axis",
+        "synthesis/claims/polar.py",
+        "for axis, sign in product(range(n), (-1, 1)):",
+        "for axis, sign in product(range(n), (1, 1)):",
+        CLAIMS,
+    ),
+    Mutant(
+        "V may be negative in a region of attraction",
+        "synthesis/claims/region.py",
+        "return beyond or (V and fall)",
+        "return beyond or fall",
+        CLAIMS,
+    ),
+    Mutant(
+        "a terminal set keeps its limits to their square",
+        "synthesis/claims/terminal.py",
+        "if c * reach > row.b**2:",
+        "if c * reach > 1.1 * row.b**2:",
+        CLAIMS,
+    ),
+    Mutant(
+        "multipliers of a set may be below zero, in the checker",
+        "synthesis/checker/claims.py",
+        "if any(v < 0 for v in y) or not same or total > b:",
+        "if not same or total > b:",
+        CLAIMS,
+    ),
+    Mutant(
+        "a motion of p that jumps leaves a moving P believed, in the checker",
+        "synthesis/checker/claims.py",
+        'refused = "P depends on p, and p may jump"',
+        'refused = ""',
+        CLAIMS,
     ),
     Mutant(
         "the energy of an output is counted at one of two points",

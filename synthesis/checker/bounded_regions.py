@@ -15,7 +15,7 @@ from .demands import Claim
 from .polynomials import Polynomial, bernstein_coefficients, scalar, variable
 from .reading import Unreadable, whole
 
-MOST_BOXES, MOST_TERMS = 20_000, 5000
+MOST_BOXES, MOST_TERMS, MOST_STATES = 20_000, 5000, 8
 Terms = dict[tuple[int, ...], Fraction]
 
 
@@ -47,6 +47,8 @@ def _slope(V: Terms, f: Sequence[Terms]) -> Terms:
 def claimed(plant: Any, own: Any, content: Any) -> Claim:
     """Return what a file of a region of attraction claims."""
     names, rho = plant["states"], rational(own["rho"])
+    if not isinstance(names, list) or not 1 <= len(names) <= MOST_STATES:
+        raise Unreadable(f"a region of attraction is known for 1 to {MOST_STATES} states")
     n = len(names)
     f, V = [_terms(each, n) for each in plant["f"]], _terms(own["V"], n)
     box = [rational(text) for text in content["box"]]

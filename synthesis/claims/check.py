@@ -113,11 +113,12 @@ def _region(given: ProvenClaim, refute: bool) -> Verdict:
     answer, reason, place = region.judged(plant, claim)
     if answer == PROVEN:
         return Verdict(answer=PROVEN, statement=_established(given), **_head(given))
-    found = departed.departure(plant, claim) if refute else None
+    small = reason != region.TOO_LARGE
+    found = departed.departure(plant, claim) if refute and small else None
     if found is not None:
         shown = {"place": place, "motion": found.motion, "exact": found.exact}
         return Verdict(answer=FALSE, reason=found.reason, **shown, **_head(given))
-    proves = region.proven_level(plant, claim)
+    proves = region.proven_level(plant, claim) if small else math.nan
     return Verdict(answer=answer, reason=reason, place=place, proves=proves, **_head(given))
 
 

@@ -61,7 +61,7 @@ def claim_of(content: Mapping[str, Any]) -> Any:
     bound = BOUNDS.get(kind)
     only(content, ("claim", "P", "K", "p", AXIS, *([bound] if bound else [])))
     _present(content, "P")
-    bounds = {"bound": _number(content, bound)} if bound else {}
+    bounds: dict[str, Any] = {"bound": _number(content, bound)} if bound else {}
     p = content.get("p")
     matrices: dict[str, Any] = stacked(content, ("P", "K"))
     if p is not None:

@@ -40,7 +40,7 @@ class ClosedLoop:
         if isinstance(plant, GridPlant):
             return [cls(plant, K, shift)]
         pairs = [(i, j) for i in range(len(K)) for j in range(i)]
-        return [cls(_pair(plant, i, j), K[[i, j]], shift) for i, j in pairs]
+        return [cls(_pair(plant, K, i, j), 0 * K[[i, j]], shift) for i, j in pairs]
 
     @property
     def scheduling(self) -> Scheduling:
@@ -68,8 +68,10 @@ class ClosedLoop:
         return Matrices(A * math.exp(self.shift * own.dt), B, C, D)
 
 
-def _pair(plant: VertexPlant, i: int, j: int) -> GridPlant:
-    own = [M[[i, j]] for M in (plant.A, plant.B, plant.C, plant.D)]
+def _pair(plant: VertexPlant, K: Array, i: int, j: int) -> GridPlant:
+    """Return the line between two closed loops."""
+    A, B, C, D = (M[[i, j]] for M in (plant.A, plant.B, plant.C, plant.D))
+    own = A + B @ K[[i, j]], B, C + D @ K[[i, j]], D
     return GridPlant(np.array([0.0, 1.0]), *own, rate=math.inf, dt=plant.dt)
 
 

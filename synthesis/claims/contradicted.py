@@ -46,7 +46,7 @@ NEAR = 1e-7
 
 
 class Found(NamedTuple):
-    """What contradicts a claim: a sentence, the motion and the place, and whether it is exact."""
+    """A contradiction of a claim: a sentence, the motion and the place, and whether it is exact."""
 
     reason: str
     motion: Counterexample | None
@@ -104,7 +104,7 @@ def _at_rest(
                 f"The plant at rest at {frozen[k].words} contradicts it: its matrix has an"
                 f" eigenvalue that does not decay{_asked(claim)}, by Routh's scheme in rationals."
             )
-            return Found(reason, _motion_at_rest(numbers[k], frozen[k].p, plant.dt), None, True)
+            return Found(reason, motion_at_rest(numbers[k], frozen[k].p, plant.dt), None, True)
     return None
 
 
@@ -112,7 +112,8 @@ def _asked(claim: LyapunovClaim) -> str:
     return f" as fast as {claim.bound:.9g} 1/s" if claim.kind == "decay rate" else ""
 
 
-def _motion_at_rest(A: Array, p: float | None, dt: float | None) -> Counterexample:
+def motion_at_rest(A: Array, p: float | None, dt: float | None) -> Counterexample:
+    """Return the motion of the slowest mode of one model, over some of its own times."""
     from scipy.linalg import expm
 
     values, vectors = cast(Any, np.linalg.eig(A))

@@ -10,17 +10,20 @@ from typing import Any
 import numpy as np
 
 from symheli.values.arrays import Array
-from synthesis.claims.contradicted import Found
+from synthesis.claims.contradicted import Found, motion_at_rest
 from synthesis.claims.monomials import compiled, derivative, in_units, scaled, value
 from synthesis.claims.plants import PolynomialPlant
 from synthesis.claims.region import Region, region_of, rising
 from synthesis.claims.region_claim import RegionClaim
 from synthesis.claims.verdict import Counterexample
+from synthesis.numerics.polynomial.spectrum import decays
 
 STARTS = 12
 """States from which a motion is integrated."""
-FAR = 30.0
-"""Size of a motion, in half widths of a box that holds {V <= rho}, at which it has left."""
+FAR, OUT = 1e3, 30.0
+"""Size of a motion, in half widths of a box that holds {V <= rho}, at which it has left for good;
+and at which it has where the integrator cannot go on, as in a finite escape time.
+"""
 LONG = 1e4
 """Time of a motion, in times that the states need to move by their own size."""
 NEAR = 0.05
@@ -38,8 +41,27 @@ def departure(plant: PolynomialPlant, claim: RegionClaim) -> Found | None:
         return None
     f = [scaled(in_units(own, region.units), 1 / u)
          for own, u in zip(plant.fields, region.units, strict=True)]  # fmt: skip
+    if all(sum(e) <= 1 for own in f for e in own):
+        return None if _linear_decays(f) else _unstable(plant)
     starts = rising(plant, claim, region)[:STARTS]
     return _resting(plant, claim, region, f, starts) or _left(f, claim, region, starts)
+
+
+def _linear(f: Any) -> Array:
+    n = range(len(f))
+    return np.array([[own.get(tuple(int(i == j) for i in n), Fraction(0)) for j in n] for own in f])
+
+
+def _linear_decays(f: Any) -> bool:
+    return decays(_linear(f), False)
+
+
+def _unstable(plant: PolynomialPlant) -> Found:
+    A = _linear(plant.fields).astype(float)
+    reason = (
+        "The equations are linear, and an eigenvalue does not decay: exactly, by Routh's scheme."
+    )
+    return Found(reason, motion_at_rest(A, None, None), None, True)
 
 
 def _left(f: Any, claim: RegionClaim, region: Region, starts: Array) -> Found | None:
@@ -56,9 +78,9 @@ def _left(f: Any, claim: RegionClaim, region: Region, starts: Array) -> Found | 
         kept = np.unique(np.linspace(0, len(time) - 1, 40).astype(int))
         motion = Counterexample(time[kept], states[kept] * units, None)
         reason = (
-            f"A motion from V = {float(value(region.V, exact)):.6g} <= rho leaves: it is {FAR:g}"
-            f" times as far out as {{V <= rho}} reaches at t = {time[-1]:.6g}; a second integrator"
-            " agrees."
+            f"A motion from V = {float(value(region.V, exact)):.6g} <= rho does not tend to zero:"
+            f" at t = {time[-1]:.6g} it is {float(np.abs(states[-1]).max()):.2g} times as far out"
+            " as {V <= rho} reaches; a second integrator agrees."
         )
         return Found(reason, motion, None, False)
     return None
@@ -67,7 +89,7 @@ def _left(f: Any, claim: RegionClaim, region: Region, starts: Array) -> Found | 
 def _flown(
     rate: Callable[[Array], Array], z: Array, method: Any, tolerance: float
 ) -> tuple[Array, Array] | None:
-    """Return (time, states) of a motion that leaves; None of one that does not."""
+    """Return (time, states) of a motion that does not tend to zero; None of one that may."""
     from scipy.integrate import solve_ivp
 
     speed = float(np.abs(rate(z)).max())
@@ -88,8 +110,12 @@ def _flown(
             lambda t, x: rate(x), (0.0, horizon), z, method=method, rtol=tolerance, atol=1e-12,
             events=[gone, back],
         )  # fmt: skip
-    left = len(found.t_events[0]) > 0
-    return (found.t, found.y.T) if left else None
+    size = np.abs(found.y).max(axis=0)
+    escaped = len(found.t_events[0]) > 0 or (found.status < 0 and size[-1] > OUT)
+    # to the end of a long time it is no nearer than it began: it circles or rests elsewhere
+    late = size[found.t > horizon / 2]
+    stayed = found.status == 0 and len(late) > 0 and bool(late.min() >= size[0])
+    return (found.t, found.y.T) if escaped or stayed else None
 
 
 def _resting(
@@ -120,7 +146,7 @@ def _newton(rate: Callable[[Array], Array], J: Any, z: Array) -> Array | None:
         slope = np.array([[value(d, list(own)) for d in row] for row in J], dtype=float)
         step = np.linalg.lstsq(slope, rate(own), rcond=None)[0]
         own = own - step
-        if not np.all(np.isfinite(own)) or np.abs(own).max() > FAR:
+        if not np.all(np.isfinite(own)) or np.abs(own).max() > OUT:
             return None
         if np.abs(step).max() <= 1e-15 * np.abs(own).max():
             break

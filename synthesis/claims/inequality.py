@@ -35,7 +35,7 @@ UNIT = ((Fraction(0), Fraction(1)),)
 
 
 class Required(NamedTuple):
-    """What must be positive definite: its name, the polynomial matrix, and where in words: of a
+    """A demand of positive definiteness: its name, the polynomial matrix, and where in words: of a
     vertex, whose number `vertex` is; on a grid None.
     """
 

@@ -78,11 +78,20 @@ class LyapunovClaim:
     @property
     def sentence(self) -> str:
         """The claim in words."""
-        return {
-            "stability": "the state tends to zero exponentially from every start",
-            "decay rate": f"|x(t)| <= c exp(-{self.bound!r} t) |x(0)|",
-            "l2 gain": f"exponentially stable, and |y|_2 < {self.bound!r} |u|_2 from rest",
-        }[self.kind]
+        closed = "" if self.K is None else "with u = K x + w: "
+        closed = closed.replace("K", "K of each vertex or point") if self._several else closed
+        return (
+            closed
+            + {
+                "stability": "the state tends to zero exponentially from every start",
+                "decay rate": f"|x(t)| <= c exp(-{self.bound!r} t) |x(0)|",
+                "l2 gain": f"exponentially stable, and |y|_2 < {self.bound!r} |u|_2 from rest",
+            }[self.kind]
+        )
+
+    @property
+    def _several(self) -> bool:
+        return self.K is not None and self.K.ndim == 3
 
     def fitting(self, plant: VertexPlant | GridPlant) -> tuple[Array, Array]:
         """Return P (1 or N, n, n) and K (1 or N, m, n) of a plant.

@@ -7,6 +7,7 @@ writes: 0.1 is 1/10.
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from itertools import product
@@ -19,7 +20,11 @@ from symheli.values.arrays import Array
 
 Monomials = dict[tuple[int, ...], Fraction]
 MOST_TERMS, HIGHEST_POWER = 5000, 60
-"""Terms of a polynomial, and a power in its text, beyond which it is not read."""
+"""Terms of a polynomial, and its degree, beyond which it is not read."""
+WRITTEN = re.compile(
+    r"[-+]?(\d{1,4000}(/\d{1,4000})?|(\d{1,400}\.?\d{0,400}|\.\d{1,400})([eE][-+]?\d{1,3})?)"
+)
+"""Texts that are rationals, of so many digits."""
 
 
 def monomials(value: Any, names: Sequence[str]) -> Monomials:
@@ -43,15 +48,31 @@ def monomials(value: Any, names: Sequence[str]) -> Monomials:
         key = tuple(exponents)
         if len(key) != len(names) or not all(isinstance(e, int) and e >= 0 for e in key):
             raise InputError(f"expected {len(names)} exponents >= 0, got {exponents!r:.60}")
-        found[key] = _rational(number)
-    return _without_zeros(found)
+        found[key] = rational(number)
+    return bounded(_without_zeros(found))
 
 
-def _rational(number: Any) -> Fraction:
+def rational(number: Any) -> Fraction:
+    """Return the rational of a number, or of a text such as "3/4" or "1.5e-3".
+
+    Raises `InputError` for anything else, also for one of too many digits.
+    """
     try:
+        if isinstance(number, str) and not WRITTEN.fullmatch(number):
+            raise ValueError(number)
         return Fraction(number)
     except (TypeError, ValueError, OverflowError, ZeroDivisionError):
         raise InputError(f"expected a finite number, got {number!r:.60}") from None
+
+
+def bounded(F: Monomials) -> Monomials:
+    """Return the polynomial; raises `InputError` for too many terms or too high a degree."""
+    if len(F) > MOST_TERMS or degree(F) > HIGHEST_POWER:
+        raise InputError(
+            f"a polynomial of more than {MOST_TERMS} terms, or of a degree above {HIGHEST_POWER},"
+            " is not read"
+        )
+    return F
 
 
 def _of_text(text: str, names: Sequence[str]) -> Monomials:
@@ -68,7 +89,7 @@ def _of_text(text: str, names: Sequence[str]) -> Monomials:
 def _node(node: ast.AST, source: str, names: Sequence[str]) -> Monomials:
     if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
         written = ast.get_source_segment(source, node) or ""
-        return {(0,) * len(names): _rational(written)}
+        return {(0,) * len(names): rational(written)}
     if isinstance(node, ast.Name):
         if node.id not in names:
             raise InputError(f"{node.id!r} is no state; the states are {', '.join(names)}")
@@ -129,9 +150,7 @@ def times(F: Monomials, G: Monomials) -> Monomials:
     for (e, c), (k, d) in product(F.items(), G.items()):
         key = tuple(a + b for a, b in zip(e, k, strict=True))
         found[key] = found.get(key, Fraction(0)) + c * d
-    if len(found) > MOST_TERMS:
-        raise InputError(f"a polynomial of more than {MOST_TERMS} terms is not read")
-    return _without_zeros(found)
+    return bounded(_without_zeros(found))
 
 
 def power(F: Monomials, exponent: int) -> Monomials:

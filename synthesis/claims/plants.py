@@ -100,7 +100,7 @@ class VertexPlant:
 
     @property
     def hypotheses(self) -> tuple[str, ...]:
-        """What the plant is, in sentences."""
+        """The plant in sentences."""
         count = len(self.A)
         if count == 1:
             return (f"one linear model of {self.states} states, {_time(self.dt)}",)
@@ -165,7 +165,7 @@ class GridPlant:
 
     @property
     def hypotheses(self) -> tuple[str, ...]:
-        """What the plant is, in sentences."""
+        """The plant in sentences."""
         moving = "p may jump" if math.isinf(self.rate) else f"|dp/dt| <= {self.rate:g} per second"
         low, high = self.p[0], self.p[-1]
         return (
@@ -230,7 +230,7 @@ class PolynomialPlant:
 
     @property
     def hypotheses(self) -> tuple[str, ...]:
-        """What the plant is, in sentences."""
+        """The plant in sentences."""
         return tuple(
             f"{name}' = {_short(written(each, self.states))}"
             for name, each in zip(self.states, self.f, strict=True)
@@ -296,7 +296,7 @@ class LimitedPlant:
 
     @property
     def hypotheses(self) -> tuple[str, ...]:
-        """What the plant is, in sentences."""
+        """The plant in sentences."""
         count = len(self.A)
         models = "one model" if count == 1 else f"any convex combination of {count} models"
         return (

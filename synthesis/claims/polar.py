@@ -104,7 +104,7 @@ Judge = Callable[[list[bool]], bool]
 
 
 Corner = Callable[[list[int], tuple[Fraction, ...]], int]
-"""What the signs of all polynomials at a corner, and the corner, say: `FAILS`, `TOUCHES` where one
+"""The meaning of the signs of all polynomials at a corner: `FAILS`, `TOUCHES` where one
 is zero that has to be positive, or 0.
 """
 FAILS, TOUCHES = 2, 1

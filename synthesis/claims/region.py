@@ -7,6 +7,7 @@ is x = 0; there is one component, no motion leaves it, and every motion in it te
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any, NamedTuple
@@ -33,6 +34,10 @@ RAYS = 100
 """Directions along which the size of {V <= rho} is looked up."""
 ROOM = (Fraction(17, 16), Fraction(2), Fraction(8))
 """Factors of that size that are tried for a box that holds it."""
+MOST_COEFFICIENTS, MOST_WORK = 300_000, 60_000_000
+"""Bernstein coefficients of a polynomial, and of all boxes together, beyond which nothing more is
+looked at.
+"""
 ROUNDS = 12
 """Bisections of the level that V does prove."""
 FEWER = 1000
@@ -56,6 +61,9 @@ def judged(
     plant: PolynomialPlant, claim: RegionClaim, cells: int = MOST_CELLS
 ) -> tuple[str, str, Place | None]:
     """Return the answer about this V alone, the reason and the place."""
+    n, size = len(plant.states), coefficients(plant, claim)
+    if size > MOST_COEFFICIENTS:
+        return UNDECIDED, TOO_LARGE, None
     region = region_of(plant, claim)
     if region is None:
         return UNDECIDED, UNBOUNDED, None
@@ -64,7 +72,7 @@ def judged(
         return NOT_BY_THIS, RISES, seen
     if not region.slope:
         return UNDECIDED, "dV/dt is zero everywhere: V does not fall. Another V would decide", None
-    n, left = len(region.units), cells
+    left = min(cells, MOST_WORK // size)
     for face in faces(n):
         found, looked = first_open(_tensors(region, claim.rho, face), _settled, _at_corner, left)
         left -= looked
@@ -77,6 +85,18 @@ def judged(
     return PROVEN, "", None
 
 
+def coefficients(plant: PolynomialPlant, claim: RegionClaim) -> int:
+    """Return the most Bernstein coefficients of a polynomial that is looked at."""
+    V = claim.function(plant.states)
+    F = [*V, *along(V, plant.fields)]
+    sizes = sorted(max(e[i] for e in F) + 1 for i in range(len(plant.states)))
+    return math.prod(sizes[1:]) * (max(map(sum, F)) + 1)
+
+
+TOO_LARGE = (
+    "the polynomials have too many Bernstein coefficients for this exact check. Fewer states, or a"
+    " lower degree, would decide"
+)
 UNBOUNDED = (
     "no box was shown to hold {V <= rho}: it may be unbounded. A V whose highest terms are positive"
     " in every direction would decide"

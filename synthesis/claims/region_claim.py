@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from typing import Any, ClassVar
 
 from symheli.errors import InputError
 from symheli.values.summary import summarized
-from synthesis.claims.monomials import Monomials, monomials, written
+from synthesis.claims.monomials import Monomials, monomials, rational, written
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,10 +40,7 @@ class RegionClaim:
     __repr__ = summarized
 
     def __post_init__(self) -> None:
-        try:
-            rho = Fraction(self.rho)
-        except (TypeError, ValueError, OverflowError, ZeroDivisionError):
-            rho = Fraction(0)
+        rho = rational(self.rho)
         if rho <= 0:
             raise InputError(f"rho: expected a number > 0, got {self.rho!r:.60}")
         object.__setattr__(self, "rho", rho)

@@ -33,7 +33,7 @@ class Counterexample(NamedTuple):
 
 
 class Place(NamedTuple):
-    """Where an inequality fails: in words, by the parameter or vertex (None: the plant is one), and
+    """The place of a failure: in words, by the parameter or vertex (None: the plant is one), and
     the direction or state `x`; `short` is what is missing, as a part of the size of its terms.
     """
 

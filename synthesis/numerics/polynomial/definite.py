@@ -73,6 +73,8 @@ def first_miss(F: PolynomialMatrix, cells: int = MAX_BOXES) -> Miss | None:
         for corner in product((0, -1), repeat=m):
             if not positive_definite(G[corner]):
                 return Miss(tuple(box[i][k] for i, k in enumerate(corner)), True)
+        if max(G.shape[:m], default=1) <= 2:
+            continue  # every coefficient is a value at a corner
         curvature = _curvature(numbers[None], m)[0]
         if spent > cells or curvature.max() == 0.0:
             return Miss(tuple((a + b) / 2 for a, b in box), False)

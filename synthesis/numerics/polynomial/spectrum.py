@@ -1,4 +1,4 @@
-"""Where the eigenvalues of a matrix of rationals lie, and its linear equations, exactly."""
+"""Eigenvalues of a matrix of rationals, whether they decay, and its linear equations, exactly."""
 
 from __future__ import annotations
 

@@ -19,6 +19,7 @@ def test_the_row_of_a_published_claim_is_what_its_files_give(name):
     assert row(name, FOLDER)[:4] == kept[name][:4]
 
 
+@pytest.mark.slow(but=("mpc", "golden", "cubic"))
 @pytest.mark.filterwarnings("ignore:Solution may be inaccurate")
 @pytest.mark.parametrize("name", PUBLISHED)
 def test_the_files_are_the_data_of_the_source(name):
