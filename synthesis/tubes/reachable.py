@@ -9,15 +9,17 @@ and Buss, CDC (2008); Girard, HSCC (2005); Moore, Interval Analysis (1966).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import reduce
+from itertools import pairwise, product
 from typing import Any, NamedTuple
 
 import casadi
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.progress import task
+from symheli.progress import task, tracked
 from symheli.values.arrays import Array, frozen
 from symheli.values.numbers import positive, whole
 from symheli.values.summary import summarized
@@ -166,6 +168,7 @@ def reachable(
     step: float,
     states: Sequence[str] = (),
     order: int = 12,
+    parts: Sequence[int] = (),
 ) -> ReachableTube:
     """Bounds of all motions of dx/dt = f(x) from a box of starts, for all times up to a horizon.
 
@@ -186,6 +189,8 @@ def reachable(
         Names; by default x1, x2, ...
     order : int
         Generators of a set, per state: more are sharper.
+    parts : sequence of int, optional
+        Parts of the box of starts along each state, each with a tube of its own; default: one.
 
     Returns
     -------
@@ -217,9 +222,43 @@ def reachable(
     if len(names) != n or len(set(names)) < n:
         raise InputError(f"states: expected {n} different names, got {states!r:.80}")
     horizon, step = positive(horizon, "horizon"), positive(step, "step")
+    counts = tuple(whole(k, "parts", 1) for k in parts) or (1,) * n
+    if len(counts) != n:
+        raise InputError(f"parts: expected {n} whole numbers, got {parts!r:.80}")
+    stepper = _Stepper(f.expand(), whole(order, "order", 1) * n)
+    boxes = tracked("parts of the start", list(_split(lower, upper, counts)))
+    tubes = [stepper.tube(_first(*box), horizon, step, names) for box in boxes]
+    return reduce(_united, tubes)
+
+
+def _split(lower: Array, upper: Array, counts: tuple[int, ...]) -> Iterator[tuple[Array, Array]]:
+    """Yield boxes that cover a box, some along each axis; neighbours share their edges."""
+    edges = [np.linspace(a, b, k + 1) for a, b, k in zip(lower, upper, counts, strict=True)]
+    for own, a, b in zip(edges, lower, upper, strict=True):
+        own[[0, -1]] = a, b
+    for sides in product(*(pairwise(own) for own in edges)):
+        low, high = np.array(sides).T
+        yield low, high
+
+
+def _first(lower: Array, upper: Array) -> Zonotope:
     box = Domain.box(lower, upper)
-    first = Zonotope(box.centre, box.generators[:, np.any(box.generators, axis=0)])
-    return _Stepper(f.expand(), whole(order, "order", 1) * n).tube(first, horizon, step, names)
+    return Zonotope(box.centre, box.generators[:, np.any(box.generators, axis=0)])
+
+
+def _united(one: ReachableTube, other: ReachableTube) -> ReachableTube:
+    """Return the tube that holds both, up to the end of the shorter one."""
+    k = min(len(one.lower), len(other.lower))
+    shorter = one if len(one.lower) == k else other
+    return ReachableTube(
+        one.states,
+        shorter.times,
+        np.minimum(one.lower[:k], other.lower[:k]),
+        np.maximum(one.upper[:k], other.upper[:k]),
+        np.minimum(one.at_lower[: k + 1], other.at_lower[: k + 1]),
+        np.maximum(one.at_upper[: k + 1], other.at_upper[: k + 1]),
+        one.why or other.why,
+    )
 
 
 class _Stepper:
