@@ -19,7 +19,7 @@ RESULTS = set(
     Estimator Experiment FitForControl FlightDataset FrozenModels
     GainCurve ReferenceGovernor Helicopter History InvariantSet
     KinematicModel LPVARXModel LargestGust LocalGain LoopShaping LowComplexitySet
-    MarginTable Margins MuDesign Online Plan RegionOfAttraction
+    MarginTable Margins MuDesign Online Plan ReachableTube RegionOfAttraction
     RigidBodyOnline RobustMargin Scores SlopeMargin SpecificationTable
     StateSpaceModel StructuredController SwitchedController TerminalSet TrimPoint Tube
     WorstCaseGain
