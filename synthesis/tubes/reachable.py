@@ -9,15 +9,17 @@ and Buss, CDC (2008); Girard, HSCC (2005); Moore, Interval Analysis (1966).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import reduce
+from itertools import pairwise, product
 from typing import Any, NamedTuple
 
 import casadi
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.progress import task
+from symheli.progress import task, tracked
 from symheli.values.arrays import Array, frozen
 from symheli.values.numbers import positive, whole
 from symheli.values.summary import summarized
@@ -30,8 +32,8 @@ WIDER, TRIALS = 1.15, 12
 """Factor on the set about a step until it is mapped into itself, and the most trials."""
 TINY = 1e-250
 """Added to bounds of rounding, which may underflow."""
-LARGEST = 1e6
-"""Size of a set over that of the first at which the tube is given up."""
+LARGEST = 1e100
+"""Size of a set at which the tube is given up."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +52,16 @@ class ReachableTube:
         Bounds at the times.
     why : str
         Why the tube ends before its horizon; empty where it does not.
+
+    Examples
+    --------
+    >>> import casadi
+    >>> x = casadi.SX.sym("x", 1)
+    >>> growth = casadi.Function("growth", [x], [1 + x**2])
+    >>> found = reachable(growth, ([0.0], [0.1]), 0.5, step=0.02)
+    >>> low, high = found.bounds("x1", 0.0, 0.5)
+    >>> bool(low <= 0 and 0.685 < high < 0.7)
+    True
     """
 
     states: tuple[str, ...]
@@ -166,6 +178,7 @@ def reachable(
     step: float,
     states: Sequence[str] = (),
     order: int = 12,
+    parts: Sequence[int] = (),
 ) -> ReachableTube:
     """Bounds of all motions of dx/dt = f(x) from a box of starts, for all times up to a horizon.
 
@@ -186,6 +199,8 @@ def reachable(
         Names; by default x1, x2, ...
     order : int
         Generators of a set, per state: more are sharper.
+    parts : sequence of int, optional
+        Parts of the box of starts along each state, each with a tube of its own; default: one.
 
     Returns
     -------
@@ -217,9 +232,43 @@ def reachable(
     if len(names) != n or len(set(names)) < n:
         raise InputError(f"states: expected {n} different names, got {states!r:.80}")
     horizon, step = positive(horizon, "horizon"), positive(step, "step")
+    counts = tuple(whole(k, "parts", 1) for k in parts) or (1,) * n
+    if len(counts) != n:
+        raise InputError(f"parts: expected {n} whole numbers, got {parts!r:.80}")
+    stepper = _Stepper(f.expand(), whole(order, "order", 1) * n)
+    boxes = tracked("parts of the start", list(_split(lower, upper, counts)))
+    tubes = [stepper.tube(_first(*box), horizon, step, names) for box in boxes]
+    return reduce(_united, tubes)
+
+
+def _split(lower: Array, upper: Array, counts: tuple[int, ...]) -> Iterator[tuple[Array, Array]]:
+    """Yield boxes that cover a box, some along each axis; neighbours share their edges."""
+    edges = [np.linspace(a, b, k + 1) for a, b, k in zip(lower, upper, counts, strict=True)]
+    for own, a, b in zip(edges, lower, upper, strict=True):
+        own[[0, -1]] = a, b
+    for sides in product(*(pairwise(own) for own in edges)):
+        low, high = np.array(sides).T
+        yield low, high
+
+
+def _first(lower: Array, upper: Array) -> Zonotope:
     box = Domain.box(lower, upper)
-    first = Zonotope(box.centre, box.generators[:, np.any(box.generators, axis=0)])
-    return _Stepper(f.expand(), whole(order, "order", 1) * n).tube(first, horizon, step, names)
+    return Zonotope(box.centre, box.generators[:, np.any(box.generators, axis=0)])
+
+
+def _united(one: ReachableTube, other: ReachableTube) -> ReachableTube:
+    """Return the tube that holds both, up to the end of the shorter one."""
+    k = min(len(one.lower), len(other.lower))
+    shorter = one if len(one.lower) == k else other
+    return ReachableTube(
+        one.states,
+        shorter.times,
+        np.minimum(one.lower[:k], other.lower[:k]),
+        np.maximum(one.upper[:k], other.upper[:k]),
+        np.minimum(one.at_lower[: k + 1], other.at_lower[: k + 1]),
+        np.maximum(one.at_upper[: k + 1], other.at_upper[: k + 1]),
+        one.why or other.why,
+    )
 
 
 class _Stepper:
@@ -239,13 +288,12 @@ class _Stepper:
         whole_steps = int(horizon // h)
         last = horizon - whole_steps * h
         sizes = [h] * whole_steps + [last] * (last > 0)
-        largest = LARGEST * max(float(first.radius.max()), float(np.abs(first.c).max()))
         times, boxes, over, why = [0.0], [first.box()], [], ""
         now: Zonotope | None = first
         with task("reachable tube", len(sizes)) as progress:
             for size in sizes:
                 between, now = self._step(now, size)
-                if now is None or not float(now.radius.max()) < largest:
+                if now is None or not float(now.radius.max()) < LARGEST:
                     why = f"no bounds are found beyond {times[-1]:.4g} s"
                     break
                 over.append(between)
@@ -276,20 +324,25 @@ class _Stepper:
     def _invariant(
         self, now: Zonotope, c: Array, slope: Array, A: Array, h: float
     ) -> tuple[Domain, AffineForm] | None:
-        """Return the set c + G z + h/2 slope t + wobble w that holds all motions over the step, and
-        f over it.
+        """Return the set c + (G + h/2 A G) z + h/2 slope t + wobble w that holds all motions over
+        the step, and f over it.
         """
-        half = 0.5 * h * slope
-        least = h * np.abs(A) @ (now.radius + np.abs(half))
-        wobble = np.maximum(self.wobble, 0.5 * least)
-        # what is left of the start's centre, with the rounding of its own sums
+        half, middle = 0.5 * h * slope, now.G + 0.5 * h * (A @ now.G)
+        turned, m = middle - now.G, now.G.shape[1]
+        wobble = np.maximum(self.wobble, 0.5 * h * np.abs(A) @ np.abs(half))
+        # what is left of the start's centre and generators, with the rounding of its own sums
         left = np.abs(now.c - c + half) + 8 * EPS * (np.abs(now.c) + np.abs(c) + np.abs(half))
+        left += 8 * EPS * (np.abs(middle) + np.abs(now.G)).sum(axis=1)
         for _ in range(TRIALS):
-            generators = np.hstack([now.G, half[:, None], np.diag(wobble)])
+            generators = np.hstack([middle, half[:, None], np.diag(wobble)])
             domain = Domain(c, generators, (1,) * generators.shape[1])
             form = enclose(self.f, domain).value
             apart = np.abs(form.centre - slope) + EPS * (np.abs(form.centre) + np.abs(slope))
-            reach = (left + h * (apart + form.linear + form.rest) + TINY) * MARGIN
+            own, others = form.slopes[:, :m], np.abs(form.slopes[:, m:]).sum(axis=1)
+            # s times the slope less what the generators were turned by, at s = 0 or h
+            turn = np.maximum(np.abs(turned), np.abs(h * own - turned) + 4 * EPS * h * np.abs(own))
+            reach = left + turn.sum(axis=1) + h * (apart + others + form.rest)
+            reach = (reach + TINY) * MARGIN
             if not np.all(np.isfinite(reach)):
                 return None
             if np.all(reach <= wobble):
