@@ -19,11 +19,8 @@ RESULTS = set(
     Estimator Experiment FitForControl FlightDataset FrozenModels
     GainCurve ReferenceGovernor Helicopter History InvariantSet
     KinematicModel LPVARXModel LargestGust LocalGain LoopShaping LowComplexitySet
-<<<<<<< HEAD
-    MarginTable Margins MuDesign Online PeriodicGain Plan RationalGain RegionOfAttraction
-=======
-    MarginTable Margins MuDesign Online Plan ReachableTube RegionOfAttraction
->>>>>>> regions
+    MarginTable Margins MuDesign Online PeriodicGain Plan RationalGain ReachableTube
+    RegionOfAttraction
     RigidBodyOnline RobustMargin Scores SlopeMargin SpecificationTable
     ProvenClaim StateSpaceModel StructuredController SwitchedController TerminalSet TrimPoint Tube
     Verdict WorstCaseGain
