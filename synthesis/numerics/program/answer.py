@@ -1,7 +1,5 @@
 """Answers of a solver of cone programs."""
 
-from __future__ import annotations
-
 from enum import Enum
 
 
