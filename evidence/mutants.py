@@ -396,7 +396,7 @@ MUTANTS = (
         "a step of p is as long as its rate, whatever the period, in a claim about a grid",
         "synthesis/claims/inequality.py",
         "step = min(step, as_fraction(plant.rate) * as_fraction(plant.dt))",
-        "step = min(step, as_fraction(plant.rate) / 2)",
+        "step = min(step, as_fraction(plant.rate))",
         CLAIMS,
     ),
     Mutant(
