@@ -18,7 +18,7 @@ from symheli.errors import InputError
 if TYPE_CHECKING:
     from synthesis.certify.statement.proven_statement import ProvenStatement
 
-HELP = "prove saved certificates again, exactly, from their files alone"
+HELP = "prove saved certificates again, exactly, from their files alone; or claims of a --plant"
 
 ARGUMENTS = (
     positional(

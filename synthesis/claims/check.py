@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from symheli import LPVStateSpace
+from symheli import LinearModel, LPVStateSpace
 from symheli.errors import InputError
 from symheli.threads import with_one_thread
 from synthesis.claims import contradicted, departed, lyapunov, on_model, region, terminal
@@ -27,8 +27,8 @@ def check(plant: Any, claim: Any, *, refute: bool = True) -> Verdict:
 
     Parameters
     ----------
-    plant : VertexPlant, GridPlant, PolynomialPlant, LimitedPlant or LPVStateSpace
-        What the claim is about.
+    plant : VertexPlant, GridPlant, PolynomialPlant, LimitedPlant, LPVStateSpace or LinearModel
+        The plant of the claim.
     claim : LyapunovClaim, RegionClaim or TerminalClaim
         The claim with what is said to prove it: the first about vertices, a grid or a model, the
         second about polynomials, the third about a plant with limits.
@@ -58,6 +58,8 @@ def check(plant: Any, claim: Any, *, refute: bool = True) -> Verdict:
     >>> round(found.place.short, 3)
     0.354
     """
+    if isinstance(plant, LinearModel):
+        plant = VertexPlant(plant.A, plant.B, plant.C, plant.D, plant.dt)
     if isinstance(plant, LPVStateSpace) and isinstance(claim, LyapunovClaim):
         return _on_model(plant, claim, refute)
     for plants, kind, decide, _ in ROUTES:

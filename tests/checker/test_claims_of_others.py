@@ -130,8 +130,14 @@ def test_a_p_that_is_not_positive_and_a_jump_of_p_are_refused(contents, tmp_path
 
 def test_multipliers_and_boxes_are_checked_not_believed(contents, tmp_path, capsys):
     content = json.loads(json.dumps(contents["polytope"]))
-    for forged in (["-1", "0", "0", "0"], ["0", "0", "0", "0"]):
-        content["multipliers"][0] = forged
+    # row 5: x1 after a step is x1/2, which is H'y of the third with y below zero too
+    assert content["multipliers"][6][0] == "1/2"
+    for k, forged in (
+        (0, ["-1", "0", "0", "0"]),
+        (0, ["0", "0", "0", "0"]),
+        (6, ["-1/10", "0", "-6/10", "0"]),
+    ):
+        content["multipliers"][k] = forged
         assert checked(content, tmp_path, capsys)[0] == NOT_PROVEN
     content["multipliers"].pop()
     assert checked(content, tmp_path, capsys)[0] == UNKNOWN

@@ -65,10 +65,13 @@ def first_miss(F: PolynomialMatrix, cells: int = MAX_BOXES) -> Miss | None:
     while waiting:
         spent += 1
         G, box = waiting.pop()
+        middle = tuple((a + b) / 2 for a, b in box)
+        if spent > cells:
+            return Miss(middle, False)
         numbers = nearest(G)
         # a check in floating point that fails saves the exact one
         promising = bool(np.all(np.linalg.eigvalsh(_normalised(numbers))[..., 0] > 0))
-        if spent <= cells and promising and positive_definite(G):
+        if promising and positive_definite(G):
             continue
         for corner in product((0, -1), repeat=m):
             if not positive_definite(G[corner]):
@@ -76,12 +79,11 @@ def first_miss(F: PolynomialMatrix, cells: int = MAX_BOXES) -> Miss | None:
         if max(G.shape[:m], default=1) <= 2:
             continue  # every coefficient is a value at a corner
         curvature = _curvature(numbers[None], m)[0]
-        if spent > cells or curvature.max() == 0.0:
-            return Miss(tuple((a + b) / 2 for a, b in box), False)
+        if curvature.max() == 0.0:
+            return Miss(middle, False)
         axis = int(np.argmax(curvature))
-        middle = sum(box[axis]) / 2
-        halves = (box[axis][0], middle), (middle, box[axis][1])
-        for part, ends in zip(_bisect(G, axis), halves, strict=True):
+        (a, b), c = box[axis], middle[axis]
+        for part, ends in zip(_bisect(G, axis), ((a, c), (c, b)), strict=True):
             waiting.append((part, (*box[:axis], ends, *box[axis + 1 :])))
     return None
 

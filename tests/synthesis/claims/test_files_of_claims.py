@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from symheli import LPVStateSpace, Scheduling
+from symheli import LinearModel, LPVStateSpace, Scheduling
 from symheli.errors import InputError, SymheliError
 from synthesis import Certificate
 from synthesis.claims import (
@@ -192,6 +192,12 @@ def test_a_p_about_a_model_is_a_certificate(tmp_path):
     assert check(lag(), moving).proven  # 2 (1 + p)(1 + 2 p) > 0.5 * 2
     steep = LyapunovClaim("stability", [[[1.0]], [[6.0]]], p=[0.0, 1.0])
     assert check(lag(), steep).answer == "this P does not prove it"  # 2 < 0.5 * 5 at p = 0
+
+
+def test_a_linear_model_is_one_vertex():
+    model = LinearModel([[-1.0]], [[1.0]], [[1.0]], [[0.0]], ["x"], ["u"], ["y"])
+    assert check(model, LyapunovClaim("l2 gain", [[1.0]], 1.001)).proven
+    assert not check(model, LyapunovClaim("l2 gain", [[1.0]], 0.999)).proven
 
 
 def test_points_of_p_are_refused_where_they_have_no_meaning():

@@ -8,7 +8,7 @@ import pytest
 from symheli.errors import InputError
 from synthesis.claims import PolynomialPlant, RegionClaim, check, region
 from synthesis.claims.monomials import added, derivative, monomials, scaled, times, value
-from synthesis.claims.polar import bisected
+from synthesis.claims.polar import bisected, faces, inside
 
 PROVEN, BY_ANOTHER = "proven", "this P does not prove it"
 FALSE, OPEN = "the claim is false", "not decided"
@@ -175,6 +175,20 @@ def test_a_second_component_of_the_set_is_no_region():
     found = check(PolynomialPlant("x", ["-x"]), RegionClaim("x^2*(x - 3)^2 + x^2/10", 1.0))
     assert found.answer != PROVEN
     assert check(PolynomialPlant("x", ["-x"]), RegionClaim("x^2*(x - 3)^2 + x^2/10", 0.5)).proven
+
+
+def test_every_ray_crosses_a_face_of_the_box():
+    """Both sides of every axis: on each face the polynomial in (t, r) is F at that point."""
+    F, seen = monomials("x^3*y - 2*x*y^2 + y", ["x", "y"]), set()
+    for face in faces(2):
+        own = inside(F, face, lowered=False)
+        for t in ((Fraction(0), Fraction(1)), (Fraction(1), Fraction(1))):
+            corner = tuple(-int(v == 1) for v in t)
+            x = face.point(t, [Fraction(1)] * 2)
+            assert (own[corner] > 0) == (value(F, x) > 0)
+            seen.add(tuple(x))
+    assert len(seen) == 4
+    assert [tuple(face) for face in faces(2)] == [(0, -1), (0, 1), (1, -1), (1, 1)]
 
 
 def test_halves_of_one_variable_stay_exact_integers():

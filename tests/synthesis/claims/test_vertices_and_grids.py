@@ -128,6 +128,28 @@ def test_the_rate_of_p_is_that_which_p_allows(rate, expected):
     assert answer(plant, claim, refute=False) == expected
 
 
+@pytest.mark.parametrize("ends", [(1.0, 3.0), (3.0, 1.0)])
+def test_p_may_move_to_either_side(ends):
+    plant = GridPlant([0, 1], [[[-1.0]], [[-1.0]]], rate=1.01)
+    claim = LyapunovClaim("stability", np.reshape(ends, (2, 1, 1)))
+    assert answer(plant, claim, refute=False) == BY_ANOTHER
+
+
+@pytest.mark.parametrize(("gamma", "expected"), [(2.0001, True), (1.9999, False)])
+def test_a_sampled_gain_counts_what_an_input_adds_to_v(gamma, expected):
+    """x+ = x/2 + u, y = x: gain 2, by P = 2 alone: (2 - g^2)(P a^2 - P + 1) > (a P)^2."""
+    plant = VertexPlant([[0.5]], [[1.0]], [[1.0]], dt=1.0)
+    assert holds(plant, LyapunovClaim("l2 gain", [[2.0]], gamma)) == expected
+
+
+@pytest.mark.parametrize(("rate", "expected"), [(0.19, True), (0.21, False)])
+def test_a_step_of_p_is_its_rate_times_the_period(rate, expected):
+    """x+ = x/sqrt(1.1), P = 1 + p, two samples a second: P(p + rate/2) < 1.1 P(p) at p = 0."""
+    a = 1.1**-0.5
+    plant = GridPlant([0, 1], [[[a]], [[a]]], rate=rate, dt=0.5)
+    assert holds(plant, LyapunovClaim("stability", [[[1.0]], [[2.0]]])) == expected
+
+
 def test_p_that_may_jump_leaves_a_moving_p_undecided():
     plant = GridPlant([0, 1], [[[-1.0]], [[-1.0]]])
     found = check(plant, LyapunovClaim("stability", [[[1.0]], [[1.5]]]))
