@@ -501,13 +501,19 @@ def test_a_changed_number_is_not_proven(change):
         (lambda: multiplier_gain(SECTOR, BLOCKS["slope"](1.0), ["w"]), "no block"),
         (lambda: multiplier_gain(SECTOR, [BLOCKS["slope"](1.0)] * 2), "two blocks"),
         (lambda: multiplier_gain(random_loop(1, dt=1.0), BLOCKS["delay"](1.0)), "continuous"),
-        (lambda: multiplier_gain(around([[1.0]], [1], [1]), BLOCKS["odd"](1.0)), "not stable"),
         (lambda: multiplier_gain(SECTOR, DynamicBlock("w", "v", 1.0, SECTOR)), "weight"),
     ],
 )
 def test_what_does_not_fit_is_refused_in_words(call, words):
     with pytest.raises(InputError, match=words):
         call()
+
+
+def test_a_loop_without_stable_nominal_blocks_has_no_gain():
+    found = multiplier_gain(around([[1.0]], [1], [1]), BLOCKS["odd"](1.0))
+    assert not found.verified
+    assert math.isinf(found.lower)
+    assert "nominal loop is not stable" in found.why
 
 
 def test_an_unknown_channel_or_kind_is_named():
