@@ -16,13 +16,15 @@ same forms. E is a power of a lag a/(s + a), sampled (1 - a)/(z - a). The forms:
                Y > 0, S = -S'
     dynamics   bound^2 |v|_Y^2 - |d|_Y^2 over each channel and all its E, Y > 0
     delay      e = v(t - T) - v(t): |v|_X^2 - |v + e|_X^2 over the powers E, X of any sign; |N
-               v|_Y^2 - |D e|_Y^2, with |exp(-s T) - 1| <= |N/D|, Y > 0, over powers of the lag; of
-               a window, e = s d and T^2 |v|_Z^2 - |d|_Z^2, Z > 0
+               v|_Y^2 - |D e|_Y^2, with |exp(-s T) - 1| <= |N/D|, Y > 0, over powers of the lag; 3
+               |K v|_W^2 + (L v)' W M e, W > 0, as e lags; of a window, e = s d and T^2 |v|_Z^2 -
+               |d|_Z^2, Z > 0
     own        M of the outputs of a filter of (v, d), with weights >= 0
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from itertools import pairwise
@@ -35,6 +37,7 @@ from .reading import Unreadable, array, number, whole
 from .signals import Block, Form, Loop, Refused, Row, added, stable
 
 CORNER, ZEROS, POLES = Fraction(2363, 1000), Fraction(838, 1000), Fraction(685, 1000)
+LAG, TURN = Fraction(27, 100), Fraction(14, 5)
 
 
 class Told(NamedTuple):
@@ -190,53 +193,98 @@ def _delay(loop: Loop, form: Form, block: Block) -> Told:
     N = [Fraction(0), T, 2 * ZEROS / c * T**2, T**3 / c**2]
     first, second = 2 * POLES / c * T, T**2 / c**2
     D = [one, first + T / 2, second + T / 2 * first, T / 2 * second]
-    up, down = (_through(p, own, a) for p, own in ((N, v), (D, e)))
+    up, down = (_through(p, own, a, 3) for p, own in ((N, v), (D, e)))
     Y = block.lower(len(up))
     form.square(Y, up)
     form.square(Y, down, -1)
     matrices = [Y]
+    M = [2 * TURN**2, 2 * TURN * T, T**2]
+    L = times(M, [one, -2 * LAG * T, (LAG * T) ** 2])
+    large, ahead = (_through(p, v, a, 4) for p in ([0 * T, 0 * T, T**2], L))
+    behind = _through(M, e, a, 4)
+    W = block.lower(len(large))
+    form.square(W, large, 3)
+    for row, p in zip(W, ahead, strict=True):
+        for value, q in zip(row, behind, strict=True):
+            form.add(value, p, q)
+    matrices.append(W)
     if window:
         Z = block.lower(len(flat) + count)
         form.square(Z, [row for own in v_all for row in own], T * T)
         form.square(Z, [row for own in d_all for row in own], -1)
         matrices.append(Z)
-    demands = [Demand("a multiplier is positive", even(M)) for M in matrices]
+    demands = [Demand("a multiplier is positive", even(M)) for M in matrices if M]
     says = {"difference": "v(t - T) - v(t)", "delay": "v(t - T)"}
     words = says.get(shape, "minus the integral of v from t - T to t")
     return Told(
-        [*demands, *_above_the_error()],
+        [*demands, *_above_the_error(), *_ahead_of_the_phase()],
         f"{words}, T constant, from 0 to {float(T)!r} s",
         nominal,
     )
 
 
-def _through(p: Sequence[Fraction], copies: Sequence[Sequence[Row]], a: Fraction) -> list[Row]:
-    """Return p(s)/(s + a)^3 times the powers of the lag, from the first on: with E = a/(s + a), s =
-    a (1 - E)/E, so that s^k/(s + a)^3 = a^(k - 3) (1 - E)^k E^(3 - k).
+def _through(
+    p: Sequence[Fraction], copies: Sequence[Sequence[Row]], a: Fraction, m: int
+) -> list[Row]:
+    """Return p(s)/(s + a)^m times the powers of the lag, from the first on: with E = a/(s + a), s =
+    a (1 - E)/E, so that s^k/(s + a)^m = a^(k - m) (1 - E)^k E^(m - k).
     """
-    weights = [Fraction(0)] * 4
+    weights = [Fraction(0)] * (m + 1)
     for k, value in enumerate(p):
-        size = value * a**k / a**3
-        for i, binomial in enumerate([(1,), (1, -1), (1, -2, 1), (1, -3, 3, -1)][k]):
-            weights[3 - k + i] += size * binomial
+        size = value * a**k / a**m
+        for i in range(k + 1):
+            weights[m - k + i] += size * (-1) ** i * math.comb(k, i)
     return [
         added((w, copies[start + r][i]) for r, w in enumerate(weights))
-        for start in range(len(copies) - 3)
+        for start in range(len(copies) - m)
         for i in range(len(copies[0]))
     ]
+
+
+def times(p: Sequence[Fraction], q: Sequence[Fraction]) -> list[Fraction]:
+    """Return the product of polynomials."""
+    out = [Fraction(0)] * (len(p) + len(q) - 1)
+    for i, a in enumerate(p):
+        for j, b in enumerate(q):
+            out[i + j] += a * b
+    return out
+
+
+def _positive(p: Sequence[Fraction], said: str) -> Demand:
+    """Return that a polynomial is positive on [0, 1]."""
+    poly = Polynomial((1, 1), {}, 1)
+    for k, value in enumerate(p):
+        M = matrix([[value]], 1)
+        poly = poly + Polynomial((1, 1), {(k,) if k else (): M.terms[()]}, M.below)
+    return Demand(said, poly, variables=1)
+
+
+def _ahead_of_the_phase() -> Iterator[Demand]:
+    """Yield that (1 + a^2 t^2) (cos(phi - t) - cos(phi)) > -3 t^4/(b + t^4), b = 4 q^4, with tan
+    (phi/2) = a t, for t up to 4.9: the left side is (1 - a^2 t^2) (cos t - 1) + 2 a t sin t, of
+    Taylor sums less what they leave out. Beyond, where it is above -2, 3 t^4/(b + t^4) > 2. Below
+    4.9, t < phi + pi, so that of shorter delays cos(phi - theta) is least at an end, too.
+    """
+    end, terms, b = Fraction(49, 10), 24, 4 * TURN**4
+    said = "the phase of a delay is behind that of its multiplier"
+    yield _positive([3 * end**4 - 2 * (b + end**4)], said)
+    cos, sin = [Fraction(0)] * (terms + 1), [Fraction(0)] * (terms + 1)
+    for k in range(1, terms):
+        (sin if k % 2 else cos)[k] = Fraction((-1) ** (k // 2), math.factorial(k))
+    rest = [Fraction(0)] * terms + [Fraction(-2, math.factorial(terms))]
+    left = times([Fraction(1), Fraction(0), -(LAG**2)], cos)
+    parts = [left, times([Fraction(0), 2 * LAG], sin), times([1 + LAG, 2 * LAG, LAG**2], rest)]
+    total = [sum((p[k] for p in parts if k < len(p)), Fraction(0)) for k in range(terms + 3)]
+    whole_ = times(total, [b, Fraction(0), Fraction(0), Fraction(0), Fraction(1)])
+    whole_[4] += 3
+    scaled = [value * end**k for k, value in enumerate(whole_[2:])]
+    yield _positive(scaled, said)
 
 
 def _above_the_error() -> Iterator[Demand]:
     """Yield that |exp(-s T) - 1|^2 <= |N/D|^2, in t = (w T)^2: 2 - 2 cos is below its Taylor sum up
     to t = 9.87 > pi^2, where it also is below the same of a longer delay, and below 4 at all t.
     """
-
-    def times(p: Sequence[Fraction], q: Sequence[Fraction]) -> list[Fraction]:
-        out = [Fraction(0)] * (len(p) + len(q) - 1)
-        for i, a in enumerate(p):
-            for j, b in enumerate(q):
-                out[i + j] += a * b
-        return out
 
     def squared(damping: Fraction) -> list[Fraction]:
         return [Fraction(1), (4 * damping**2 - 2) / CORNER**2, 1 / CORNER**4]
@@ -252,11 +300,7 @@ def _above_the_error() -> Iterator[Demand]:
     scaled = [v * end**k for k, v in enumerate(near)]
     far = [(a - 4 * b) * start**k for k, (a, b) in enumerate(zip(N, D, strict=True))][:-1]
     for p in (scaled, far[::-1]):
-        terms = [matrix([[v]], 1) for v in p]
-        poly = Polynomial((1, 1), {}, 1)
-        for k, M in enumerate(terms):
-            poly = poly + Polynomial((1, 1), {(k,) if k else (): M.terms[()]}, M.below)
-        yield Demand("the weight is above the error of a delay", poly, variables=1)
+        yield _positive(p, "the weight is above the error of a delay")
 
 
 def _own(loop: Loop, form: Form, block: Block) -> Told:

@@ -25,7 +25,7 @@ from synthesis.robust.multipliers.blocks import (
 )
 from synthesis.robust.multipliers.boxes import BoxMultipliers
 from synthesis.robust.multipliers.classes import Lags
-from synthesis.robust.multipliers.delays import WEIGHT
+from synthesis.robust.multipliers.delays import PHASE
 from synthesis.robust.multipliers.loop import Plant, Wired
 from synthesis.robust.multipliers.members import Member
 from synthesis.robust.multipliers.peak_proof import PeakProof
@@ -173,7 +173,7 @@ def _lags(block: Block, model: LinearModel, poles: Sequence[float] | None, order
     if isinstance(order, bool) or not isinstance(order, int) or not 1 <= order <= 20:
         raise InputError(f"order: expected an integer from 1 to 20, got {order!r:.40}")
     if isinstance(block, DelayBlock):
-        return Lags((2.0 / block.longest,), max(order, WEIGHT + (block.form == "window")))
+        return Lags((2.0 / block.longest,), max(order, PHASE + (block.form == "window")))
     given = _usual(model) if poles is None else tuple(float(v) for v in poles)
     if not all(0 < a < math.inf for a in given) or len(set(given)) < len(given):
         raise InputError(f"poles: expected different numbers > 0 rad/s, got {given!r:.60}")

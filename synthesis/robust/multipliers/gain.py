@@ -20,7 +20,7 @@ from synthesis.robust.multipliers.blocks import Block
 from synthesis.robust.multipliers.members import Family
 from synthesis.robust.multipliers.peak_proof import ENERGY, PEAK, PeakProof
 from synthesis.robust.multipliers.peak_proof import KIND as PEAK_KIND
-from synthesis.robust.multipliers.proof import GainProof
+from synthesis.robust.multipliers.proof import NOMINAL, GainProof
 from synthesis.robust.multipliers.sentences import sentence
 
 KINDS = L2, ENERGY, PEAK
@@ -166,7 +166,8 @@ def multiplier_gain(
     -------
     MultiplierGain
         `upper` is proven for every member, in units of the outputs per unit of the inputs; `lower`
-        is the gain of a linear member, found over frequency without multipliers.
+        is the gain of a linear member, found over frequency without multipliers, inf where one is
+        not stable.
 
     Raises
     ------
@@ -203,6 +204,8 @@ def multiplier_gain(
         raise UnknownNameError("kind", kind, KINDS)
     asked = Asked.of(model, own, inputs, outputs, poles, order, kind)
     fault = asked.fault()
+    if fault == NOMINAL:
+        return MultiplierGain(math.inf, math.inf, (), math.nan, None, fault, kind)
     if fault:
         raise InputError(fault)
     if decay is not None and not (0 < decay < (1 if model.dt else math.inf)):

@@ -125,7 +125,7 @@ class Family(NamedTuple):
         """Return numbers of members over their ranges."""
         count = len(self.ranges)
         each = max(2, min(VALUES, int(MOST ** (1 / max(count, 1)))))
-        lines = [np.linspace(a, b, each) if b > a else np.array([a]) for a, b in self.ranges]
+        lines = [np.linspace(a, b, each).tolist() if b > a else [a] for a, b in self.ranges]
         return list(itertools.islice(itertools.product(*lines), MOST))
 
     def worst(self) -> tuple[Member, Array]:

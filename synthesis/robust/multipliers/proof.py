@@ -38,6 +38,7 @@ TYPES: dict[str, type[Multipliers]] = {
 }
 """Classes by their names in files."""
 NAMES = {kind: name for name, kind in TYPES.items()}
+NOMINAL = "the nominal loop is not stable"
 
 
 class GainProof(NamedTuple):
@@ -70,7 +71,7 @@ class GainProof(NamedTuple):
         A = exact.A + matmul(matmul(exact.B, N), exact.C)
         none = np.zeros((len(A), 0)), np.zeros((0, len(A))), np.zeros((0, 0))
         if not Transfer.of(A, *none, plant.sampled).stable:
-            return "the nominal loop is not stable"
+            return NOMINAL
         return ""
 
     def _fault_of_inequality(self) -> str:

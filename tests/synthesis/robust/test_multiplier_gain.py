@@ -21,6 +21,7 @@ from synthesis.robust import (
     StaticBlock,
     multiplier_gain,
 )
+from synthesis.robust.multipliers.delays import KAPPA, phase, weight
 
 
 def loop(A, B, C, D, inputs, outputs, dt=None):
@@ -159,6 +160,26 @@ def test_lower_bounds_of_delays_are_those_of_a_search_of_its_own(name, factor, t
     own = truth_of_delays(PUBLISHED[name][0], factor)
     assert own == pytest.approx(truth, rel=1e-4)
     assert published(name).lower == pytest.approx(own, rel=1e-6)
+
+
+def test_phase_brings_the_bound_of_a_delay_near_its_truth():
+    """1.4060 is the worst gain with delays of both signs: by size and energy alone, no less."""
+    assert published("cdelay").upper < 1.24
+
+
+@pytest.mark.parametrize("T", [0.3, 2.0])
+def test_what_is_used_of_a_delay_is_true_of_every_shorter_one(T):
+    """|e| below its weight, and 3 |K v|^2 + Re (L v)* (M e) >= 0, at v = 1, by evaluation."""
+    for omega in np.geomspace(1e-2, 50, 400) / T:
+        s = 1j * omega
+        N, D, *of_phase = (
+            sum(c * s**k for k, c in enumerate(p)) for p in (*weight(T, float), *phase(T, float))
+        )
+        e = np.exp(-s * np.linspace(0, T, 200)) - 1
+        assert np.all(np.abs(D * e) <= np.abs(N) * (1 + 1e-12))
+        K, L, M = of_phase
+        left = KAPPA * abs(K) ** 2 + np.real(np.conj(L) * M * e)
+        assert left.min() >= -1e-12 * abs(L * M)
 
 
 def test_a_published_number_below_the_truth_is_not_reached():
@@ -501,13 +522,19 @@ def test_a_changed_number_is_not_proven(change):
         (lambda: multiplier_gain(SECTOR, BLOCKS["slope"](1.0), ["w"]), "no block"),
         (lambda: multiplier_gain(SECTOR, [BLOCKS["slope"](1.0)] * 2), "two blocks"),
         (lambda: multiplier_gain(random_loop(1, dt=1.0), BLOCKS["delay"](1.0)), "continuous"),
-        (lambda: multiplier_gain(around([[1.0]], [1], [1]), BLOCKS["odd"](1.0)), "not stable"),
         (lambda: multiplier_gain(SECTOR, DynamicBlock("w", "v", 1.0, SECTOR)), "weight"),
     ],
 )
 def test_what_does_not_fit_is_refused_in_words(call, words):
     with pytest.raises(InputError, match=words):
         call()
+
+
+def test_a_loop_without_stable_nominal_blocks_has_no_gain():
+    found = multiplier_gain(around([[1.0]], [1], [1]), BLOCKS["odd"](1.0))
+    assert not found.verified
+    assert math.isinf(found.lower)
+    assert "nominal loop is not stable" in found.why
 
 
 def test_an_unknown_channel_or_kind_is_named():
