@@ -2,8 +2,6 @@
 the box where they are inconclusive.
 """
 
-from __future__ import annotations
-
 from itertools import product
 from typing import Any, NamedTuple
 
