@@ -19,7 +19,7 @@ import numpy as np
 from symheli.progress import task
 from synthesis.numerics.linear.norm import to_continuous
 from synthesis.robust.intervals import LevelProof
-from synthesis.robust.structure import BlockLoop, ExactLoop
+from synthesis.robust.structure import BlockLoop, ExactLoop, Part
 from synthesis.robust.upper_bound import Upper, held_level, proven_level
 
 NEAR = 1e-3
@@ -62,10 +62,13 @@ class CellsProof(NamedTuple):
         known = [bound for bound in found if bound is not None]
         return max(known) if known and len(known) == len(found) else None
 
-    def verified(self, loop: ExactLoop) -> bool:
-        """Whether the cells cover the ranges, and the proof of each holds of the loop there."""
+    def verified(self, loop: ExactLoop, parts: Sequence[Part]) -> bool:
+        """Whether the cells cover the ranges, and the proof of each holds of the loop there, whose
+        blocks are these `parts`.
+        """
         return self.covers and all(
-            cell.proof.verified(loop.within(cell.proof.parts, cell.low, cell.high))
+            cell.proof.parts == tuple(parts)
+            and cell.proof.verified(loop.within(parts, cell.low, cell.high), parts)
             for cell in self.cells
         )
 

@@ -76,11 +76,11 @@ class LevelProof(NamedTuple):
     performance: bool
     intervals: tuple[Interval, ...]
 
-    def verified(self, loop: ExactLoop) -> bool:
-        """Whether the loop is stable without its blocks, the scalings fit its blocks, hold on their
-        intervals, and these leave no frequency out.
+    def verified(self, loop: ExactLoop, parts: Sequence[Part]) -> bool:
+        """Whether the loop is stable without its blocks, which are these `parts`, the scalings fit
+        them and hold on their intervals, and these leave no frequency out.
         """
-        if self.bound is None or not self._fits(loop):
+        if self.parts != tuple(parts) or self.bound is None or not self._fits(loop):
             return False
         check = Check.of(
             loop.transfer.scaled(self.rows, self.columns), self.parts, self.performance

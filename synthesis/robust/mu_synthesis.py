@@ -112,13 +112,11 @@ class MuDesign:
         """
         if self.proof is None or self.asked is None or self.controller is None:
             return False
-        loop, level = (
-            DesignPlant.of(*self.asked).loop.in_rationals.behind(self.controller),
-            self.proof.bound,
-        )
+        plant, level = DesignPlant.of(*self.asked), self.proof.bound
+        loop = plant.loop.in_rationals.behind(self.controller)
         if level is None or self.proof.performance or level > self.mu:
             return False
-        return self.proof.verified(loop) and (
+        return self.proof.verified(loop, plant.parts) and (
             not rigorous or witness.level_is_kept(self.proof, loop)
         )
 

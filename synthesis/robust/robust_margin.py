@@ -87,10 +87,11 @@ class RobustMargin(LevelStatement):
             return self.proof.verify(rigorous=True)
         if self.proof is None or self.asked is None:
             return False
-        loop, level = loop_of(*self.asked).in_rationals, self.proof.bound
-        if level is None or Fraction(self.lower) * level > 1:
+        asked, level = loop_of(*self.asked), self.proof.bound
+        loop = asked.in_rationals
+        if level is None or self.proof.performance or Fraction(self.lower) * level > 1:
             return False
-        return self.proof.verified(loop) and (
+        return self.proof.verified(loop, asked.parts) and (
             not rigorous or witness.level_is_kept(self.proof, loop)
         )
 

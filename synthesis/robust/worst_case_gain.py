@@ -78,10 +78,11 @@ class WorstCaseGain(LevelStatement):
         """
         if self.proof is None or self.asked is None:
             return False
-        loop, level = loop_of(*self.asked, performance=True).in_rationals, self.proof.bound
+        asked, level = loop_of(*self.asked, performance=True), self.proof.bound
+        loop = asked.in_rationals
         if level is None or not (self.proof.performance and level <= self.upper):
             return False
-        if not self.proof.verified(loop):
+        if not self.proof.verified(loop, asked.parts):
             return False
         if not rigorous:
             return True

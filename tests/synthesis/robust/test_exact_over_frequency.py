@@ -9,6 +9,7 @@ from test_robust_margin import page
 from test_several_uncertain_things import RING, two_lags
 
 from symheli import LFT, LinearModel, LPVStateSpace, Scheduling
+from symheli.lpv import connect
 from symheli.lpv.lft.reduction import reduce_exactly
 from synthesis.robust import (
     DynamicBlock,
@@ -20,6 +21,7 @@ from synthesis.robust import (
     upper_bound,
     worst_case_gain,
 )
+from synthesis.robust.cells import Cell, CellsProof
 
 
 def lag(dt=None):
@@ -78,15 +80,65 @@ def forged(proof):
 
 @pytest.mark.guard
 def test_a_proof_with_other_numbers_is_refused():
-    loop = structure.loop_of(*lag()).exact
+    whole = structure.loop_of(*lag())
+    loop, parts = whole.exact, whole.parts
     proof = robust_margin(*lag()).proof
-    assert proof.verified(loop)
+    assert proof.verified(loop, parts)
     for name, other in forged(proof):
         claim = other.bound
-        kept = claim is not None and claim >= proof.bound and other.verified(loop)
+        kept = claim is not None and claim >= proof.bound and other.verified(loop, parts)
         assert not kept, name
     unstable = loop._replace(A=-loop.A)
-    assert not proof.verified(unstable)
+    assert not proof.verified(unstable, parts)
+
+
+@pytest.mark.guard
+def test_a_proof_for_a_parameter_is_none_for_dynamics():
+    """A resonance whose stiffness is uncertain: gain 5.3 of a number, 10.1 of dynamics."""
+    model = LinearModel(
+        [[0.0, 1.0], [-1.0, -0.2]],
+        [[0.0, 0.0], [1.0, 1.0]],
+        [[0.1, 0.0], [1.0, 0.0]],
+        np.zeros((2, 2)),
+        ["a", "b"],
+        ["p", "w"],
+        ["q", "z"],
+    )
+    number = LFT.parameter(Scheduling("d", "1", -1.0, 1.0), "q", "p")
+    known = worst_case_gain(connect(model, number, inputs=["w"], outputs=["z"]))
+    asked = LFT.constant(model), [DynamicBlock("p", "q", 1.0)]
+    one, other = (
+        structure.loop_of(*own, performance=True).in_rationals for own in (known.asked, asked)
+    )
+    unit = float(one.B[1, 0])  # a power of two, that of the copies of the parameter
+    assert one.C[0, 0] * unit == other.C[0, 0]
+    proof = known.proof._replace(
+        rows=known.proof.rows / [unit, 1.0], columns=known.proof.columns * [unit, 1.0]
+    )
+    assert proof.verified(other, proof.parts)
+    assert not replace(known, proof=proof, asked=asked).verify()
+    cells = CellsProof((Cell((-1.0,), (1.0,), proof),))
+    assert not replace(known, proof=cells, asked=asked).verify()
+    assert worst_case_gain(*asked).lower > 1.9 * known.upper
+
+
+@pytest.mark.guard
+def test_a_proof_of_a_gain_is_none_of_a_margin():
+    """Gains .9 and .001 of two loops apart: the margin is 1.11, not that of the second alone."""
+    model = LinearModel(
+        -np.eye(2), np.eye(2), np.diag([0.9, 0.001]), np.zeros((2, 2)), "ab", "pw", "qz"
+    )
+    known = robust_margin(
+        LFT.constant(model), [DynamicBlock("p", "q", 1.0), DynamicBlock("w", "z", 1.0)]
+    )
+    eye, zero = np.eye(2), np.zeros((2, 2))
+    every = intervals.Interval(0.0, math.inf, intervals.Scalings(eye, eye, zero))
+    proof = known.proof._replace(
+        performance=True, level=0.0099, rows=np.ones(2), columns=np.ones(2), intervals=(every,)
+    )
+    loop = structure.loop_of(*known.asked)
+    assert proof.verified(loop.in_rationals, loop.parts)
+    assert not replace(known, lower=100.0, proof=proof).verify()
 
 
 def liar(lie):
