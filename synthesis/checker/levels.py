@@ -162,7 +162,8 @@ def _read(content: Any) -> tuple[Loop, list[str]]:
         bound = number(each["bound"], "the bound of a block")
         if bound <= 0:
             raise Unreadable("the file is damaged: the bound of a block is not above zero")
-        said.append(f"stable linear dynamics of {len(j)} by {len(i)} of gain <= {float(bound)!r}")
+        size = f"{len(j)} by {len(i)} of gain <= {float(bound)!r}"
+        said.append(f"stable linear time-invariant dynamics of {size}")
         into, out = into + i, out + [(row, bound) for row in j]
         full.append((len(j), len(i)))
     if len({*into}) < len(into) or len({row for row, _ in out}) < len(out):

@@ -38,6 +38,7 @@ from .signals import Block, Form, Loop, Refused, Row, added, stable
 
 CORNER, ZEROS, POLES = Fraction(2363, 1000), Fraction(838, 1000), Fraction(685, 1000)
 LAG, TURN = Fraction(27, 100), Fraction(14, 5)
+OF_ONES_OWN = "a causal block of bounded gain with the integral inequalities of the file's filter"
 
 
 class Told(NamedTuple):
@@ -112,7 +113,8 @@ def _static(loop: Loop, form: Form, block: Block) -> Told:
             form.add(block.take(), e[i], loop.slope(block.outputs[i]))
     kind = "slopes" if sloped else "a sector"
     time = "" if constant else ", which may depend on time"
-    words = f"static functions, the same{', odd' * odd}, of {kind} from {float(low)!r} to"
+    shape = f"{', odd' * odd}{', zero at zero,' * sloped}"
+    words = f"static functions, the same{shape} of {kind} from {float(low)!r} to"
     return Told((), f"{words} {float(high)!r}{time}", low)
 
 
@@ -150,7 +152,7 @@ def _dynamics(loop: Loop, form: Form, block: Block) -> Told:
     for k in range(len(copies[0])):
         size = bound * bound if k < len(v) else Fraction(-1)
         form.square(Y, [own[k] for own in copies], size)
-    words = f"stable linear dynamics of gain at most {float(bound)!r}"
+    words = f"stable linear time-invariant dynamics of gain at most {float(bound)!r}"
     return Told([Demand("a multiplier is positive", even(Y))], words, Fraction(0))
 
 
@@ -326,8 +328,7 @@ def _own(loop: Loop, form: Form, block: Block) -> Told:
         rows = array(M, "a form", len(z), len(z))
         even(rows)
         form.square(rows, z, weight)
-    words = "a block with the integral inequalities of the filter in the file, as multiples of it"
-    return Told((), words, Fraction(0))
+    return Told((), f"{OF_ONES_OWN}; so has every multiple of it from 0 to 1", Fraction(0))
 
 
 KINDS = {

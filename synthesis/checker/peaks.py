@@ -22,7 +22,16 @@ from itertools import pairwise, product
 from typing import Any
 
 from .demands import Claim, Demand
-from .multipliers import KINDS, Told, blocks_of, channels, motion_of, sentences, told_of
+from .multipliers import (
+    KINDS,
+    OF_ONES_OWN,
+    Told,
+    blocks_of,
+    channels,
+    motion_of,
+    sentences,
+    told_of,
+)
 from .polynomials import even, matrix
 from .reading import Unreadable, array, number
 from .signals import Block, Form, Loop, Refused
@@ -65,7 +74,13 @@ def box(loop: Loop, form: Form, block: Block) -> Told:
     return Told(demands, f"real numbers, moving in any way: {each}", Fraction(0))
 
 
-READERS = {**KINDS, "box": box}
+def own(loop: Loop, form: Form, block: Block) -> Told:
+    """Add the form of a filter of one's own, in the words of inequalities over finite times."""
+    told = KINDS["own"](loop, form, block)
+    return told._replace(words=f"{OF_ONES_OWN}, over every finite time from rest")
+
+
+READERS = {**KINDS, "box": box, "own": own}
 
 
 def claimed(content: Any) -> Claim:

@@ -61,7 +61,7 @@ class LevelStatement(ProvenStatement):
         n = len(model.states)
         time = "in continuous time" if model.dt is None else f"sampled every {model.dt!r} s"
         each = (
-            f"stable linear dynamics from {', '.join(names_of(b.outputs))} to"
+            f"stable linear time-invariant dynamics from {', '.join(names_of(b.outputs))} to"
             f" {', '.join(names_of(b.inputs))} of gain <= {b.bound!r}"
             f"{'' if b.weight is None else ' times the weight in the file'}"
             for b in blocks

@@ -27,9 +27,9 @@ from synthesis.robust import covers
 
 
 class DynamicBlock(NamedTuple):
-    """Unknown stable linear dynamics from `outputs` of a model back to its `inputs`, of gain at
-    most `bound` at every frequency, in units of the inputs per unit of the outputs; of gain at most
-    `bound` |W(j omega)| with a stable `weight` W of one input and output, a `LinearModel` or a
+    """Unknown stable linear time-invariant dynamics from `outputs` of a model to its `inputs`, of
+    gain at most `bound` at every frequency, in units of the inputs per unit of the outputs; or at
+    most `bound` |W(j omega)| with a stable `weight` W of one input and output: a `LinearModel` or a
     system of python-control, continuous (a sampled model takes it by Tustin's rule) or sampled.
 
     Examples

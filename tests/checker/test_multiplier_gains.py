@@ -222,6 +222,22 @@ def test_the_command_says_the_block_and_decides(name, contents, tmp_path, capsys
     assert "inputs 1" in said
 
 
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("repeated", "zero at zero"),  # not so of a sector, which says it by itself
+        ("dynamics", "time-invariant"),  # lags of multipliers commute with nothing else
+        ("own", "multiple"),  # without the path from zero to the block nothing follows
+        ("own", "causal block of bounded gain"),
+        ("energy, own", "over every finite time"),
+    ],
+)
+def test_what_the_proof_needs_of_a_block_is_said(name, said, contents):
+    content = contents[name]
+    assert any(said in sentence for sentence in claimed(content).hypotheses)
+    assert any(said in sentence for sentence in MultiplierGain.restored(content).conditions)
+
+
 def places(value, path=()):
     items = value.items() if isinstance(value, dict) else enumerate(value)
     for key, item in items:

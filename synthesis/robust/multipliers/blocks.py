@@ -107,7 +107,7 @@ class DelayBlock:
     Parameters
     ----------
     inputs, outputs : sequence of str
-        d and v, in pairs; no v may depend on d at the same instant, but in the form "window".
+        d and v, in pairs; no v may depend on d at the same instant.
     longest : float
         Longest delay, s.
     form : str
@@ -194,7 +194,9 @@ class ParameterBlock:
 @dataclass(frozen=True, eq=False)
 class OwnMultiplier:
     """A block that is known by integral inequalities: for z = Psi (v, d), z(0) of a filter at rest,
-    the sum over time of z' M z is >= 0 for each M.
+    the sum over time of z' M z is >= 0 for each M, of all v and d of finite energy. The block is
+    causal, of bounded gain, and its multiples from 0 to 1 have these inequalities too; for gains to
+    a peak they hold over every finite time.
 
     Parameters
     ----------

@@ -80,7 +80,7 @@ class MultiplierGain(ProvenStatement):
             return ()
         time = "in continuous time" if own.dt is None else f"sampled every {own.dt!r} s"
         model = f"the model in the file, {len(own.plant.A)} states, {time}"
-        return (model, *(sentence(block) for block in own.blocks))
+        return (model, *(sentence(block, self.kind != L2) for block in own.blocks))
 
     @property
     def facts(self) -> Mapping[str, Any]:
