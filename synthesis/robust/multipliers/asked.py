@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -35,6 +35,7 @@ from synthesis.robust.multipliers.search import Search, Storage
 from synthesis.robust.structure import DynamicBlock
 
 L2 = "L2"
+KINDS = StaticBlock, DelayBlock, ParameterBlock, DynamicBlock, OwnMultiplier
 APART = 30.0
 """Ratio of the fastest to the slowest pole of a model from which on the lags have two poles."""
 
@@ -62,6 +63,12 @@ class Asked:
         measure: str,
     ) -> Asked:
         """Return the question; raise for names and numbers that do not fit."""
+        for block in blocks:
+            if isinstance(block, OwnMultiplier) and block.filter.dt != model.dt:
+                raise InputError(
+                    f"filter: it is {_time(block.filter.dt)} and the model {_time(model.dt)}; give"
+                    " the filter in the time of the model"
+                )
         if not blocks:
             raise InputError("blocks: expected at least one; without a block use l2_gain")
         taken = [
@@ -160,8 +167,17 @@ def blocks_of(given: Sequence[Block] | Block) -> list[Block]:
         case StaticBlock() | DelayBlock() | ParameterBlock() | OwnMultiplier() | DynamicBlock():
             return [given]
         case _:
-            found: list[Any] = list(given)
-            return found
+            found: list[Any] = list(given) if isinstance(given, Iterable) else [given]
+    for each in found:
+        if not isinstance(each, KINDS):
+            raise InputError(
+                f"blocks: expected {', '.join(kind.__name__ for kind in KINDS)}, got {each!r:.40}"
+            )
+    return found
+
+
+def _time(dt: float | None) -> str:
+    return "continuous" if dt is None else f"sampled every {dt!r} s"
 
 
 def _list(names: Sequence[str]) -> list[str]:
@@ -174,7 +190,7 @@ def _lags(block: Block, model: LinearModel, poles: Sequence[float] | None, order
         raise InputError(f"order: expected an integer from 1 to 20, got {order!r:.40}")
     if isinstance(block, DelayBlock):
         return Lags((2.0 / block.longest,), max(order, PHASE + (block.form == "window")))
-    given = _usual(model) if poles is None else tuple(float(v) for v in poles)
+    given = _usual(model) if poles is None else tuple(np.ravel(np.asarray(poles, float)).tolist())
     if not all(0 < a < math.inf for a in given) or len(set(given)) < len(given):
         raise InputError(f"poles: expected different numbers > 0 rad/s, got {given!r:.60}")
     if model.dt is not None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -265,6 +266,8 @@ def multipliers_of(block: Block, lags: Lags, moving: bool) -> Multipliers:
                 "the block has a weight: put the weight into the model, behind the block's outputs,"
                 " and leave weight out"
             )
+        if not isinstance(block.bound, Real) or not 0 <= block.bound < math.inf:
+            raise InputError(f"bound: expected a finite number >= 0, got {block.bound!r:.40}")
         sizes = len(_names(block.inputs)), len(_names(block.outputs))
         return DynamicMultipliers(*sizes, float(block.bound), lags)
     return block.multipliers(lags, moving)

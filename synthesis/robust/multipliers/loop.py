@@ -50,6 +50,35 @@ class Extended(NamedTuple):
     Y: Array
 
 
+def closing(C: Array, D: Array, N: Array) -> tuple[Array, Array]:
+    """Return K, L of w = K x + L u where w = u + N (C x + D w); doubles.
+
+    Raises `LinAlgError` where I - N D is singular.
+    """
+    L = np.linalg.inv(np.eye(len(N)) - N @ D)
+    return L @ N @ C, L
+
+
+def around_nominal(loop: Extended, plant: Plant, blocks: Sequence[Wired]) -> Extended:
+    """Return the loop, in doubles, in the inputs w less what the nominal blocks make of the
+    model's outputs: inequalities in (x, w) are those of the same x, and poles those of the nominal
+    loop.
+    """
+    N = np.zeros((plant.B.shape[1], len(plant.C)))
+    for kind, into, out in blocks:
+        if len(into) == len(out):
+            N[list(into), list(out)] = kind.nominal(float)
+    own, L = closing(plant.C, plant.D, N)
+    n, K = len(loop.A), np.zeros((len(N), len(loop.A)))
+    K[:, : own.shape[1]] = own
+
+    def turned(rows: Array) -> Array:
+        return np.hstack([rows[:, :n] + rows[:, n:] @ K, rows[:, n:] @ L])
+
+    motion = turned(np.hstack([loop.A, loop.B]))
+    return Extended(motion[:, :n], motion[:, n:], tuple(map(turned, loop.Z)), turned(loop.Y))
+
+
 def fractions(M: Any) -> Array:
     """Return doubles as rationals."""
     M = np.asarray(M, dtype=float)

@@ -21,7 +21,7 @@ from synthesis.robust.multipliers.blocks import (
     ParameterBlock,
     StaticBlock,
 )
-from synthesis.robust.multipliers.loop import Plant
+from synthesis.robust.multipliers.loop import Plant, closing
 from synthesis.robust.structure import DynamicBlock
 
 GRID = 300
@@ -60,22 +60,30 @@ class Family(NamedTuple):
         """Return the blocks (K, inputs, outputs) at frequencies (K,), rad/s."""
         out = np.zeros((len(omega), self.plant.B.shape[1], len(self.plant.C)), complex)
         for block, value, (into, of) in zip(self.blocks, numbers, self.places, strict=True):
-            factor = _factor(block, value, omega)
+            factor = None if math.isnan(value) else _factor(block, value, omega)
             if factor is not None and len(into) == len(of):
                 for i, j in zip(into, of, strict=True):
                     out[:, i, j] = factor
         return out
 
+    @property
+    def nominal(self) -> Array:
+        """The blocks (inputs, outputs) of the nominal member."""
+        return self.delta([_nominal(b) for b in self.blocks], np.zeros(1))[0].real
+
     def closed(self, numbers: Sequence[float], omega: Array) -> Array:
         """Return the responses (K, inputs, f) of all inputs of the model and of its outputs (K,
-        outputs, f) to f, stacked.
+        outputs, f) to f, stacked; by way of the nominal loop, as the model may have poles at these
+        frequencies.
         """
         A, B, C, D = self.plant[:4]
+        n, m = B.shape
+        N = self.nominal
+        K, L = closing(C, D, N)
+        A, B, C, D = A + B @ K, B @ L, C + D @ K, D @ L
         s = np.exp(1j * omega * self.dt) if self.dt else 1j * omega
-        n = len(A)
         G = C @ np.linalg.solve(s[:, None, None] * np.eye(n) - A, B + 0j) + D if n else D + 0j
-        Delta = self.delta(numbers, omega)
-        m = B.shape[1]
+        Delta = self.delta(numbers, omega) - N
         outside = np.zeros((m, len(self.plant.into)))
         outside[list(self.plant.into), range(len(self.plant.into))] = 1.0
         right = np.broadcast_to(outside + 0j, (len(omega), *outside.shape))
@@ -86,6 +94,7 @@ class Family(NamedTuple):
         G = np.where(singular[:, None, None], 0.0, G)
         with np.errstate(invalid="ignore"):
             own = G @ w
+            w = w + N @ own
         own[singular] = math.inf
         return np.concatenate([w, own], axis=1)
 
@@ -106,10 +115,12 @@ class Family(NamedTuple):
         """Whether a member is stable, or has a delay or dynamics, for which it is not known."""
         if any(isinstance(b, DelayBlock | DynamicBlock) for b in self.blocks):
             return True
+        return self._settles(self.delta(numbers, np.zeros(1))[0].real)
+
+    def _settles(self, N: Array) -> bool:
+        """Whether the loop with gains (inputs, outputs) in place of its blocks is stable."""
         A, B, C, D = self.plant[:4]
-        N = self.delta(numbers, np.zeros(1))[0].real
-        loop = A + B @ N @ np.linalg.solve(np.eye(len(C)) - D @ N, C)
-        poles = np.linalg.eigvals(loop)
+        poles = np.linalg.eigvals(A + B @ closing(C, D, N)[0])
         return bool(np.all(np.abs(poles) < 1 if self.dt else poles.real < 0))
 
     def grid(self) -> Array:
@@ -134,6 +145,8 @@ class Family(NamedTuple):
         """
         omega, m = self.grid(), self.plant.B.shape[1]
         best, sizes = Member(-1.0, (), math.nan), np.zeros(m)
+        if not self._settles(self.nominal):
+            return Member(math.inf, tuple(map(_nominal, self.blocks)), math.nan), sizes
         for numbers in self.members():
             if not self.stable(numbers):
                 return Member(math.inf, numbers, math.nan), sizes
@@ -184,6 +197,20 @@ class Family(NamedTuple):
         )
         numbers, omega = place(found.x)
         return max(at, Member(-float(found.fun), numbers, omega), key=lambda m: m.gain)
+
+
+def _nominal(block: Block) -> float:
+    """Return the number of the nominal member: the least slope, the middle of a parameter, else
+    zero.
+    """
+    match block:
+        case StaticBlock():
+            return block.low
+        case ParameterBlock():
+            return (block.low + block.high) / 2
+        case DelayBlock():
+            return 0.0
+    return math.nan
 
 
 def _range(block: Block) -> tuple[float, float]:

@@ -21,7 +21,7 @@ from symheli.values.arrays import Array
 from synthesis.numerics.program.affine_program import AffineProgram, BernsteinCell, cells
 from synthesis.numerics.program.cone_program import Solver
 from synthesis.robust.multipliers import inequality
-from synthesis.robust.multipliers.loop import Plant, Wired, extended
+from synthesis.robust.multipliers.loop import Plant, Wired, around_nominal, extended
 
 BACKED = 1e-4, 1e-3, 1e-2, 0.1
 """Relative distances from the optimum at which the largest margin of the inequality is sought."""
@@ -121,7 +121,7 @@ class Search:
         frequency `peak` of the largest gain of a member.
         """
         self.plant, self.blocks, self.solver = plant, tuple(blocks), solver
-        self.loop = extended(plant, blocks, float)
+        self.loop = around_nominal(extended(plant, blocks, float), plant, blocks)
         self.scale = scale
         self.outside = list(plant.into)
         m = self.loop.B.shape[1]

@@ -368,9 +368,9 @@ def test_the_multiplier_of_the_proof_holds_at_single_frequencies():
         assert np.linalg.eigvalsh(F)[-1] < 0
 
 
-def own_multiplier(bound):
+def own_multiplier(bound, dt=None):
     none = np.zeros((0, 0)), np.zeros((0, 2)), np.zeros((2, 0))
-    psi = LinearModel(*none, np.diag([bound, 1.0]), [], ["v", "d"], ["a", "b"])
+    psi = LinearModel(*none, np.diag([bound, 1.0]), [], ["v", "d"], ["a", "b"], dt)
     return OwnMultiplier(["w"], ["v"], psi, [np.diag([1.0, -1.0])])
 
 
@@ -523,6 +523,9 @@ def test_a_changed_number_is_not_proven(change):
         (lambda: multiplier_gain(SECTOR, [BLOCKS["slope"](1.0)] * 2), "two blocks"),
         (lambda: multiplier_gain(random_loop(1, dt=1.0), BLOCKS["delay"](1.0)), "continuous"),
         (lambda: multiplier_gain(SECTOR, DynamicBlock("w", "v", 1.0, SECTOR)), "weight"),
+        (lambda: multiplier_gain(SECTOR, DynamicBlock("w", "v", "1")), "bound"),
+        (lambda: multiplier_gain(SECTOR, "w"), "expected StaticBlock"),
+        (lambda: multiplier_gain(SECTOR, own_multiplier(0.3, 0.1)), "sampled every 0.1 s"),
     ],
 )
 def test_what_does_not_fit_is_refused_in_words(call, words):
@@ -535,6 +538,28 @@ def test_a_loop_without_stable_nominal_blocks_has_no_gain():
     assert not found.verified
     assert math.isinf(found.lower)
     assert "nominal loop is not stable" in found.why
+
+
+@pytest.mark.parametrize("dt", [None, 0.1])
+@pytest.mark.parametrize(
+    "block",
+    [StaticBlock("w", "v", slope=(-2.0, -1.0)), ParameterBlock("w", "v", -2.0, -1.0)],
+)
+def test_a_model_with_an_integrator_is_one_with_stable_blocks(block, dt):
+    """x' = d + f, v = x/2, d = -k v, k from 1 to 2: |x|_2 <= 2 |f|_2, sampled x + dt x' next."""
+    A, B = [[0.0 if dt is None else 1.0]], [[dt or 1.0, dt or 1.0]]
+    model = loop(A, B, [[0.5], [1.0]], np.zeros((2, 2)), ["w", "f"], ["v", "y"], dt)
+    found = multiplier_gain(model, block)
+    assert found.lower == pytest.approx(2.0, rel=1e-9)
+    assert found.upper == pytest.approx(2.0, rel=1e-3)
+
+
+def test_an_unstable_nominal_loop_of_a_peak_is_told():
+    """The middle of the range is an integrator."""
+    model = loop([[0.0]], [[1.0, 1.0]], [[1.0], [1.0]], np.zeros((2, 2)), ["w", "f"], ["v", "y"])
+    found = multiplier_gain(model, ParameterBlock("w", "v", -1.0, 1.0), kind="peak to peak")
+    assert math.isinf(found.upper)
+    assert "not stable" in found.why
 
 
 def test_an_unknown_channel_or_kind_is_named():
