@@ -144,6 +144,11 @@ def _read(content: Any) -> tuple[Loop, list[str]]:
     lft, given = content["model"], content["blocks"]
     if lft["type"] != "LFT":
         raise Unreadable("a worst-case gain is checked of an LFT, another model is not known")
+    if "copies" not in content:
+        raise Unreadable(
+            "the proof is of fewer copies of a parameter than the model in the file has, and this"
+            " checker reduces none: save the gain of model.reduce()"
+        )
     ranges = [each["scheduling"] for each in lft["blocks"]]
     motion = parameters(ranges) if ranges else ()
     sizes = [whole(each["size"], "the size of a block", 1, 10**3) for each in lft["blocks"]]

@@ -87,6 +87,65 @@ def test_a_saved_gain_is_proven(files, name, capsys):
     assert capsys.readouterr().out.splitlines()[-1] == "proven in exact arithmetic"
 
 
+def test_copies_that_the_proof_does_not_have_are_told_and_the_advice_works(tmp_path, capsys):
+    """The second copy is not driven."""
+    model = LinearModel(
+        [[-1.0, 0.2], [0.1, -2.0]],
+        [[1.0, 0.0, 1.0], [0.5, 0.0, 0.3]],
+        [[0.3, 0.1], [0.2, 0.4], [1.0, 1.0]],
+        np.zeros((3, 3)),
+        ["a", "b"],
+        ["p1", "p2", "w"],
+        ["q1", "q2", "z"],
+    )
+    k = Scheduling("k", "1", -0.2, 0.3)
+    copies = [LFT.parameter(k, f"q{i}", f"p{i}") for i in (1, 2)]
+    loop = connect(model, *copies, inputs=["w"], outputs=["z"])
+    path = tmp_path / "gain.json"
+    assert report.main([str(worst_case_gain(loop).save(path))]) == UNKNOWN
+    assert "save the gain of model.reduce()" in capsys.readouterr().out
+    path = tmp_path / "reduced.json"
+    assert report.main([str(worst_case_gain(loop.reduce()).save(path))]) == PROVEN
+
+
+def test_a_loop_that_is_not_well_posed_at_infinity_is_refused(files, tmp_path):
+    """z = s/(s + 1) w of a parameter and of the performance: the inequality is 1 > 0 times 1 + v^2
+    at every frequency v, and zero at infinity, where the parameter at 1 closes an algebraic loop.
+    """
+    content = json.loads(files["repeated"].read_text(encoding="utf-8"))
+    lft, eye, zero = content["model"], array([[1.0, 0.0], [0.0, 1.0]]), array(np.zeros((2, 2)))
+    lft["blocks"] = [
+        {**lft["blocks"][0], "size": 1, "scheduling": {**lft["blocks"][0]["scheduling"]}}
+    ]
+    lft["blocks"][0]["scheduling"] |= {"low": -1.0, "high": 1.0}
+    lft["states"] = [{"signal": name, "unit": "1"} for name in "ab"]
+    lft |= {
+        "M11": array([[1.0]]),
+        "M12": array([[-1.0, 0.0, 0.0]]),
+        "M21": array([[1.0], [0.0], [0.0]]),
+        "M22": array([[-1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, -1.0, 1.0]]),
+    }
+    content |= {
+        "bound": 1.0,
+        "level": 1.0,
+        "copies": array([1.0]),
+        "rows": array([1.0, 1.0]),
+        "columns": array([1.0, 1.0]),
+        "parts": [[0, 1, 0, 1, True], [1, 2, 1, 2, False]],
+        "intervals": [[0.0, {"float": "inf"}, [eye, zero], [eye, zero], [zero, zero]]],
+    }
+    assert status_of(content, tmp_path / "forged.json") == NOT_PROVEN
+    content["intervals"][0][1] = 1e6
+    high = [1e6, {"float": "inf"}, *content["intervals"][0][2:]]
+    content["intervals"].append(high)
+    assert status_of(content, tmp_path / "forged.json") == NOT_PROVEN
+
+
+def array(values):
+    own = np.asarray(values, float)
+    return {"shape": list(own.shape), "array": own.ravel().tolist()}
+
+
 def status_of(content, path):
     path.write_text(json.dumps(content), encoding="utf-8")
     return report.main([str(path)])
