@@ -42,6 +42,8 @@ LARGER = 1
 """How often a controller is made larger."""
 CELLS = 32
 """Parts of the ranges in which the gain is proven, at most."""
+PACES, APART = (1.0, 1.3, 0.77, 1.7, 0.6), 0.1
+"""Paces of the clock in mean paces, and the relative distance from poles that is enough."""
 DECAY, READ = 0.3, 0.02
 """Sizes of the first random entries of new states: among each other, and where they are read."""
 
@@ -167,16 +169,21 @@ class Clock(NamedTuple):
 
     @classmethod
     def of(cls, plant: DesignPlant) -> Clock:
-        """Return that of a sampled model itself; else the one of the mean pace."""
-        return cls(1.0 if plant.loop.dt is not None else plant.pace)
+        """Return that of a sampled model itself; else one near the mean pace, `APART` from the
+        poles: an unstable pole at the pace has no place on the circle.
+        """
+        if plant.loop.dt is not None:
+            return cls(1.0)
+        poles = np.concatenate([np.linalg.eigvals(P.A) for P in first_members(plant)])
+        paces = [plant.pace * factor for factor in PACES]
+        apart = [float(np.abs(poles / pace - 1).min(initial=1.0)) for pace in paces]
+        return cls(paces[int(np.argmax(np.minimum(apart, APART)))])
 
     def sampled(self, A: Array, B: Array, C: Array, D: Array) -> tuple[Array, Array, Array, Array]:
         """Return a continuous model from sample to sample."""
         found = sampled_controller(A / self.pace, B / self.pace, C, D)
         if found is None:
-            raise InputError(
-                f"a pole is at the mean pace {self.pace:g} rad/s itself; move it a little"
-            )
+            raise InputError(f"a pole is at {self.pace:g} rad/s, the pace of the search, itself")
         return found
 
     def plant(self, P: Generalized) -> Generalized:

@@ -28,9 +28,9 @@ def lag(unknown=0.1):
 BLOCK = [DynamicBlock("d", "v")]
 
 
-def uncertain_lag():
-    """x' = -k x + w + u, k in [1, 3]; z = (x, u), y = x + n/10."""
-    k = Scheduling("k", "1", 1.0, 3.0)
+def uncertain_lag(low=1.0, high=3.0):
+    """x' = -k x + w + u, k in [low, high]; z = (x, u), y = x + n/10."""
+    k = Scheduling("k", "1", low, high)
     known = LinearModel(
         [[0.0]],
         [[-1, 1, 0, 1]],
@@ -69,6 +69,15 @@ def test_it_is_no_lower_than_the_optimum_of_the_worst_member_and_near_it(design)
     """No controller does better for all than the best one for k = 1 does there. Measured: .4 %."""
     least = hinf(uncertain_lag().at(1.0), ["u"], ["y"]).optimum
     assert least * (1 - 1e-6) <= design.gain.lower <= 1.01 * least
+
+
+def test_a_plant_whose_only_pole_is_unstable_is_designed_for():
+    """Its pole is at the mean pace of all: no bilinear map of that pace has a place for it."""
+    found = mu_synthesis(uncertain_lag(-3.0, 1.0), ["u"], ["y"], goal="gain", iterations=1)
+    least = hinf(uncertain_lag(-3.0, 1.0).at(-3.0), ["u"], ["y"]).optimum
+    assert found.verified
+    assert least * (1 - 1e-6) <= found.gain.lower <= 1.01 * least
+    assert all(found.loop.at(k).is_stable() for k in np.linspace(-3.0, 1.0, 9))
 
 
 @pytest.mark.slow
