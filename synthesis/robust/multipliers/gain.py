@@ -202,6 +202,8 @@ def multiplier_gain(
     model, own = as_model(model), blocks_of(blocks)
     if kind not in KINDS:
         raise UnknownNameError("kind", kind, KINDS)
+    if decay is not None and kind != PEAK:
+        raise InputError(f"decay: it belongs to kind={PEAK!r}; leave it out of {kind!r}")
     asked = Asked.of(model, own, inputs, outputs, poles, order, kind)
     fault = asked.fault()
     if fault == NOMINAL:

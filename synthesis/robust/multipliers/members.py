@@ -88,7 +88,7 @@ class Family(NamedTuple):
         outside[list(self.plant.into), range(len(self.plant.into))] = 1.0
         right = np.broadcast_to(outside + 0j, (len(omega), *outside.shape))
         left = np.eye(m) - Delta @ G
-        singular = np.linalg.cond(left) > SINGULAR
+        singular: Array = np.asarray(np.linalg.cond(left) > SINGULAR)
         left[singular] = np.eye(m)
         w = np.where(singular[:, None, None], math.inf, np.linalg.solve(left, right))
         G = np.where(singular[:, None, None], 0.0, G)

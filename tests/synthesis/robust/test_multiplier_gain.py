@@ -525,6 +525,7 @@ def test_a_changed_number_is_not_proven(change):
         (lambda: multiplier_gain(SECTOR, DynamicBlock("w", "v", 1.0, SECTOR)), "weight"),
         (lambda: multiplier_gain(SECTOR, DynamicBlock("w", "v", "1")), "bound"),
         (lambda: multiplier_gain(SECTOR, "w"), "expected StaticBlock"),
+        (lambda: multiplier_gain(SECTOR, BLOCKS["slope"](1.0), decay=0.1), "leave it out"),
         (lambda: multiplier_gain(SECTOR, own_multiplier(0.3, 0.1)), "sampled every 0.1 s"),
     ],
 )
