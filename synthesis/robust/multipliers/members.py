@@ -88,7 +88,7 @@ class Family(NamedTuple):
         outside[list(self.plant.into), range(len(self.plant.into))] = 1.0
         right = np.broadcast_to(outside + 0j, (len(omega), *outside.shape))
         left = np.eye(m) - Delta @ G
-        singular: Array = np.asarray(np.linalg.cond(left) > SINGULAR)
+        singular = np.linalg.cond(left) > SINGULAR
         left[singular] = np.eye(m)
         w = np.where(singular[:, None, None], math.inf, np.linalg.solve(left, right))
         G = np.where(singular[:, None, None], 0.0, G)
@@ -107,7 +107,7 @@ class Family(NamedTuple):
         stability.
         """
         rows = own[:, [self.plant.B.shape[1] + i for i in self.plant.out]]
-        finite = np.isfinite(rows).all(axis=(1, 2))
+        finite: Array = np.isfinite(rows).all(axis=(1, 2))
         values = np.linalg.svd(np.where(finite[:, None, None], rows, 0.0), compute_uv=False)[:, 0]
         return np.where(finite, values, math.inf)
 
