@@ -107,7 +107,7 @@ class Family(NamedTuple):
         stability.
         """
         rows = own[:, [self.plant.B.shape[1] + i for i in self.plant.out]]
-        finite: Array = np.isfinite(rows).all(axis=(1, 2))
+        finite = np.asarray(np.isfinite(rows).all(axis=(1, 2)))
         values = np.linalg.svd(np.where(finite[:, None, None], rows, 0.0), compute_uv=False)[:, 0]
         return np.where(finite, values, math.inf)
 
