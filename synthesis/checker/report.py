@@ -4,7 +4,18 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from . import dwell, lagged, lft, regions, sets, storage, terminal
+from . import (
+    dwell,
+    lagged,
+    lft,
+    listed,
+    periodic,
+    rational,
+    regions,
+    sets,
+    storage,
+    terminal,
+)
 from .demands import Claim, failure
 from .reading import DAMAGED, TUBE, Unreadable, opened
 
@@ -27,6 +38,12 @@ def claim_of(kind: str, content: Mapping[str, Any]) -> Claim:
         return regions.claimed(content)
     if kind == terminal.KIND:
         return terminal.claimed(content)
+    if kind in (listed.GROWTH, listed.GAIN):
+        return listed.claimed(kind, content)
+    if kind in (rational.GAIN, rational.STABILITY):
+        return rational.claimed(kind, content)
+    if kind in (periodic.GAIN, periodic.STABILITY):
+        return periodic.claimed(kind, content)
     if kind in (TUBE, "tube"):
         raise Unreadable(
             "tubes are not decided here: their proof rests on enclosures of nonlinear equations"
