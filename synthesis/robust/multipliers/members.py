@@ -98,19 +98,20 @@ class Family(NamedTuple):
         stability.
         """
         rows = own[:, [self.plant.B.shape[1] + i for i in self.plant.out]]
-        finite = np.isfinite(rows).all(axis=(1, 2))
-        values = np.linalg.svd(np.where(finite[:, None, None], rows, 0.0), compute_uv=False)[:, 0]
-        return np.where(finite, values, math.inf)
+        out = np.full(len(rows), math.inf)
+        finite = np.flatnonzero(np.isfinite(rows).all(axis=(1, 2)))
+        out[finite] = np.linalg.svd(rows[finite], compute_uv=False)[:, 0]
+        return out
 
     def stable(self, numbers: Sequence[float]) -> bool:
         """Whether a member is stable, or has a delay or dynamics, for which it is not known."""
         if any(isinstance(b, DelayBlock | DynamicBlock) for b in self.blocks):
             return True
         A, B, C, D = self.plant[:4]
-        N = self.delta(numbers, np.zeros(1))[0].real
+        N = np.real(self.delta(numbers, np.zeros(1)))[0]
         loop = A + B @ N @ np.linalg.solve(np.eye(len(C)) - D @ N, C)
         poles = np.linalg.eigvals(loop)
-        return bool(np.all(np.abs(poles) < 1 if self.dt else poles.real < 0))
+        return bool(np.all(np.abs(poles) < 1 if self.dt else np.real(poles) < 0))
 
     def grid(self) -> Array:
         """Return frequencies, rad/s."""
