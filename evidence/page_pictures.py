@@ -1,4 +1,5 @@
-"""Pictures of pages that their own blocks draw: docs/plots.md, embedding.md, tutorial.md.
+"""Pictures of pages that their own blocks draw: docs/plots.md, embedding.md, published.md,
+tutorial.md.
 
     python -m evidence.page_pictures             run the pages, say which pictures differ
     python -m evidence.page_pictures --write     and put the pictures into docs
@@ -20,7 +21,7 @@ from pathlib import Path
 import numpy as np
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
-PAGES = ("plots.md", "embedding.md", "tutorial.md")
+PAGES = ("plots.md", "embedding.md", "published.md", "tutorial.md")
 BLOCK = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 SAVED = re.compile(r'savefig\("([\w-]+\.png)"')
 DIFFERENT = 0.02

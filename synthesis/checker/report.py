@@ -4,7 +4,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from . import dwell, lagged, levels, lft, sets, storage
+from . import dwell, lagged, levels, lft, listed, periodic, rational, sets, storage
 from .demands import Claim, failure
 from .reading import DAMAGED, TUBE, Unreadable, opened
 
@@ -25,6 +25,12 @@ def claim_of(kind: str, content: Mapping[str, Any]) -> Claim:
         return dwell.claimed(content)
     if kind == "worst-case gain":
         return levels.claimed(content)
+    if kind in (listed.GROWTH, listed.GAIN):
+        return listed.claimed(kind, content)
+    if kind in (rational.GAIN, rational.STABILITY):
+        return rational.claimed(kind, content)
+    if kind in (periodic.GAIN, periodic.STABILITY):
+        return periodic.claimed(kind, content)
     if kind in (TUBE, "tube"):
         raise Unreadable(
             "tubes are not decided here: their proof rests on enclosures of nonlinear equations"

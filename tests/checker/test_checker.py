@@ -39,7 +39,7 @@ FOLDER = ROOT / "synthesis" / "checker"
 FILES = sorted((ROOT / "tests" / "data" / "proofs").glob("*.json"))
 DECIDED = [f for f in FILES if f.stem != "tube"]
 PROVEN, NOT_PROVEN, UNKNOWN = 0, 1, 2
-LINES = 2500
+LINES = 3000
 COARSE = Spline(segments=2, degree=2)
 FORGED = 8
 """Numbers of each file that the default tests change."""

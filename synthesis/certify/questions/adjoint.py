@@ -36,4 +36,6 @@ def backwards(problem: BoundProblem) -> BoundProblem | None:
         return None
     options = adjoint_options(len(source.parameters))
     turned = (source.adjoint(), demand.rates, demand.kind)
-    return pose(*turned, options.get("form"), None, options.get("solver"), problem.search)
+    return pose(
+        *turned, options.get("form"), None, options.get("solver"), problem.search, problem.effort
+    )

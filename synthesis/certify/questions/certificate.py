@@ -387,6 +387,7 @@ class Certificate(ProvenStatement):
             )
         elif self.attempts or self.hypotheses:
             lines.append(f"  {len(self.attempts)} programs tried, in .details")
+        lines += [f"  {each.program}: {each.answer}" for each in self.attempts if each.left]
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:

@@ -48,6 +48,12 @@ only to rounding.
 """
 
 
+SLOWER = 2.0
+"""Multiple of a growth that is attained by which a model is made to decay before its decay rate is
+bounded.
+"""
+
+
 class Beaten(NamedTuple):
     """Lower bound on the gain, in the sign of the bound, and the seconds it took to find it."""
 
@@ -76,7 +82,7 @@ def certify(problem: BoundProblem) -> Certificate:
                 time.perf_counter() - start,
                 delta,
             )
-            return report.nothing(Status.UNSTABLE, beaten)
+            return _of_growth(problem, report.nothing(Status.UNSTABLE, beaten))
         # stable or not to rounding: nothing is known from below
         frozen, search = Worst(0.0 if problem.gains else -MARGINAL_DECAY, frozen.p), None
     stability = demand.kind == STABILITY
@@ -96,7 +102,7 @@ def certify(problem: BoundProblem) -> Certificate:
         delta,
     )
     if math.isinf(limit.value) if problem.gains else limit.value >= 0:
-        return report.nothing(Status.GROWING, beaten)
+        return _of_growth(problem, report.nothing(Status.GROWING, beaten))
     best = best or ladder.search(level)
     for other in (over_jumps, by_coefficients) if stability else (by_coefficients,):
         again = None if best.proof is not None else other(problem)
@@ -139,6 +145,38 @@ def _searched(problem: BoundProblem, beaten: Beaten) -> Certificate:
     """Search a proof of a loop whose lower bound is known."""
     ladder = route(problem)
     return Report(problem).found(ladder.search(beaten.frozen), beaten, ladder)
+
+
+def _of_growth(problem: BoundProblem, cert: Certificate) -> Certificate:
+    """Return a certificate of growth with the best bound of it that is found: of the model whose
+    state decays faster by a multiple of what is attained. Other questions stay without one.
+    """
+    if not problem.demand.kind.facets.decays:
+        return cert
+    middle = np.array([[s.middle for s in problem.model.parameters]])
+    pace = float(np.abs(np.linalg.eigvals(problem.model.at(middle).A)).max())
+    by = SLOWER * -cert.upper + (pace if problem.model.dt is None else 1.0 / problem.model.dt)
+    model = _decaying(problem.model, by)
+    if model is None:
+        return cert
+    ladder = route(problem._replace(model=model))
+    best = ladder.search(by + cert.upper)
+    attempts = tuple(ladder.attempts)
+    return replace(cert, alpha=best.bound - by, attempts=attempts) if best.proof else cert
+
+
+def _decaying(model: Pieces, by: float) -> Pieces | None:
+    """Return the model whose states decay by so much more, 1/s; None where its basis holds no
+    constant.
+    """
+    source, n = model.source, model.sizes[0]
+    if model.dt is not None:
+        return pieces(replace(source, A=source.A * math.exp(-by * model.dt)))
+    try:
+        one = source.basis.constant()
+    except InputError:
+        return None
+    return pieces(replace(source, A=source.A - by * np.multiply.outer(one, np.eye(n))))
 
 
 class _LoopAndWorst(NamedTuple):

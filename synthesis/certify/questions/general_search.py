@@ -36,8 +36,9 @@ from synthesis.numerics.polynomial.pieces import Pieces
 from synthesis.numerics.polynomial.regions import model_on, regions
 from synthesis.numerics.polynomial.symmetric import extended, length, smat
 from synthesis.numerics.program import interior_point
-from synthesis.numerics.program.answer import Answer
+from synthesis.numerics.program.answer import LEFT, Answer
 from synthesis.numerics.program.cone_program import LYAPUNOV, SolverPoint, general_solver, solve
+from synthesis.numerics.program.effort import work
 from synthesis.numerics.program.interior_point import Minimum
 from synthesis.numerics.program.lyapunov_program import LyapunovBlocks, LyapunovProgram, Sizes
 
@@ -63,6 +64,8 @@ MIN_POINT_TOLERANCE = 2e-3
 """Least relative gap to which a program of points is solved: its P is proven by other means, and a
 P well inside the constraints holds between the points too.
 """
+ANNOUNCED = 5.0
+"""Seconds of work from which on a program is announced."""
 CENTRAL_LEVEL = 1.05
 """Multiple of the expected gain at which frozen models have the central storage functions whose
 dissipation is the measure of how far inside the inequalities a P that varies with p is kept.
@@ -232,10 +235,12 @@ class General(Ladder):
             candidate = self._solve(shape, margin)
             found, message = self._verified(candidate, shape), candidate.message
         self.scaled_demand = demand
+        problem.effort.proven |= found.proof is not None
         words = "no P" if found.proof is None else f"bound {found.bound:.6g}"
         segments = math.prod(len(k) - 1 for k in shape.knots)
         name = f"{segments} segments of degree {max(shape.degrees)}"
-        self.attempts.append(Attempt(name, margin, f"{message}, {words}", found.bound))
+        answer = message if message.startswith(LEFT) else f"{message}, {words}"
+        self.attempts.append(Attempt(name, margin, answer, found.bound))
         return found
 
     def _solve(self, shape: Shape, margin: float) -> SolverPoint:
@@ -256,9 +261,21 @@ class General(Ladder):
         n = problem.model.sizes[0]
         program = assemble(inequalities, shape, n, problem.impose, maximise=not problem.gains)
         built = time.perf_counter()
-        candidate = solve(program, problem.solver)
+        refused = self._refused(work(program))
+        candidate = refused or solve(program, problem.solver)
         self.spent += (built - start, time.perf_counter() - built, 0.0)
         return candidate
+
+    def _refused(self, seconds: float) -> Minimum | None:
+        """Return the answer to a program of so much work that it is left out, None to others; long
+        ones are announced.
+        """
+        words = self.problem.effort.refused(seconds)
+        if words:
+            return Minimum(Answer.UNTRIED, None, 0.0, words)
+        if seconds > ANNOUNCED:
+            self._searching.to(len(self.attempts), f"a program of about {seconds:.0f} s")
+        return None
 
     def _by_points(self, shape: Shape, margin: float) -> tuple[Found, str]:
         """Solve programs of few inequalities, adding the violated ones, until the bound proven on
@@ -345,6 +362,9 @@ class General(Ladder):
         tied = self.varies(shape) and self.scaled_demand.motion.tied
         floor = self.problem.impose.least if tied or not self.varies(shape) else None
         program = LyapunovProgram(tuple(chosen), Sizes(n, nu, unknowns), margin, floor)
+        refused = self._refused(work(program))
+        if refused:
+            return refused
         given = self.problem.solver
         coarse = max(MIN_POINT_TOLERANCE, given.options["tolerance"])
         candidate = interior_point.minimise(program, replace(given, tolerance=coarse))

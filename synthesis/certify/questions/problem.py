@@ -17,6 +17,7 @@ from synthesis.certify.statement.rates import Rate, limits
 from synthesis.numerics.polynomial.motion import Motion
 from synthesis.numerics.polynomial.pieces import Pieces, pieces
 from synthesis.numerics.program.cone_program import LYAPUNOV, Solver, general_solver
+from synthesis.numerics.program.effort import Effort
 from synthesis.numerics.program.lyapunov_program import MAX_STATES_GENERAL
 
 Model = LPVStateSpace | LFT | UncertainStateSpace
@@ -25,7 +26,8 @@ Model = LPVStateSpace | LFT | UncertainStateSpace
 class BoundProblem(NamedTuple):
     """A model in polynomial pieces, the kind of bound and the options; `uncertain`: the set of
     models for which the bound must hold, with `model` as its nominal one; `usual`: whether form,
-    impose and solver were left out; `general`: whether the general search is asked for.
+    impose and solver were left out; `general`: whether the general search is asked for; `effort`:
+    the work of all its searches together.
     """
 
     model: Pieces
@@ -34,6 +36,7 @@ class BoundProblem(NamedTuple):
     impose: Imposed
     solver: Solver
     search: LowerBoundSearch | None
+    effort: Effort
     uncertain: UncertainStateSpace | None = None
     usual: bool = False
     general: bool = False
@@ -99,6 +102,7 @@ def pose(
     impose: Imposed | None,
     solver: Solver | str | None,
     search: LowerBoundSearch | None,
+    effort: Effort | None = None,
 ) -> BoundProblem:
     """Check the options against one another and against the model, and return the problem.
 
@@ -125,8 +129,9 @@ def pose(
         model = model.with_scheduling(moving)
     if uncertain is not None:
         uncertain = uncertain.with_scheduling(model.parameters)
-    demand = Demand(Kind.named(kind), motion)
-    problem = BoundProblem(pieces(model), demand, form, impose, Solver("CLARABEL"), search)
+    demand, usually = Demand(Kind.named(kind), motion), Solver("CLARABEL")
+    work = Effort() if effort is None else effort
+    problem = BoundProblem(pieces(model), demand, form, impose, usually, search, work)
     problem = problem._replace(uncertain=uncertain, usual=usual)
     _check_channels(problem)
     _check_options(problem)
@@ -163,7 +168,8 @@ def _accepted(model: Model) -> LPVStateSpace:
     except InputError as error:
         raise InputError(
             "the LFT depends on its parameters as a rational function, not a polynomial; use"
-            " lft_gain, or fit a polynomial: to_lpv(degree=...)"
+            " synthesis.robust.rational_gain, lft_gain where p may jump, or fit a polynomial:"
+            " to_lpv(degree=...)"
         ) from error
 
 

@@ -4,8 +4,11 @@ rate, energy-to-peak gain (generalised H2 norm) and H2 norm.
 
 from __future__ import annotations
 
+import math
+
 from symheli.lpv.bases import FunctionSpace
 from symheli.threads import with_one_thread
+from symheli.values.numbers import positive
 from synthesis.certify.lower_bounds.lower_bound import THOROUGH, LowerBoundSearch
 from synthesis.certify.questions.certificate import Certificate
 from synthesis.certify.questions.certify import certify
@@ -15,6 +18,10 @@ from synthesis.certify.statement.forms import LyapunovForm, Spline
 from synthesis.certify.statement.impose import Imposed
 from synthesis.certify.statement.rates import Rate
 from synthesis.numerics.program.cone_program import Solver
+from synthesis.numerics.program.effort import Effort
+
+EFFORT = 30.0
+"""Usual effort of a gain, s of one common core."""
 
 
 @with_one_thread
@@ -26,6 +33,7 @@ def l2_gain(
     impose: Imposed | None = None,
     solver: Solver | str | None = None,
     search: LowerBoundSearch | None = THOROUGH,
+    effort: float = EFFORT,
 ) -> Certificate:
     """Certify an upper bound on the L2 gain over every p(t) within its range and rates.
 
@@ -52,6 +60,10 @@ def l2_gain(
     search : LowerBoundSearch or None
         How hard to look for bad trajectories; with None the
         worst frozen gain is the lower bound.
+    effort : float
+        Work of the programs over several parameters, counted in seconds of one common core. Once
+        a bound is proven, no program begins that exceeds it; the certificate names what was left
+        untried and the effort that tries it. math.inf: everything is tried.
 
     Returns
     -------
@@ -89,7 +101,8 @@ def l2_gain(
     """
     if isinstance(form, FunctionSpace):
         return gain_on_grid(model, rate, form, impose)
-    return certify(pose(model, rate, "l2 gain", form, impose, solver, search))
+    work = Effort(math.inf if effort == math.inf else positive(effort, "effort"))
+    return certify(pose(model, rate, "l2 gain", form, impose, solver, search, work))
 
 
 @with_one_thread
@@ -174,7 +187,7 @@ def decay_rate(
     -------
     Certificate
         `alpha` (1/s) is proven; no proof can exceed `upper`: the slowest frozen mode, or growth
-        along a trajectory.
+        along a trajectory. Where the state grows, `alpha` < 0 is a bound of growth, computed.
 
     Raises
     ------

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from enum import Enum
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-from synthesis.numerics.program.answer import Answer
-
-if TYPE_CHECKING:
-    pass
+from synthesis.numerics.program.answer import LEFT, Answer
 
 
 class Status(Enum):
@@ -64,6 +61,11 @@ class Attempt(NamedTuple):
     margin: float
     answer: str
     bound: float
+
+    @property
+    def left(self) -> bool:
+        """Whether it was left untried for its work."""
+        return self.answer.startswith(LEFT)
 
     def __str__(self) -> str:
         return f"{self.program}, margin {self.margin:.0e}: {self.answer}"

@@ -12,3 +12,7 @@ class Answer(Enum):
     INFEASIBLE = "the solver reports that no solution exists"
     FAILED = "the solver stopped without an answer"
     UNTRIED = "the program was not given to the solver"
+
+
+LEFT = "left untried"
+"""First words for a program that was too much work."""
