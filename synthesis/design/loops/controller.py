@@ -353,6 +353,6 @@ def _of_lft(loop: LFT, rate: Any, options: Mapping[str, Any]) -> Certificate:
         raise InputError(
             "rate: the loop is an LFT, certified where p may jump; made.closed() is the loop:"
             " synthesis.robust.worst_case_gain(loop, cells=32) proves its gain where p is constant,"
-            " synthesis.robust.rational_gain(loop, rate) at limited rates"
+            " and in continuous time synthesis.robust.rational_gain(loop, rate) at limited rates"
         )
     return lft_gain(loop.reduce(), **options)
