@@ -99,7 +99,7 @@ class Family(NamedTuple):
         """
         rows = own[:, [self.plant.B.shape[1] + i for i in self.plant.out]]
         out = np.full(len(rows), math.inf)
-        finite = np.flatnonzero(np.isfinite(rows).all(axis=(1, 2)))
+        finite = np.flatnonzero(np.all(np.isfinite(rows), axis=(1, 2)))
         out[finite] = np.linalg.svd(rows[finite], compute_uv=False)[:, 0]
         return out
 
