@@ -430,8 +430,8 @@ def _worst_case(rng: np.random.Generator) -> Trial:
 def _multipliers(rng: np.random.Generator) -> Trial:
     """One block near its limit; members by their own responses, with w = Delta v."""
     A, B, C, _ = next(frozen(plant(rng, 2, 2)))
-    names = [f"x{i}" for i in range(len(A))], ["f", "d"], ["y", "v"]
-    loop = LinearModel(A, B, C, np.zeros((2, 2)), *map(signals, names))
+    x, u, y = map(signals, ([f"x{i}" for i in range(len(A))], ["f", "d"], ["y", "v"]))
+    loop = LinearModel(A, B, C, np.zeros((2, 2)), x, u, y)
     grid = np.geomspace(1e-2, 1e2, 1500) * np.abs(np.linalg.eigvals(A)).max()
     grid = np.unique(np.r_[grid, np.abs(np.linalg.eigvals(A))])
     G, s = loop.frequency_response(grid), 1j * grid

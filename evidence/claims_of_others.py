@@ -49,7 +49,8 @@ def common_p(A: Sequence[Array], sampled: bool) -> Array:
     limits = [np.eye(n) << P, P << 1e3 * np.eye(n)]
     program = cp.Problem(cp.Maximize(margin), [*limits, *(F << -margin * np.eye(n) for F in falls)])
     program.solve(solver="CLARABEL")
-    return np.round((P.value + P.value.T) / 2, DIGITS)
+    found = np.asarray(P.value, float)
+    return np.round((found + found.T) / 2, DIGITS)
 
 
 def ball(rho: float) -> tuple[Document, Document]:
@@ -126,10 +127,10 @@ def _robust_feedback(A: Sequence[Array], B: Array) -> tuple[Array, Array]:
     n, m = B.shape
     Q, Y, margin = cp.Variable((n, n), symmetric=True), cp.Variable((m, n)), cp.Variable()
     forms = [cp.bmat([[Q, (M @ Q + B @ Y).T], [M @ Q + B @ Y, Q]]) for M in A]
-    limits = [np.eye(n) >> Q, *(F >> margin * np.eye(2 * n) for F in forms)]
+    limits: list[Any] = [np.eye(n) >> Q, *(F >> margin * np.eye(2 * n) for F in forms)]
     cp.Problem(cp.Maximize(margin), limits).solve(solver="CLARABEL")
-    P = np.linalg.inv(Q.value)
-    return np.round(Y.value @ P, 3), np.round((P + P.T) / 2, 6)
+    P = np.linalg.inv(np.asarray(Q.value, float))
+    return np.round(np.asarray(Y.value, float) @ P, 3), np.round((P + P.T) / 2, 6)
 
 
 def terminal(more: float, level: float) -> tuple[Document, Document]:

@@ -30,6 +30,8 @@ NEAR = 0.05
 """Part of its first size to which a motion falls before it counts as one that tends to zero."""
 METHODS = (("LSODA", 1e-9), ("Radau", 1e-11))
 """Integrators, of different families, and their relative tolerance."""
+MOST_STEPS = 20_000
+"""Steps of an integrator after which a motion is left."""
 SMALL = 10**6
 """Largest denominator, in units of the box, of an equilibrium that is tried in rationals."""
 
@@ -87,35 +89,46 @@ def _left(f: Any, claim: RegionClaim, region: Region, starts: Array) -> Found | 
 
 
 def _flown(
-    rate: Callable[[Array], Array], z: Array, method: Any, tolerance: float
+    rate: Callable[[Array], Array], z: Array, method: str, tolerance: float
 ) -> tuple[Array, Array] | None:
     """Return (time, states) of a motion that does not tend to zero; None of one that may."""
-    from scipy.integrate import solve_ivp
-
-    speed = float(np.abs(rate(z)).max())
+    speed, first = float(np.abs(rate(z)).max()), float(np.abs(z).max())
     if speed == 0:
         return None
-
-    def gone(t: float, x: Array) -> float:
-        return FAR - float(np.abs(x).max())
-
-    def back(t: float, x: Array) -> float:
-        return float(np.abs(x).max()) - NEAR * float(np.abs(z).max())
-
-    gone.terminal = back.terminal = True  # type: ignore[attr-defined]
-    horizon = LONG * float(np.abs(z).max()) / speed
+    horizon = LONG * first / speed
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # of a motion that ends in finite time
-        found = solve_ivp(
-            lambda t, x: rate(x), (0.0, horizon), z, method=method, rtol=tolerance, atol=1e-12,
-            events=[gone, back],
-        )  # fmt: skip
-    size = np.abs(found.y).max(axis=0)
-    escaped = len(found.t_events[0]) > 0 or (found.status < 0 and size[-1] > OUT)
+        time, states, status = _stepped(rate, z, horizon, method, tolerance)
+    size = np.abs(states).max(axis=1)
+    if size[-1] <= NEAR * first:
+        return None
+    escaped = size[-1] >= FAR or (status == "failed" and size[-1] > OUT)
     # to the end of a long time it is no nearer than it began: it circles or rests elsewhere
-    late = size[found.t > horizon / 2]
-    stayed = found.status == 0 and len(late) > 0 and bool(late.min() >= size[0])
-    return (found.t, found.y.T) if escaped or stayed else None
+    late = size[time > horizon / 2]
+    stayed = status == "finished" and len(late) > 0 and bool(late.min() >= first)
+    return (time, states) if escaped or stayed else None
+
+
+def _stepped(
+    rate: Callable[[Array], Array], z: Array, horizon: float, method: str, tolerance: float
+) -> tuple[Array, Array, str]:
+    """Return times and states until the motion is near zero, far out or at the horizon, and the
+    status of the integrator: "running", "finished", or "failed" where it cannot go on.
+    """
+    from scipy import integrate
+
+    kind: Any = getattr(integrate, method)
+    solver = kind(lambda t, x: rate(x), 0.0, z, horizon, rtol=tolerance, atol=1e-12)
+    times, states = [0.0], [z]
+    while solver.status == "running" and len(times) < MOST_STEPS:
+        solver.step()
+        if not np.all(np.isfinite(solver.y)):
+            return np.array(times), np.array(states), "failed"
+        times.append(float(solver.t))
+        states.append(solver.y.copy())
+        if not NEAR * np.abs(z).max() < np.abs(solver.y).max() < FAR:
+            break
+    return np.array(times), np.array(states), str(solver.status)
 
 
 def _resting(

@@ -142,7 +142,7 @@ class Bases(NamedTuple):
 
 
 class Effort(NamedTuple):
-    """Number added to half the least degree of the rest, and half the degree of sigma."""
+    """Additions to half the least degree of the rest, and half the degree of sigma."""
 
     more: int = 0
     sigma: int = 0

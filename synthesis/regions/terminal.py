@@ -38,7 +38,7 @@ BELOW = 1 - 1e-9
 SHARES = (0.05, 0.3, 0.6, 0.9, 0.97)
 """Shares of the loop's slowest rate at which V falls beside the cost, tried for the largest set."""
 INFINITE = 1e10
-"""Number that acados takes for a bound that is none."""
+"""Bound that acados takes for none."""
 MATRICES = ("Q", "R", "K", "P")
 
 

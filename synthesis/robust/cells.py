@@ -18,8 +18,9 @@ import numpy as np
 
 from symheli.progress import task
 from synthesis.numerics.linear.norm import to_continuous
+from synthesis.robust.exact_loop import ExactLoop
 from synthesis.robust.intervals import LevelProof
-from synthesis.robust.structure import BlockLoop, ExactLoop, Part
+from synthesis.robust.structure import BlockLoop, Part
 from synthesis.robust.upper_bound import Upper, held_level, proven_level
 
 NEAR = 1e-3

@@ -16,8 +16,9 @@ from synthesis.design.lti.hinf import hinf
 from synthesis.design.lti.point_design import PointDesign, named_loop
 from synthesis.design.plant.generalized import Channels, Generalized, sampled_controller
 from synthesis.numerics.linear.norm import to_continuous
+from synthesis.robust.exact_loop import Part
 from synthesis.robust.filters import Filter
-from synthesis.robust.structure import BlockLoop, DynamicBlock, Part, behind, channels_of, loop_of
+from synthesis.robust.structure import BlockLoop, DynamicBlock, behind, channels_of, loop_of
 from synthesis.robust.upper_bound import Upper, proven_level
 
 BACK_OFF = 1.002

@@ -19,7 +19,7 @@ from symheli.values.arrays import Array
 from synthesis.numerics.polynomial.exact import positive_definite
 from synthesis.numerics.polynomial.positive import bernstein, positive, positive_until
 from synthesis.numerics.polynomial.transfer import Gaussian, Transfer, rationals
-from synthesis.robust.structure import ExactLoop, Part
+from synthesis.robust.exact_loop import ExactLoop, Part
 
 DEPTH = 24
 """Halvings, of what lies to either side of a frequency, by which the end of an interval is found.

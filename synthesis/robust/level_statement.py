@@ -20,8 +20,9 @@ from synthesis.certify.questions.certificate_file import decoded, encoded, same_
 from synthesis.certify.statement.proven_statement import ProvenStatement
 from synthesis.certify.statement.sentences import motion
 from synthesis.robust.cells import Cell, CellsProof
+from synthesis.robust.exact_loop import Part
 from synthesis.robust.intervals import Interval, LevelProof, Scalings
-from synthesis.robust.structure import DynamicBlock, Part, names_of
+from synthesis.robust.structure import DynamicBlock, names_of
 
 Asked = tuple[LFT | LPVStateSpace, Sequence[DynamicBlock]]
 

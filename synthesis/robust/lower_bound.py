@@ -20,7 +20,8 @@ import numpy as np
 from scipy import optimize
 
 from symheli.values.arrays import Array
-from synthesis.robust.structure import BlockLoop, Part
+from synthesis.robust.exact_loop import Part
+from synthesis.robust.structure import BlockLoop
 
 ITERATIONS = 30
 """Steps of the power iteration from each start."""

@@ -10,7 +10,7 @@ import numpy as np
 from symheli.values.arrays import Array
 from synthesis.design.plant.generalized import Generalized
 from synthesis.robust.design_plant import DesignPlant, size_of
-from synthesis.robust.structure import Part
+from synthesis.robust.exact_loop import Part
 from synthesis.robust.worst_case_gain import Member
 
 MOST_CORNERS = 16

@@ -13,9 +13,9 @@ import numpy as np
 from symheli.values.arrays import Array
 
 if TYPE_CHECKING:
+    from synthesis.robust.exact_loop import ExactLoop
     from synthesis.robust.intervals import LevelProof
     from synthesis.robust.slope import SlopeProof
-    from synthesis.robust.structure import ExactLoop
 
 DIGITS = 60
 FREQUENCIES = 40

@@ -698,7 +698,7 @@ def from_below(
     P: Array,
     solver: Solver,
 ) -> Grown:
-    """Tube grown as by `_grown`, from ellipsoids P that are too small or just large enough."""
+    """Return what `_grown` does, from ellipsoids P that are too small or just large enough."""
     decay, growth, later, rounds, spare = effort
     for _ in range(rounds):
         P, growth = P / growth**2, later

@@ -137,6 +137,7 @@ def test_multipliers_and_boxes_are_checked_not_believed(contents, tmp_path, caps
         (0, ["0", "0", "0", "0"]),
         (6, ["-1/10", "0", "-6/10", "0"]),
     ):
+        content = json.loads(json.dumps(contents["polytope"]))
         content["multipliers"][k] = forged
         assert checked(content, tmp_path, capsys)[0] == NOT_PROVEN
     content["multipliers"].pop()

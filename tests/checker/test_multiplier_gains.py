@@ -108,7 +108,16 @@ def claimed(content):
     return (peaks if "measure" in content else multipliers).claimed(content)
 
 
-LATER = {"sector", "parameter", "dynamics", "window", "delay", "peak, sector", "energy, box"}
+LATER = {
+    "sector",
+    "copies",
+    "parameter",
+    "dynamics",
+    "window",
+    "delay",
+    "peak, sector",
+    "energy, box",
+}
 """Made in the slow set alone."""
 
 

@@ -351,7 +351,8 @@ def _of_lft(loop: LFT, rate: Any, options: Mapping[str, Any]) -> Certificate:
 
     if rate is not None and not np.all(np.isinf(np.asarray(rate, float))):
         raise InputError(
-            "rate: the loop is an LFT, certified where p may jump; where it is constant"
-            " synthesis.robust.worst_case_gain(made.closed(), cells=32) proves the gain"
+            "rate: the loop is an LFT, certified where p may jump; made.closed() is the loop:"
+            " synthesis.robust.worst_case_gain(loop, cells=32) proves its gain where p is constant,"
+            " and in continuous time synthesis.robust.rational_gain(loop, rate) at limited rates"
         )
     return lft_gain(loop.reduce(), **options)

@@ -148,7 +148,7 @@ class _Opened:
     @classmethod
     def of(cls, plant: Plant, K: LPVStateSpace) -> _Opened:
         own = plant.model
-        model = own.model if isinstance(own, UncertainStateSpace) else own
+        model = own.model if isinstance(own, UncertainStateSpace) else plant.nominal
         w, z = list(plant.disturbances), list(plant.performance)
         if isinstance(own, UncertainStateSpace):
             w += own.perturbation_inputs

@@ -189,6 +189,7 @@ def multiplier_gain(
     function depend on time, and 7.08 where it does not:
 
     >>> from symheli import LinearModel
+    >>> from synthesis.robust import StaticBlock
     >>> A, B = [[-0.2, -1.0], [1.0, 0.0]], [[-1.0, -1.0], [0.0, 0.0]]
     >>> C, D = [[1.0, 1.0], [1.0, 1.0]], [[0.0, 0.0], [0.0, 0.0]]
     >>> loop = LinearModel(A, B, C, D, ["a", "b"], ["w", "f"], ["v", "y"])

@@ -107,9 +107,10 @@ class Family(NamedTuple):
         stability.
         """
         rows = own[:, [self.plant.B.shape[1] + i for i in self.plant.out]]
-        finite = np.asarray(np.isfinite(rows).all(axis=(1, 2)))
-        values = np.linalg.svd(np.where(finite[:, None, None], rows, 0.0), compute_uv=False)[:, 0]
-        return np.where(finite, values, math.inf)
+        out = np.full(len(rows), math.inf)
+        finite = np.flatnonzero(np.all(np.isfinite(rows), axis=(1, 2)))
+        out[finite] = np.linalg.svd(rows[finite], compute_uv=False)[:, 0]
+        return out
 
     def stable(self, numbers: Sequence[float]) -> bool:
         """Whether a member is stable, or has a delay or dynamics, for which it is not known."""
@@ -121,7 +122,7 @@ class Family(NamedTuple):
         """Whether the loop with gains (inputs, outputs) in place of its blocks is stable."""
         A, B, C, D = self.plant[:4]
         poles = np.linalg.eigvals(A + B @ closing(C, D, N)[0])
-        return bool(np.all(np.abs(poles) < 1 if self.dt else poles.real < 0))
+        return bool(np.all(np.abs(poles) < 1 if self.dt else np.real(poles) < 0))
 
     def grid(self) -> Array:
         """Return frequencies, rad/s."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -19,7 +20,7 @@ from scipy import linalg
 from symheli.lpv.bases import Polynomial
 from symheli.values.arrays import Array
 from synthesis.numerics.program.affine_program import AffineProgram, BernsteinCell, cells
-from synthesis.numerics.program.cone_program import Solver
+from synthesis.numerics.program.cone_program import Solver, solve
 from synthesis.robust.multipliers import inequality
 from synthesis.robust.multipliers.loop import Plant, Wired, around_nominal, extended
 
@@ -141,9 +142,26 @@ class Search:
         self.fine = self.responses(grid, X)
         self.sizes = np.abs(self.fine.turned(self.fine.terms)).max(axis=(1, 2, 3))
         self.sizes[self.sizes == 0] = 1.0
+        self._join_sizes()
         around = peak * np.exp(np.linspace(-AROUND, AROUND, 9)) if peak > 0 else np.ones(0)
         line = self._frequencies(FREQUENCIES)
         self.points = self.responses(np.unique(np.r_[line, around]))
+
+    def _join_sizes(self) -> None:
+        """Divide the entries of a matrix that is positive by those of its diagonal."""
+        start = 0
+        for kind, _, _ in self.blocks:
+            own = self.sizes[start : start + kind.count]
+            each = [kind.matrices(e) for e in np.eye(kind.count)]
+            for q in range(len(each[0]) if each else 0):
+                F = np.array([M[q] for M in each])
+                diagonal = {
+                    int(i): k for k, i in zip(*np.nonzero(np.einsum("kii->ki", F)), strict=True)
+                }
+                for k, i, j in zip(*np.nonzero(F), strict=True):
+                    if i < j:
+                        own[k] = math.sqrt(own[diagonal[int(i)]] * own[diagonal[int(j)]])
+            start += kind.count
 
     def _frequencies(self, count: int) -> Array:
         poles = np.linalg.eigvals(self.loop.A) if len(self.loop.A) else np.ones(1)
@@ -345,7 +363,7 @@ class Search:
         if aim != GAIN:
             self._within(program, cell, count if inside else 0)
         self._admit(program, cell)
-        found = program.minimise(cost, self.solver)
+        found = solve(replace(program.cone_program(cost), own_units=True), self.solver)
         if found.x is None:
             return None
         x = float(found.x[-1]) / unit

@@ -263,7 +263,7 @@ def bounds_are_in_order(kind, seed, dt=None):
     return found
 
 
-QUICK = "sector", "odd", "jumping"
+QUICK = "sector", "jumping"
 
 
 @pytest.mark.parametrize("kind", QUICK)
@@ -278,11 +278,12 @@ def test_many_proven_gains_are_above_those_of_members(kind, seed):
     bounds_are_in_order(kind, seed)
 
 
-@pytest.mark.parametrize("kind", ["odd", "dynamics"])
+@pytest.mark.parametrize("kind", ["odd", pytest.param("dynamics", marks=pytest.mark.slow)])
 def test_sampled_loops_are_proven_too(kind):
     bounds_are_in_order(kind, 3, dt=1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["parameter", "dynamics"])
 def test_the_bound_of_one_linear_block_is_its_worst_gain(kind):
     """Of one constant parameter, or one block of dynamics, D and G scalings lose nothing; lags of
@@ -292,6 +293,7 @@ def test_the_bound_of_one_linear_block_is_its_worst_gain(kind):
     assert found.upper < found.lower * 1.03
 
 
+@pytest.mark.slow
 def test_the_lower_bound_of_a_parameter_is_the_norm_of_its_loop():
     model = random_loop(4)
     found = multiplier_gain(model, ParameterBlock("w", "v", -0.05, 0.05), poles=[1.0])
@@ -302,6 +304,7 @@ def test_the_lower_bound_of_a_parameter_is_the_norm_of_its_loop():
     assert found.lower == pytest.approx(max(gains), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_several_blocks_of_different_kinds_are_taken_together():
     A = np.diag([-1.0, -2.0, -3.0])
     B, C = 0.3 * np.ones((3, 4)), np.ones((4, 3))
@@ -317,6 +320,7 @@ def test_several_blocks_of_different_kinds_are_taken_together():
     assert len(found.member) == 3
 
 
+@pytest.mark.slow
 def test_a_simulated_saturation_stays_below_the_proven_gain():
     """Energies of a simulation by fixed steps of a hundredth of a second."""
     model = SECTOR
@@ -374,6 +378,7 @@ def own_multiplier(bound, dt=None):
     return OwnMultiplier(["w"], ["v"], psi, [np.diag([1.0, -1.0])])
 
 
+@pytest.mark.slow
 def test_a_multiplier_of_ones_own_is_that_of_the_block_it_describes():
     """bound^2 |v|^2 - |d|^2 without lags, as of a parameter that jumps without its skew part."""
     own = multiplier_gain(CDELAY, own_multiplier(0.3))

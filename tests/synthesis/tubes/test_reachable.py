@@ -144,7 +144,7 @@ def test_laub_loomis_from_the_smallest_box_stays_below_its_limit():
     found = reachable(laub_loomis(), box, 20.0, step=0.02)
     assert found.why == ""
     assert found.bounds("x4")[1] < 4.5
-    assert found.width("x4", 20.0) < 0.006  # CORA, JuliaReach: about .004 to .005
+    assert found.width("x4", 20.0) < 0.006  # .0042 where it was measured
 
 
 def quadrotor():
