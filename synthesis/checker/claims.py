@@ -125,6 +125,9 @@ def _lyapunov(plant: Any, own: Any) -> Claim:
         demands, refused = _at_least(demands)
     hypotheses = [f"any convex combination of {count} models of {n} states, changing in any way, in"
                   f" {time}"]  # fmt: skip
+    if own["K"] is not None:
+        each = ", the combination is that of the closed loops of each K" if len(K) > 1 else ""
+        hypotheses.append(f"closed by u = K x{each}")
     return Claim(said, hypotheses, demands, refused=refused)
 
 

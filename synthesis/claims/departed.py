@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from fractions import Fraction
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -21,14 +22,25 @@ from synthesis.numerics.polynomial.spectrum import decays
 STARTS = 12
 """States from which a motion is integrated."""
 FAR, OUT = 1e3, 30.0
-"""Size of a motion, in half widths of a box that holds {V <= rho}, at which it has left for good;
-and at which it has where the integrator cannot go on, as in a finite escape time.
+"""Size of a motion, in half widths of a box that holds {V <= rho} and times the range of the
+coefficients there, at which it has left for good; and at which it has where the integrator cannot
+go on, as in a finite escape time.
 """
-LONG = 1e4
+SUDDEN = 1e-9
+"""Part of the time of a motion in which it would grow by its own size, in a finite escape."""
+TURNS, LEVEL = 8, 1e-2
+"""Turns of a state from which on it circles, and how much smaller they may become, as steps of an
+integrator miss a peak.
+"""
+CLOSE = 1e-6
+"""Relative distance of an equilibrium at which a motion has come to rest."""
+LONG = 100.0
 """Time of a motion, in times that the states need to move by their own size."""
+MOST_RATES = 80_000
+"""Values of f in all motions of a claim, beyond which no more is flown."""
 NEAR = 0.05
 """Part of its first size to which a motion falls before it counts as one that tends to zero."""
-METHODS = (("LSODA", 1e-9), ("Radau", 1e-11))
+METHODS = (("LSODA", 1e-9), ("Radau", 1e-8))
 """Integrators, of different families, and their relative tolerance."""
 SMALL = 10**6
 """Largest denominator, in units of the box, of an equilibrium that is tried in rationals."""
@@ -65,13 +77,14 @@ def _unstable(plant: PolynomialPlant) -> Found:
 
 
 def _left(f: Any, claim: RegionClaim, region: Region, starts: Array) -> Found | None:
-    rate = compiled(f)
+    rate, J, spent = compiled(f), jacobian(f), count()
+    far = FAR * _range(f)
     for z in starts:
         exact = [Fraction(float(v)) for v in z]
         if value(region.V, exact) > claim.rho:
             continue
-        first = _flown(rate, z, *METHODS[0])
-        if first is None or _flown(rate, z, *METHODS[1]) is None:
+        first = _flown(rate, J, z, far, spent, *METHODS[0])
+        if first is None or _flown(rate, J, z, far, spent, *METHODS[1]) is None:
             continue
         time, states = first
         units = np.array([float(u) for u in region.units])
@@ -86,8 +99,24 @@ def _left(f: Any, claim: RegionClaim, region: Region, starts: Array) -> Found | 
     return None
 
 
+class _Spent(Exception):
+    """The work for the motions of a claim is done."""
+
+
+def _range(f: Any) -> float:
+    """Return the largest over the least coefficient: how far a motion may go out and come back."""
+    sizes = [abs(c) for own in f for c in own.values()]
+    return float(max(sizes) / min(sizes)) if sizes else 1.0
+
+
 def _flown(
-    rate: Callable[[Array], Array], z: Array, method: Any, tolerance: float
+    rate: Callable[[Array], Array],
+    J: Any,
+    z: Array,
+    far: float,
+    spent: Iterator[int],
+    method: Any,
+    tolerance: float,
 ) -> tuple[Array, Array] | None:
     """Return (time, states) of a motion that does not tend to zero; None of one that may."""
     from scipy.integrate import solve_ivp
@@ -97,33 +126,67 @@ def _flown(
         return None
 
     def gone(t: float, x: Array) -> float:
-        return FAR - float(np.abs(x).max())
+        return far - float(np.abs(x).max())
 
     def back(t: float, x: Array) -> float:
         return float(np.abs(x).max()) - NEAR * float(np.abs(z).max())
+
+    def counted(t: float, x: Array) -> Array:
+        if next(spent) > MOST_RATES:
+            raise _Spent
+        return rate(x)
 
     gone.terminal = back.terminal = True  # type: ignore[attr-defined]
     horizon = LONG * float(np.abs(z).max()) / speed
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # of a motion that ends in finite time
-        found = solve_ivp(
-            lambda t, x: rate(x), (0.0, horizon), z, method=method, rtol=tolerance, atol=1e-12,
-            events=[gone, back],
-        )  # fmt: skip
+        try:
+            found = solve_ivp(counted, (0.0, horizon), z, method=method, rtol=tolerance,
+                              atol=1e-12, events=[gone, back])  # fmt: skip
+        except _Spent:
+            return None
     size = np.abs(found.y).max(axis=0)
-    escaped = len(found.t_events[0]) > 0 or (found.status < 0 and size[-1] > OUT)
+    escaped = len(found.t_events[0]) > 0 or (found.status < 0 and _sudden(rate, found))
     # to the end of a long time it is no nearer than it began: it circles or rests elsewhere
-    late = size[found.t > horizon / 2]
-    stayed = found.status == 0 and len(late) > 0 and bool(late.min() >= size[0])
-    return (found.t, found.y.T) if escaped or stayed else None
+    late = found.y[:, found.t > horizon / 2]
+    stayed = found.status == 0 and late.size > 0 and np.abs(late).max(axis=0).min() >= size[0]
+    stays = stayed and (_at_rest(rate, J, found.y[:, -1]) or _circles(late))
+    return (found.t, found.y.T) if escaped or stays else None
+
+
+def _sudden(rate: Callable[[Array], Array], found: Any) -> bool:
+    """Whether a motion that ends far out grows by its own size in no time."""
+    x, t = found.y[:, -1], float(found.t[-1])
+    size = float(np.abs(x).max())
+    return size > OUT and SUDDEN * t * float(np.abs(rate(x)).max()) > size
+
+
+def _at_rest(rate: Callable[[Array], Array], J: Any, x: Array) -> bool:
+    """Whether an equilibrium is at x."""
+    near = _newton(rate, J, x)
+    return near is not None and bool(np.abs(near - x).max() <= CLOSE * np.abs(x).max())
+
+
+def _circles(late: Array) -> bool:
+    """Whether a state turns back and forth, to no smaller values: a motion may also creep."""
+    for own in late:
+        turns = np.flatnonzero(np.diff(np.sign(np.diff(own))) != 0)
+        first, last = np.array_split(np.abs(own), 2)
+        if len(turns) >= TURNS and last.max() >= (1 - LEVEL) * first.max() > 0:
+            return True
+    return False
+
+
+def jacobian(f: Any) -> list[list[Any]]:
+    """Return df_i/dx_j."""
+    return [[derivative(own, j) for j in range(len(f))] for own in f]
 
 
 def _resting(
     plant: PolynomialPlant, claim: RegionClaim, region: Region, f: Any, starts: Array
 ) -> Found | None:
     """Return an equilibrium of {V <= rho} other than zero, in rationals."""
-    rate = compiled(f)
-    J = [[derivative(own, j) for j in range(len(f))] for own in f]
+    rate, J = compiled(f), jacobian(f)
     for z in starts:
         near = _newton(rate, J, z)
         if near is None or not np.abs(near).max() > 1e-3 * np.abs(z).max():
