@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from itertools import count
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -119,13 +120,43 @@ def _flown(
     tolerance: float,
 ) -> tuple[Array, Array] | None:
     """Return (time, states) of a motion that does not tend to zero; None of one that may."""
-    from scipy.integrate import solve_ivp
-
     speed = float(np.abs(rate(z)).max())
     if speed == 0:
         return None
+    horizon = LONG * float(np.abs(z).max()) / speed
+    try:
+        found = _integrated(rate, z, horizon, FAR, spent, method, tolerance)
+        gone = len(found.t_events[0]) > 0
+        if gone and far > FAR and not _sudden(rate, found):
+            found = _integrated(rate, z, horizon, far, spent, method, tolerance)
+            gone = len(found.t_events[0]) > 0
+    except _Spent:
+        return None
+    escaped = gone or (found.status < 0 and _sudden(rate, found))
+    # to the end of a long time it is no nearer than it began: it circles or rests elsewhere
+    size = np.abs(found.y).max(axis=0)
+    late = found.y[:, found.t > horizon / 2]
+    stayed = found.status == 0 and late.size > 0 and np.abs(late).max(axis=0).min() >= size[0]
+    stays = stayed and (_at_rest(rate, J, found.y[:, -1]) or _circles(late))
+    return (found.t, found.y.T) if escaped or stays else None
+
+
+def _integrated(
+    rate: Callable[[Array], Array],
+    z: Array,
+    horizon: float,
+    far: float,
+    spent: Iterator[int],
+    method: Any,
+    tolerance: float,
+) -> Any:
+    """Return a motion until it is far out, near zero, or the time is over."""
+    from scipy.integrate import solve_ivp
+
+    seen: list[tuple[float, Array]] = []
 
     def gone(t: float, x: Array) -> float:
+        seen.append((t, np.array(x)))
         return far - float(np.abs(x).max())
 
     def back(t: float, x: Array) -> float:
@@ -137,21 +168,22 @@ def _flown(
         return rate(x)
 
     gone.terminal = back.terminal = True  # type: ignore[attr-defined]
-    horizon = LONG * float(np.abs(z).max()) / speed
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # of a motion that ends in finite time
         try:
-            found = solve_ivp(counted, (0.0, horizon), z, method=method, rtol=tolerance,
-                              atol=1e-12, events=[gone, back])  # fmt: skip
-        except _Spent:
-            return None
-    size = np.abs(found.y).max(axis=0)
-    escaped = len(found.t_events[0]) > 0 or (found.status < 0 and _sudden(rate, found))
-    # to the end of a long time it is no nearer than it began: it circles or rests elsewhere
-    late = found.y[:, found.t > horizon / 2]
-    stayed = found.status == 0 and late.size > 0 and np.abs(late).max(axis=0).min() >= size[0]
-    stays = stayed and (_at_rest(rate, J, found.y[:, -1]) or _circles(late))
-    return (found.t, found.y.T) if escaped or stays else None
+            return solve_ivp(counted, (0.0, horizon), z, method=method, rtol=tolerance,
+                             atol=1e-12, events=[gone, back])  # fmt: skip
+        except ValueError:  # the instant of an event is not found between two steps of an escape
+            return _seen(seen, far)
+
+
+def _seen(seen: Sequence[tuple[float, Array]], far: float) -> Any:
+    """Return the steps of a motion up to the first one that is far out."""
+    out = next((k for k, (_, x) in enumerate(seen) if np.abs(x).max() > far), None)
+    kept = seen if out is None else seen[: out + 1]
+    t, y = (np.array(each) for each in zip(*kept, strict=True))
+    ends = [t[-1:] if out is not None else t[:0], t[:0]]
+    return SimpleNamespace(t=t, y=y.T, t_events=ends, status=-1)
 
 
 def _sudden(rate: Callable[[Array], Array], found: Any) -> bool:
