@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 
 from . import bounded_regions
 from .demands import Claim, Demand, exponential
-from .exact import Rows
+from .exact import nonnegative
 from .functions import solved
 from .polynomials import Polynomial, block, combined, diagonal, even, matrix, scalar, variable, zero
 from .reading import INFINITE, Unreadable, array, ascending, limit, number, period, whole
@@ -41,24 +41,6 @@ def claimed(content: Any) -> Claim:
     if kinds == ("polynomial", "region"):
         return bounded_regions.claimed(plant, own, content)
     raise Unreadable(f"a claim {kinds!r:.60} is not known")
-
-
-def nonnegative(M: Rows) -> bool:
-    """Whether a symmetric matrix of integers is positive semidefinite, by elimination."""
-    own, before = [list(row) for row in M], 1
-    while own:
-        pivot, head = own[0][0], own[0][1:]
-        if pivot < 0 or (pivot == 0 and any(head)):
-            return False
-        if pivot == 0:
-            own = [row[1:] for row in own[1:]]
-            continue
-        own = [
-            [(pivot * v - row[0] * top) // before for v, top in zip(row[1:], head, strict=True)]
-            for row in own[1:]
-        ]
-        before = pivot
-    return True
 
 
 def _stack(value: Any, name: str, count: int | None, *size: int | None) -> Stack:
@@ -143,6 +125,9 @@ def _lyapunov(plant: Any, own: Any) -> Claim:
         demands, refused = _at_least(demands)
     hypotheses = [f"any convex combination of {count} models of {n} states, changing in any way, in"
                   f" {time}"]  # fmt: skip
+    if own["K"] is not None:
+        each = ", the combination is that of the closed loops of each K" if len(K) > 1 else ""
+        hypotheses.append(f"closed by u = K x{each}")
     return Claim(said, hypotheses, demands, refused=refused)
 
 

@@ -109,6 +109,24 @@ def pivots_positive(M: Rows) -> bool:
     return True
 
 
+def nonnegative(M: Rows) -> bool:
+    """Whether a symmetric matrix of integers is positive semidefinite, by elimination."""
+    own, before = [list(row) for row in M], 1
+    while own:
+        pivot, head = own[0][0], own[0][1:]
+        if pivot < 0 or (pivot == 0 and any(head)):
+            return False
+        if pivot == 0:
+            own = [row[1:] for row in own[1:]]
+            continue
+        own = [
+            [(pivot * v - row[0] * top) // before for v, top in zip(row[1:], head, strict=True)]
+            for row in own[1:]
+        ]
+        before = pivot
+    return True
+
+
 def shortfall(M: Rows) -> float:
     """Return the least multiple of its own diagonal that must be added to M to make it positive
     definite, to three digits: how far it is from being so, in no units.

@@ -2,7 +2,7 @@
 
     dV/dt, or V(f) - V, + x'(Q + K'R K) x < 0 in the set, but at 0
 
-as `regions` has it, and |k x| <= b of every limit where b^2 P - alpha k k' > 0.
+as `regions` has it, Q + K'R K >= 0, and |k x| <= b of every limit where b^2 P - alpha k k' > 0.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from typing import Any
 
 from . import regions
 from .demands import Claim, Demand
+from .exact import nonnegative
 from .polynomials import Polynomial, combined, even, matrix, scalar, variable
 from .reading import Unreadable, array, number, period
 
@@ -37,8 +38,8 @@ def claimed(content: Any) -> Claim:
     known |= dict(zip(controls, K, strict=True))
     if len(f) != n or not (n and m) or any(k not in known or b <= 0 for k, b in bounds):
         raise Unreadable("the file is damaged: equations or limits that do not fit the states")
-    for M in (Q, R):
-        even(M)
+    feedback = matrix(K, n)
+    stage = even(Q) + feedback.T @ even(R) @ feedback
     x = [variable(i) for i in range(n)]
     u = regions.linear(K)
     closed, V = [regions.composed(p, [*x, *u], n) for p in f], _form(P, x)
@@ -46,6 +47,8 @@ def claimed(content: Any) -> Claim:
     if dt is not None:
         change = regions.composed(V, closed, n) - V
     demands, refused = regions.decrease(content, V, change + _form(Q, x) + _form(R, u), alpha)
+    if not refused and not nonnegative(stage.terms[()]):
+        refused = "a cost below zero may fall while the set is left"
     for name, bound in bounds:
         row = matrix([known[name]], n)
         form = even(P) * (bound * bound) - row.T @ row * alpha

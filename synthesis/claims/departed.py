@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
+from itertools import count
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -21,17 +23,26 @@ from synthesis.numerics.polynomial.spectrum import decays
 STARTS = 12
 """States from which a motion is integrated."""
 FAR, OUT = 1e3, 30.0
-"""Size of a motion, in half widths of a box that holds {V <= rho}, at which it has left for good;
-and at which it has where the integrator cannot go on, as in a finite escape time.
+"""Size of a motion, in half widths of a box that holds {V <= rho} and times the range of the
+coefficients there, at which it has left for good; and at which it has where the integrator cannot
+go on, as in a finite escape time.
 """
-LONG = 1e4
+SUDDEN = 1e-9
+"""Part of the time of a motion in which it would grow by its own size, in a finite escape."""
+TURNS, LEVEL = 8, 1e-2
+"""Turns of a state from which on it circles, and how much smaller they may become, as steps of an
+integrator miss a peak.
+"""
+CLOSE = 1e-6
+"""Relative distance of an equilibrium at which a motion has come to rest."""
+LONG = 100.0
 """Time of a motion, in times that the states need to move by their own size."""
+MOST_RATES = 80_000
+"""Values of f in all motions of a claim, beyond which no more is flown."""
 NEAR = 0.05
 """Part of its first size to which a motion falls before it counts as one that tends to zero."""
-METHODS = (("LSODA", 1e-9), ("Radau", 1e-11))
+METHODS = (("LSODA", 1e-9), ("Radau", 1e-8))
 """Integrators, of different families, and their relative tolerance."""
-MOST_STEPS = 20_000
-"""Steps of an integrator after which a motion is left."""
 SMALL = 10**6
 """Largest denominator, in units of the box, of an equilibrium that is tried in rationals."""
 
@@ -67,13 +78,14 @@ def _unstable(plant: PolynomialPlant) -> Found:
 
 
 def _left(f: Any, claim: RegionClaim, region: Region, starts: Array) -> Found | None:
-    rate = compiled(f)
+    rate, J, spent = compiled(f), jacobian(f), count()
+    far = FAR * _range(f)
     for z in starts:
         exact = [Fraction(float(v)) for v in z]
         if value(region.V, exact) > claim.rho:
             continue
-        first = _flown(rate, z, *METHODS[0])
-        if first is None or _flown(rate, z, *METHODS[1]) is None:
+        first = _flown(rate, J, z, far, spent, *METHODS[0])
+        if first is None or _flown(rate, J, z, far, spent, *METHODS[1]) is None:
             continue
         time, states = first
         units = np.array([float(u) for u in region.units])
@@ -88,55 +100,125 @@ def _left(f: Any, claim: RegionClaim, region: Region, starts: Array) -> Found | 
     return None
 
 
+class _Spent(Exception):
+    """The work for the motions of a claim is done."""
+
+
+def _range(f: Any) -> float:
+    """Return the largest over the least coefficient: how far a motion may go out and come back."""
+    sizes = [abs(c) for own in f for c in own.values()]
+    return float(max(sizes) / min(sizes)) if sizes else 1.0
+
+
 def _flown(
-    rate: Callable[[Array], Array], z: Array, method: str, tolerance: float
+    rate: Callable[[Array], Array],
+    J: Any,
+    z: Array,
+    far: float,
+    spent: Iterator[int],
+    method: Any,
+    tolerance: float,
 ) -> tuple[Array, Array] | None:
     """Return (time, states) of a motion that does not tend to zero; None of one that may."""
-    speed, first = float(np.abs(rate(z)).max()), float(np.abs(z).max())
+    speed = float(np.abs(rate(z)).max())
     if speed == 0:
         return None
-    horizon = LONG * first / speed
+    horizon = LONG * float(np.abs(z).max()) / speed
+    try:
+        found = _integrated(rate, z, horizon, FAR, spent, method, tolerance)
+        gone = len(found.t_events[0]) > 0
+        if gone and far > FAR and not _sudden(rate, found):
+            found = _integrated(rate, z, horizon, far, spent, method, tolerance)
+            gone = len(found.t_events[0]) > 0
+    except _Spent:
+        return None
+    escaped = gone or (found.status < 0 and _sudden(rate, found))
+    # to the end of a long time it is no nearer than it began: it circles or rests elsewhere
+    size = np.abs(found.y).max(axis=0)
+    late = found.y[:, found.t > horizon / 2]
+    stayed = found.status == 0 and late.size > 0 and np.abs(late).max(axis=0).min() >= size[0]
+    stays = stayed and (_at_rest(rate, J, found.y[:, -1]) or _circles(late))
+    return (found.t, found.y.T) if escaped or stays else None
+
+
+def _integrated(
+    rate: Callable[[Array], Array],
+    z: Array,
+    horizon: float,
+    far: float,
+    spent: Iterator[int],
+    method: Any,
+    tolerance: float,
+) -> Any:
+    """Return a motion until it is far out, near zero, or the time is over."""
+    from scipy.integrate import solve_ivp
+
+    seen: list[tuple[float, Array]] = []
+
+    def gone(t: float, x: Array) -> float:
+        seen.append((t, np.array(x)))
+        return far - float(np.abs(x).max())
+
+    def back(t: float, x: Array) -> float:
+        return float(np.abs(x).max()) - NEAR * float(np.abs(z).max())
+
+    def counted(t: float, x: Array) -> Array:
+        if next(spent) > MOST_RATES:
+            raise _Spent
+        return rate(x)
+
+    gone.terminal = back.terminal = True  # type: ignore[attr-defined]
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # of a motion that ends in finite time
-        time, states, status = _stepped(rate, z, horizon, method, tolerance)
-    size = np.abs(states).max(axis=1)
-    if size[-1] <= NEAR * first:
-        return None
-    escaped = size[-1] >= FAR or (status == "failed" and size[-1] > OUT)
-    # to the end of a long time it is no nearer than it began: it circles or rests elsewhere
-    late = size[time > horizon / 2]
-    stayed = status == "finished" and len(late) > 0 and bool(late.min() >= first)
-    return (time, states) if escaped or stayed else None
+        try:
+            return solve_ivp(counted, (0.0, horizon), z, method=method, rtol=tolerance,
+                             atol=1e-12, events=[gone, back])  # fmt: skip
+        except ValueError:  # the instant of an event is not found between two steps of an escape
+            return _seen(seen, far)
 
 
-def _stepped(
-    rate: Callable[[Array], Array], z: Array, horizon: float, method: str, tolerance: float
-) -> tuple[Array, Array, str]:
-    """Return times and states until the motion is near zero, far out or at the horizon, and the
-    status of the integrator: "running", "finished", or "failed" where it cannot go on.
-    """
-    from scipy import integrate
+def _seen(seen: Sequence[tuple[float, Array]], far: float) -> Any:
+    """Return the steps of a motion up to the first one that is far out."""
+    out = next((k for k, (_, x) in enumerate(seen) if np.abs(x).max() > far), None)
+    kept = seen if out is None else seen[: out + 1]
+    t, y = (np.array(each) for each in zip(*kept, strict=True))
+    ends = [t[-1:] if out is not None else t[:0], t[:0]]
+    return SimpleNamespace(t=t, y=y.T, t_events=ends, status=-1)
 
-    kind: Any = getattr(integrate, method)
-    solver = kind(lambda t, x: rate(x), 0.0, z, horizon, rtol=tolerance, atol=1e-12)
-    times, states = [0.0], [z]
-    while solver.status == "running" and len(times) < MOST_STEPS:
-        solver.step()
-        if not np.all(np.isfinite(solver.y)):
-            return np.array(times), np.array(states), "failed"
-        times.append(float(solver.t))
-        states.append(solver.y.copy())
-        if not NEAR * np.abs(z).max() < np.abs(solver.y).max() < FAR:
-            break
-    return np.array(times), np.array(states), str(solver.status)
+
+def _sudden(rate: Callable[[Array], Array], found: Any) -> bool:
+    """Whether a motion that ends far out grows by its own size in no time."""
+    x, t = found.y[:, -1], float(found.t[-1])
+    size = float(np.abs(x).max())
+    return size > OUT and SUDDEN * t * float(np.abs(rate(x)).max()) > size
+
+
+def _at_rest(rate: Callable[[Array], Array], J: Any, x: Array) -> bool:
+    """Whether an equilibrium is at x."""
+    near = _newton(rate, J, x)
+    return near is not None and bool(np.abs(near - x).max() <= CLOSE * np.abs(x).max())
+
+
+def _circles(late: Array) -> bool:
+    """Whether a state turns back and forth, to no smaller values: a motion may also creep."""
+    for own in late:
+        turns = np.flatnonzero(np.diff(np.sign(np.diff(own))) != 0)
+        first, last = np.array_split(np.abs(own), 2)
+        if len(turns) >= TURNS and last.max() >= (1 - LEVEL) * first.max() > 0:
+            return True
+    return False
+
+
+def jacobian(f: Any) -> list[list[Any]]:
+    """Return df_i/dx_j."""
+    return [[derivative(own, j) for j in range(len(f))] for own in f]
 
 
 def _resting(
     plant: PolynomialPlant, claim: RegionClaim, region: Region, f: Any, starts: Array
 ) -> Found | None:
     """Return an equilibrium of {V <= rho} other than zero, in rationals."""
-    rate = compiled(f)
-    J = [[derivative(own, j) for j in range(len(f))] for own in f]
+    rate, J = compiled(f), jacobian(f)
     for z in starts:
         near = _newton(rate, J, z)
         if near is None or not np.abs(near).max() > 1e-3 * np.abs(z).max():

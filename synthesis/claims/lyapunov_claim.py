@@ -15,6 +15,8 @@ from symheli.values.summary import summarized
 from synthesis.claims.plants import GridPlant, VertexPlant
 
 KINDS = ("stability", "decay rate", "l2 gain")
+FASTEST = 300.0
+"""Decay of a sample, the logarithm of its factor, beyond which a claim is not read."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +68,9 @@ class LyapunovClaim:
                 "P is not symmetric to the last digit; V = x'Px is that of (P + P')/2: give that"
             )
         object.__setattr__(self, "P", P)
-        bound = 0.0 if self.kind == "stability" else positive(self.bound, "bound", or_zero=True)
+        bound = 0.0
+        if self.kind != "stability":
+            bound = positive(self.bound, "bound", or_zero=self.kind == "decay rate")
         object.__setattr__(self, "bound", bound)
         if self.K is not None:
             K = np.asarray(self.K, dtype=object)
@@ -79,7 +83,9 @@ class LyapunovClaim:
     def sentence(self) -> str:
         """The claim in words."""
         closed = "" if self.K is None else "with u = K x + w: "
-        closed = closed.replace("K", "K of each vertex or point") if self._several else closed
+        closed = (
+            closed.replace("K", "K of each vertex or point") if self.each_has_its_own else closed
+        )
         return (
             closed
             + {
@@ -90,7 +96,8 @@ class LyapunovClaim:
         )
 
     @property
-    def _several(self) -> bool:
+    def each_has_its_own(self) -> bool:
+        """Whether every vertex or point has its own K."""
         return self.K is not None and self.K.ndim == 3
 
     def fitting(self, plant: VertexPlant | GridPlant) -> tuple[Array, Array]:
@@ -113,6 +120,11 @@ class LyapunovClaim:
         if self.kind == "l2 gain" and not (m and plant.C.shape[1]):
             raise InputError(
                 "a gain is from inputs to outputs: give B and C, and D if there is one"
+            )
+        if self.kind == "decay rate" and self.bound * (plant.dt or 0.0) > FASTEST:
+            raise InputError(
+                f"bound: exp(-bound dt) is below exp(-{FASTEST:g}), beyond what doubles hold; give"
+                f" a rate of at most {FASTEST / (plant.dt or 1.0):g} 1/s"
             )
         if len(P) > 1 and isinstance(plant, VertexPlant) and plant.dt is None:
             raise InputError(

@@ -9,6 +9,11 @@ from typing import Any, ClassVar
 from symheli.errors import InputError
 from symheli.values.summary import summarized
 from synthesis.certify.statement.proven_statement import ProvenStatement
+from synthesis.claims.lyapunov_claim import LyapunovClaim
+from synthesis.claims.plants import VertexPlant
+
+MIXED = "the closed loop of a combination of models is the same combination of their closed loops"
+"""Condition of a claim in which each model has its own feedback."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -61,7 +66,9 @@ class ProvenClaim(ProvenStatement):
     @property
     def conditions(self) -> tuple[str, ...]:
         """Conditions of the claim, each a sentence made from the numbers of the proof."""
-        return self.plant.hypotheses
+        own = isinstance(self.given, LyapunovClaim) and self.given.each_has_its_own
+        mixed = own and isinstance(self.plant, VertexPlant) and len(self.plant.A) > 1
+        return (*self.plant.hypotheses, *((MIXED,) if mixed else ()))
 
     @property
     def facts(self) -> Mapping[str, Any]:

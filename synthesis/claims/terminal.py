@@ -174,7 +174,23 @@ def highest(H: Array, h: Array, a: Array, b: Any) -> Highest:
         x = solve(H[own], h[own][:, None])
         if x is not None and all(H @ x[:, 0] <= h):
             return Highest(None, x[:, 0])
-    return _inner(H, h, a, b, found.x)
+    few = _few(H, h, a, b, tight)
+    return _inner(H, h, a, b, found.x) if few is None else Highest(few, None)
+
+
+def _few(H: Array, h: Array, a: Array, b: Any, tight: list[int]) -> Array | None:
+    """Return y >= 0 of fewer rows than states, as of a set that is not bounded; None: not found."""
+    sizes = range(1, min(len(a), len(tight) + 1))
+    for basis in islice((own for k in sizes for own in combinations(tight, k)), MOST_BASES):
+        own = list(basis)
+        y = solve(H[own] @ H[own].T, (H[own] @ a)[:, None])
+        if y is None or any(v < 0 for v in y[:, 0]) or any(H[own].T @ y[:, 0] != a):
+            continue
+        if h[own] @ y[:, 0] <= b:
+            whole = np.array([Fraction(0)] * len(h), dtype=object)
+            whole[own] = y[:, 0]
+            return whole
+    return None
 
 
 def _inner(H: Array, h: Array, a: Array, b: Any, near: Array) -> Highest:
@@ -199,7 +215,7 @@ def _cost(plant: LimitedPlant, claim: TerminalClaim) -> Outcome | None:
         short = float(-value / (x @ P @ x))
         words = f"vertex {k + 1} (the cost falls)" if len(plant.A) > 1 else "the cost"
         place = Place(words, None, x.astype(float), short)
-        more = next((f for f in FACTORS if _falls(plant, claim, as_fraction(1 + f))), None)
+        more = next((f for f in FACTORS if _falls(plant, claim, 1 + f)), None)
         reason = "The terminal cost falls by less than the stage cost in one direction."
         if more is not None:
             reason += f" {1 + more!r} P as terminal cost does fall by as much."
@@ -207,8 +223,9 @@ def _cost(plant: LimitedPlant, claim: TerminalClaim) -> Outcome | None:
     return None
 
 
-def _falls(plant: LimitedPlant, claim: TerminalClaim, factor: Fraction) -> bool:
-    P, K = rationals(claim.P) * factor, rationals(claim.K)
+def _falls(plant: LimitedPlant, claim: TerminalClaim, factor: float) -> bool:
+    """Whether the cost falls with a multiple of P, rounded to doubles as one who follows it has."""
+    P, K = rationals(factor * claim.P), rationals(claim.K)
     stage = rationals(claim.Q) + K.T @ rationals(claim.R) @ K
     forms = (not_positive(P - A.T @ P @ A - stage) for A in closed(plant, claim))
     return all(found is None or found[0] == 0 for found in forms)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ast
+import operator
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any, NamedTuple
@@ -17,6 +19,10 @@ ADVICE = (
     "write it with + - * and whole powers, for instance by a Taylor polynomial about the"
     " equilibrium; the proof is of that model then"
 )
+
+
+HIGHEST = 60
+"""Largest power in a text."""
 
 
 class Equations(NamedTuple):
@@ -88,7 +94,8 @@ def _of_sympy(f: Any, states: Any, controls: Any) -> Equations:
 
     def read(expression: Any, name: str) -> SparsePolynomial:
         try:
-            own = sympy.sympify(expression)
+            own = _of_text(expression, x) if isinstance(expression, str) else expression
+            own = sympy.sympify(own)
             exact = own.replace(lambda e: e.is_Float, lambda e: sympy.Rational(float(e)))
             poly = sympy.Poly(exact, *x)
             terms: Any = {k: Fraction(int(c.p), int(c.q)) for k, c in poly.terms()}
@@ -102,6 +109,35 @@ def _of_sympy(f: Any, states: Any, controls: Any) -> Equations:
     names = tuple(map(str, x))
     polynomials = tuple(read(e, f"the equation of {s}") for e, s in zip(every, x, strict=False))
     return Equations(names[:n], names[n:], polynomials, read)
+
+
+def _of_text(text: str, x: Sequence[Any]) -> Any:
+    """Return the polynomial of a text in the symbols x; nothing else of the text is evaluated."""
+    import sympy
+
+    by = {str(each): each for each in x}
+    do = {ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul,
+          ast.Div: operator.truediv}  # fmt: skip
+
+    def read(node: ast.AST) -> Any:
+        match node:
+            case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
+                return sympy.sympify(value)
+            case ast.Name(id=name) if name in by:
+                return by[name]
+            case ast.UnaryOp(op=ast.USub() | ast.UAdd() as sign, operand=own):
+                return -read(own) if isinstance(sign, ast.USub) else read(own)
+            case ast.BinOp(left=own, op=ast.Pow(), right=ast.Constant(value=int() as power)):
+                if 0 <= power <= HIGHEST:
+                    return read(own) ** power
+            case ast.BinOp(left=left, op=kind, right=right) if type(kind) in do:
+                return do[type(kind)](read(left), read(right))
+        raise TypeError(f"no polynomial: {ast.dump(node):.80}")
+
+    try:
+        return read(ast.parse(text.strip().replace("^", "**"), mode="eval").body)
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        raise TypeError(str(error)) from error
 
 
 def _of_casadi(f: Any, states: Any, controls: Any) -> Equations:

@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from symheli.values.arrays import Array
+from synthesis.numerics.polynomial.direction import not_positive
 from synthesis.numerics.polynomial.exact import exact, positive_definite, rational
 from synthesis.numerics.polynomial.gram import gram_polynomial, has_pure_powers, positive_on_all
 from synthesis.numerics.polynomial.multivariate import (
@@ -94,3 +95,17 @@ def _regular(T: Array) -> bool:
     """Whether T'T is positive definite."""
     own = exact(T, rational())
     return positive_definite(own.T @ own)
+
+
+def costs(Q: Array, R: Array, K: Array) -> bool:
+    """Whether Q + K'R K is positive semidefinite, in rational arithmetic."""
+    weights, moves, feedback = (exact(M, rational()) for M in (Q, R, K))
+    found = not_positive(weights + feedback.T @ moves @ feedback)
+    return found is None or found[0] == 0
+
+
+def within(P: Array, row: Array, bound: float, alpha: float) -> bool:
+    """Whether |row x| < bound for all x'P x <= alpha, in rational arithmetic."""
+    number = rational()
+    k, own = exact(row[None], number), exact(P, number)
+    return positive_definite(own * number(bound) ** 2 - (k.T @ k) * number(alpha))

@@ -20,7 +20,6 @@ from symheli.values.numbers import by_name, positive
 from symheli.values.summary import summarized
 from synthesis.certify.questions.certificate_file import decoded, encoded
 from synthesis.certify.statement.proven_statement import ProvenStatement
-from synthesis.numerics.polynomial.exact import exact, positive_definite, rational
 from synthesis.numerics.polynomial.multivariate import SparsePolynomial, linear_substitution
 from synthesis.numerics.polynomial.symmetric import symmetrized
 from synthesis.numerics.program.cone_program import Solver, general_solver
@@ -28,7 +27,7 @@ from synthesis.regions.equations import Equations, equations
 from synthesis.regions.files import read_proof, read_terms, written_proof, written_terms
 from synthesis.regions.growth import linearization
 from synthesis.regions.levels import NOTHING, LevelSearch
-from synthesis.regions.proof import RegionProof, why_not
+from synthesis.regions.proof import RegionProof, costs, why_not, within
 
 if TYPE_CHECKING:
     import casadi
@@ -40,6 +39,10 @@ SHARES = (0.05, 0.3, 0.6, 0.9, 0.97)
 INFINITE = 1e10
 """Bound that acados takes for none."""
 MATRICES = ("Q", "R", "K", "P")
+COSTLESS = (
+    "Q + K'R K is not positive semidefinite to the last digit, so that a set may be left while the"
+    " cost falls: add a small multiple of the identity to Q"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,11 +119,13 @@ class TerminalSet(ProvenStatement):
         if any((0,) * p.size in p.terms for p in self.f):
             return "f is not 0 at 0"
         V = quadratic_form(self.P)
+        if not costs(self.Q, self.R, self.K):
+            return COSTLESS
         change = decrease(self.f, V, self.K, self.Q, self.R, self.dt)
         if not (math.isfinite(self.alpha) and self.alpha > 0):
             return "the level is no number above 0"
         for name, bound in self.bounds:
-            if not _within(self.P, self.row(name), bound, self.alpha):
+            if not within(self.P, self.row(name), bound, self.alpha):
                 return f"the limit of {name} is not kept"
         return why_not(V, change, self.alpha, self.proof)
 
@@ -319,13 +324,6 @@ def decrease(
     closed = [p.composed((*x, *u)) for p in f]
     change = V.along(closed) if dt is None else V.composed(closed) - V
     return change + quadratic_form(Q) + quadratic_form(R).composed(u)
-
-
-def _within(P: Array, row: Array, bound: float, alpha: float) -> bool:
-    """Whether |row x| < bound for all x'P x <= alpha, in rational arithmetic."""
-    number = rational()
-    k, own = exact(row[None], number), exact(P, number)
-    return positive_definite(own * number(bound) ** 2 - (k.T @ k) * number(alpha))
 
 
 @with_one_thread

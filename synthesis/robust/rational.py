@@ -90,8 +90,8 @@ class RationalGain(ProvenStatement):
 
     def verify(self, rigorous: bool = True) -> bool:
         """Check the inequalities again, in rational arithmetic always."""
-        level = self.gamma**2 if self.lft.inputs else 0.0
-        return bool(self.P.size) and math.isfinite(level) and holds(self.lft, self.P, self.F, level)
+        gain = self.gamma if self.lft.inputs else 0.0
+        return bool(self.P.size) and math.isfinite(gain) and holds(self.lft, self.P, self.F, gain)
 
     @property
     def claim(self) -> str:

@@ -111,10 +111,12 @@ def inequalities(own: Parts, P: Any, F: Any, rates: Sequence[Any], level: Any) -
         yield total
 
 
-def holds(lft: LFTMatrices, P: Array, F: Array, level: float) -> bool:
-    """Whether P and F, by Bernstein coefficients on [-1, 1]^m, prove this square of the gain: in
-    rational arithmetic.
+def holds(lft: LFTMatrices, P: Array, F: Array, gain: float) -> bool:
+    """Whether P and F, by Bernstein coefficients on [-1, 1]^m, prove this gain: in rational
+    arithmetic.
     """
+    if gain < 0 or not np.array_equal(P, np.swapaxes(P, -1, -2)):
+        return False  # of P lower triangles alone are read below
     number: Any = rational()
     own, box = Parts.of(lft).exactly(), box_of(lft.blocks)
     rates = delta_rates(lft)
@@ -124,7 +126,7 @@ def holds(lft: LFTMatrices, P: Array, F: Array, level: float) -> bool:
     V, held = (convert(PolynomialMatrix(box, M), number) for M in (P, F))
     if not negative_definite_exactly(-V):
         return False
-    eye = np.eye(own.inputs, dtype=int) * number(float(level)) + number(0)
+    eye = np.eye(own.inputs, dtype=int) * number(float(gain)) ** 2 + number(0)
     bound = PolynomialMatrix.constant(eye, V.box)
     limits = [number(0 if rate is None else rate) for rate in rates]
     return all(

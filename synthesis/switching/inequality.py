@@ -21,6 +21,8 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from symheli.values.arrays import Array
 from synthesis.numerics.polynomial.definite import negative_definite_exactly
 from synthesis.numerics.polynomial.exact import exact, positive_definite, rational
@@ -54,6 +56,10 @@ def holds(
     P[i] (3 K + 1, n, n) are the Bernstein coefficients of mode i on K segments of these `lengths`,
     s; sampled (samples + 1, n, n) its values.
     """
+    if any(length <= 0 for length in lengths):
+        return False
+    if not all(np.array_equal(M, np.swapaxes(M, -1, -2)) for M in P):
+        return False  # lower triangles alone are read below
     number = rational()
     own = [exact(each, number) for each in P]
     steps = [number(float(length)) for length in lengths]

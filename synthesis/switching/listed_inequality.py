@@ -107,6 +107,10 @@ def holds(models: Listed, P: Array, letters: int, level: float, degree: int, gai
     """Whether P (N^letters, n, n) proves the bound, whose power is the level: the square of a gain
     or of a factor a sample, to the `degree` of the monomials; twice an exponent times it.
     """
+    if not np.array_equal(P, np.swapaxes(P, -1, -2)):
+        return False  # lower triangles alone are read below
+    if level < 0 and (gain or models.dt is not None):
+        return False  # its square says nothing
     own, number = models.exactly().lifted(degree), rational()
     if gain:
         own = models.exactly()

@@ -96,8 +96,8 @@ class PeriodicGain(ProvenStatement):
 
     def verify(self, rigorous: bool = True) -> bool:
         """Check the inequalities again, in rational arithmetic always."""
-        level = self.gamma**2 if self._driven else 0.0
-        return bool(len(self.P)) and math.isfinite(level) and holds(self.turning, self.P, level)
+        gain = self.gamma if self._driven else 0.0
+        return bool(len(self.P)) and math.isfinite(gain) and holds(self.turning, self.P, gain)
 
     @property
     def claim(self) -> str:

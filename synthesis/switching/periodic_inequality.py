@@ -155,16 +155,18 @@ def inequalities(own: Turning, P: Sequence[Any], level: Any, half: Half) -> Iter
     yield block([[top, side], [side.T, last]])
 
 
-def holds(own: Turning, P: Array, level: float) -> bool:
-    """Whether the terms P (1 + 2 K, n, n) prove this square of the gain, or stability of a model
-    without inputs; in rational arithmetic.
+def holds(own: Turning, P: Array, gain: float) -> bool:
+    """Whether the terms P (1 + 2 K, n, n) prove this gain, or stability of a model without inputs;
+    in rational arithmetic.
     """
+    if gain < 0 or not np.array_equal(P, np.swapaxes(P, -1, -2)):
+        return False  # of P lower triangles alone are read below
     number: Any = rational()
     exactly, terms = own.exactly(), exact(P, number)
     for side in (1, -1):
         half = Half(side, number(0))
         each = [half.known(M) for M in terms]
-        eye = np.eye(own.matrices[1].shape[-1], dtype=int) * number(float(level))
+        eye = np.eye(own.matrices[1].shape[-1], dtype=int) * number(float(gain)) ** 2
         forms = inequalities(exactly, each, half.known(eye), half)
         if not all(negative_definite_exactly(form) for form in forms):
             return False

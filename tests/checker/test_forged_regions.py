@@ -159,3 +159,24 @@ def test_a_forged_terminal_set_is_refused(forged, terminal_file, tmp_path, capsy
         pass
     assert report.main([str(tmp_path / "forged.json")]) != PROVEN
     capsys.readouterr()
+
+
+def test_a_cost_below_zero_does_not_let_a_set_be_left(tmp_path, capsys):
+    """x' = 1.5 x leaves every set, but of V = x^2 with Q = -10 dV/dt - 10 x^2 = -7 x^2."""
+    one = {"shape": [1, 1], "array": [1.0]}
+    content = {
+        "schema": "symheli statement", "version": 2, "statement": "terminal-set",
+        "kind": "terminal set", "states": ["x"], "controls": ["u"],
+        "f": [[[[1, 0], "3/2"], [[0, 1], "1"]]], "dt": None, "bounds": [["u", 1.0]],
+        "Q": {"shape": [1, 1], "array": [-10.0]}, "R": one, "P": one, "alpha": 1.0,
+        "K": {"shape": [1, 1], "array": [0.0]}, "T": one,
+        "sum_V": {"monomials": [[1]], "Q": one}, "sum_sigma": {"monomials": [[0]], "Q": one},
+        "sum_s": {"monomials": [[1]], "Q": one},
+        "sum_rest": {"monomials": [[1], [2]], "Q": {"shape": [2, 2], "array": [6.0, 0, 0, 1.0]}},
+    }  # fmt: skip
+    (tmp_path / "forged.json").write_text(json.dumps(content))
+    found = TerminalSet.load(tmp_path / "forged.json")
+    assert not found.verified
+    assert "multiple of the identity to Q" in found.why
+    assert report.main([str(tmp_path / "forged.json")]) != PROVEN
+    assert "cost below zero" in capsys.readouterr().out

@@ -195,9 +195,10 @@ class WaveFamily:
         if lpv.dt is not None:
             poles = np.log(np.where(poles == 0, 1e-12, poles.astype(complex))) / lpv.dt
         pace = np.abs(poles)
-        self.fast = 2 * math.pi / float(pace.max())
+        fastest = float(pace.max()) or 1.0
+        self.fast = 2 * math.pi / fastest
         self.slow = min(2 * math.pi / max(float(pace.min()), 1e-6), 20 * self.fast)
-        self.longest = 0.5 / float(pace.max())
+        self.longest = 0.5 / fastest
         # a slow p covers little of the range in the longest cycle: levels close enough for some
         # steps up and down
         spacing = min((s.high - s.low) / search.levels, self.rate * self.longest_period / 6)

@@ -222,3 +222,23 @@ def test_wrong_levels_and_functions_are_refused():
         RegionClaim("x^2", -1)
     with pytest.raises(InputError, match=r"V\(0\)"):
         check(CUBIC, RegionClaim("1 + x^2", 0.5))
+
+
+@pytest.mark.parametrize(
+    "f",
+    [
+        ["-x + 10000*y", "-y - y^3"],  # goes out 3700 times as far and comes back
+        ["y - x/100000000 - x^3/100000000", "-y - y^3"],  # goes out and creeps back
+    ],
+)
+def test_a_motion_that_comes_back_late_does_not_contradict_a_claim(f):
+    """y decays by itself, and x by itself: every motion tends to zero."""
+    found = check(PolynomialPlant(["x", "y"], f), RegionClaim("x^2 + y^2", 1))
+    assert found.answer == "this P does not prove it"
+
+
+def test_a_motion_that_circles_contradicts_a_claim():
+    circle = PolynomialPlant(["x", "y"], ["y + x*(x^2+y^2-1)*(4-x^2-y^2)",
+                                          "-x + y*(x^2+y^2-1)*(4-x^2-y^2)"])  # fmt: skip
+    found = check(circle, RegionClaim("x^2 + y^2", 1.5))
+    assert (found.answer, found.exact) == ("the claim is false", False)

@@ -5,6 +5,7 @@ import pytest
 from scipy.linalg import solve_discrete_are
 
 from symheli.errors import InputError
+from synthesis.checker import report
 from synthesis.claims import LimitedPlant, TerminalClaim, check
 from synthesis.claims.plants import box_limits
 
@@ -114,3 +115,32 @@ WRONG = {
 def test_wrong_input_is_told_in_a_sentence(said):
     with pytest.raises(InputError, match=said):
         WRONG[said]()
+
+
+def test_the_multiple_of_a_terminal_cost_that_is_named_does_when_it_is_typed():
+    rng, followed = np.random.default_rng(3), 0
+    for _ in range(20):
+        A, B = rng.normal(size=(3, 3)), rng.normal(size=(3, 1))
+        C = rng.normal(size=(1, 3))
+        Q, R = C.T @ C, np.eye(1)
+        P = solve_discrete_are(A, B, Q, R)
+        P, K = (P + P.T) / 2, -np.linalg.solve(R + B.T @ P @ B, B.T @ P @ A)
+        plant, level = LimitedPlant(A, B, **box_limits([1e3] * 3, [1e3])), 1e-3
+        found = check(plant, TerminalClaim(K=K, P=P, level=level, Q=Q, R=R))
+        if " P as terminal cost" in found.reason:
+            factor = float(found.reason.split(" P as terminal cost")[0].split()[-1])
+            again = check(plant, TerminalClaim(K=K, P=factor * P, level=level, Q=Q, R=R))
+            assert again.answer == "proven"
+            followed += 1
+    assert followed > 5
+
+
+def test_a_strip_that_is_not_bounded_is_decided(tmp_path):
+    """x1 halves and x2 stays: |x1| <= 1 is not left, and x2 may be anything."""
+    H, h = [[1.0, 0.0], [-1.0, 0.0]], [1.0, 1.0]
+    plant = LimitedPlant([[0.5, 0.0], [0.0, 1.0]], [[0.0], [0.0]], H_x=H, h_x=h)
+    found = check(plant, TerminalClaim(K=[[0.0, 0.0]], H=H, h=h))
+    assert found.answer == "proven"
+    assert report.main([str(found.save(tmp_path / "strip.json"))]) == 0
+    larger = TerminalClaim(K=[[0.0, 0.0]], H=H, h=[1.5, 1.5])
+    assert check(plant, larger).answer != "proven"

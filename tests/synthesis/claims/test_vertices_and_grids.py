@@ -1,5 +1,8 @@
 """Claims by V = x'Px about vertices and grids, against closed forms and independent arithmetic."""
 
+import math
+
+import mpmath
 import numpy as np
 import pytest
 from scipy.linalg import solve_continuous_lyapunov, solve_discrete_lyapunov
@@ -209,10 +212,41 @@ def test_units_of_states_and_of_v_do_not_move_the_answer():
         assert answer(VertexPlant(own[0]), LyapunovClaim("stability", own[1])) == PROVEN
 
 
+def test_a_decay_rate_that_is_met_with_equality_is_not_said_to_have_no_p():
+    """P = I proves 1/2 of turning at any speed, with equality; diag(1, 2) does not."""
+    J = np.array([[0.0, 1.0], [-1.0, 0.0]])
+    plant = VertexPlant([-0.5 * np.eye(2) + J, -0.5 * np.eye(2) + 2 * J])
+    assert answer(plant, LyapunovClaim("decay rate", np.eye(2), 0.5)) == PROVEN
+    found = check(plant, LyapunovClaim("decay rate", np.diag([1.0, 2.0]), 0.5))
+    assert found.answer == BY_ANOTHER
+    assert "No constant P" not in found.reason
+
+
+def test_a_sampled_decay_rate_that_is_met_to_a_digit_is_not_called_false():
+    """exp(-100) rounded down decays by 100 a sample, where exp(100) is rounded too."""
+    slow = math.nextafter(math.exp(-100.0), 0.0)
+    assert mpmath.mpf(slow) < mpmath.exp(-100)
+    plant = VertexPlant([[[slow]], [[slow]]], dt=1.0)
+    assert answer(plant, LyapunovClaim("decay rate", [[1.0]], 100.0)) != FALSE
+
+
+def test_a_feedback_of_each_vertex_says_what_a_combination_is():
+    plant = VertexPlant([[[1.0]], [[2.0]]], [[[1.0]], [[2.0]]])
+    several = check(plant, LyapunovClaim("stability", [[1.0]], K=[[[-2.0]], [[-2.0]]]))
+    one = check(plant, LyapunovClaim("stability", [[1.0]], K=[[-2.0]]))
+    assert (several.answer, one.answer) == (PROVEN, PROVEN)
+    assert "combination of their closed loops" in several.hypotheses[-1]
+    assert "closed loops" not in one.hypotheses[-1]
+
+
 WRONG = {
     "not symmetric": lambda: LyapunovClaim("stability", [[1, 2], [0, 1]]),
     "expected a claim of": lambda: LyapunovClaim("passivity", [[1]]),
     "bound": lambda: LyapunovClaim("l2 gain", [[1]]),
+    "number > 0": lambda: LyapunovClaim("l2 gain", [[1]], 0.0),
+    "rate of at most": lambda: check(
+        VertexPlant([[0.5]], dt=1.0), LyapunovClaim("decay rate", [[1]], 1e6)
+    ),
     "expected square": lambda: LyapunovClaim("stability", [[1, 2]]),
     "ascending": lambda: GridPlant([1, 0], [[[-1]], [[-1]]]),
     "rate": lambda: GridPlant([0, 1], [[[-1]], [[-1]]], rate=-1),

@@ -217,3 +217,18 @@ def test_a_file_says_what_was_proven(tmp_path):
     (tmp_path / "region.json").write_text(json.dumps(content))
     with pytest.raises(InputError, match="negative there"):
         RegionOfAttraction.load(tmp_path / "region.json")
+
+
+@pytest.mark.parametrize("text", [
+    "__import__('pathlib').Path('touched').touch()", "x.diff()", "9**9**9**9", "x**1000000000",
+    "x if x else x", "lambda: x", "q",
+])  # fmt: skip
+def test_a_text_is_read_as_a_polynomial_and_nothing_in_it_runs(text, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    x = sympy.Symbol("x", real=True)
+    assert region_of_attraction({x: "-x + x^3/4"}, "x**2").verified
+    with pytest.raises(InputError, match="polynomial"):
+        region_of_attraction({x: text})
+    with pytest.raises(InputError, match="polynomial"):
+        region_of_attraction({x: -x}, text)
+    assert not list(tmp_path.iterdir())

@@ -4,6 +4,7 @@ files.
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -174,3 +175,12 @@ def test_what_has_no_meaning_is_refused_with_advice():
         rational_gain(sampled)
     with pytest.raises(InputError, match="rational_gain"):
         l2_gain(lag(0.1))
+
+
+def test_a_gain_below_zero_and_a_p_that_is_not_symmetric_prove_nothing():
+    found = rational_gain(twice(1.0))
+    assert found.verify()
+    assert not replace(found, gamma=-found.gamma).verify()
+    P = found.P.copy()
+    P[..., 0, 1] -= 1e-3
+    assert not replace(found, P=P).verify()

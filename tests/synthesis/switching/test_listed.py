@@ -4,6 +4,7 @@ routes, designs against those over a parameter; what is proven is proven by the 
 
 import json
 import math
+from dataclasses import replace
 
 import cvxpy as cp
 import numpy as np
@@ -17,7 +18,7 @@ from symheli.errors import InputError, SynthesisError
 from synthesis import Plant, l2_gain
 from synthesis.checker import report
 from synthesis.switching import ListedBound, growth_rate, listed_feedback, listed_gain
-from synthesis.switching.listed_inequality import lifted, monomials
+from synthesis.switching.listed_inequality import Listed, holds, lifted, monomials
 
 KNOWN = {
     "two states": ([[[-1, -1], [-4, 0]], [[3, 3], [-2, 1]]], 3.917384715148),
@@ -254,3 +255,19 @@ def test_models_that_do_not_fit_are_refused():
     plant = Plant(model, ["w"], ["x"], ["u"], ["x"])
     with pytest.raises(InputError, match="without parameters"):
         listed_feedback([plant])
+
+
+def test_a_p_that_is_not_symmetric_proves_nothing():
+    # x -> [2 1; 1 2] x grows by 3; the lower triangles of P and P - A'PA are positive definite
+    A, P = np.array([[[2.0, 1.0], [1.0, 2.0]]]), np.array([[[1.0, -10.0], [0.0, 1.0]]])
+    models = Listed(A, np.zeros((1, 2, 0)), np.zeros((1, 0, 2)), np.zeros((1, 0, 0)), 1.0)
+    for form in (P[0], P[0] - A[0].T @ P[0] @ A[0]):
+        assert np.linalg.eigvalsh(np.tril(form) + np.tril(form, -1).T)[0] > 0
+    assert not holds(models, P, 0, 1.0, 1, False)
+
+
+@pytest.mark.parametrize("which", [0, 2, 3])
+def test_a_factor_or_a_gain_below_zero_is_not_proven(which, bounds):
+    found = bounds[which]
+    assert found.verify()
+    assert not replace(found, value=-found.bound).verify()

@@ -4,6 +4,7 @@ models at rest, forged files.
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -140,3 +141,12 @@ def test_a_motion_of_another_form_is_refused():
         periodic_gain(spring().discretize(0.1), {"p": (0.0, 1.0, 0.0)}, 3.0)
     with pytest.raises(InputError, match="the model holds on"):
         periodic_gain(spring(), {"p": (0.0, 2.0, 0.0)}, 3.0)
+
+
+def test_a_gain_below_zero_and_a_p_that_is_not_symmetric_prove_nothing():
+    found = periodic_gain(spring(), {"p": (0.0, 1.0, 0.0)}, 3.0, harmonics=3)
+    assert found.verify()
+    assert not replace(found, gamma=-found.gamma).verify()
+    P = found.P.copy()
+    P[0, 0, 1] -= 1.0
+    assert not replace(found, P=P).verify()

@@ -79,6 +79,8 @@ def test_a_forged_proof_is_not_verified():
         replace(found, P=(found.P[0], 1.3 * found.P[1])),
         replace(found, decay=0.5),
         replace(found, modes=own._replace(jumps=larger)),
+        replace(found, P=tuple(M + np.array([[0.0, -1.0], [0.0, 0.0]]) for M in found.P)),
+        replace(found, lengths=-found.lengths),
     ):
         assert not forged.verify()
 
