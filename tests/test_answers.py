@@ -858,7 +858,7 @@ PYTHON = {
     "a plant of a word": (
         lambda s: synthesis.Plant("xcell60"),
         InputError,
-        "model: expected an LPVStateSpace, an UncertainStateSpace, a LinearModel or a",
+        "model: expected an LPVStateSpace, an UncertainStateSpace, an LFT, a LinearModel or a",
     ),
     "a design of a model": (
         lambda s: synthesis.output_feedback(s.lag),

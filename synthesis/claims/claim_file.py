@@ -28,6 +28,11 @@ def read_claim(path: str | os.PathLike[str]) -> Any:
         "l2 gain" (with `gamma`), each with `P` and perhaps `K`; "region of attraction" with `V` and
         `rho`; "terminal set" with `K`, and `P` and `level` or `H` and `h`, and perhaps `Q`, `R`.
 
+    Returns
+    -------
+    LyapunovClaim, RegionClaim or TerminalClaim
+        The claim, for `check`.
+
     Raises
     ------
     InputError

@@ -34,6 +34,11 @@ def read_plant(path: str | os.PathLike[str]) -> Any:
         `rate`, `A`, `B`, `C`, `D`, `dt` of a grid; without p of vertices. Stacks are N x n x n or n
         x n x N; where both fit, `axis` says "first" or "last".
 
+    Returns
+    -------
+    VertexPlant, GridPlant, PolynomialPlant or LimitedPlant
+        The plant, for `check`.
+
     Raises
     ------
     InputError

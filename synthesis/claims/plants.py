@@ -313,6 +313,11 @@ def box_limits(x_max: Any, u_max: Any) -> dict[str, Array]:
     x_max, u_max : float or array
         Limits of each state and each input, in their units; inf: no limit.
 
+    Returns
+    -------
+    dict
+        Rows `H_x` and `H_u`, and what they are at most, `h_x` and `h_u`.
+
     Raises
     ------
     InputError
