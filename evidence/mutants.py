@@ -606,7 +606,7 @@ MUTANTS = (
     Mutant(
         "limits of a terminal set are not checked",
         "synthesis/regions/terminal.py",
-        "if not _within(self.P, self.row(name), bound, self.alpha):",
+        "if not within(self.P, self.row(name), bound, self.alpha):",
         "if False:",
         "tests/checker/test_forged_regions.py",
     ),

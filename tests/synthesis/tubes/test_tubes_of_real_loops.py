@@ -219,6 +219,7 @@ def test_equipment_that_does_not_fit_is_refused(given):
         LoopEquipment(actuation=Actuation(delay=0.03, period=PERIOD))
 
 
+@pytest.mark.slow
 def test_the_seconds_of_an_actuation_are_the_periods_of_a_tube(at_3):
     """The same proof, to the last digit of its file; and no delay is given twice."""
     heli, given = at_3[0], {"gust": 0.1, "period": PERIOD, "delay": 1}
