@@ -199,7 +199,7 @@ def region_of_attraction(
     Parameters
     ----------
     f : mapping, sequence or casadi.Function
-        {state: dx/dt} in SymPy; a list of SymPy or CasADi expressions with `states`; or a
+        {state: dx/dt} in SymPy; a list of SymPy or CasADi expressions, with their states; or a
         casadi.Function x -> dx/dt. Polynomials with f(0) = 0; a float is the rational that it is.
     V : expression, casadi.Function or array (n, n), optional
         Lyapunov function with V(0) = 0, or P of x'P x. Default: A'P + PA = -I of the linearization

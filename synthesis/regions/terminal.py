@@ -350,7 +350,7 @@ def terminal(
     Parameters
     ----------
     f : LinearModel, mapping, sequence or casadi.Function
-        {state: dx/dt} in SymPy; a list of SymPy or CasADi expressions with `states`; a
+        {state: dx/dt} in SymPy; a list of SymPy or CasADi expressions, with their states; a
         casadi.Function (x, u); polynomials with f(0, 0) = 0. With `dt` the next x.
     Q, R : array (n, n) and (m, m)
         Weights of the stage cost x'Q x + u'R u, positive semidefinite and definite.

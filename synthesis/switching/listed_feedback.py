@@ -44,8 +44,8 @@ class ListedFeedback:
 
     Attributes
     ----------
-    K : array (N, controls, n)
-        Of every plant; all the same where one gain serves all.
+    K : array (N, nu, n)
+        Of every plant, for nu controls; all the same where one gain serves all.
     optimum : float
         Least gain of the program, computed.
     proof : ListedBound
