@@ -54,8 +54,10 @@ class TerminalSet(ProvenStatement):
 
     Attributes
     ----------
-    states, controls : tuple of str
-        Names of x and u.
+    states : tuple of str
+        Names of x.
+    controls : tuple of str
+        Names of u.
     f : tuple of SparsePolynomial
         dx/dt, or the next x, in x and u.
     dt : float or None
