@@ -19,6 +19,7 @@ from fractions import Fraction
 from itertools import combinations_with_replacement, product
 from typing import Any, NamedTuple
 
+from . import words
 from .demands import Claim, Demand
 from .polynomials import Polynomial, block, diagonal, even, matrix, zero
 from .reading import Unreadable, array, number, period, whole
@@ -131,14 +132,14 @@ def claimed(content: Any) -> Claim:
 
     time = "in continuous time" if dt is None else f"sampled every {float(dt)!r} s"
     said = [f"{count} linear models of {n} states, {time}, in any order and any mixture"]
-    claim = _claim(float(bound), gain, dt is not None)
+    claim = _claim(bound, gain, dt is not None)
     return Claim(claim, said, demands(models, P, letters, dt is not None, gain), bound, level,
                  refused=refused)  # fmt: skip
 
 
-def _claim(bound: float, gain: bool, sampled: bool) -> str:
+def _claim(bound: Fraction, gain: bool, sampled: bool) -> str:
     if gain:
-        return f"the energy of the outputs is at most {bound!r}^2 times that of the inputs"
+        return words.energy(bound)
     if sampled:
-        return f"every state stays below a constant times {bound!r}^k after k samples"
-    return f"every state stays below a constant times exp({bound!r} t), t in s"
+        return f"every state stays below a constant times {float(bound)!r}^k after k samples"
+    return f"every state stays below a constant times exp({float(bound)!r} t), t in s"

@@ -16,6 +16,7 @@ from itertools import product
 from math import comb
 from typing import Any, NamedTuple
 
+from . import words
 from .demands import Claim, Demand
 from .polynomials import Polynomial, block, diagonal, even, matrix, scalar, variable
 from .reading import Unreadable, array, number, whole
@@ -143,11 +144,7 @@ def claimed(content: Any) -> Claim:
     omega = number(content["omega"], "the speed")
     said = [f"a model of {n} states in continuous time, whose parameters are known functions of an"
             f" angle that turns at {float(omega)!r} rad/s"]  # fmt: skip
-    claim = (
-        f"the energy of the outputs is at most {float(bound)!r}^2 times that of the inputs"
-        if driven
-        else "the free state decays exponentially"
-    )
+    claim = words.energy(bound) if driven else "the free state decays exponentially"
     refused = "a gain is not below zero, nor a speed" if bound < 0 or omega <= 0 else ""
     own = _demands(content, P, driven)
     return Claim(claim, said, own, bound, lambda g: g * g, refused=refused)

@@ -119,7 +119,7 @@ def claimed(content: Any) -> Claim:
     bound = number(content["gamma"], "the bound") if u else Fraction(0)
     said = words.model(x, u, y, None, moving)
     claim = (
-        f"the energy of the outputs is at most {float(bound)!r}^2 times that of the inputs"
+        words.energy(bound)
         if u
         else "the free state decays exponentially, and the loop is well posed"
     )

@@ -18,6 +18,11 @@ def gain(kind: str, bound: Fraction) -> str:
     }[kind]
 
 
+def energy(bound: Fraction) -> str:
+    """Return what a gain claims of energies."""
+    return f"the energy of the outputs is at most {float(bound)!r}^2 times that of the inputs"
+
+
 def model(x: int, u: int, y: int, dt: Fraction | None, moving: Sequence[Parameter]) -> list[str]:
     """Return of a model of which sizes a claim is, and how its parameters move."""
     time = "continuous time" if dt is None else f"samples of {float(dt)!r} s"

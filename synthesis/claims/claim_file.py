@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from symheli.errors import InputError
-from synthesis.claims.document import AXIS, document, number, only, stacked
+from synthesis.claims.document import AXIS, number, only, read_as, stacked
 from synthesis.claims.lyapunov_claim import KINDS, LyapunovClaim
 from synthesis.claims.region_claim import RegionClaim
 from synthesis.claims.terminal_claim import TerminalClaim
@@ -46,11 +46,7 @@ def read_claim(path: str | os.PathLike[str]) -> Any:
     >>> read_claim("claim.json").sentence
     '|x(t)| <= c exp(-0.5 t) |x(0)|'
     """
-    content = document(path)
-    try:
-        return claim_of(content)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+    return read_as(path, claim_of)
 
 
 def claim_of(content: Mapping[str, Any]) -> Any:

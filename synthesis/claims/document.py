@@ -8,14 +8,16 @@ import os
 import struct
 import zipfile
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from symheli.errors import InputError
 from symheli.values.arrays import Array
+
+T = TypeVar("T")
 
 DAMAGED = (
     *(ValueError, LookupError, TypeError, NotImplementedError, EOFError, ArithmeticError),
@@ -45,6 +47,15 @@ def document(path: str | os.PathLike[str]) -> dict[str, Any]:
     if not isinstance(found, dict) or not found:
         raise InputError(f'{path}: expected keys and values, as {{"A": [[-1]]}}')
     return found
+
+
+def read_as(path: str | os.PathLike[str], made: Callable[[dict[str, Any]], T]) -> T:
+    """Return what is made of a file's keys and values; an `InputError` of it names the file."""
+    content = document(path)
+    try:
+        return made(content)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
 
 
 def _json(file: Path) -> Any:

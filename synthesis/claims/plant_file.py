@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from symheli.errors import InputError
-from synthesis.claims.document import AXIS, document, number, only, stacked
+from synthesis.claims.document import AXIS, number, only, read_as, stacked
 from synthesis.claims.plants import (
     GridPlant,
     LimitedPlant,
@@ -52,11 +52,7 @@ def read_plant(path: str | os.PathLike[str]) -> Any:
     >>> print(*read_plant("plant.json").hypotheses)
     x' = 1*x^3 - 1*x
     """
-    content = document(path)
-    try:
-        return plant_of(content)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+    return read_as(path, plant_of)
 
 
 def plant_of(content: Mapping[str, Any]) -> Any:

@@ -30,6 +30,7 @@ from synthesis.numerics.polynomial.matrix import PolynomialMatrix
 from synthesis.numerics.program.affine_program import AffineProgram
 from synthesis.numerics.program.answer import Answer
 from synthesis.numerics.program.cone_program import Solver, general_solver
+from synthesis.numerics.program.expression import times_identity
 from synthesis.robust.rational_inequality import Parts, box_of, delta_rates, holds, inequalities
 
 KIND = {True: "gain of a rational model", False: "stability of a rational model"}
@@ -296,7 +297,7 @@ def _candidate(
     F = program.full(width, order, _space([degree] * len(box))).on(box)
     g = program.full(1, 1, _space([0] * len(box))).on(box)
     eye = PolynomialMatrix.constant(np.eye(own.inputs), box)
-    level = _times_identity(g, own.inputs) if own.inputs else eye
+    level = times_identity(g, own.inputs) if own.inputs else eye
     limits_ = [0.0 if rate is None else float(rate) for rate in rates]
     program.require(P >> LEAST, "P > 0")
     for i, form in enumerate(inequalities(own, P, F, limits_, level)):
@@ -308,16 +309,6 @@ def _candidate(
     p, f = (M.at(found.x).coefficients for M in (P, F))
     square = float(g.at(found.x).coefficients.ravel()[0])
     return 0.5 * (p + np.swapaxes(p, -1, -2)), f, max(square, 1e-12)
-
-
-def _times_identity(g: Any, n: int) -> Any:
-    """Return g times the identity, of an unknown g (1, 1)."""
-    rows = np.eye(n)
-    parts_ = [rows[:, [i]] @ (g @ rows[[i]]) for i in range(n)]
-    total = parts_[0]
-    for each in parts_[1:]:
-        total = total + each
-    return total
 
 
 def _space(degrees: Sequence[int]) -> Any:

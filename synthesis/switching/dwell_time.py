@@ -12,7 +12,6 @@ from scipy import linalg
 
 from symheli import LinearModel, LPVStateSpace
 from symheli.errors import InputError
-from symheli.lpv import Polynomial
 from symheli.lpv.riccati import lyapunov
 from symheli.threads import with_one_thread
 from symheli.values.arrays import Array, frozen
@@ -23,14 +22,11 @@ from synthesis.certify.questions.certificate_file import decoded, encoded
 from synthesis.certify.statement.proven_statement import ProvenStatement
 from synthesis.numerics.polynomial.matrix import PolynomialMatrix
 from synthesis.numerics.polynomial.pieces import pieces
-from synthesis.numerics.program.affine_program import AffineProgram, BernsteinCell
+from synthesis.numerics.program.affine_program import CONSTANT, POINT, AffineProgram
 from synthesis.numerics.program.answer import Answer
 from synthesis.numerics.program.cone_program import Solver, general_solver
 from synthesis.switching.inequality import DEGREE, Modes, holds, long_enough
 
-POINT = BernsteinCell(np.zeros((1, 1)), np.ones((1, 1)))
-"""The cell of a program without a scheduling parameter."""
-CONSTANT = Polynomial(0, 0.0, 1.0)
 SPARE = 1e-8
 """Least multiple of the identity that a candidate leaves in every inequality, P of at most one in
 coordinates in which the modes' own P add up to it and the slowest mode decays at rate one.

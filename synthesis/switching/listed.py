@@ -238,7 +238,7 @@ def growth_rate(
     """
     own = _listed(models, dt)
     low = growing(own)
-    search = ListedSearch(own, general_solver(solver), _effort(effort))
+    search = ListedSearch(own, general_solver(solver), Effort.of(effort))
     size = search.size(low.level)
     found = _nothing(GROWTH, own, low.level, low.word, low.times)
     for candidate in search.growth(low.level):
@@ -292,7 +292,7 @@ def listed_gain(
     own = _listed(models, None)
     if not own.B.shape[-1] or not own.C.shape[-2]:
         raise InputError("a gain needs inputs and outputs; use growth_rate without channels")
-    search = ListedSearch(own, general_solver(solver), _effort(effort))
+    search = ListedSearch(own, general_solver(solver), Effort.of(effort))
     low = gaining(own)
     found = _nothing(GAIN, own, low.level, low.word, low.times)
     if math.isinf(low.level):
@@ -328,10 +328,6 @@ def _nothing(
         models=models,
         why=why,
     )
-
-
-def _effort(given: float) -> Effort:
-    return Effort(math.inf if given == math.inf else positive(given, "effort"))
 
 
 def _listed(given: Sequence[Any], dt: float | None) -> Listed:

@@ -10,15 +10,15 @@ import numpy as np
 
 from symheli import LinearModel
 from symheli.errors import InputError, SynthesisError
-from symheli.lpv import Polynomial
 from symheli.threads import with_one_thread
 from symheli.values.arrays import Array
 from symheli.values.summary import summarized
 from synthesis.design.plant.generalized import Generalized
 from synthesis.design.plant.plant import Plant, require_plant
 from synthesis.numerics.program.affine_program import (
+    CONSTANT,
+    POINT,
     AffineProgram,
-    BernsteinCell,
     MatrixVariable,
     from_lower,
 )
@@ -26,8 +26,6 @@ from synthesis.numerics.program.answer import Answer
 from synthesis.numerics.program.cone_program import Solver, general_solver
 from synthesis.switching.listed import ListedBound, listed_gain
 
-POINT = BernsteinCell(np.zeros((1, 1)), np.ones((1, 1)))
-CONSTANT = Polynomial(0, 0.0, 1.0)
 PAIRS = 64
 """Pairs of models that follow one another up to which each model has a storage function."""
 BACK_OFFS, ENOUGH = (1.01, 1.05, 1.2, 2.0), 1.02

@@ -6,23 +6,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 from scipy import linalg, optimize
 
-from symheli.lpv import Polynomial
 from symheli.progress import task
 from symheli.values.arrays import Array
 from synthesis.numerics.linear.norm import norm
-from synthesis.numerics.program.affine_program import AffineProgram, BernsteinCell
+from synthesis.numerics.program.affine_program import CONSTANT, POINT, AffineProgram
 from synthesis.numerics.program.answer import Answer
 from synthesis.numerics.program.cone_program import Solver, solve
 from synthesis.numerics.program.effort import Effort, work
 from synthesis.switching.listed_inequality import Listed, Word, lifted, words
 
-POINT = BernsteinCell(np.zeros((1, 1)), np.ones((1, 1)))
-CONSTANT = Polynomial(0, 0.0, 1.0)
 SPARE = 1e-7
 """Least multiple of the identity that a candidate leaves in every inequality, P at most one."""
 CLOSE = 1e-4
@@ -158,6 +156,7 @@ class ListedSearch:
     def __init__(self, models: Listed, solver: Solver, effort: Effort) -> None:
         self.models, self.units = balanced(models)
         self.solver, self.effort = solver, effort
+        self.lifted = cache(self.models.lifted)
         self.left: list[str] = []
 
     def forms(self, gain: bool) -> Iterator[tuple[int, int]]:
@@ -219,7 +218,7 @@ class ListedSearch:
 
     def _at(self, letters: int, degree: int, level: float) -> Candidate | None:
         """Return P at a level, None where there is none with something to spare."""
-        models = self.models.lifted(degree)
+        models = self.lifted(degree)
         sampled = models.dt is not None
         if sampled:  # of growth one a sample
             models = models._replace(A=models.A / level**degree)

@@ -24,6 +24,7 @@ from synthesis.numerics.polynomial.pieces import pieces
 from synthesis.numerics.program.affine_program import AffineProgram
 from synthesis.numerics.program.answer import Answer
 from synthesis.numerics.program.cone_program import Solver, general_solver
+from synthesis.numerics.program.expression import times_identity
 from synthesis.switching.periodic_inequality import Half, Turning, holds, inequalities
 
 KIND = {True: "gain of a periodic model", False: "stability of a periodic model"}
@@ -334,10 +335,7 @@ def _searched(start: PeriodicGain, harmonics: int, solver: Solver) -> PeriodicGa
     program = AffineProgram()
     P = [program.symmetric(n, CONSTANT).on(BOX) for _ in range(1 + 2 * harmonics)]
     g = program.full(1, 1, CONSTANT).on(BOX)
-    level: Any = np.zeros((0, 0))
-    for i, row in enumerate(np.eye(nu)):
-        one = row[:, None] @ (g @ row[None])
-        level = one if i == 0 else level + one
+    level = times_identity(g, nu) if nu else None
     for side in (1, -1):
         half = Half(side, 0.0)
         first, falls = inequalities(own, P, level, half)

@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
-from symheli.lpv import Polynomial
 from symheli.values.arrays import Array
 from synthesis.numerics.program.affine_program import (
+    CONSTANT,
+    POINT,
     AffineProgram,
-    BernsteinCell,
     MatrixVariable,
     from_lower,
 )
@@ -29,11 +29,6 @@ from synthesis.tubes.inequality import (
     invariant,
     motion,
 )
-
-POINT = BernsteinCell(np.zeros((1, 1)), np.ones((1, 1)))
-"""The cell of a program without a scheduling parameter."""
-CONSTANT = Polynomial(0, 0.0, 1.0)
-
 
 CONSTANT_SPARE = 1e-6
 """Spare of the constant in the inequality of a gain, 1/s: its bias is no less."""

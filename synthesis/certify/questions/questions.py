@@ -4,11 +4,8 @@ rate, energy-to-peak gain (generalised H2 norm) and H2 norm.
 
 from __future__ import annotations
 
-import math
-
 from symheli.lpv.bases import FunctionSpace
 from symheli.threads import with_one_thread
-from symheli.values.numbers import positive
 from synthesis.certify.lower_bounds.lower_bound import THOROUGH, LowerBoundSearch
 from synthesis.certify.questions.certificate import Certificate
 from synthesis.certify.questions.certify import certify
@@ -101,7 +98,7 @@ def l2_gain(
     """
     if isinstance(form, FunctionSpace):
         return gain_on_grid(model, rate, form, impose)
-    work = Effort(math.inf if effort == math.inf else positive(effort, "effort"))
+    work = Effort.of(effort)
     return certify(pose(model, rate, "l2 gain", form, impose, solver, search, work))
 
 

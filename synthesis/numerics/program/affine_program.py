@@ -18,7 +18,7 @@ import numpy as np
 from scipy import sparse
 
 from symheli.errors import InputError
-from symheli.lpv.bases import FunctionSpace
+from symheli.lpv.bases import FunctionSpace, Polynomial
 from symheli.lpv.bases.function_space import tensor_grid
 from symheli.lpv.bases.polynomials import interpolation_points
 from symheli.values.arrays import Array
@@ -41,6 +41,12 @@ class BernsteinCell(NamedTuple):
 
     nodes: Array
     to_bernstein: Array
+
+
+POINT = BernsteinCell(np.zeros((1, 1)), np.ones((1, 1)))
+"""The cell of a program without a scheduling parameter."""
+CONSTANT = Polynomial(0, 0.0, 1.0)
+"""The basis of a matrix that depends on no parameter."""
 
 
 def cells(breaks: Sequence[Sequence[float]], degrees: Sequence[int]) -> list[BernsteinCell]:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
+from symheli.values.numbers import positive
 from synthesis.numerics.polynomial.symmetric import length
 from synthesis.numerics.program.answer import LEFT
 from synthesis.numerics.program.cone_program import ConeProgram
@@ -28,6 +30,11 @@ class Effort:
     limit: float = math.inf
     spent: float = 0.0
     proven: bool = False
+
+    @classmethod
+    def of(cls, given: Any) -> Effort:
+        """Return an effort of so many seconds; raises `InputError` for what is no time."""
+        return cls(math.inf if given == math.inf else positive(given, "effort"))
 
     def refused(self, seconds: float) -> str:
         """Return why a program of this work is left out, nothing where it is taken on."""

@@ -4,8 +4,10 @@ sums, products with known matrices, transposes, derivatives by p, blocks, `F >> 
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -152,3 +154,9 @@ def lifted(F: PolynomialMatrix) -> AffineMatrix:
 
 def _affine(F: PolynomialMatrix) -> AffineMatrix:
     return AffineMatrix(F.box, F.coefficients)
+
+
+def times_identity(number: AffineMatrix, n: int) -> AffineMatrix:
+    """Return an unknown number (1, 1) times the identity (n, n), n > 0."""
+    rows = np.eye(n)
+    return reduce(operator.add, [rows[:, [i]] @ (number @ rows[[i]]) for i in range(n)])
