@@ -189,13 +189,15 @@ def test_an_impossible_design_is_refused_with_what_to_add_and_possible_with_it()
 
 
 @pytest.mark.slow
-def test_twenty_impossible_designs_are_answered_in_five_seconds_of_processor():
+def test_twenty_impossible_designs_are_answered_without_a_program():
+    """`python -m evidence.impossible` tells the seconds; they are the machine's."""
     assert len(impossible.CASES) == 20
-    for name, said, seconds in impossible.answers():
-        assert "add to" in said or "divided by" in said or "times 10" in said or "delay" in said, (
-            name
-        )
-        assert seconds < impossible.LIMIT, name
+    heard = []
+    with watched(heard.append):
+        for name, said, _ in impossible.answers():
+            advice = "add to", "divided by", "times 10", "delay"
+            assert any(words in said for words in advice), name
+    assert "designing" not in {p.task for p in heard}
 
 
 def test_a_gain_above_the_largest_is_refused_before_any_program(small, family):

@@ -235,7 +235,8 @@ class General(Ladder):
             candidate = self._solve(shape, margin)
             found, message = self._verified(candidate, shape), candidate.message
         self.scaled_demand = demand
-        problem.effort.proven |= found.proof is not None
+        if found.proof is not None and not found.bound > problem.effort.enough:
+            problem.effort.proven = True
         words = "no P" if found.proof is None else f"bound {found.bound:.6g}"
         segments = math.prod(len(k) - 1 for k in shape.knots)
         name = f"{segments} segments of degree {max(shape.degrees)}"

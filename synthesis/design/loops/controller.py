@@ -27,6 +27,7 @@ from synthesis.design.plant.as_controller import as_controller
 from synthesis.design.plant.diagnosis import decided
 from synthesis.design.plant.refusals import conditions
 from synthesis.numerics.program.cone_program import LYAPUNOV, Solver
+from synthesis.numerics.program.effort import Effort
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,7 +50,7 @@ AS_PROMISED = 1.002
 """Ratio of a proven gain to the promised one up to which the other of loop and adjoint is not
 tried.
 """
-RICHER_SEARCH = {
+RICHER_SEARCH: dict[str, Any] = {
     "form": Spline(degree=4, segments=4, grading=1.0),
     "impose": Bernstein(floor=1e-2),
     "solver": Solver(LYAPUNOV, tolerance=1e-3),
@@ -188,7 +189,8 @@ class Controller:
         not P: then the adjoint, which has the same gain, is analysed first. Where one of the two
         proves more than `gamma` the other is tried too, then a richer P where that is far more, and
         the lowest gain is returned; of a parameter whose rate is another one only the loop is,
-        since backwards that is not so.
+        since backwards that is not so. Work ends at the usual `effort` once the promised gain is
+        proven, not before; an effort that is given ends it with whatever is proven.
 
         Of a controller that was sampled it is the gain of the sampled loop, and the hypotheses say
         so, with the misfit of the sampled plant. `synthesis.certify_sampled` proves that of a plant
@@ -196,7 +198,7 @@ class Controller:
         jump.
         """
         from synthesis.certify.questions.adjoint import ADJOINT, adjoint_options
-        from synthesis.certify.questions.questions import l2_gain
+        from synthesis.certify.questions.questions import EFFORT, l2_gain
 
         loop = self.closed()
         if isinstance(loop, LFT):
@@ -206,12 +208,15 @@ class Controller:
         tied = any(isinstance(s.rate, str) for s in moving)
         usual = not {"form", "impose", "solver"} & set(options)
 
+        kept = math.inf if math.isnan(self.promised) else AS_PROMISED * self.promised
+
         def proof(adjoint: bool, richer: bool = False) -> Certificate:
             usually: dict[str, Any] = {"form": Spline()} if usual else {}
             if richer:
-                usually = RICHER_SEARCH
+                usually = dict(RICHER_SEARCH)
             elif adjoint and usual:
                 usually |= adjoint_options(len(moving))
+            usually["effort"] = Effort(EFFORT, enough=kept)
             if not adjoint:
                 return l2_gain(loop, rate, **usually | options).resting_on(rests)
             proven = l2_gain(loop.adjoint(), rate, **usually | options)

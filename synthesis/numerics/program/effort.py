@@ -23,17 +23,22 @@ PER_ITERATION, ITERATIONS = 1e-10, 15
 
 @dataclass
 class Effort:
-    """Work that may be done: once something is `proven`, no program begins that would take the
-    seconds `spent` above the `limit`.
+    """Work that may be done: once a bound is `proven` that is at most `enough`, no program begins
+    that would take the seconds `spent` above the `limit`.
     """
 
     limit: float = math.inf
+    enough: float = math.inf
     spent: float = 0.0
     proven: bool = False
 
     @classmethod
     def of(cls, given: Any) -> Effort:
-        """Return an effort of so many seconds; raises `InputError` for what is no time."""
+        """Return an effort of so many seconds, or the effort that is given; raises `InputError`
+        for what is no time.
+        """
+        if isinstance(given, cls):
+            return given
         return cls(math.inf if given == math.inf else positive(given, "effort"))
 
     def refused(self, seconds: float) -> str:
