@@ -30,7 +30,7 @@ def l2_gain(
     impose: Imposed | None = None,
     solver: Solver | str | None = None,
     search: LowerBoundSearch | None = THOROUGH,
-    effort: float = EFFORT,
+    effort: float | Effort = EFFORT,
 ) -> Certificate:
     """Certify an upper bound on the L2 gain over every p(t) within its range and rates.
 
@@ -57,10 +57,11 @@ def l2_gain(
     search : LowerBoundSearch or None
         How hard to look for bad trajectories; with None the
         worst frozen gain is the lower bound.
-    effort : float
+    effort : float or Effort
         Work of the programs over several parameters, counted in seconds of one common core. Once
         a bound is proven, no program begins that exceeds it; the certificate names what was left
-        untried and the effort that tries it. math.inf: everything is tried.
+        untried and the effort that tries it. math.inf: everything is tried. With
+        `synthesis.numerics.program.effort.Effort(30, enough=2)` only a bound of at most 2 ends it.
 
     Returns
     -------

@@ -62,6 +62,14 @@ def test_programs_are_taken_on_until_something_is_proven():
     assert effort.spent == 50.0
 
 
+def test_a_bound_that_is_not_enough_does_not_end_the_work():
+    usual = l2_gain(spring(), search=None)
+    short = l2_gain(spring(), search=None, effort=Effort(1e-6, enough=np.inf))
+    asked = l2_gain(spring(), search=None, effort=Effort(1e-6, enough=1.01 * usual.gamma))
+    assert any(each.left for each in short.attempts)
+    assert asked.gamma <= 1.01 * usual.gamma < short.gamma
+
+
 def test_work_grows_with_the_unknowns():
     few, many = (LyapunovProgram((), Sizes(4, 1, k), 1e-6, None) for k in (3, 30))
     assert work(many) > 100 * work(few)
