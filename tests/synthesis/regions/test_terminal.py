@@ -1,5 +1,8 @@
 """Terminal sets: published ones, closed forms, and a predictive controller that uses them."""
 
+import importlib
+from pathlib import Path
+
 import casadi
 import numpy as np
 import pytest
@@ -198,3 +201,17 @@ def test_what_is_not_proven_is_not_handed_over():
             hand()
     with pytest.raises(InputError, match="step: expected"):
         found.do_mpc()
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")  # do-mpc names what else could be installed
+def test_in_do_mpc_the_cost_falls_by_the_stage_cost_at_least(monkeypatch):
+    pytest.importorskip("do_mpc", reason="do-mpc is not installed")
+    monkeypatch.syspath_prepend(Path(__file__).parents[3] / "examples")
+    example = importlib.import_module("terminal_in_do_mpc")
+    flown = example.flight(example.controller(example.terminal_set()), (1.0, 1.0), 40)
+    x, y, u, cost = flown.T
+    assert np.abs(u).max() <= 1 + 1e-6
+    stage = 10 * x**2 + y**2 + u**2
+    assert (np.diff(cost) <= -stage[:-1] + 1e-5 * cost[:-1] + 1e-6).all()  # as ipopt solves
+    assert cost[-1] < 1e-3 * cost[0]
