@@ -7,11 +7,16 @@ import pytest
 from evidence.attack import KINDS, attacked, table
 
 
+SECONDS_A_TRIAL = {"robust margin": 60}
+"""Kinds of which one trial takes that long, because of thousands of intervals of frequency."""
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_proof_is_false(kind):
-    row = attacked(kind, 3, seed=10_000)
-    assert row.trials == 3
+    count = 1 if kind in SECONDS_A_TRIAL else 3
+    row = attacked(kind, count, seed=10_000)
+    assert row.trials == count
     assert row.false == ()
     assert not row.largest > 1 + 1e-6
 
