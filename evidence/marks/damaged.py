@@ -114,7 +114,7 @@ DAMAGES: Mapping[str, tuple[str, Damage]] = {
     "noise": ("for comparison: velocities at 50 Hz with sqrt(2) times the noise", more_noise),
 }
 COMPARED = "noise"
-"""No damage of a log: what half of the information costs, however it is used."""
+"""No damage of a log: as much is told of the velocities as at half the rate."""
 
 CHEAP = {"least squares": "ls", "ridge": "ridge", "recursive least squares": "rls"}
 METHODS = (*CHEAP, "instrumental variables", "filter error")
