@@ -13,6 +13,8 @@ import numpy as np
 from identification.design.excitation import excitation_of
 from identification.design.leakage import warn_of_leakage
 from identification.estimators.filter_error import FilterError
+from identification.estimators.instrumental_variables import InstrumentalVariables
+from identification.estimators.instruments import FlightSource
 from identification.estimators.least_squares import residual_covariance
 from identification.estimators.method import Method, exported_methods, method_of
 from identification.estimators.prediction_error import BoxJenkins
@@ -29,10 +31,13 @@ from identification.structure.regressors import as_records, stacked, units_of
 from identification.structure.state_space import StateSpace
 from symheli.errors import InputError
 from symheli.records import FlightRecord
-from symheli.records.mending import bridged
+from symheli.records.mending import BRIDGED, bridged
 
-LOST = 0.5
-"""Longest hole that a simulated flight bridges, s."""
+IN_FLIGHT = {FilterError.shorthand: 0.5, InstrumentalVariables.shorthand: BRIDGED}
+"""Longest hole that a simulated flight bridges, s, by method. Instruments alone take what is
+bridged for measured: holes of half a second then cost more than the rows do. Chosen on the seeds
+1000 to 1011 of the study's flights, 5 % of their rows lost; .07 to .21 s differ little.
+"""
 
 SLOW = 0.6
 """Share of the samples below which a sensor is slower than the others."""
@@ -209,15 +214,25 @@ def _rigid(
 
 
 def _complete(record: FlightRecord, method: Method) -> FlightRecord:
-    """The record with its short holes bridged: by the simulator's flight where the method takes
-    what is bridged as badly measured, else those between the values of a slower sensor alone.
+    """The record with its short holes bridged: by the flight of the method's simulator where it
+    has one, else those between the values of a slower sensor alone.
     """
     if isinstance(method, FilterError):
-        return bridged(record, STATES, LOST, method.simulator.flown)
+        return bridged_in_flight(record, method.shorthand, method.simulator)
+    if isinstance(method, InstrumentalVariables) and isinstance(method.instruments, FlightSource):
+        return bridged_in_flight(record, method.shorthand, method.instruments)
     there = np.isfinite(record.columns(STATES)).mean(axis=0)
     return bridged(
         record, [name for name, share in zip(STATES, there, strict=True) if share < SLOW]
     )
+
+
+def bridged_in_flight(record: FlightRecord, method: str, simulator: FlightSource) -> FlightRecord:
+    """The record with lost rows there again, and samples of any signal, in holes as long as a
+    method bridges by the simulator's flight (`IN_FLIGHT`).
+    """
+    longest = IN_FLIGHT.get(method)
+    return record if longest is None else bridged(record, STATES, longest, simulator.flown)
 
 
 def _fitted(

@@ -59,7 +59,8 @@ class InstrumentalVariables(Method):
         Names of signals of the record, `LaggedSignals` of them with their window, or another
         source. In closed loop name what is added to the stabilised inputs, in open loop the inputs.
         A `FlightSource` such as `symheli.flight.SimulatedFlight` gives the regressors themselves as
-        a simulator flies them: theta = (Z' Phi)^-1 Z' Y.
+        a simulator flies them: theta = (Z' Phi)^-1 Z' Y. `fit` fills holes up to a tenth of a
+        second by that flight.
 
     Raises
     ------

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2
 
-from identification.estimators.estimate import fit
+from identification.estimators.estimate import bridged_in_flight, fit
 from identification.estimators.instruments import FlightSource
 from identification.judge.coefficient_covariance import drawn
 from identification.judge.frozen_plant import FrozenPlant, Model, Point, tuples
@@ -203,7 +203,8 @@ def structure_bias(
 
     No noise is in it, so that all of it is what the structure leaves out of a nonlinear vehicle in
     these manoeuvres. The simulator may be another vehicle: sizes of the bias carry over, phases
-    need not.
+    need not. Rows that a log has lost are there in the simulator's flight as far as the method of
+    the model bridges holes: without them the bias is another one.
 
     Parameters
     ----------
@@ -255,6 +256,8 @@ def structure_bias(
             f" {simulator!r:.80}"
         )
     given = [records] if isinstance(records, FlightRecord) else list(records)
+    if isinstance(model.structure, KinematicARX):
+        given = [bridged_in_flight(record, model.method, simulator) for record in given]
     own = fit(_in_time(model.structure), [simulator.flown(record) for record in given])
     return StructureBias(own, exact)  # type: ignore[arg-type]
 

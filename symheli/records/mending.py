@@ -284,7 +284,8 @@ def _with_lost_rows(record: FlightRecord, longest: float) -> FlightRecord:
     """
     dt, steps = record.dt, np.diff(record.time)
     lost = np.round(steps / dt).astype(int) - 1
-    there = (lost > 0) & (steps <= longest) & (np.abs(steps - (lost + 1) * dt) <= SCATTER * dt)
+    short = steps <= longest + 0.5 * dt
+    there = (lost > 0) & short & (np.abs(steps - (lost + 1) * dt) <= SCATTER * dt)
     if not there.any():
         return record
     counts = np.where(there, lost, 0)

@@ -50,3 +50,13 @@ def test_a_row_compares_medians_and_names_the_seed_that_loses_most():
     row = damaged.row("filter error", "gap", marks)
     assert row[2:8] == ("0.100, 0.100", "0.110, 0.300", "1.10", "3.00 (2)", "met", "3, 3 of 81")
     assert damaged.row("filter error", "gap", marks[1:])[6] == "MISSED"
+
+
+def test_the_comparison_has_twice_the_variance_of_noise_and_no_mark(ideal, flight):
+    clean = symheli.flight.SimulatedFlight(ideal).flown(flight)
+    noisier = damaged.more_noise(flight, np.random.default_rng(1))
+    added = [np.std(noisier[name] - flight[name]) / clean[name].std() for name in damaged.SLOW]
+    np.testing.assert_allclose(added, 10 ** (-30 / 20), rtol=0.1)
+    np.testing.assert_array_equal(noisier["q"], flight["q"])
+    marks = [damaged.Marks(seed=0, gaps={"none": 0.1, "noise": 0.2}, wrong={}, said={})]
+    assert damaged.row("filter error", "noise", marks)[6] == ""

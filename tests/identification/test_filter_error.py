@@ -198,7 +198,7 @@ def test_short_holes_cost_little(vehicle):
     lost = whole.rows(np.arange(600) % 30 > 2)
     of_whole, of_lost = (fitted(vehicle, r, Cut(clean), steps=5) for r in (whole, lost))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(estimate, "LOST", 0.0)
+        patch.setitem(estimate.IN_FLIGHT, "filter error", 0.0)
         cut = fitted(vehicle, lost, Cut(clean), steps=5)
     spread = np.sqrt(np.einsum("onon->no", of_whole.covariance))
 

@@ -44,6 +44,30 @@ def test_a_vehicle_of_the_structure_has_no_bias(vehicle, record, model):
     assert np.abs(off).max() < 1e-6 * size
 
 
+def test_what_a_method_bridges_is_there_in_the_flight_of_the_bias(vehicle, record):
+    """A log without some of its rows, identified by a method that bridges them and by one that does
+    not.
+    """
+    clean = vehicle.without_noise(seed=1).flown(record)
+
+    class Source:
+        def flown(self, record):
+            return clean.rows(np.rint(record.time / record.dt).astype(int))
+
+    still = idn.KinematicARX(
+        CONTROLS, "airspeed_command", na=1, nb=1, basis=idn.Polynomial(0, 0, 10)
+    )
+    lost = record.rows((np.arange(len(record)) + 50) % 100 > 8)
+    there = exact(vehicle, record, 1.0)
+    for method, alike in ((idn.methods.FilterError(Source()), True), ("ls", False)):
+        model = idn.fit(still, lost, method)
+        own = [
+            idn.judge.structure_bias(model, of, Source(), there).model.theta
+            for of in (lost, record)
+        ]
+        assert np.allclose(*own, rtol=1e-9, atol=0) == alike
+
+
 def test_a_structure_of_too_low_a_degree_has_one(record):
     """Coefficients that move with p, identified as constants."""
     vehicle = Vehicle(na=1, nb=1)

@@ -113,3 +113,21 @@ def test_instruments_fade_to_both_ends_of_every_stretch():
     two = _faded(np.concatenate([stretch, stretch + 12]), [range(12), range(12)])
     np.testing.assert_allclose(hole, expected)
     np.testing.assert_allclose(two, expected)
+
+
+@pytest.mark.parametrize(("lost", "dropped"), [(4, 0), (6, 6 + 1)])
+def test_instruments_flown_in_a_simulator_bridge_a_tenth_of_a_second(lost, dropped):
+    """Of a longer hole its rows and the one behind it, whose past it is, are dropped."""
+    vehicle = Vehicle(na=1, nb=1)
+    whole, clean = vehicle.record(400, seed=1, sensors=SENSORS), vehicle.record(400, seed=1)
+
+    class Source:
+        def flown(self, record):
+            return clean.rows(np.rint(record.time / record.dt).astype(int))
+
+    iv = idn.methods.InstrumentalVariables(Source())
+    hole = (np.arange(400) >= 200) & (np.arange(400) < 200 + lost)
+    found, of_whole = (
+        idn.fit(vehicle.kin, record, iv).aerodynamics for record in (whole.rows(~hole), whole)
+    )
+    assert found.rows_used == of_whole.rows_used - dropped

@@ -71,12 +71,15 @@ def test_a_slower_sensor_is_named_and_what_it_holds_is_missing():
     np.testing.assert_array_equal(np.isnan(found["u"]), np.arange(N) % 2 == 1)
 
 
-def test_rows_that_are_lost_come_back_beside_another_flight():
-    """The difference of the flights is a line, and is interpolated exactly."""
+@pytest.mark.parametrize("longest", [0.12, 0.5])
+def test_rows_that_are_lost_come_back_beside_another_flight(longest):
+    """The difference of the flights is a line, and is interpolated exactly. A hole as long as the
+    longest, .12 s, is bridged however its ends are rounded.
+    """
     whole = noisy()
     lost = whole.rows((np.arange(N) % 50) > 4)
     other = whole.with_signals(UNITS, **{n: whole[n] + 1.0 + whole.time for n in UNITS})
-    found = bridged(lost, UNITS, 0.5, lambda record: other.rows(slice(5, None)))
+    found = bridged(lost, UNITS, longest, lambda record: other.rows(slice(5, None)))
     np.testing.assert_allclose(found.values, whole.values[5:], rtol=0, atol=1e-9)
     assert found.meta["filled"]["q"].sum() == N - 5 - len(lost)
 
