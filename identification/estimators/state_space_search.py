@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +20,7 @@ from identification.model.state_space_model import (
     StateSpaceModel,
     design_matrices,
     pieces_of,
+    spread_of,
     start_of,
 )
 from identification.model.state_space_run import Along, StateSpaceRun
@@ -40,8 +42,8 @@ RADIUS = 0.99
 UNSEEN = 1e-12
 """Share of the largest information below which a direction is not seen in the response."""
 
-LARGEST_DAMPING, FLAT = 1e6, 2
-"""Damping at which a search ends, and the number of steps in a row that gain too little."""
+DAMPING, LARGEST_DAMPING, FLAT = 1e-3, 1e6, 2
+"""Damping a search begins with and ends at; number of steps in a row that gain too little."""
 
 NEAR, BENT = 0.1, 0.375
 """Part of a step over which curvature is measured; largest bend of a step, as a share of it."""
@@ -149,11 +151,17 @@ class Problem:
     held: bool = False
     """Whether the gain K stays as it is."""
 
-    @property
+    @cached_property
     def scale(self) -> Array:
         """Spread (ny,) of the outputs."""
-        spread = np.nanstd(np.concatenate([piece.y for piece in self.pieces]), axis=0)
-        return np.where(spread > 0, spread, 1.0)
+        return spread_of(np.concatenate([piece.y for piece in self.pieces]))
+
+    @cached_property
+    def units(self) -> Array:
+        """Units (n,) of the unknowns, in which no choice of units for the signals shows."""
+        size = np.sqrt(np.mean(np.concatenate([piece.u for piece in self.pieces]) ** 2, axis=0))
+        matrices = self.run.units(self.scale, np.where(size > 0, size, 1.0))
+        return np.append(matrices, np.ones(len(self.pieces) * self.run.structure.order))
 
     @property
     def weights(self) -> Array:
@@ -304,7 +312,7 @@ def _searched(
     """The unknowns of least cost; with innovations K is held at first, which errors that are nearly
     zero do not determine, and then their covariance is the weight, twice.
     """
-    evaluations, converged, all_ = 0, True, method.evaluations
+    evaluations, converged, all_, damping = 0, True, method.evaluations, DAMPING
     phases = [(False, method.tolerance, all_)]
     if problem.run.innovations:
         problem, rough = replace(problem, held=True), max(method.tolerance, ROUGH)
@@ -314,8 +322,9 @@ def _searched(
         if weighted:
             problem = problem.weighted(z)
         left = max(min(most, all_ - evaluations), 1)
-        z, used, converged = minimized(problem, z, left, tolerance, method.shorthand)
-        evaluations += used
+        found = minimized(problem, z, left, tolerance, method.shorthand, damping)
+        z, converged, damping = found.z, found.converged, found.damping
+        evaluations += found.evaluations
     if not converged:
         warnings.warn(
             ConvergenceWarning(f"{method.shorthand!r} of states did not settle: {ADVICE}"),
@@ -325,38 +334,56 @@ def _searched(
     return z, problem, {"evaluations": evaluations, "converged": converged, "message": message}
 
 
+class Minimum(NamedTuple):
+    """Unknowns, number of evaluations with slopes, whether they settled, damping of a next step."""
+
+    z: Array
+    evaluations: int
+    converged: bool
+    damping: float
+
+
 def minimized(
-    problem: Problem, z: Array, evaluations: int, tolerance: float, name: str
-) -> tuple[Array, int, bool]:
-    """Unknowns by Levenberg-Marquardt steps bent along the curvature of the response, number of
-    evaluations with slopes, whether they settled.
+    problem: Problem,
+    z: Array,
+    evaluations: int,
+    tolerance: float,
+    name: str,
+    damping: float = DAMPING,
+) -> Minimum:
+    """The unknowns by Levenberg-Marquardt steps bent along the curvature of the response.
+
+    A step that only its damping keeps short says nothing of whether they settle.
 
     Source: Transtrum and Sethna (2012), Improvements to the Levenberg-Marquardt algorithm for
     nonlinear least-squares minimization, arXiv 1201.5885, sec. 4.
     """
-    damping, flat, converged = 1e-3, 0, False
+    flat, converged = 0, False
     with task(f"{name}: evaluations, at most", evaluations) as search:
         for used in range(1, evaluations + 1):
             search.step()
             now = problem.information(z)
             found = _better(problem, z, now, damping)
             if found is None:  # no step of any size is better
-                return z, used, True
-            step, damping, cost = found
+                return Minimum(z, used, True, DAMPING)
+            step, free, damping, cost = found
             z = z + step
-            small = np.linalg.norm(step) <= tolerance * np.linalg.norm(z)
-            flat = flat + 1 if now.cost - cost <= tolerance * now.cost else 0
-            converged = bool(small or flat == FLAT)
+            moved, size = np.linalg.norm(step / problem.units), np.linalg.norm(z / problem.units)
+            flat = flat + 1 if free and now.cost - cost <= tolerance * now.cost else 0
+            converged = bool((free and moved <= tolerance * size) or flat == FLAT)
             if converged:
                 break
-    return z, used, converged
+    return Minimum(z, used, converged, damping)
 
 
 def _better(
     problem: Problem, z: Array, now: Information, damping: float
-) -> tuple[Array, float, float] | None:
-    """A step that lowers the cost, the damping of the next one, and that cost."""
-    values, vectors, scale = _directions(now.square)
+) -> tuple[Array, bool, float, float] | None:
+    """A step that lowers the cost, whether something else than its first damping keeps it short,
+    the damping of the next one, and that cost.
+    """
+    values, vectors, scale = _directions(now.square, problem.units)
+    free = damping * values[-1] <= values[0]
 
     def solved(gradient: Array) -> Array:
         across = vectors.T @ (gradient / scale)
@@ -371,15 +398,15 @@ def _better(
                 step = step + bend
         cost = problem.cost(z + step)
         if cost < now.cost:
-            return step, max(damping / 3.0, 1e-14), cost
-        damping *= 2.0
+            return step, bool(free), max(damping / 3.0, 1e-14), cost
+        damping, free = 2.0 * damping, True
     return None
 
 
-def _directions(square: Array) -> tuple[Array, Array, Array]:
+def _directions(square: Array, units: Array) -> tuple[Array, Array, Array]:
     """Eigenvalues and eigenvectors of the information in units of `scale`, of what is seen."""
-    size = np.sqrt(np.diagonal(square))
-    scale = np.maximum(size, 1e-6 * size.max(initial=0.0) + np.finfo(float).tiny)
+    size = np.sqrt(np.diagonal(square)) * units
+    scale = np.maximum(size, 1e-6 * size.max(initial=0.0) + np.finfo(float).tiny) / units
     values, vectors = np.linalg.eigh(square / np.outer(scale, scale))
     seen = values > UNSEEN * values[-1]
     return values[seen], vectors[:, seen], scale
@@ -430,7 +457,7 @@ def _covariance(problem: Problem, z: Array) -> Array:
     many residuals as the unknowns leave free.
     """
     white = problem.weighted(z)
-    values, vectors, scale = _directions(white.information(z).square)
+    values, vectors, scale = _directions(white.information(z).square, problem.units)
     kept = len(z) - problem.run.undetermined
     values, vectors = values[-kept:], vectors[:, -kept:]
     root = vectors / np.sqrt(values) / scale[:, None]

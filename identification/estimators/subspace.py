@@ -13,6 +13,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from identification.estimators.method import Estimate, Method
+from identification.model.state_space_model import spread_of
 from identification.model.state_space_run import StateSpaceRun
 from identification.structure.lpvarx import LPVARX
 from identification.structure.regressors import Regression, basis_values
@@ -153,7 +154,7 @@ class _Data(NamedTuple):
         before[starts] = starts - 1
         before[~known] = np.flatnonzero(~known)
         run = np.arange(len(y)) - np.maximum.accumulate(before)
-        scale = np.where((spread := np.nanstd(y, axis=0)) > 0, spread, 1.0)
+        scale = spread_of(y)
         signals = np.column_stack([np.nan_to_num(y) / scale, _scaled(u)])
         if structure.offset:
             signals = np.column_stack([signals, np.ones(len(y))])
@@ -214,18 +215,22 @@ def _kernel(data: _Data, rows: Array, marks: Array, past: int, shift: int) -> Ar
 
 
 def _ridge(phi: Array, y: Array) -> Array:
-    """Coefficients (n, ny) by ridge regression, its weight by generalised cross-validation."""
+    """Coefficients (n, ny) by ridge regression, its weight by generalised cross-validation.
+
+    What is left and its freedom are sums of positive parts: where the features are as many as the
+    samples both vanish with the weight, and differences of large numbers would choose it.
+    """
     values, vectors = eigh(phi.T @ phi)
-    values = np.maximum(values, 0.0)
     across = vectors.T @ (phi.T @ y)
-    total, m, best = float(np.sum(y**2)), len(y), (np.inf, 0.0)
+    seen = values > np.finfo(float).eps * values[-1]
+    values, vectors, across = values[seen], vectors[:, seen], across[seen]
+    total, power = float(np.sum(y**2)), np.sum(across**2, axis=1) / values
+    beside = max(total - float(np.sum(power)), 0.0)
+    spare, best = max(len(y) - len(values), 0), (np.inf, 0.0)
     for weight in WEIGHTS * values[-1]:
-        shrunk = across / (values + weight)[:, None]
-        left = total - 2 * np.sum(shrunk * across) + np.sum(values[:, None] * shrunk**2)
-        freedom = m - float(np.sum(values / (values + weight)))
-        if freedom <= 0:
-            continue
-        best = min(best, (max(float(left), 1e-14 * total) / freedom**2, float(weight)))
+        share = weight / (values + weight)
+        left, freedom = beside + float(share**2 @ power), spare + float(np.sum(share))
+        best = min(best, (max(left, 1e-14 * total) / freedom**2, float(weight)))
     return vectors @ (across / (values + best[1])[:, None])
 
 
