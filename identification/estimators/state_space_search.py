@@ -15,6 +15,7 @@ from identification.design.excitation import excitation_of
 from identification.estimators.innovations import Innovations
 from identification.estimators.method import Method
 from identification.estimators.prediction_error import ADVICE, OutputError, PredictionError
+from identification.estimators.state_space_trim import Trim
 from identification.estimators.subspace import Piece, Subspace, subspace_start
 from identification.model.state_space_model import (
     StateSpaceModel,
@@ -24,10 +25,10 @@ from identification.model.state_space_model import (
     start_of,
 )
 from identification.model.state_space_run import Along, StateSpaceRun
-from identification.structure.regressors import stacked, units_of
+from identification.structure.regressors import basis_values, stacked, units_of
 from identification.structure.state_space import StateSpace
 from symheli import LPVStateSpace, Scheduling
-from symheli.errors import ConvergenceWarning, ExcitationError, InputError
+from symheli.errors import ConvergenceWarning, DataWarning, ExcitationError, InputError
 from symheli.progress import task
 from symheli.records import FlightRecord
 from symheli.values import Signal
@@ -48,11 +49,20 @@ DAMPING, LARGEST_DAMPING, FLAT = 1e-3, 1e6, 2
 NEAR, BENT = 0.1, 0.375
 """Part of a step over which curvature is measured; largest bend of a step, as a share of it."""
 
+VISITED, GROWN = 50, 20.0
+"""Number of places of p at which a filter is looked at; growth along a record that is none."""
+
 HELD = 2**25
 """Largest number of slopes that are kept to measure curvature with: 256 MB."""
 
 ROUGH = 1e-4
 """Relative change of the cost at which a search that others follow ends."""
+
+TRIM = 10.0
+"""Mean of an output, in its spreads, that is a trim."""
+
+COMPLETE = 0.05
+"""Share of complete rows from which the covariance of outputs is that of these."""
 
 FLOOR = 1e-6
 """Least deviation of an innovation, as a share of its output's spread, that weighs."""
@@ -71,20 +81,83 @@ def state_space_of(
     """
     records = tuple(structure.regression.prepared(record) for record in records)
     method = _required(structure, method)
-    inputs = replace(structure.regression, na=0, nb=1)
-    excitation_of(inputs, stacked(inputs, records)).require()
+    _require_values(structure, records)
     pieces = [Piece(*found[1:]) for record in records for found in pieces_of(structure, record)]
-    if not pieces:
-        raise ExcitationError(f"no unbroken stretch of more than {structure.order} samples")
+    _require_enough(StateSpaceRun(structure, not isinstance(method, OutputError)), pieces)
+    trim = Trim.of(structure, pieces)
+    pieces = pieces if trim is None else trim.less(pieces)
     begin = subspace_start(structure, pieces, method.past if isinstance(method, Subspace) else None)
     problem = Problem(StateSpaceRun(structure, not isinstance(method, OutputError)), pieces)
     z = problem.best_of(_starts(problem, begin.unknowns))
     details = {"singular_values": begin.singular_values.tolist()}
+    problem = replace(problem, guarded=problem.forgets(z))
     if not isinstance(method, Subspace):
         z, problem, more = _searched(problem, z, method)
         details |= more
     z[: problem.run.size] = _calmed(problem.run, z[: problem.run.size])
-    return _model(problem, z, records, method.shorthand, details)
+    found = _model(problem, z, records, method.shorthand, details)
+    return found if trim is None else trim.back(found)
+
+
+def _require_values(structure: StateSpace, records: Sequence[FlightRecord]) -> None:
+    """Raise `ExcitationError` where a signal has no values, no output moves, or an input does not
+    tell its functions of p.
+    """
+    arx = structure.regression
+    for name in (*arx.outputs, *arx.inputs, *arx.parameters):
+        if not any(np.isfinite(record[name]).any() for record in records):
+            raise ExcitationError(f"{name} has no values in the records: leave it out")
+    if all(np.nanmin(values) == np.nanmax(values) for values in _all_of(arx.outputs, records)):
+        raise ExcitationError(f"{', '.join(arx.outputs)}: no output moves in the records")
+    if not structure.offset and not structure.own_scheduling:
+        _warn_of_trims(arx.outputs, records)
+    inputs = replace(arx, na=0, nb=1)
+    given = {*arx.outputs} - {*arx.parameters}  # outputs may all be missing at different times
+    there = [
+        record.with_signals(
+            {str(s): s.unit for s in record.signals if str(s) in given},
+            **{name: np.zeros(len(record)) for name in given},
+        )
+        for record in records
+    ]
+    excitation_of(inputs, stacked(inputs, there)).require()
+
+
+def _warn_of_trims(names: Sequence[str], records: Sequence[FlightRecord]) -> None:
+    """Warn (`DataWarning`) of outputs whose mean is far larger than what moves."""
+    for name, values in zip(names, _all_of(names, records), strict=True):
+        mean, spread = float(np.nanmean(values)), float(np.nanstd(values))
+        if abs(mean) > TRIM * spread > 0.0:
+            warnings.warn(
+                DataWarning(
+                    f"{name} moves by {spread:.2g} about {mean:.4g}, which no state of a linear"
+                    " model explains: take offset=True, or subtract its trim"
+                ),
+                stacklevel=5,
+            )
+
+
+def _all_of(names: Sequence[str], records: Sequence[FlightRecord]) -> list[Array]:
+    return [np.concatenate([record[name] for record in records]) for name in names]
+
+
+def _require_enough(run: StateSpaceRun, pieces: Sequence[Piece]) -> None:
+    """Raise `ExcitationError` for no stretch that is long enough, or no more values of outputs than
+    unknowns.
+    """
+    nx = run.structure.order
+    if not pieces:
+        raise ExcitationError(
+            f"no stretch of more than {nx} samples in which all inputs and p are known"
+        )
+    values = sum(int(np.isfinite(piece.y).sum()) for piece in pieces)
+    unknown = run.size - run.undetermined + nx * len(pieces)
+    if values <= unknown:
+        raise ExcitationError(
+            f"{values} values of outputs in {len(pieces)} unbroken stretches cannot determine"
+            f" {unknown} unknowns: record longer, without gaps in inputs and p, or take fewer"
+            " states or a smaller basis"
+        )
 
 
 def _required(structure: StateSpace, method: Method) -> OutputError | Innovations | Subspace:
@@ -150,6 +223,10 @@ class Problem:
     weight: Array | None = None
     held: bool = False
     """Whether the gain K stays as it is."""
+    guarded: bool = False
+    """Whether runs whose filter forgets nothing count as diverging: with the right start they show
+    small errors, whatever their matrices.
+    """
 
     @cached_property
     def scale(self) -> Array:
@@ -191,8 +268,32 @@ class Problem:
         with np.errstate(all="ignore"):
             return np.where(np.isfinite(piece.y), found.y - piece.y, 0.0) @ self.weights
 
+    @cached_property
+    def visited(self) -> Array:
+        """Functions of p (rows, n) at places that the records visit."""
+        p = np.concatenate([piece.p for piece in self.pieces])
+        p = p[np.isfinite(p.reshape(len(p), -1)).all(axis=1)]
+        even = np.linspace(0, len(p) - 1, VISITED).astype(int)
+        ends = [pick(p.reshape(len(p), -1), axis=0) for pick in (np.argmin, np.argmax)]
+        return basis_values(self.run.structure.regression, p[np.unique([*even, *np.ravel(ends)])])
+
+    def forgets(self, z: Array) -> bool:
+        """Whether a filter with p held at these places lets go of its start along the longest
+        piece, or at least does not grow by more than `GROWN`.
+        """
+        A, _, C, _, K = self.run.matrices(z[: self.run.size])
+        if not K.size:
+            return True
+        filters = np.tensordot(self.visited, A - K @ C, 1)
+        if not np.isfinite(filters).all():
+            return False
+        radius = float(np.abs(np.linalg.eigvals(filters)).max())
+        return radius <= GROWN ** (1.0 / max(len(piece.y) for piece in self.pieces))
+
     def cost(self, z: Array) -> float:
         """The sum of squares; infinite where a run diverges."""
+        if self.guarded and not self.forgets(z):
+            return np.inf
         with np.errstate(all="ignore"):
             total = sum(float(np.sum(error**2)) for error in self.errors(z))
         return total if np.isfinite(total) else np.inf
@@ -221,18 +322,20 @@ class Problem:
         return Information(cost, gradient, square, errors, kept)
 
     def best_of(self, candidates: Sequence[Array]) -> Array:
-        """The unknowns of least cost, each piece started from the state that suits it best.
+        """The unknowns of least cost, each piece started from the state that suits it best; of
+        filters those that forget their start where there are any.
 
         Raises `InputError` where every run diverges.
         """
-        tried = []
+        tried: list[tuple[bool, float, Array]] = []
         for unknowns in candidates:
             starts = [
                 start_of(self.run, unknowns[: self.run.size], *piece) for piece in self.pieces
             ]
             z = np.concatenate([unknowns[: self.run.size], *starts])
-            tried.append((self.cost(z), z))
-        cost, z = min(tried, key=lambda each: each[0])
+            cost = self.cost(z)
+            tried.append((not (np.isfinite(cost) and self.forgets(z)), cost, z))
+        _, cost, z = min(tried, key=lambda each: each[:2])
         if not np.isfinite(cost):
             raise InputError(
                 "every run from the subspace start diverges: fit over shorter records, or with"
@@ -246,10 +349,12 @@ class Problem:
         return replace(self, weight=np.linalg.inv(np.linalg.cholesky(covariance)).T, held=False)
 
     def residual_covariance(self, z: Array) -> Array:
-        """(ny, ny) of complete rows."""
+        """(ny, ny) of complete rows; where these are few, of each output by itself."""
         errors = np.concatenate([self.left(z, i) for i in range(len(self.pieces))])
-        errors = errors[np.isfinite(errors).all(axis=1)]
-        return errors.T @ errors / max(len(errors), 1)
+        complete = errors[np.isfinite(errors).all(axis=1)]
+        if len(complete) >= COMPLETE * len(errors):
+            return complete.T @ complete / max(len(complete), 1)
+        return np.diag(np.nanmean(errors**2, axis=0))
 
 
 def _starts(problem: Problem, unknowns: Array) -> list[Array]:

@@ -2,11 +2,15 @@
 move.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from test_state_space_methods import OMEGA, POINTS, System
 
 import identification as idn
+from identification.estimators.state_space_trim import Trim
+from symheli.errors import DataWarning, ExcitationError
 
 SYSTEM = System.drawn(3, 2, 2, 1, 1)
 
@@ -53,3 +57,93 @@ def test_a_step_that_damping_keeps_short_does_not_end_a_search():
     left = [np.linalg.slogdet(found.residual_covariance)[1] for found in ends]
     assert left[0] == pytest.approx(left[1], abs=1e-4)
     assert all(found.details["converged"] for found in ends)
+
+
+def test_a_filter_that_forgets_nothing_is_no_model():
+    """From the right start it leaves small errors of a short record: the information of that start
+    made every band vanish.
+    """
+    system = System.drawn(2, 1, 1, 1, 5)
+    found = idn.fit(system.structure, system.record(100, 0, noise=0.1), "innovations")
+    stability = idn.judge.frozen_stability(found, POINTS)
+    f = system.basis(np.array(POINTS))
+    exact = [np.log(np.abs(np.linalg.eigvals(A)).max()) / 0.1 for A in np.tensordot(f, system.A, 1)]
+    assert np.all((stability.low <= exact) & (exact <= stability.high))
+    A, _, C, _, K = found.run.matrices(found.unknowns)
+    assert np.abs(np.linalg.eigvals(np.tensordot(f, A - K @ C, 1))).max() < 1.05
+
+
+@pytest.mark.parametrize("method", ["oe", "innovations"])
+def test_whole_values_far_from_zero_are_taken_up_by_the_offset(method):
+    """An airspeed of 100 that moves by 1, a stick at .5: the model of the same signals about 0."""
+    system = System.drawn(2, 2, 2, 1, 1)
+    record = system.record(250, 2, noise=0.1)
+    whole = changed(record, y0=record["y0"] + 100.0, y1=record["y1"] - 30.0, u1=record["u1"] + 0.5)
+    structure = replace(system.structure, offset=True)
+    mine, theirs = (idn.fit(structure, each, method) for each in (record, whole))
+    run, flown = mine.simulate(record), theirs.simulate(whole)
+    np.testing.assert_allclose(flown - [100.0, -30.0], run, atol=1e-3)
+    bands = [idn.judge.frozen_stability(found, POINTS) for found in (mine, theirs)]
+    np.testing.assert_allclose(bands[1].growth, bands[0].growth, rtol=1e-3)
+    np.testing.assert_allclose(bands[1].high, bands[0].high, rtol=0.02)
+
+
+def test_the_covariance_moves_with_the_trim():
+    """As many outputs as states: the trim of the states is the only one."""
+    system = System.drawn(2, 2, 2, 1, 1)
+    structure = replace(system.structure, offset=True, feedthrough=True)
+    found = idn.fit(structure, system.record(300, 2, noise=0.1), "subspace")
+    trim, size = Trim(np.array([3.0, -2.0]), np.array([0.5, 1.0])), found.run.size
+    e = np.random.default_rng(0).normal(size=size)
+    of_e = replace(found, covariance=np.outer(e, e).reshape(1, size, 1, size))
+    moved = [replace(found, unknowns=found.unknowns + h * e) for h in (-1e-5, 1e-5)]
+    before, after = (trim.back(each).unknowns for each in moved)
+    slope = (after - before) / 2e-5
+    variances = np.diagonal(trim.back(of_e).covariance[0, :, 0])
+    np.testing.assert_allclose(variances, slope**2, rtol=1e-5, atol=1e-8)
+
+
+def test_whole_values_without_an_offset_are_told():
+    record = SYSTEM.record(300, 2, noise=0.1)
+    with pytest.warns(DataWarning, match="offset=True, or subtract its trim"):
+        idn.fit(SYSTEM.structure, changed(record, y0=record["y0"] + 100.0), "subspace")
+
+
+def test_outputs_that_are_never_there_together_are_found():
+    record = SYSTEM.record(600, 0)
+    even = np.arange(600) % 2 == 0
+    apart = changed(
+        record, y0=np.where(even, record["y0"], np.nan), y1=np.where(even, np.nan, record["y1"])
+    )
+    found = idn.fit(SYSTEM.structure, apart, idn.methods.OutputError(tolerance=1e-13))
+    assert SYSTEM.error(found) < 1e-6
+
+
+@pytest.mark.parametrize("method", ["subspace", "oe", "innovations"])
+@pytest.mark.parametrize(
+    ("columns", "says"),
+    [
+        ({"y1": np.nan}, "y1 has no values"),
+        ({"u0": np.nan}, "u0 has no values"),
+        ({"p": np.nan}, "p has no values"),
+        ({"y0": 3.0, "y1": 0.0}, "y0, y1: no output moves"),
+    ],
+)
+def test_signals_that_say_nothing_are_named(columns, says, method):
+    record = SYSTEM.record(200, 0, noise=0.1)
+    filled = {name: np.full(200, value) for name, value in columns.items()}
+    with pytest.raises(ExcitationError, match=says):
+        idn.fit(SYSTEM.structure, changed(record, **filled), method)
+
+
+@pytest.mark.parametrize("method", ["oe", "innovations"])
+def test_an_output_that_does_not_move_leaves_the_others_as_they_are(method, recwarn):
+    record = changed(SYSTEM.record(300, 0, noise=0.1), y1=np.zeros(300))
+    found = idn.fit(SYSTEM.structure, record, method)
+    assert found.score(record, 1)["y0"] > 90.0
+    assert not [str(w.message) for w in recwarn if issubclass(w.category, RuntimeWarning)]
+
+
+def test_fewer_values_than_unknowns_are_refused():
+    with pytest.raises(ExcitationError, match="cannot determine 42 unknowns"):
+        idn.fit(SYSTEM.structure, SYSTEM.record(20, 0, noise=0.1), "innovations")
