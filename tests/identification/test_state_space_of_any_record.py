@@ -10,7 +10,7 @@ from test_state_space_methods import OMEGA, POINTS, System
 
 import identification as idn
 from identification.estimators.state_space_trim import Trim
-from symheli.errors import DataWarning, ExcitationError
+from symheli.errors import DataWarning, ExcitationError, InputError
 
 SYSTEM = System.drawn(3, 2, 2, 1, 1)
 
@@ -147,3 +147,38 @@ def test_an_output_that_does_not_move_leaves_the_others_as_they_are(method, recw
 def test_fewer_values_than_unknowns_are_refused():
     with pytest.raises(ExcitationError, match="cannot determine 42 unknowns"):
         idn.fit(SYSTEM.structure, SYSTEM.record(20, 0, noise=0.1), "innovations")
+
+
+def test_a_response_that_is_real_has_a_region_on_the_real_axis():
+    """At frequency 0 and at half the sampling frequency: 1.96 deviations, not 2.45."""
+    found = idn.fit(SYSTEM.structure, SYSTEM.record(250, 0, noise=0.1), "oe")
+    regions = idn.judge.response_regions(found, [0.0], [0.0, np.pi / found.dt])
+    assert regions.contains(regions.centre).all()
+    for deviations, inside in ((1.9, True), (2.0, False), (-1.9, True)):
+        beside = regions.centre.real + deviations * regions.width
+        assert (regions.contains(beside) == inside).all()
+    assert not regions.contains(regions.centre + 0.1j * regions.width).any()
+    with pytest.raises(InputError, match="expected shape"):
+        regions.contains(np.ones((2, 2)))
+
+
+def test_advice_for_a_covariance_is_of_the_method_of_states():
+    found = idn.fit(SYSTEM.structure, SYSTEM.record(250, 0, noise=0.1), "subspace")
+    for judged in (
+        lambda: idn.judge.response_regions(found, [0.0], [1.0]),
+        lambda: idn.judge.frozen_stability(found, [0.0]),
+    ):
+        with pytest.raises(InputError, match='fit by "oe" or "innovations"'):
+            judged()
+
+
+def test_a_scan_leaves_out_trials_without_a_fit():
+    """A difference equation of one lag has a free run of three samples, one of three lags none."""
+    system = System.drawn(2, 1, 1, 1, 5)
+    training, test = system.record(300, 0, noise=0.1), system.record(300, 1, noise=0.1)
+    scan = idn.order_scan(
+        system.structure.regression, training, test.rows(slice(0, 4)), orders=(4, 1), degrees=(1,)
+    )
+    assert scan.best("one_step").na == 1
+    with pytest.raises(InputError, match="validation records are too short"):
+        scan.best("ahead")
