@@ -54,7 +54,8 @@ class Subspace(Method):
     Parameters
     ----------
     past : int, optional
-        Samples of the past; default twice the order, at least 12.
+        Samples of the past; default twice the order, at least 12, and fewer where gaps leave too
+        few windows of these.
 
     Raises
     ------
@@ -110,14 +111,19 @@ def subspace_start(structure: StateSpace, pieces: Sequence[Piece], past: int | N
     Raises `ExcitationError` where no stretch is long enough.
     """
     nx, ny = structure.order, len(structure.outputs)
+    least, chosen = -(-nx // ny), past is not None
     past = max(2 * nx, 12) if past is None else past
-    future = max(-(-nx // ny) + 1, past // 2)
     data = _Data.of(structure, pieces, past)
-    if len(data.rows) < 2 * nx + 2:
-        raise ExcitationError(
-            f"{len(data.rows)} windows of {past + 1} samples without a gap are too few for"
-            f" {nx} states: record longer, or give Subspace(past=...) a shorter past"
-        )
+    while (steps := int(np.sum(np.diff(data.rows) == 1))) < 2 * nx + 2:
+        if chosen or past == least:
+            shorter = ", or give Subspace(past=...) a shorter past" if chosen else ""
+            raise ExcitationError(
+                f"{steps} windows of {past + 2} samples without a gap are too few for"
+                f" {nx} states: record longer, with fewer gaps, or take fewer states{shorter}"
+            )
+        past = max(2 * past // 3, least)
+        data = _Data.of(structure, pieces, past)
+    future = max(least + 1, past // 2)
     response = _responses(structure, data, past, min(future, past))
     _, singular, V = np.linalg.svd(response, full_matrices=False)
     if len(singular) < nx:

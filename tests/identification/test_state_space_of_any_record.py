@@ -182,3 +182,14 @@ def test_a_scan_leaves_out_trials_without_a_fit():
     assert scan.best("one_step").na == 1
     with pytest.raises(InputError, match="validation records are too short"):
         scan.best("ahead")
+
+
+def test_short_stretches_have_a_short_past():
+    """Nine samples between gaps, where the usual past takes thirteen."""
+    system = System.drawn(2, 1, 1, 1, 5)
+    record = system.record(300, 0)
+    pieces = record.rows(np.arange(300) % 10 > 0)
+    found = idn.fit(system.structure, pieces, idn.methods.OutputError(tolerance=1e-13))
+    assert system.error(found) < 1e-6
+    with pytest.raises(ExcitationError, match="a shorter past"):
+        idn.fit(system.structure, pieces, idn.methods.Subspace(past=12))
