@@ -81,7 +81,7 @@ def state_space_of(
     """
     records = tuple(structure.regression.prepared(record) for record in records)
     method = _required(structure, method)
-    _require_values(structure, records)
+    _require_values(structure, records, noisy=not isinstance(method, OutputError))
     pieces = [Piece(*found[1:]) for record in records for found in pieces_of(structure, record)]
     _require_enough(StateSpaceRun(structure, not isinstance(method, OutputError)), pieces)
     trim = Trim.of(structure, pieces)
@@ -99,9 +99,10 @@ def state_space_of(
     return found if trim is None else trim.back(found)
 
 
-def _require_values(structure: StateSpace, records: Sequence[FlightRecord]) -> None:
+def _require_values(structure: StateSpace, records: Sequence[FlightRecord], *, noisy: bool) -> None:
     """Raise `ExcitationError` where a signal has no values, no output moves, or an input does not
-    tell its functions of p.
+    tell its functions of p. Warn (`DataWarning`) of trims, and where inputs tell too little of
+    states that no noise excites.
     """
     arx = structure.regression
     for name in (*arx.outputs, *arx.inputs, *arx.parameters):
@@ -121,6 +122,26 @@ def _require_values(structure: StateSpace, records: Sequence[FlightRecord]) -> N
         for record in records
     ]
     excitation_of(inputs, stacked(inputs, there)).require()
+    if not noisy:
+        _warn_of_poor_inputs(structure, there)
+
+
+def _warn_of_poor_inputs(structure: StateSpace, records: Sequence[FlightRecord]) -> None:
+    """Warn (`DataWarning`) where the inputs of twice as many samples as states are dependent, and
+    their rank times the number of outputs is below the number of unknowns.
+    """
+    rich = replace(structure.regression, na=0, nb=2 * structure.order)
+    data, run = stacked(rich, records), StateSpaceRun(structure)
+    rank, unknown = excitation_of(rich, data).rank, run.size - run.undetermined
+    told = len(rich.outputs) * rank
+    if len(data.phi) > 2 * rich.n_regressors > 2 * rank and told < unknown:
+        warnings.warn(
+            DataWarning(
+                f"the inputs tell {told} numbers at most, the matrices have {unknown}: the rest is"
+                " noise; excite at more frequencies, or take fewer states"
+            ),
+            stacklevel=5,
+        )
 
 
 def _warn_of_trims(names: Sequence[str], records: Sequence[FlightRecord]) -> None:
@@ -565,6 +586,15 @@ def _covariance(problem: Problem, z: Array) -> Array:
     values, vectors, scale = _directions(white.information(z).square, problem.units)
     kept = len(z) - problem.run.undetermined
     values, vectors = values[-kept:], vectors[:, -kept:]
+    unseen = kept - problem.run.gains.size - len(values)
+    if unseen > 0:
+        warnings.warn(
+            DataWarning(
+                f"{unseen} of {kept} directions of the matrices do not show in these records, and"
+                " the covariance is without them: take fewer states, or excite more richly"
+            ),
+            stacklevel=5,
+        )
     root = vectors / np.sqrt(values) / scale[:, None]
     count = sum(int(np.isfinite(piece.y).sum()) for piece in problem.pieces)
     return root @ root.T * count / max(count - len(values), 1)  # type: ignore[no-any-return]

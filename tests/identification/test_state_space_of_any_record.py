@@ -10,6 +10,7 @@ from test_state_space_methods import OMEGA, POINTS, System
 
 import identification as idn
 from identification.estimators.state_space_trim import Trim
+from symheli import FlightRecord
 from symheli.errors import DataWarning, ExcitationError, InputError
 
 SYSTEM = System.drawn(3, 2, 2, 1, 1)
@@ -193,3 +194,21 @@ def test_short_stretches_have_a_short_past():
     assert system.error(found) < 1e-6
     with pytest.raises(ExcitationError, match="a shorter past"):
         idn.fit(system.structure, pieces, idn.methods.Subspace(past=12))
+
+
+@pytest.mark.parametrize(
+    ("noise", "method", "says"),
+    [
+        (0.1, "oe", "the inputs tell 2 numbers at most, the matrices have 4"),
+        (0.0, "innovations", "2 of 8 directions of the matrices do not show"),
+    ],
+)
+def test_one_sine_does_not_tell_two_states(noise, method, says):
+    n, rng = 600, np.random.default_rng(0)
+    A, x, y, u = np.array([[0.8, 0.3], [-0.3, 0.8]]), np.zeros(2), np.zeros(n), np.zeros(n)
+    for k in range(n):
+        y[k], u[k] = x[0] + noise * rng.normal(), np.sin(0.3 * k)
+        x = A @ x + np.array([0.2, 1.0]) * u[k]
+    record = FlightRecord.from_arrays(0.1 * np.arange(n), {"y": "1", "u": "1"}, y=y, u=u)
+    with pytest.warns(DataWarning, match=says):
+        idn.fit(idn.StateSpace("y", "u", order=2), record.rows(slice(200, n)), method)
