@@ -311,6 +311,17 @@ class Problem:
         radius = float(np.abs(np.linalg.eigvals(filters)).max())
         return radius <= GROWN ** (1.0 / max(len(piece.y) for piece in self.pieces))
 
+    def drawn_in(self, z: Array) -> Array:
+        """The unknowns with as much of the gain as lets a guarded filter forget its start."""
+        if not self.guarded or self.forgets(z):
+            return z
+        for share in np.linspace(0.9, 0.0, 10):
+            other = z.copy()
+            other[self.run.gains] *= share
+            if self.forgets(other):
+                return other
+        return z
+
     def cost(self, z: Array) -> float:
         """The sum of squares; infinite where a run diverges."""
         if self.guarded and not self.forgets(z):
@@ -490,6 +501,8 @@ def minimized(
             search.step()
             now = problem.information(z)
             found = _better(problem, z, now, damping)
+            if found is None and damping > DAMPING:  # longer ones may be
+                found = _better(problem, z, now, DAMPING)
             if found is None:  # no step of any size is better
                 return Minimum(z, used, True, DAMPING)
             step, free, damping, cost = found
@@ -497,9 +510,11 @@ def minimized(
             moved, size = np.linalg.norm(step / problem.units), np.linalg.norm(z / problem.units)
             flat = flat + 1 if free and now.cost - cost <= tolerance * now.cost else 0
             converged = bool((free and moved <= tolerance * size) or flat == FLAT)
-            if converged:
+            if converged and damping <= DAMPING:
                 break
-    return Minimum(z, used, converged, damping)
+            if converged:  # once more by long steps: an edge that was met may end
+                damping, flat, converged = DAMPING, FLAT - 1, False
+    return Minimum(z, used, converged, min(damping, DAMPING))
 
 
 def _better(
@@ -522,6 +537,7 @@ def _better(
             bend = -0.5 * solved(curvature)
             if np.linalg.norm(scale * bend) <= BENT * np.linalg.norm(scale * step):
                 step = step + bend
+        step = problem.drawn_in(z + step) - z
         cost = problem.cost(z + step)
         if cost < now.cost:
             return step, bool(free), max(damping / 3.0, 1e-14), cost
