@@ -61,6 +61,9 @@ ROUGH = 1e-4
 TRIM = 10.0
 """Mean of an output, in its spreads, that is a trim."""
 
+LAGS, WIDEST = 25, 20
+"""Samples over which errors of a free run may be correlated; least rows for each of these."""
+
 COMPLETE = 0.05
 """Share of complete rows from which the covariance of outputs is that of these."""
 
@@ -353,6 +356,31 @@ class Problem:
                     kept.append((i, rows, at, part))
         return Information(cost, gradient, square, errors, kept)
 
+    def correlated(self, z: Array) -> Array:
+        """Covariance (n, n) of the gradient where errors are correlated over some samples and the
+        inputs are not correlated with them: of the free run.
+        """
+        size, errors = self.run.size, self.errors(z)
+        rows = sum(map(len, errors))
+        seen = sum(int(np.isfinite(piece.y).any(axis=1).sum()) for piece in self.pieces)
+        lags = min(LAGS, rows // WIDEST)
+        ny, out = len(self.scale), np.zeros((len(z), len(z)))
+        R = np.zeros((lags + 1, ny, ny))  # e(k) e(k + l)', tapered (Bartlett)
+        for error in errors:
+            for lag in range(min(lags + 1, len(error))):
+                R[lag] += error[: len(error) - lag].T @ error[lag:]
+        R *= (1.0 - np.arange(lags + 1) / (lags + 1.0))[:, None, None] / max(seen, 1)
+        for i, piece in enumerate(self.pieces):
+            at, there = np.r_[0:size, self.own(i)], np.isfinite(piece.y)
+            for part, slopes in self.run.slopes(z[:size], self.along(z, i)):
+                own = np.matmul(self.weights.T, slopes * there[part, :, None])
+                later = 0.5 * np.matmul(R[0], own)
+                for lag in range(1, min(lags + 1, len(own))):
+                    later[:-lag] += np.matmul(R[lag], own[lag:])
+                half = own.reshape(-1, len(at)).T @ later.reshape(-1, len(at))
+                out[np.ix_(at, at)] += half + half.T
+        return out
+
     def best_of(self, candidates: Sequence[Array]) -> Array:
         """The unknowns of least cost, each piece started from the state that suits it best; of
         filters those that forget their start where there are any.
@@ -595,8 +623,9 @@ def _model(
 
 
 def _covariance(problem: Problem, z: Array) -> Array:
-    """(n, n) of all unknowns, residuals white: the inverse information along what is seen, for as
-    many residuals as the unknowns leave free.
+    """(n, n) of all unknowns along what is seen, for as many residuals as the unknowns leave free:
+    the inverse information where residuals are innovations; of a free run what residuals that are
+    correlated over some samples make of it.
     """
     white = problem.weighted(z)
     values, vectors, scale = _directions(white.information(z).square, problem.units)
@@ -611,6 +640,11 @@ def _covariance(problem: Problem, z: Array) -> Array:
             ),
             stacklevel=5,
         )
-    root = vectors / np.sqrt(values) / scale[:, None]
     count = sum(int(np.isfinite(piece.y).sum()) for piece in problem.pieces)
-    return root @ root.T * count / max(count - len(values), 1)  # type: ignore[no-any-return]
+    free = count / max(count - len(values), 1)
+    root = vectors / np.sqrt(values) / scale[:, None]
+    if problem.run.innovations:
+        return free * root @ root.T
+    root = root / np.sqrt(values)
+    across = vectors.T @ (white.correlated(z) / np.outer(scale, scale)) @ vectors
+    return free * root @ across @ root.T

@@ -41,7 +41,7 @@ class StateSpaceModel:
     method : str
         Shorthand of the method.
     covariance : array (1, n, 1, n), optional
-        Of the unknowns, for white residuals, along the directions that change the response.
+        Of the unknowns, along the directions that change the response; see `fit`.
     details : mapping
         `evaluations`, `converged`, `message`, `singular_values` of the subspace start.
 

@@ -9,7 +9,10 @@ import pytest
 from test_state_space_methods import OMEGA, POINTS, System
 
 import identification as idn
+from identification.estimators.state_space_search import Problem
 from identification.estimators.state_space_trim import Trim
+from identification.estimators.subspace import Piece
+from identification.model.state_space_run import StateSpaceRun
 from symheli import FlightRecord
 from symheli.errors import DataWarning, ExcitationError, InputError
 
@@ -212,3 +215,48 @@ def test_one_sine_does_not_tell_two_states(noise, method, says):
     record = FlightRecord.from_arrays(0.1 * np.arange(n), {"y": "1", "u": "1"}, y=y, u=u)
     with pytest.warns(DataWarning, match=says):
         idn.fit(idn.StateSpace("y", "u", order=2), record.rows(slice(200, n)), method)
+
+
+def test_errors_of_a_free_run_that_are_correlated_count_so():
+    """Beside the sum over all pairs of samples; one output is missing at times."""
+    system = System.drawn(2, 1, 2, 1, 1)
+    record = system.record(100, 0, noise=0.3)
+    y = record.columns(["y0", "y1"]).copy()
+    y[::7, 1] = np.nan
+    pieces = [
+        Piece(y[part], record.columns(["u0"])[part], record["p"][part])
+        for part in (slice(0, 60), slice(60, 100))
+    ]
+    problem = Problem(StateSpaceRun(system.structure), pieces)
+    matrices = problem.run.unknowns(system.A, system.B, system.C, np.zeros((2, 0)), system.K)
+    z, size = np.append(matrices, np.zeros(4)), problem.run.size
+    errors, slopes, pairs, exact = problem.errors(z), [], np.zeros((11, 2, 2)), 0.0
+    for i, (piece, e) in enumerate(zip(pieces, errors, strict=True)):
+        along = np.concatenate(
+            [part for _, part in problem.run.slopes(matrices, problem.along(z, i))]
+        )
+        wide = np.zeros((*along.shape[:2], len(z)))
+        wide[:, :, np.r_[0:size, problem.own(i)]] = along * np.isfinite(piece.y)[:, :, None]
+        slopes.append(wide / problem.scale[:, None])
+        for lag in range(-5, 6):
+            for k in range(max(-lag, 0), min(len(e), len(e) - lag)):
+                pairs[lag + 5] += np.outer(e[k], e[k + lag]) / 100
+    for own in slopes:
+        for lag in range(-5, 6):
+            R = pairs[lag + 5] * (1.0 - abs(lag) / 6.0)
+            for k in range(max(-lag, 0), min(len(own), len(own) - lag)):
+                exact = exact + own[k].T @ R @ own[k + lag]
+    np.testing.assert_allclose(problem.correlated(z), exact, atol=1e-9 * np.abs(exact).max())
+
+
+@pytest.mark.slow
+def test_bands_of_a_free_run_hold_with_gusts():
+    """Noise of the states colours what a free run leaves: white residuals would give 86 %."""
+    system = System.drawn(2, 1, 1, 1, 5)
+    system = replace(system, K=5.0 * system.K)
+    exact, held = system.responses()[:, ::6], []
+    for seed in range(20):
+        record = system.record(600, seed, noise=0.5)
+        found = idn.fit(system.structure, record, idn.methods.OutputError(evaluations=400))
+        held.append(idn.judge.response_regions(found, POINTS, OMEGA[::6]).contains(exact).mean())
+    assert 0.9 < np.mean(held) < 0.99
