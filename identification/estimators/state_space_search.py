@@ -49,8 +49,10 @@ DAMPING, LARGEST_DAMPING, FLAT = 1e-3, 1e6, 2
 NEAR, BENT = 0.1, 0.375
 """Part of a step over which curvature is measured; largest bend of a step, as a share of it."""
 
-VISITED, GROWN = 50, 20.0
-"""Number of places of p at which a filter is looked at; growth along a record that is none."""
+VISITED, GROWN, LONG = 50, 20.0, 200
+"""Number of places of p at which a filter is looked at; growth along a record that is none, and
+samples of it that count where growth is only estimated.
+"""
 
 HELD = 2**25
 """Largest number of slopes that are kept to measure curvature with: 256 MB."""
@@ -91,6 +93,8 @@ def state_space_of(
     pieces = pieces if trim is None else trim.less(pieces)
     begin = subspace_start(structure, pieces, method.past if isinstance(method, Subspace) else None)
     problem = Problem(StateSpaceRun(structure, not isinstance(method, OutputError)), pieces)
+    if isinstance(method, OutputError) and not structure.own_scheduling:
+        _warn_of_growth(problem, begin.unknowns)
     z = problem.best_of(_starts(problem, begin.unknowns))
     details = {"singular_values": begin.singular_values.tolist()}
     problem = replace(problem, guarded=problem.forgets(z))
@@ -208,6 +212,21 @@ def _required(structure: StateSpace, method: Method) -> OutputError | Innovation
             f" {method.shorthand!r}"
         )
     return method
+
+
+def _warn_of_growth(problem: Problem, unknowns: Array) -> None:
+    """Warn (`DataWarning`) where the subspace start grows: no free run follows such a plant."""
+    A = StateSpaceRun(problem.run.structure, innovations=True).matrices(unknowns)[0]
+    radius = float(np.abs(np.linalg.eigvals(np.tensordot(problem.visited, A, 1))).max())
+    length = min(max(len(piece.y) for piece in problem.pieces), LONG)
+    if radius**length > GROWN:
+        warnings.warn(
+            DataWarning(
+                f"the subspace start has modes that grow by {radius - 1:.2g} a sample: a free run"
+                ' cannot follow them, and may call stable what is not; fit by "innovations"'
+            ),
+            stacklevel=4,
+        )
 
 
 class Information(NamedTuple):

@@ -260,3 +260,20 @@ def test_bands_of_a_free_run_hold_with_gusts():
         found = idn.fit(system.structure, record, idn.methods.OutputError(evaluations=400))
         held.append(idn.judge.response_regions(found, POINTS, OMEGA[::6]).contains(exact).mean())
     assert 0.9 < np.mean(held) < 0.99
+
+
+def test_a_free_run_of_what_grows_is_warned_of():
+    """It would call the plant stable: the closest free run of a loop is no model of its plant."""
+    n, rng = 600, np.random.default_rng(0)
+    y, u, x = np.zeros(n), np.zeros(n), 0.0
+    for k in range(n):
+        y[k] = x + 0.05 * rng.normal()
+        u[k] = rng.choice([-1.0, 1.0]) - 1.0 * y[k]
+        x = 1.06 * x + 0.2 * u[k]
+    record = FlightRecord.from_arrays(0.1 * np.arange(n), {"y": "1", "u": "1"}, y=y, u=u)
+    structure = idn.StateSpace("y", "u", order=1)
+    with pytest.warns(DataWarning) as told:
+        idn.fit(structure, record, "oe")
+    assert "modes that grow by 0.0" in str(told[0].message)
+    found = idn.fit(structure, record, "innovations")
+    assert idn.judge.frozen_stability(found, [0.0]).calls == ("unstable",)
