@@ -58,6 +58,8 @@ _TOO_SHORT = (
     " record.mended() says of them, decimate to the slowest sensor, or fly again"
 )
 
+ADVICE = "allow more steps, excite more, or lower the degree of the basis"
+
 LAGS, CHUNK = 25, 256
 """Number of samples over which scores are taken to be correlated, and of those summed at a time."""
 
@@ -269,11 +271,7 @@ class FilterError(Method):
             | beside,
             remarks=(
                 *_unknown_wind(beside.get("wind", {})),
-                *(
-                    ()
-                    if settled or steps == 1
-                    else (not_settled(self, "excite more, or lower the degree of the basis"),)
-                ),
+                *(() if settled or steps == 1 else (not_settled(self, ADVICE),)),
             ),
             residual_covariance=residual,
             covariance=covariance[: 6 * n, : 6 * n].reshape(6, n, 6, n),
