@@ -557,7 +557,7 @@ def minimized(
             moved, size = np.linalg.norm(step / problem.units), np.linalg.norm(z / problem.units)
             flat = flat + 1 if free and now.cost - cost <= tolerance * now.cost else 0
             converged = bool((free and moved <= tolerance * size) or flat == FLAT)
-            if converged and damping <= DAMPING:
+            if converged and not (problem.run.innovations and damping > DAMPING):
                 break
             if converged:  # once more by long steps: an edge that was met may end
                 damping, flat, converged = DAMPING, FLAT - 1, False
