@@ -102,8 +102,9 @@ def fit(
         - "iv" flown in a simulator, all equations with the same regressors, and `FilterError`:
           summed over residuals correlated in time, up to 25 samples, and between equations; for
           records that are long against that;
-        - of states (1, n, 1, n), of all entries, for white residuals, along the directions that
-          change the response; not "subspace";
+        - of states (1, n, 1, n), of all entries, along the directions that change the response: for
+          white innovations, or for residuals of a free run correlated up to 25 samples; not
+          "subspace";
         - of all others None: prices on coefficients move them by more than they scatter.
 
     Raises
@@ -124,8 +125,9 @@ def fit(
     ConvergenceWarning
         An iteration does not settle.
     DataWarning
-        The scheduling signal contains the outputs that the model is to predict, samples are means
-        and the delay is not 0, or instruments are weak.
+        Of states: an output stands far from zero without an offset, or the records do not tell all
+        of the matrices. Else: the scheduling signal contains the outputs that the model is to
+        predict, samples are means and the delay is not 0, or instruments are weak.
 
     See Also
     --------

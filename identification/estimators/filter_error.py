@@ -58,6 +58,8 @@ _TOO_SHORT = (
     " record.mended() says of them, decimate to the slowest sensor, or fly again"
 )
 
+ADVICE = "allow more steps, excite more, or lower the degree of the basis"
+
 LAGS, CHUNK = 25, 256
 """Number of samples over which scores are taken to be correlated, and of those summed at a time."""
 
@@ -269,11 +271,7 @@ class FilterError(Method):
             | beside,
             remarks=(
                 *_unknown_wind(beside.get("wind", {})),
-                *(
-                    ()
-                    if settled or steps == 1
-                    else (not_settled(self, "excite more, or lower the degree of the basis"),)
-                ),
+                *(() if settled or steps == 1 else (not_settled(self, ADVICE),)),
             ),
             residual_covariance=residual,
             covariance=covariance[: 6 * n, : 6 * n].reshape(6, n, 6, n),
@@ -423,6 +421,12 @@ class Noise(NamedTuple):
     def of(cls, R: Array, left: Array, gust: float, remains: float) -> Noise:
         """Of sensors R, equations that leave (6,) and Euler's, which are exact."""
         return cls(R, np.append(left, MODEL_ERROR * R[6:]), gust, remains)
+
+    def driving(self, count: int) -> Array:
+        """Variances (count, 3) of what is new in the gust at each sample: at first all of it."""
+        out = np.full((count, 3), self.gust * (1 - self.remains**2))
+        out[:1] = self.gust
+        return out
 
 
 class Linearized(NamedTuple):
@@ -578,8 +582,9 @@ class SmoothedStretch:
         return L
 
     def linearized(self, theta: Array, noise: Noise) -> Linearized:
-        """With a gust every equation less what remains of the one before: what is left of the gust
-        in that is white.
+        """With a gust every equation but the first less what remains of the one before: what is
+        left of the gust in that is white. The first has the whole gust: without it the balance of
+        all samples would count for nothing.
         """
         F, left = self._equations(theta)
         D = self._by_unknowns(theta)
@@ -595,16 +600,13 @@ class SmoothedStretch:
                 if e.kind == "input" and e.channel < 3 and e.lag == 1:
                     H[:, :6, e.channel] -= f @ theta[row * size : (row + 1) * size]
             none = np.zeros_like(L[0])
-            L = [
-                now[1:] - a * before[:-1]
-                for now, before in zip([*L, none], [none, *L], strict=True)
-            ]
-            F, D = F[1:] - a * F[:-1], D[1:] - a * D[:-1]
-            left, H = left[1:] - a * left[:-1], H[1:]
-            own = [own[0][1:], -a * own[0][1:]]
-        terms: list[tuple[list[Array], Array]] = [(L, noise.R), (own, noise.Q)]
+            L = [_less(now, a * before) for now, before in zip([*L, none], [none, *L], strict=True)]
+            F, D, left = _less(F, a * F), _less(D, a * D), _less(left, a * left)
+            own = [own[0], _less(none, a * own[0])]
+        R = noise.R if noise.R.ndim == 1 else np.vstack([noise.R[:1], noise.R])
+        terms: list[tuple[list[Array], Array]] = [(L, R), (own, noise.Q)]
         if noise.gust:
-            terms.append(([H], np.full(3, noise.gust * (1 - noise.remains**2))))
+            terms.append(([H], noise.driving(len(F))))
         return Linearized(F, D, left, L, H, Whitening.of(terms))
 
     def smooth(self, found: Linearized, change: Array, later: Array, noise: Noise) -> None:
@@ -619,10 +621,11 @@ class SmoothedStretch:
         moved, n = np.zeros_like(self.y), len(self.y)
         first = n - len(F)
         for i, block in enumerate(L):
-            moved[first - i : n - i] += np.einsum("kij,ki->kj", block, pull)
+            row = max(i - first, 0)  # a lag that the first equation does not have
+            moved[first - i + row : n - i] += np.einsum("kij,ki->kj", block[row:], pull[row:])
         self.x = self.y - moved * noise.R
         if noise.gust:
-            drive = np.einsum("kij,ki->kj", H, pull) * noise.gust * (1 - noise.remains**2)
+            drive = np.einsum("kij,ki->kj", H, pull) * noise.driving(len(H))
             self.gust[first - 1 : -1] = lfilter([1.0], [1.0, -noise.remains], drive, axis=0)
 
     def residual(self, theta: Array) -> Array:
@@ -645,6 +648,11 @@ def _unknown_wind(wind: Mapping[str, tuple[float, float]]) -> tuple[Warning, ...
             " airspeed a coefficient holds: fly a second heading, or measure the airspeed"
         ),
     )
+
+
+def _less(now: Array, before: Array) -> Array:
+    """Rows (m, ...) of `now`, each but the first less the row of `before` in front of it."""
+    return np.concatenate([now[:1], now[1:] - before[:-1]])
 
 
 def _ahead(x: Array, by: Array, dt: float) -> Array:

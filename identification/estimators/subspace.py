@@ -13,6 +13,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from identification.estimators.method import Estimate, Method
+from identification.model.state_space_model import spread_of
 from identification.model.state_space_run import StateSpaceRun
 from identification.structure.lpvarx import LPVARX
 from identification.structure.regressors import Regression, basis_values
@@ -53,7 +54,8 @@ class Subspace(Method):
     Parameters
     ----------
     past : int, optional
-        Samples of the past; default twice the order, at least 12.
+        Samples of the past; default twice the order, at least 12, and fewer where gaps leave too
+        few windows of these.
 
     Raises
     ------
@@ -109,14 +111,19 @@ def subspace_start(structure: StateSpace, pieces: Sequence[Piece], past: int | N
     Raises `ExcitationError` where no stretch is long enough.
     """
     nx, ny = structure.order, len(structure.outputs)
+    least, chosen = -(-nx // ny), past is not None
     past = max(2 * nx, 12) if past is None else past
-    future = max(-(-nx // ny) + 1, past // 2)
     data = _Data.of(structure, pieces, past)
-    if len(data.rows) < 2 * nx + 2:
-        raise ExcitationError(
-            f"{len(data.rows)} windows of {past + 1} samples without a gap are too few for"
-            f" {nx} states: record longer, or give Subspace(past=...) a shorter past"
-        )
+    while (steps := int(np.sum(np.diff(data.rows) == 1))) < 2 * nx + 2:
+        if chosen or past == least:
+            shorter = ", or give Subspace(past=...) a shorter past" if chosen else ""
+            raise ExcitationError(
+                f"{steps} windows of {past + 2} samples without a gap are too few for"
+                f" {nx} states: record longer, with fewer gaps, or take fewer states{shorter}"
+            )
+        past = max(2 * past // 3, least)
+        data = _Data.of(structure, pieces, past)
+    future = max(least + 1, past // 2)
     response = _responses(structure, data, past, min(future, past))
     _, singular, V = np.linalg.svd(response, full_matrices=False)
     if len(singular) < nx:
@@ -153,7 +160,7 @@ class _Data(NamedTuple):
         before[starts] = starts - 1
         before[~known] = np.flatnonzero(~known)
         run = np.arange(len(y)) - np.maximum.accumulate(before)
-        scale = np.where((spread := np.nanstd(y, axis=0)) > 0, spread, 1.0)
+        scale = spread_of(y)
         signals = np.column_stack([np.nan_to_num(y) / scale, _scaled(u)])
         if structure.offset:
             signals = np.column_stack([signals, np.ones(len(y))])
@@ -214,18 +221,22 @@ def _kernel(data: _Data, rows: Array, marks: Array, past: int, shift: int) -> Ar
 
 
 def _ridge(phi: Array, y: Array) -> Array:
-    """Coefficients (n, ny) by ridge regression, its weight by generalised cross-validation."""
+    """Coefficients (n, ny) by ridge regression, its weight by generalised cross-validation.
+
+    What is left and its freedom are sums of positive parts: where the features are as many as the
+    samples both vanish with the weight, and differences of large numbers would choose it.
+    """
     values, vectors = eigh(phi.T @ phi)
-    values = np.maximum(values, 0.0)
     across = vectors.T @ (phi.T @ y)
-    total, m, best = float(np.sum(y**2)), len(y), (np.inf, 0.0)
+    seen = values > np.finfo(float).eps * values[-1]
+    values, vectors, across = values[seen], vectors[:, seen], across[seen]
+    total, power = float(np.sum(y**2)), np.sum(across**2, axis=1) / values
+    beside = max(total - float(np.sum(power)), 0.0)
+    spare, best = max(len(y) - len(values), 0), (np.inf, 0.0)
     for weight in WEIGHTS * values[-1]:
-        shrunk = across / (values + weight)[:, None]
-        left = total - 2 * np.sum(shrunk * across) + np.sum(values[:, None] * shrunk**2)
-        freedom = m - float(np.sum(values / (values + weight)))
-        if freedom <= 0:
-            continue
-        best = min(best, (max(float(left), 1e-14 * total) / freedom**2, float(weight)))
+        share = weight / (values + weight)
+        left, freedom = beside + float(share**2 @ power), spare + float(np.sum(share))
+        best = min(best, (max(left, 1e-14 * total) / freedom**2, float(weight)))
     return vectors @ (across / (values + best[1])[:, None])
 
 

@@ -37,6 +37,13 @@ def tuples(points: Iterable[Point]) -> list[tuple[float, ...]]:
     return chosen
 
 
+def with_covariance(model: Model) -> str:
+    """What to do for a covariance of such a model."""
+    if isinstance(model, StateSpaceModel):
+        return 'fit by "oe" or "innovations"'
+    return "fit by FilterError or least squares"
+
+
 @dataclass(frozen=True, eq=False)
 class FrozenPlant:
     """`outputs` and `inputs` of a model; of known kinematics only the states that stay with them,

@@ -11,7 +11,14 @@ from scipy.stats import norm
 
 from identification.design.criterion import Criterion, Verdict, table
 from identification.judge.coefficient_covariance import drawn
-from identification.judge.frozen_plant import FrozenPlant, Model, Point, text, tuples
+from identification.judge.frozen_plant import (
+    FrozenPlant,
+    Model,
+    Point,
+    text,
+    tuples,
+    with_covariance,
+)
 from identification.judge.response_regions import StructureBias
 from symheli import LinearModel
 from symheli.errors import InputError
@@ -180,8 +187,7 @@ def frozen_stability(
     covariance = model.covariance if covariance is None else covariance
     if covariance is None:
         raise InputError(
-            f"covariance: method {model.method!r} gives none; fit by FilterError or least squares,"
-            " or give one"
+            f"covariance: method {model.method!r} gives none; {with_covariance(model)}, or give one"
         )
     covariance = frozen(covariance, "covariance", 2 * model.theta.shape[::-1])
     plant = FrozenPlant(model, tuple(map(str, model.outputs)), tuple(map(str, model.inputs)))

@@ -97,6 +97,9 @@ class OrderScan:
     def best(self, by: str = "ahead") -> ScannedOrder:
         """The trial of the largest median fit over the outputs "one_step", "ahead" or in
         "free_run"; or of the least "bic".
+
+        Raises `ExcitationError` where the data determine none, `InputError` where no trial has such
+        a fit: validation records are too short for it.
         """
         tried = [t for t in self.trials if not t.refused]
         if not tried:
@@ -107,7 +110,14 @@ class OrderScan:
             return min(tried, key=lambda t: t.bic)
         if by not in ("one_step", "ahead", "free_run"):
             raise InputError(f'by: expected "one_step", "ahead", "free_run" or "bic", got {by!r}')
-        return max(tried, key=lambda t: float(np.median(getattr(t, by))))
+        fits = [(float(np.median(getattr(t, by))), t) for t in tried]
+        known = [each for each in fits if not np.isnan(each[0])]
+        if not known:
+            raise InputError(
+                f"by: no trial has a fit {by!r}: the validation records are too short for it, or"
+                " lack an output; scan with a shorter horizon, or on others"
+            )
+        return max(known, key=lambda each: each[0])[1]
 
     def __str__(self) -> str:
         outputs = self.trials[0].structure.outputs

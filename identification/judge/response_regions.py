@@ -14,7 +14,7 @@ from scipy.stats import chi2
 from identification.estimators.estimate import bridged_in_flight, fit
 from identification.estimators.instruments import FlightSource
 from identification.judge.coefficient_covariance import drawn
-from identification.judge.frozen_plant import FrozenPlant, Model, Point, tuples
+from identification.judge.frozen_plant import FrozenPlant, Model, Point, tuples, with_covariance
 from identification.structure.kinematic_arx import KinematicARX
 from identification.structure.lpvarx import LPVARX
 from identification.structure.state_space import StateSpace
@@ -25,6 +25,9 @@ from symheli.values.arrays import Array, frozen
 from symheli.values.numbers import whole
 from symheli.values.sample_period import same_period
 from symheli.values.summary import summarized
+
+CERTAIN, AGREES = 1e-12, 1e-9
+"""Deviation, as a share of a response, that is rounding alone; difference that is none then."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,11 +61,24 @@ class ResponseRegions:
         object.__setattr__(self, "covariance", frozen(self.covariance, "covariance", shape))
 
     def contains(self, exact: object) -> Array:
-        """Whether each response (K, w, ny, nu) is in its region."""
-        away = np.asarray(exact, complex) - self.centre
-        off = np.stack([np.real(away), np.imag(away)], axis=-1)[..., None]
-        distance = np.sum(off * np.linalg.solve(self.covariance, off), axis=(-2, -1))
-        return distance <= chi2.ppf(0.95, 2)
+        """Whether each response (K, w, ny, nu) is in its region. What is certain, as that a
+        response at frequency 0 is real, must agree to nine digits.
+
+        Raises `InputError` for responses of another shape.
+        """
+        exact = np.asarray(exact, complex)
+        if exact.shape != self.centre.shape:
+            raise InputError(f"exact: expected shape {self.centre.shape}, got {exact.shape}")
+        away = exact - self.centre
+        values, axes = np.linalg.eigh(self.covariance)
+        off = np.stack([np.real(away), np.imag(away)], axis=-1)
+        along = np.abs(np.sum(axes * off[..., None], axis=-2))
+        size = np.maximum(np.abs(self.centre), np.sqrt(np.max(values, axis=-1)))[..., None]
+        spread = values > (CERTAIN * size) ** 2
+        distance = np.sum(np.where(spread, along**2, 0.0) / np.where(spread, values, 1.0), axis=-1)
+        limit = np.array([0.0, *chi2.ppf(0.95, [1, 2])])[np.sum(spread, axis=-1)]
+        agrees = np.all(spread | (along <= AGREES * size), axis=-1)
+        return np.asarray((distance <= limit) & agrees)
 
     @property
     def width(self) -> Array:
@@ -77,7 +93,7 @@ class StructureBias:
 
     Parameters
     ----------
-    model : LPVARXModel or KinematicModel
+    model : LPVARXModel, KinematicModel or StateSpaceModel
         Identified in the simulator.
     exact : mapping of point to LinearModel
         Of the simulator's vehicle, at the period of the model.
@@ -169,9 +185,7 @@ def response_regions(
     ((2, 2), True)
     """
     if model.covariance is None:
-        raise InputError(
-            f"method {model.method!r} gives no covariance; fit by FilterError or least squares"
-        )
+        raise InputError(f"method {model.method!r} gives no covariance; {with_covariance(model)}")
     plant = _plant(model, outputs, inputs)
     thetas = drawn(model.theta, model.covariance, plant.free, whole(draws, "draws", 3), seed)
     omega, centres, covariances = frozen(frequencies, "frequencies", (None,)), [], []
@@ -201,14 +215,14 @@ def structure_bias(
     linear models shows it: the same flights in the simulator, without noise, identified in the
     same structure by least squares, beside its exact linear models.
 
-    No noise is in it, so that all of it is what the structure leaves out of a nonlinear vehicle in
-    these manoeuvres. The simulator may be another vehicle: sizes of the bias carry over, phases
-    need not. Rows that a log has lost are there in the simulator's flight as far as the method of
-    the model bridges holes: without them the bias is another one.
+    States are identified by their closest free run there. No noise is in it, so that all of it is
+    what the structure leaves out of a nonlinear vehicle in these manoeuvres. The simulator may be
+    another vehicle: sizes of the bias carry over, phases need not. Rows that a log has lost are
+    there as far as the method of the model bridges holes: without them the bias is another one.
 
     Parameters
     ----------
-    model : LPVARXModel or KinematicModel
+    model : LPVARXModel, KinematicModel or StateSpaceModel
         Of the structure.
     records : FlightRecord or sequence of them
         What it was identified from.

@@ -41,7 +41,7 @@ class StateSpaceModel:
     method : str
         Shorthand of the method.
     covariance : array (1, n, 1, n), optional
-        Of the unknowns, for white residuals, along the directions that change the response.
+        Of the unknowns, along the directions that change the response; see `fit`.
     details : mapping
         `evaluations`, `converged`, `message`, `singular_values` of the subspace start.
 
@@ -192,15 +192,25 @@ def start_of(
     free: bool = False,
 ) -> Array:
     """The state (nx,) from which the free run (or with innovations and not `free` the filter) comes
-    closest to y (m, ny), by Gauss-Newton steps.
+    closest to y (m, ny), each output in its spread, by Gauss-Newton steps.
     """
-    start = np.zeros(run.structure.order)
+    start, scale = np.zeros(run.structure.order), spread_of(y)[:, None]
     fed = None if free else y
     for _ in range(rounds if run.structure.own_scheduling else 1):
         found = run.along(unknowns, start, u, p, fed)
-        left, by_start = found.y - y, run.by_start(unknowns, found)
+        with np.errstate(over="ignore"):
+            left, by_start = (found.y - y) / scale[:, 0], run.by_start(unknowns, found) / scale
         seen = np.isfinite(left)
         if not np.isfinite(by_start).all() or not seen.any():
             break
         start = start - np.linalg.lstsq(by_start[seen], left[seen], rcond=None)[0]
     return start
+
+
+def spread_of(y: Array) -> Array:
+    """Deviation (ny,) of outputs (m, ny) from their means; 1 for one that does not move."""
+    known = np.isfinite(y)
+    count, held = np.maximum(known.sum(axis=0), 1), np.where(known, y, 0.0)
+    mean = held.sum(axis=0) / count
+    spread = np.sqrt(np.sum(np.where(known, y - mean, 0.0) ** 2, axis=0) / count)
+    return np.where(spread > 1e-12 * np.abs(mean), spread, 1.0)

@@ -76,6 +76,18 @@ class StateSpaceRun:
         wide = zip(given, self.shapes, strict=True)
         return np.concatenate([part[..., : shape[-1]].reshape(-1) for part, shape in wide])
 
+    def units(self, y: Array, u: Array) -> Array:
+        """Units (size,) of the entries where outputs are measured in y (ny,), inputs in u (nu,)."""
+        A, B, C, _, _ = self.shapes
+        driven = np.append(u, np.ones(int(self.structure.offset)))
+        return self.unknowns(
+            np.ones(A),
+            np.broadcast_to(1.0 / driven, B),
+            np.broadcast_to(y[:, None], C),
+            y[:, None] / u,
+            np.broadcast_to(1.0 / y, (*A[:2], len(y))),
+        )
+
     @cached_property
     def _columns(self) -> tuple[Array, ...]:
         """Positions of the entries of A, B, C, D and K among the unknowns."""

@@ -23,8 +23,10 @@ then, not their stamps.
 FROZEN, FEWEST = 0.3, 5
 """Least time (s), and least number of values left out, that make a sensor a frozen one."""
 
-AT_REST = 0.9
-"""Share of a spell in which every other sensor stands still too: the vehicle is at rest."""
+AT_REST, TELLING = 0.9, 3.0
+"""Share of its usual new values that every other sensor lacks in a spell: the vehicle is at rest;
+number of them that it should have had there, or it does not tell.
+"""
 
 COARSE = 0.5
 """Share of repeats from which a sensor counts as coarsely rounded: repeats say nothing then."""
@@ -70,22 +72,36 @@ def even(record: FlightRecord) -> tuple[FlightRecord, float, float]:
 
 @dataclass(frozen=True, eq=False)
 class Repeats:
-    """Samples of one sensor that are no new values: `mask` (n,), `same` (n,) as the one before, the
-    steps from one value to the next (1: every sample is new), and the frozen `spells`, first and
-    last rows.
+    """Samples of one sensor that are no new values: `mask` (n,), `same` (n,) as the one before,
+    those that are `new` (n,), the steps from one value to the next (1: every sample is new), and
+    the frozen `spells`, first and last rows.
     """
 
     mask: Array
     same: Array
+    new: Array
     every: int
     spells: tuple[tuple[int, int], ...]
+
+    def still(self, inside: slice) -> bool | None:
+        """Whether it stands still there, as it does not elsewhere; None where it does not tell."""
+        known = self.new | self.same
+        usual = np.sum(self.new) / max(np.sum(known), 1)
+        expected, fresh = usual * np.sum(known[inside]), np.sum(self.new[inside])
+        if fresh > (1.0 - AT_REST) * expected:
+            return False
+        return True if expected >= TELLING else None
 
 
 def repeats(record: FlightRecord, name: str) -> Repeats:
     """Return what a sensor repeats or leaves out; none of a coarsely rounded one, which repeats
-    itself by chance.
+    itself by chance, and none of one that never moves.
     """
     x = record[name]
+    never = np.zeros(len(x), bool)
+    values = x[np.isfinite(x)]
+    if not len(values) or np.ptp(values) == 0.0:
+        return Repeats(never, never, never, 1, ())
     starts = np.zeros(len(x), bool)
     starts[[part.start for part in record.segments()]] = True
     same = np.concatenate([[False], x[1:] == x[:-1]]) & ~starts
@@ -93,7 +109,7 @@ def repeats(record: FlightRecord, name: str) -> Repeats:
     rows = np.flatnonzero(new)
     inside = np.searchsorted(np.flatnonzero(starts), rows, side="right")
     apart = np.diff(rows)[np.diff(inside) == 0]
-    nothing = Repeats(np.zeros(len(x), bool), same, 1, ())
+    nothing = Repeats(never, same, new, 1, ())
     if not len(apart):
         return nothing
     every = int(np.median(apart))
@@ -109,10 +125,10 @@ def repeats(record: FlightRecord, name: str) -> Repeats:
     steps = np.abs(np.diff(x))
     steps = steps[steps > 0]
     spells = tuple((a - 1, b - 1) for a, b in alike if b - a >= least and not _rounded(x, b, steps))
-    mask = same.copy() if every > 1 else np.zeros(len(x), bool)
+    mask = same.copy() if every > 1 else never.copy()
     for first, last in spells:
         mask[first + 1 : last + 1] = True
-    return Repeats(mask, same, every, spells)
+    return Repeats(mask, same, new, every, spells)
 
 
 def _rounded(x: Array, end: int, steps: Array) -> bool:
@@ -128,17 +144,18 @@ def _rounded(x: Array, end: int, steps: Array) -> bool:
 
 
 def all_repeats(record: FlightRecord, sensors: Iterable[str]) -> dict[str, Repeats]:
-    """Return what each sensor repeats. Where all of them stand still together the vehicle is at
-    rest, and none is frozen.
+    """Return what each sensor repeats. Where all that move at other times stand still together the
+    vehicle is at rest, and none is frozen.
     """
     found = {name: repeats(record, name) for name in dict.fromkeys(sensors)}
     out = {}
     for name, one in found.items():
-        others = [other.same for n, other in found.items() if n != name]
+        others = [other for n, other in found.items() if n != name]
         mask, spells = one.mask.copy(), []
         for first, last in one.spells:
             inside = slice(first + 1, last + 1)
-            if others and all(same[inside].mean() >= AT_REST for same in others):
+            said = {other.still(inside) for other in others}
+            if True in said and False not in said:
                 mask[inside] &= one.every > 1
             else:
                 spells.append((first, last))
@@ -151,8 +168,8 @@ def mended(record: FlightRecord, sensors: Sequence[str] | None = None) -> Flight
 
     Stamps that scatter by less than a tenth of a step are put on the even clock that they mean, the
     same before and behind a gap. A sensor that repeats its value for .3 s while others move is
-    frozen. One that has a new value every second or third sample is slower than the record. Their
-    repeats become NaN, and each is said.
+    frozen; one that never moves is left as it is. One that has a new value every second or third
+    sample is slower than the record. Their repeats become NaN, and each is said.
 
     Parameters
     ----------

@@ -45,8 +45,8 @@ class Cut:
 @pytest.mark.parametrize("gust", [0.0, 0.7])
 def test_a_step_is_generalized_least_squares_with_the_dense_covariance(vehicle, gust, bridged):
     """X' S^-1 X and X' S^-1 e, S from finite differences of the equations by every measurement;
-    with a gust of every equation less what remains of the one before; of bridged samples, with
-    variances of their own.
+    with a gust of every equation less what remains of the one before, the first with all of it; of
+    bridged samples, with variances of their own.
     """
     record = vehicle.record(9, sensors=SENSORS)
     aero = vehicle.kin.aerodynamics
@@ -88,18 +88,31 @@ def test_a_step_is_generalized_least_squares_with_the_dense_covariance(vehicle, 
             .swapaxes(0, 1)
             .reshape(vehicle.kin.basis.size, -1)
         ).reshape(8, -1, 6)
-        less = np.eye(64)[8:] - remains * np.eye(64)[:-8]
+        less = np.eye(64) - remains * np.eye(64, k=-8)
         S, X, e = less @ S @ less.T, less @ X, less @ e
-        for k in range(7):  # velocities are what the gust is added to: -A1 of u v w
-            H = np.zeros((8, 3))
-            H[:6] = -A1[k + 1, :3].T
-            S[8 * k : 8 * k + 8, 8 * k : 8 * k + 8] += H @ H.T * gust**2 * (1 - remains**2)
+        for k in range(8):  # velocities are what the gust is added to: -A1 of u v w
+            H, new = np.zeros((8, 3)), 1 - remains**2 if k else 1.0
+            H[:6] = -A1[k, :3].T
+            S[8 * k : 8 * k + 8, 8 * k : 8 * k + 8] += H @ H.T * gust**2 * new
     normal, right = s.linearized(theta, Noise(R, Q, gust**2, remains)).normal()
     weighed = np.linalg.solve(S, X)
     # differences of 1e-6: eps / h of every slope, and S is conditioned like R / Q
     tolerance = 1e-5 * np.abs(normal).max()
     np.testing.assert_allclose(normal, X.T @ weighed, atol=tolerance)
     np.testing.assert_allclose(right, weighed.T @ e, rtol=1e-4, atol=1e-4 * np.abs(right).max())
+
+
+def test_a_gust_of_no_size_is_still_air(vehicle):
+    """The first equation counts too: differences alone had lost the balance of all samples."""
+    record = vehicle.record(60, sensors=SENSORS)
+    s = SmoothedStretch.of(vehicle.kin.aerodynamics, record, slice(0, 60))
+    R, Q = SENSORS**2, np.append(1e-3 * SENSORS[:6] ** 2, [1e-6, 1e-6])
+    still, faint = (
+        s.linearized(vehicle.theta, Noise(R, Q, variance, 0.999)).normal()
+        for variance in (0.0, 1e-20)
+    )
+    for a, b in zip(faint, still, strict=True):
+        np.testing.assert_allclose(a, b, atol=1e-6 * np.abs(b).max())
 
 
 def sums(m, size):

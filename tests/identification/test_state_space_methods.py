@@ -366,7 +366,7 @@ def test_a_filter_is_stable_in_corners_that_the_record_does_not_visit():
         (
             lambda s, r: idn.fit(s, r, idn.methods.Subspace(past=600)),
             ExcitationError,
-            "windows of 601 samples",
+            "windows of 602 samples",
         ),
         (
             lambda s, r: idn.fit(s, r.with_signals({"u0": "1"}, u0=0.0 * r["u0"])),

@@ -104,3 +104,33 @@ def test_a_slow_signal_that_is_rounded_is_not_frozen():
         found = logged.mended()
     assert not np.isnan(found["u"]).any()
     assert np.isnan(found["q"]).sum() == 49
+
+
+@pytest.mark.parametrize("holes", [slice(500, 501), slice(0, None, 10), slice(0, None, 60)])
+def test_a_sensor_that_never_moves_is_not_called_frozen(holes, recwarn):
+    """A yaw rate on a bench, heading on a straight track: with a hole in it as well."""
+    q = np.full(N, 0.3)
+    q[holes] = np.nan
+    record = noisy(q=q)
+    np.testing.assert_array_equal(record.mended().values, record.values)
+    assert not recwarn
+
+
+def test_only_what_moves_at_other_times_is_a_sign_of_rest():
+    q = np.random.default_rng(2).normal(size=N)
+    q[300:350] = q[300]
+    still, nothing = np.zeros(N), np.full(N, np.nan)
+    slow = np.repeat(np.random.default_rng(4).normal(size=N // 20), 20)
+    whole = np.floor(0.03 * np.arange(N))  # a heading in whole degrees
+    for theta in (still, nothing, slow, whole):
+        found = all_repeats(noisy(q=q, u=still, theta=theta), UNITS)
+        assert found["q"].spells == ((300, 349),)
+
+
+def test_a_dead_sensor_does_not_hide_that_the_vehicle_is_at_rest():
+    rng = np.random.default_rng(2)
+    columns = {name: rng.normal(size=N) for name in UNITS}
+    for values in columns.values():
+        values[300:350] = 0.0
+    columns["theta"][250:400] = np.nan
+    assert not any(one.mask.any() for one in all_repeats(noisy(**columns), UNITS).values())
