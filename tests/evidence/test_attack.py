@@ -6,7 +6,6 @@ import pytest
 
 from evidence.attack import KINDS, attacked, table
 
-
 SECONDS_A_TRIAL = {"robust margin": 60}
 """Kinds of which one trial takes that long, because of thousands of intervals of frequency."""
 
