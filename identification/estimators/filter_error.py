@@ -30,7 +30,7 @@ from symheli.progress import tracked
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 from symheli.values.kinematics import VELOCITIES, kinematic_jacobian
-from symheli.values.numbers import whole
+from symheli.values.numbers import positive, whole
 from symheli.values.runs import runs
 
 MISFIT = 30.0
@@ -157,19 +157,16 @@ class FilterError(Method):
                 "simulator: expected a source of flights such as SimulatedFlight(heli), got"
                 f" {self.simulator!r:.80}"
             )
-        for name in self.noise or {}:
+        for name, deviation in (self.noise or {}).items():
             if name not in STATES:
                 raise UnknownNameError("sensor in noise", name, STATES)
-        numbers = [*(self.noise or {}).values(), self.misfit]
-        numbers.append(self.gust_time)
-        if not all(np.isfinite(n) and n > 0 for n in numbers):
-            raise InputError(
-                "noise, misfit and gust_time must be positive, got"
-                f" {dict(self.noise or {})}, {self.misfit}, {self.gust_time}"
-            )
+            positive(deviation, f"noise of {name}")
+        positive(self.misfit, "misfit")
+        positive(self.gust_time, "gust_time, s")
+        positive(self.gust, "gust, standard deviation in m/s", or_zero=True)
         whole(self.steps, "steps", 1)
-        if not 0 <= self.gust < np.inf:
-            raise InputError(f"gust: expected a standard deviation >= 0, m/s, got {self.gust}")
+        if not isinstance(self.prior, bool):
+            raise InputError(f"prior: expected True or False, got {self.prior!r:.80}")
 
     @classmethod
     def default(cls) -> Method:

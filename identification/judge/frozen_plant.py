@@ -22,6 +22,7 @@ from symheli.lpv import stability_margin
 from symheli.lpv.stability_margin import Feedback, as_controller, closed_loop
 from symheli.lpv.tools import LinearModels, nu_gaps
 from symheli.values.arrays import Array
+from symheli.values.numbers import finite
 
 Model = LPVARXModel | KinematicModel | StateSpaceModel
 
@@ -30,8 +31,11 @@ Point = float | tuple[float, ...]
 
 
 def tuples(points: Iterable[Point]) -> list[tuple[float, ...]]:
-    """Return the points as tuples of one number a parameter; raises `InputError` for none."""
-    chosen = [p if isinstance(p, tuple) else (p,) for p in points]
+    """Return the points as tuples of one number a parameter; raises `InputError` for none, or for
+    one that is no number.
+    """
+    given = [p if isinstance(p, tuple) else (p,) for p in points]
+    chosen = [tuple(finite(value, "points") for value in p) for p in given]
     if not chosen:
         raise InputError("points: give at least one value of the scheduling")
     return chosen

@@ -283,8 +283,15 @@ def test_what_it_cannot_do_is_refused(vehicle):
     source, record = vehicle.without_noise(seed=1), vehicle.record(200, sensors=SENSORS)
     with pytest.raises(UnknownNameError, match="sensor in noise"):
         idn.methods.FilterError(source, noise={"thetta": 0.1})
-    with pytest.raises(InputError, match="must be positive"):
-        idn.methods.FilterError(source, noise={"theta": 0.0})
+    for wrong in (
+        {"noise": {"theta": 0.0}},
+        {"gust": "a"},
+        {"gust": -1.0},
+        {"gust_time": 0.0},
+        {"prior": "yes"},
+    ):
+        with pytest.raises(InputError, match="expected"):
+            idn.methods.FilterError(source, **wrong)
     with pytest.raises(InputError, match="expected a source of flights"):
         idn.methods.FilterError("e_d_lon")
     with pytest.raises(InputError, match="needs a simulator"):
