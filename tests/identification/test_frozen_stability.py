@@ -97,7 +97,7 @@ def test_no_longer_record_decides_where_the_structure_is_off_by_more_than_the_gr
 @pytest.mark.parametrize("points", [["a"], [float("nan")], []])
 def test_points_are_numbers(model, points):
     with pytest.raises(InputError, match="points"):
-        frozen_stability(model, points)
+        idn.judge.frozen_stability(model, points)
 
 
 def test_a_bias_at_other_points_is_refused(model):
