@@ -209,7 +209,10 @@ def test_no_path_of_somebodys_computer(room):
 
 @pytest.mark.slow
 def test_examples_run():
-    for path in sorted((ROOT / "examples").glob("*.py")):
+    own = "terminal_in_do_mpc"  # a package of others: its test runs it where that is installed
+    paths = [path for path in sorted((ROOT / "examples").glob("*.py")) if path.stem != own]
+    assert len(paths) >= 2
+    for path in paths:
         subprocess.run([sys.executable, str(path)], check=True, capture_output=True, timeout=60)
 
 
