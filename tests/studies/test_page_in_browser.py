@@ -310,7 +310,7 @@ def sizes(tmp_path_factory):
 @pytest.mark.parametrize("width", [390, 1280])
 def test_sizes_are_shown_and_the_console_is_silent(sizes, opened, width):
     page, said = opened(sizes.address, width)
-    page.wait_for_selector(JUDGED, timeout=15_000)
+    page.wait_for_selector(JUDGED, timeout=60_000)
     assert page.locator("svg.chart").count() == 3 + 4 + 2 * 3
     assert page.locator("text=Nothing of this is proven").is_visible()
     assert fits(page)
@@ -319,7 +319,7 @@ def test_sizes_are_shown_and_the_console_is_silent(sizes, opened, width):
 
 def test_a_size_moves_by_the_keyboard_and_the_loops_follow(sizes, opened):
     page, said = opened(sizes.address, 1280)
-    page.wait_for_selector(JUDGED, timeout=15_000)
+    page.wait_for_selector(JUDGED, timeout=60_000)
     other, _ = opened(sizes.address, 390)
     before = page.locator("svg.chart").nth(2).inner_html()
     slider = page.get_by_role("slider", name="d_ped, rad")
