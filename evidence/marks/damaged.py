@@ -90,8 +90,7 @@ def half_rate(record: FlightRecord, _: np.random.Generator) -> FlightRecord:
     columns = {name: record[name].copy() for name in SLOW}
     for column in columns.values():
         column[1::2] = column[: 2 * (len(column) // 2) : 2]
-    units = {str(s): s.unit for s in record.signals if str(s) in SLOW}
-    return record.with_signals(units, **columns).select(list(map(str, record.signals)))
+    return _with_velocities(record, columns)
 
 
 def more_noise(record: FlightRecord, rng: np.random.Generator) -> FlightRecord:
@@ -101,6 +100,11 @@ def more_noise(record: FlightRecord, rng: np.random.Generator) -> FlightRecord:
     size = 10 ** (-record.meta["plan"].noise_db / 20)
     own = {name: size * record[name].std() for name in SLOW}
     columns = {n: record[n] + own[n] * rng.standard_normal(len(record)) for n in SLOW}
+    return _with_velocities(record, columns)
+
+
+def _with_velocities(record: FlightRecord, columns: Mapping[str, Array]) -> FlightRecord:
+    """The record with other velocities, its signals in their order."""
     units = {str(s): s.unit for s in record.signals if str(s) in SLOW}
     return record.with_signals(units, **columns).select(list(map(str, record.signals)))
 

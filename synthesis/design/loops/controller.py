@@ -198,7 +198,7 @@ class Controller:
         jump.
         """
         from synthesis.certify.questions.adjoint import ADJOINT, adjoint_options
-        from synthesis.certify.questions.questions import EFFORT, l2_gain
+        from synthesis.certify.questions.questions import l2_gain
 
         loop = self.closed()
         if isinstance(loop, LFT):
@@ -208,15 +208,13 @@ class Controller:
         tied = any(isinstance(s.rate, str) for s in moving)
         usual = not {"form", "impose", "solver"} & set(options)
 
-        kept = math.inf if math.isnan(self.promised) else AS_PROMISED * self.promised
-
         def proof(adjoint: bool, richer: bool = False) -> Certificate:
             usually: dict[str, Any] = {"form": Spline()} if usual else {}
             if richer:
                 usually = dict(RICHER_SEARCH)
             elif adjoint and usual:
                 usually |= adjoint_options(len(moving))
-            usually["effort"] = Effort(EFFORT, enough=kept)
+            usually["effort"] = until_promised(self.promised)
             if not adjoint:
                 return l2_gain(loop, rate, **usually | options).resting_on(rests)
             proven = l2_gain(loop.adjoint(), rate, **usually | options)
@@ -348,6 +346,15 @@ class Controller:
             promised,
         ]
         return "\n".join([*lines, *(f"  {reason}" for reason in self.reasons)])
+
+
+def until_promised(promised: float) -> Effort:
+    """Return the usual effort of a gain, which no bound above the promised gain ends; NaN: any
+    bound ends it.
+    """
+    from synthesis.certify.questions.questions import EFFORT
+
+    return Effort(EFFORT, enough=math.inf if math.isnan(promised) else AS_PROMISED * promised)
 
 
 def _of_lft(loop: LFT, rate: Any, options: Mapping[str, Any]) -> Certificate:

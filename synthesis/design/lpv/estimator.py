@@ -20,6 +20,7 @@ from synthesis.certify.questions.certificate import Certificate
 from synthesis.certify.statement.impose import Grid
 from synthesis.certify.statement.outcome import Attempt
 from synthesis.certify.statement.rates import Rate, limits
+from synthesis.design.loops.controller import until_promised
 from synthesis.design.lpv.existence import Existence, Solution, imposed_at
 from synthesis.design.lpv.fitted import Fitted
 from synthesis.design.lpv.frozen_stability import frozen_stability
@@ -66,9 +67,12 @@ class Estimator:
     _repr_html_ = as_table
 
     def certify(self, rate: Any = None, **options: Any) -> Certificate:
-        """Certify the gain of the error with `synthesis.l2_gain`."""
+        """Certify the gain of the error with `synthesis.l2_gain`; its work ends as that of
+        `Controller.certify`.
+        """
         from synthesis.certify.questions.questions import l2_gain
 
+        options.setdefault("effort", until_promised(self.promised))
         return l2_gain(self.error, rate, **options)
 
 

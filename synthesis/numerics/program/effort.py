@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from symheli.values.numbers import positive
@@ -34,11 +34,11 @@ class Effort:
 
     @classmethod
     def of(cls, given: Any) -> Effort:
-        """Return an effort of so many seconds, or the effort that is given; raises `InputError`
-        for what is no time.
+        """Return an effort of so many seconds, or one as is given of which nothing is spent; raises
+        `InputError` for what is no time.
         """
         if isinstance(given, cls):
-            return given
+            return replace(given, spent=0.0, proven=False)
         return cls(math.inf if given == math.inf else positive(given, "effort"))
 
     def refused(self, seconds: float) -> str:

@@ -70,6 +70,13 @@ def test_a_bound_that_is_not_enough_does_not_end_the_work():
     assert asked.gamma <= 1.01 * usual.gamma < short.gamma
 
 
+def test_an_effort_that_is_given_twice_begins_anew():
+    given = Effort(1.0)
+    first = Effort.of(given)
+    first.proven, first.spent = True, 5.0
+    assert Effort.of(given) == given == Effort(1.0)
+
+
 def test_work_grows_with_the_unknowns():
     few, many = (LyapunovProgram((), Sizes(4, 1, k), 1e-6, None) for k in (3, 30))
     assert work(many) > 100 * work(few)
